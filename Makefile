@@ -1,0 +1,63 @@
+# Needs Python 3.11 or newer with pip and venv, and make. Everything else goes into .venv.
+#
+# Another interpreter than python3:  make demo PYTHON=python3.12
+# Another gripper than the simulated one:  make demo ADDRESS=tcp://192.168.1.11
+
+PYTHON ?= python3
+ADDRESS ?= sim://
+VENV := .venv
+BIN := $(VENV)/bin
+# Touched last, so it stands for a complete environment.
+STAMP := $(VENV)/.complete
+
+# The caller's environment must not leak into ours: an active venv or a PYTHONPATH would shadow it.
+unexport VIRTUAL_ENV CONDA_PREFIX PYTHONHOME PYTHONPATH PYTHONSTARTUP PIP_USER PIP_TARGET PIP_PREFIX UV_PYTHON
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test lint check format constraints clean
+
+help:  ## Show this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+demo: $(STAMP)  ## Run the demo on a simulated gripper (ADDRESS=... for a real one: it moves)
+	@$(BIN)/python -m robotiq_async demo $(ADDRESS)
+
+test: $(STAMP)  ## Run all tests
+	@$(BIN)/python -m pytest
+
+lint: $(STAMP)  ## Check style and types
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+
+check: lint test  ## Everything CI runs
+
+format: $(STAMP)  ## Put the sources into shape
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
+
+constraints: $(STAMP)  ## Take the newest versions of all dependencies into constraints.txt
+	$(BIN)/python -m uv pip compile --quiet --universal --upgrade --all-extras --no-header --no-annotate \
+		pyproject.toml --output-file constraints.txt
+
+clean:  ## Remove what the other commands made
+	rm -rf $(VENV) build dist site .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
+	find robotiq_async tests demo -type d -name __pycache__ -prune -exec rm -rf {} +
+
+# uv is several times quicker than pip, but nothing depends on it: without uv, or when it fails, pip does the work.
+$(STAMP): pyproject.toml constraints.txt
+	@command -v $(PYTHON) >/dev/null || { \
+		echo "There is no '$(PYTHON)' here. robotiq_async needs Python 3.11 or newer:" \
+			"make PYTHON=/path/to/python3.11 ..." >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+		echo "robotiq_async needs Python 3.11 or newer, and '$(PYTHON)' is $$($(PYTHON) --version 2>&1)." \
+			"Name another one: make PYTHON=/path/to/python3.11 ..." >&2; exit 1; }
+	@echo "Setting up $(VENV), once (this takes up to a minute)"
+	@$(PYTHON) -m venv --clear $(VENV) || { \
+		echo "'$(PYTHON) -m venv' failed; on Debian and Ubuntu it needs the package python3-venv." >&2; exit 1; }
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check uv \
+		&& $(BIN)/python -m uv pip install --quiet --python $(BIN)/python -c constraints.txt -e '.[all,dev]' \
+		|| { echo "Installing with uv failed; trying pip" >&2; \
+			$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[all,dev]'; } \
+		|| { echo "Installing the dependencies failed (see above); the package index must be reachable." >&2; exit 1; }
+	@touch $@
