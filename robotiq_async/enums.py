@@ -1,0 +1,191 @@
+"""The names of the field: axes, modes, object states, faults, states of the hand.
+
+Everything here is a plain enumeration or a constant; nothing here imports the package.
+"""
+
+from __future__ import annotations
+
+from enum import Enum, IntEnum, IntFlag
+from typing import Final
+
+
+class Finger(IntFlag):
+    """The four axes of the gripper, and masks of them.
+
+    ``A`` stands alone and closes between ``B`` and ``C``; ``SCISSOR`` spreads ``B`` and ``C``.
+    """
+
+    A = 1
+    B = 2
+    C = 4
+    SCISSOR = 8
+    ABC = 7
+    ALL = 15
+
+
+AXES: Final = (Finger.A, Finger.B, Finger.C, Finger.SCISSOR)
+"""The four axes in the order of their registers."""
+
+OPEN: Final = 0
+"""Position request of a fully open finger (it reads 6-7 there)."""
+CLOSED: Final = 255
+"""Position request of a fully closed finger (it reads 240 or more there)."""
+WIDTH_NORMAL: Final = 100
+"""Scissor request between wide and pinch."""
+WIDTH_WIDE: Final = 0
+"""Scissor request with B and C furthest apart."""
+WIDTH_PINCH: Final = 255
+"""Scissor request with B and C together."""
+SPEED_MIN: Final = 0
+"""Slowest, not standing: 22 mm/s nominal (manual), full closing in 10.0 s (thesis, table A1.1)."""
+SPEED_MAX: Final = 255
+"""Fastest: 110 mm/s nominal (manual), full closing in 2.1 s (thesis, table A1.1)."""
+FORCE_MIN: Final = 0
+"""Weakest, not nothing: 15 N nominal (manual)."""
+FORCE_MAX: Final = 255
+"""Strongest: 60 N nominal (manual)."""
+
+
+class Mode(IntEnum):
+    """rMOD / gMOD: the grasping mode of simple control; ignored while the scissor has its own registers."""
+
+    BASIC = 0
+    PINCH = 1
+    WIDE = 2
+    SCISSOR = 3
+
+
+class ObjectStatus(IntEnum):
+    """gDTA, gDTB, gDTC, gDTS: what an axis does.
+
+    The thesis's table swaps 1 and 2; the hardware reports 1 for a contact while opening
+    (see docs/thesis-map.md).
+    """
+
+    IN_MOTION = 0
+    """Moving; meaningful only while the go bit is set."""
+    CONTACT_OPENING = 1
+    """Stopped by a contact while opening."""
+    CONTACT_CLOSING = 2
+    """Stopped by a contact while closing."""
+    AT_POSITION = 3
+    """At the requested position."""
+
+    @property
+    def is_contact(self) -> bool:
+        """Whether something is in the way of the axis."""
+        return self in (ObjectStatus.CONTACT_OPENING, ObjectStatus.CONTACT_CLOSING)
+
+
+class Initialization(IntEnum):
+    """gIMC: how far the activation or a mode change is."""
+
+    RESET = 0
+    """Reset, or in automatic release."""
+    ACTIVATING = 1
+    CHANGING_MODE = 2
+    COMPLETE = 3
+
+
+class Severity(Enum):
+    """How serious a fault is, after the manual's classes."""
+
+    NONE = "none"
+    PRIORITY = "priority"
+    """Nothing is broken: the action waits or is ignored."""
+    MINOR = "minor"
+    """Clears by itself."""
+    MAJOR = "major"
+    """Needs a reset and a new activation."""
+
+
+class Fault(IntEnum):
+    """gFLT: the fault codes of the thesis's table 4.
+
+    A code the table does not know becomes a member of its own, ``Fault(0x0C).name == "UNKNOWN_0x0C"``,
+    with severity MAJOR: it is reported as its number and never as no fault.
+    """
+
+    NONE = 0x00
+    ACTIVATION_PENDING = 0x05
+    MODE_CHANGE_PENDING = 0x06
+    NOT_ACTIVATED = 0x07
+    COMMUNICATION_NOT_READY = 0x09
+    SCISSOR_INTERFERENCE = 0x0A
+    AUTOMATIC_RELEASE = 0x0B
+    ACTIVATION_FAULT = 0x0D
+    SCISSOR_BLOCKED = 0x0E
+    AUTOMATIC_RELEASE_DONE = 0x0F
+
+    @classmethod
+    def _missing_(cls, value: object) -> Fault | None:
+        if type(value) is not int or not 0 <= value <= 15:
+            return None
+        # An IntEnum's own constructor refuses new values, so the member is made by hand and
+        # registered: Fault(12) is Fault(12), and it hashes, compares and prints like the others.
+        member = int.__new__(cls, value)
+        member._name_ = f"UNKNOWN_0x{value:02X}"
+        member._value_ = value
+        cls._value2member_map_[value] = member
+        return member
+
+    @property
+    def severity(self) -> Severity:
+        """The class of the fault; an unknown code counts as MAJOR."""
+        return _FAULTS[int(self)][0] if int(self) in _FAULTS else Severity.MAJOR
+
+    @property
+    def description(self) -> str:
+        """One sentence on what is wrong."""
+        if int(self) in _FAULTS:
+            return _FAULTS[int(self)][1]
+        return f"fault code 0x{int(self):02X}, which the manual does not assign"
+
+    @property
+    def is_serious(self) -> bool:
+        """Whether the fault is MINOR or MAJOR: one that ends a move."""
+        return self.severity in (Severity.MINOR, Severity.MAJOR)
+
+
+_FAULTS: Final[dict[int, tuple[Severity, str]]] = {
+    0x00: (Severity.NONE, "no fault"),
+    0x05: (Severity.PRIORITY, "the action waits until the activation has finished"),
+    0x06: (Severity.PRIORITY, "the action waits until the mode change has finished"),
+    0x07: (Severity.PRIORITY, "the action waits until the gripper is activated"),
+    0x09: (Severity.MINOR, "the communication chip is not ready, it may be booting"),
+    0x0A: (Severity.MINOR, "interference on the scissor for less than 20 s"),
+    0x0B: (Severity.MINOR, "an automatic release is in progress"),
+    0x0D: (Severity.MAJOR, "the activation failed: interference or another error"),
+    0x0E: (Severity.MAJOR, "interference on the scissor for more than 20 s"),
+    0x0F: (Severity.MAJOR, "an automatic release has been completed"),
+}
+
+
+class State(Enum):
+    """Where the hand is: the thirteen states of the thesis, and RESET.
+
+    DO_ states last until their request is acknowledged, WF_ states (wait for) until the gripper reports
+    the result.
+    """
+
+    DISCONNECTED = "disconnected"
+    """No link: before the first status, or while it is being opened again."""
+    DO_ACTIVATION = "do_activation"
+    WF_ACTIVATION = "wf_activation"
+    RUNNING_IDLE = "running_idle"
+    """Active; every command has been delivered (the fingers may be moving)."""
+    RUNNING_CC = "running_cc"
+    """Active; a changed command is on its way to the gripper."""
+    FAULT = "fault"
+    """The gripper reports a minor or a major fault."""
+    DO_ATR = "do_atr"
+    WF_ATR = "wf_atr"
+    ATR_DONE = "atr_done"
+    """The automatic release is complete; only a reset helps."""
+    DO_RESET = "do_reset"
+    WF_RESET = "wf_reset"
+    RESET = "reset"
+    """Connected and not activated: waits for the user."""
+    DO_SHUTDOWN = "do_shutdown"
+    SHUTDOWN = "shutdown"
+    """stop() has ended; the hand may be started again."""

@@ -1,0 +1,130 @@
+"""Everything the library raises about a gripper or its link.
+
+::
+
+    RobotiqError
+    +-- RobotiqStateError                       the hand cannot do that now
+    |   +-- NotStartedError                     before start(), or after stop()
+    |   +-- InvalidStateError                   .state and .allowed
+    |   +-- NotActivatedError                   motion asked for while reset
+    |   +-- GripperFaultError                   .fault
+    |   +-- ActivationTimeoutError (TimeoutError)
+    |   +-- StateTimeoutError (TimeoutError)    a state that was never reached
+    |   +-- MoveTimeoutError (TimeoutError)     .status
+    |   +-- MoveSupersededError                 another command took over an axis of this move
+    +-- RobotiqConnectionError (ConnectionError)
+        +-- ConnectFailedError                  refused, unreachable, no such port; .address
+        +-- ConnectionLostError
+        +-- ResponseTimeoutError (TimeoutError)
+        +-- ProtocolError                       exception reply, wrong function, length or echo
+
+Bad arguments are plain ValueError and TypeError: they are the program's mistake, not the gripper's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from .enums import Fault, State
+
+if TYPE_CHECKING:
+    from .status import RobotiqStatus
+
+
+class RobotiqError(Exception):
+    """Base of everything the library raises about a gripper or its link."""
+
+
+class RobotiqStateError(RobotiqError):
+    """The hand cannot do that now."""
+
+
+class NotStartedError(RobotiqStateError):
+    """The hand has not been started, or has been stopped."""
+
+
+class InvalidStateError(RobotiqStateError):
+    """The call is not possible in the present state.
+
+    Attributes:
+        state: the state the hand is in.
+        allowed: the states in which the call is possible.
+    """
+
+    def __init__(self, message: str, state: State, allowed: Iterable[State] = ()) -> None:
+        """Keep the state and the states that would do."""
+        self.state = state
+        self.allowed = frozenset(allowed)
+        super().__init__(message)
+
+
+class NotActivatedError(RobotiqStateError):
+    """The gripper is reset: it moves only after an activation."""
+
+
+class GripperFaultError(RobotiqStateError):
+    """The gripper reports a minor or a major fault.
+
+    Attributes:
+        fault: the fault it reports.
+    """
+
+    def __init__(self, fault: Fault, message: str | None = None) -> None:
+        """Keep the fault."""
+        self.fault = fault
+        super().__init__(message or f"{fault.severity.value} fault 0x{int(fault):02X}: {fault.description}")
+
+
+class ActivationTimeoutError(RobotiqStateError, TimeoutError):
+    """The gripper did not finish its activation in time."""
+
+
+class StateTimeoutError(RobotiqStateError, TimeoutError):
+    """The hand did not reach the awaited state in time."""
+
+
+class MoveTimeoutError(RobotiqStateError, TimeoutError):
+    """An axis was still moving when the time of the move was over; its axes have been told to hold.
+
+    Attributes:
+        status: the last status seen.
+    """
+
+    def __init__(self, message: str, status: RobotiqStatus) -> None:
+        """Keep the last status."""
+        self.status = status
+        super().__init__(message)
+
+
+class MoveSupersededError(RobotiqStateError):
+    """Another command took over an axis of this move; its other axes run on."""
+
+
+class RobotiqConnectionError(RobotiqError, ConnectionError):
+    """The link to the gripper failed."""
+
+
+class ConnectFailedError(RobotiqConnectionError):
+    """Nobody answers at the address.
+
+    Attributes:
+        address: the address that was tried.
+    """
+
+    def __init__(self, address: str, reason: str) -> None:
+        """Keep the address."""
+        self.address = address
+        super().__init__(f"cannot connect to {address}: {reason}")
+
+
+class ConnectionLostError(RobotiqConnectionError):
+    """The link went down; what was not acknowledged by then has been dropped."""
+
+
+class ResponseTimeoutError(RobotiqConnectionError, TimeoutError):
+    """The gripper did not answer a request in time."""
+
+
+class ProtocolError(RobotiqConnectionError):
+    """A reply that is not the answer: an exception, a wrong function, length, echo or transaction."""

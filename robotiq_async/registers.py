@@ -1,0 +1,125 @@
+"""The gripper's two blocks of registers, as data.
+
+Sixteen request bytes go to the gripper and sixteen status bytes come back. Register n holds byte 2n in
+its high half and byte 2n+1 in its low half. One :class:`Field` serves the decoder, the encoder, the
+simulator and the tables in the docs. The layout is that of the instruction manual of the 3-Finger
+gripper (editions 2012, 2014 and 2018 agree but for the glove and centring bits).
+"""
+
+from __future__ import annotations
+
+from collections.abc import MutableSequence, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+REGISTER_COUNT: Final = 8
+"""Registers in either block."""
+
+Registers = tuple[int, ...]
+"""Eight registers of 16 bits."""
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A bit field of one byte of a block.
+
+    Attributes:
+        byte: index of the byte, 0..15.
+        shift: lowest bit within the byte.
+        width: number of bits.
+        doc: what it means, for people.
+    """
+
+    byte: int
+    shift: int = 0
+    width: int = 8
+    doc: str = ""
+
+    def read(self, registers: Sequence[int]) -> int:
+        """The field's value in a block of eight registers."""
+        high_half = 0 if self.byte % 2 else 8
+        return registers[self.byte // 2] >> (self.shift + high_half) & ((1 << self.width) - 1)
+
+    def write(self, registers: MutableSequence[int], value: int) -> None:
+        """Put a value into a block in place.
+
+        Raises:
+            ValueError: the value does not fit into the field.
+        """
+        mask = (1 << self.width) - 1
+        if not 0 <= value <= mask:
+            raise ValueError(
+                f"value {value} does not fit into {self.width} bits of byte {self.byte}: 0..{mask}"
+            )
+        shift = self.shift + (0 if self.byte % 2 else 8)
+        word = registers[self.byte // 2]
+        registers[self.byte // 2] = word & ~(mask << shift) | value << shift
+
+
+# Request: client to gripper. Bits that are not named are reserved and stay 0.
+rACT: Final = Field(0, 0, 1, "activate; 0 resets the gripper and its faults")
+rMOD: Final = Field(0, 1, 2, "mode of simple control: basic, pinch, wide, scissor; ignored while rICS = 1")
+rGTO: Final = Field(0, 3, 1, "go to the requested positions; 0 stops")
+rATR: Final = Field(0, 4, 1, "automatic release")
+rICF: Final = Field(1, 2, 1, "fingers A, B, C take their own registers")
+rICS: Final = Field(1, 3, 1, "the scissor takes its own registers; mode selection is off")
+rPR: Final = tuple(Field(3 + 3 * n, doc=f"position request of {name}") for n, name in enumerate("ABCS"))
+rSP: Final = tuple(Field(4 + 3 * n, doc=f"speed of {name}") for n, name in enumerate("ABCS"))
+rFR: Final = tuple(Field(5 + 3 * n, doc=f"force of {name}") for n, name in enumerate("ABCS"))
+
+# Status: gripper to client.
+gACT: Final = Field(0, 0, 1, "echo of rACT; 1 while the activation still runs")
+gMOD: Final = Field(0, 1, 2, "echo of rMOD")
+gGTO: Final = Field(0, 3, 1, "echo of rGTO")
+gIMC: Final = Field(0, 4, 2, "0 reset or automatic release, 1 activating, 2 changing mode, 3 complete")
+gSTA: Final = Field(0, 6, 2, "0 moving, 1 one or two fingers stopped early, 2 all early, 3 all reached")
+gDT: Final = tuple(
+    Field(1, 2 * n, 2, f"{name}: 0 moving, 1 contact opening, 2 contact closing, 3 at position")
+    for n, name in enumerate("ABCS")
+)
+gFLT: Final = Field(2, 0, 4, "fault code; the high nibble is not part of it")
+gPR: Final = tuple(Field(3 + 3 * n, doc=f"echo of the position of {name}") for n, name in enumerate("ABCS"))
+gPO: Final = tuple(Field(4 + 3 * n, doc=f"position of {name}") for n, name in enumerate("ABCS"))
+gCU: Final = tuple(Field(5 + 3 * n, doc=f"current of {name}, 10 mA a count") for n, name in enumerate("ABCS"))
+
+MILLIAMPERE_PER_COUNT: Final = 10
+"""gCU: the manual's worked example reads 0x0F as 150 mA; two editions print the relation upside down."""
+
+
+@dataclass(frozen=True, slots=True)
+class RegisterMap:
+    """Where the two blocks lie and how they are read on one kind of link (manual, communication chapter).
+
+    Attributes:
+        request: address of the first request register.
+        status: address of the first status register.
+        read_function: Modbus function that reads the status block, 3 or 4.
+        device_id: the unit id the gripper is shipped with.
+    """
+
+    request: int
+    status: int
+    read_function: int
+    device_id: int
+
+
+TCP_REGISTERS: Final = RegisterMap(request=0x0000, status=0x0000, read_function=4, device_id=2)
+RTU_REGISTERS: Final = RegisterMap(request=0x03E8, status=0x07D0, read_function=3, device_id=9)
+
+
+def check_registers(registers: Sequence[int]) -> Registers:
+    """Eight registers of 16 bits as a tuple.
+
+    Raises:
+        TypeError: a register is not an int.
+        ValueError: not eight registers, or one outside 0..65535.
+    """
+    block = tuple(registers)
+    if len(block) != REGISTER_COUNT:
+        raise ValueError(f"registers: expected {REGISTER_COUNT} of them, got {len(block)}")
+    for index, register in enumerate(block):
+        if type(register) is not int:
+            raise TypeError(f"registers[{index}] must be an int in 0..65535, got {register!r}")
+        if not 0 <= register <= 0xFFFF:
+            raise ValueError(f"registers[{index}] must be in 0..65535, got {register}")
+    return block
