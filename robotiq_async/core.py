@@ -1,0 +1,513 @@
+"""The hand without its link: decides what to write and learns from what is read.
+
+No I/O, no clock and no event loop: whoever owns the link calls, once per cycle and in this order,
+
+* :meth:`Core.take_request` for the image to write, if there is one, then :meth:`Core.acknowledged`;
+* :meth:`Core.see` with the status read after that;
+* :meth:`Core.lost` when the link went down at any point of it.
+
+Everything a caller waits for is a callback, told exactly once.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import replace
+
+from .adoption import Adoption
+from .desk import Delivery, Desk, Failure, tell
+from .echo import WINDOW_S, EchoWatch
+from .enums import AXES, Finger, ObjectStatus, State
+from .errors import (
+    ConnectionLostError,
+    GripperFaultError,
+    MoveSupersededError,
+    NotActivatedError,
+    NotStartedError,
+    RobotiqError,
+)
+from .machine import RUNNING, Machine, Trigger, look, refusal
+from .motion import Move, default_timeout
+from .procedures import (
+    Procedure,
+    activation,
+    automatic_release,
+    reset,
+    shutdown,
+    signature_of_status,
+)
+from .request import AxisRequest, Request
+from .status import RobotiqStatus
+
+log = logging.getLogger("robotiq_async")
+
+
+class Core:
+    """State, requests and moves of one hand."""
+
+    def __init__(self, machine: Machine, speed: int, force: int) -> None:
+        """Start without a status.
+
+        Args:
+            machine: the state of the hand, in DISCONNECTED.
+            speed: what every axis gets until set otherwise, 0..255.
+            force: what every axis gets until set otherwise, 0..255.
+        """
+        self.machine = machine
+        self.status: RobotiqStatus | None = None
+        self.foreign_commands = 0
+        self._image = Request(axes=(AxisRequest(0, speed, force),) * len(AXES))
+        """The last image written, or the one the gripper shows after a reconnect."""
+        self._adoption: Adoption | None = None
+        """Set from an adoption until the first write: what the base of that write is made from."""
+        self._adopted = self._image
+        self._watch = EchoWatch()
+        self._unsure_until = 0.0
+        """Until then a write that was not acknowledged before a reconnect may still show."""
+        self._gripping = Finger(0)
+        """The axes in contact when the go bit was last seen set: gDT is not worth reading without it."""
+        self._procedure: Procedure | None = None
+        self._step: Request | None = None
+        self._activating = False
+        """Whether stop() interrupted an activation of ours."""
+        self._desk = Desk()
+        self._sent: Desk | None = None
+        self._halting: list[tuple[int, Delivery]] = []
+        self._moves: list[tuple[Move, int]] = []
+        """Live moves, each with the number of the write that carried it (-1: not sent yet)."""
+
+    # -- what is asked ---------------------------------------------------------------------------------
+
+    def command(
+        self,
+        axes: Finger,
+        position: int | None,
+        speed: int | None,
+        force: int | None,
+        waiting: Delivery | None = None,
+    ) -> None:
+        """Ask axes for a position, a speed, a force; goes out with the next write.
+
+        Raises:
+            RobotiqError: the hand takes no command now.
+        """
+        self.refuse_unless_running(Trigger.ASK_COMMAND)
+        if position is not None:
+            self._end_moves(
+                lambda: MoveSupersededError(f"another command moves {axes!r}"),
+                lambda move: bool(move.axes & axes),
+            )
+        self._desk.put(axes, position, speed, force)
+        if waiting is not None:
+            self._desk.waiting.append(waiting)
+        self.machine.happen(Trigger.ASK_COMMAND)
+
+    def move(self, move: Move, speed: int | None, force: int | None) -> None:
+        """Ask for a move; its end is told to the move.
+
+        Raises:
+            RobotiqError: the hand takes no command now.
+        """
+        self.command(move.axes, move.position, speed, force)
+        self._moves.append((move, -1))
+
+    def abandon(self, move: Move) -> None:
+        """Nobody waits for this move any more: hold those of its axes that still move."""
+        if all(each is not move for each, _ in self._moves):
+            return
+        self._moves = [(each, number) for each, number in self._moves if each is not move]
+        self._desk.put_hold(move.axes)
+        self.machine.happen(Trigger.ASK_COMMAND)
+
+    def halt(self, delivery: Delivery) -> None:
+        """Clear rGTO.
+
+        Raises:
+            RobotiqError: the hand cannot halt now.
+        """
+        if self.machine.state is State.RESET:
+            delivery(None)
+            return
+        self.refuse_unless_running(Trigger.ASK_HALT)
+        superseded: Failure = lambda: MoveSupersededError("halt() stopped the fingers")  # noqa: E731
+        self._end_moves(superseded)
+        self._desk.put_halt(delivery, superseded)
+        self.machine.happen(Trigger.ASK_HALT)
+
+    def activate(self) -> None:
+        """Begin an activation.
+
+        Raises:
+            InvalidStateError: not in RESET.
+        """
+        self.machine.happen(Trigger.ASK_ACTIVATE)
+        self._begin(activation(self._at_rest()))
+
+    def reset(self) -> None:
+        """Begin a reset.
+
+        Raises:
+            InvalidStateError: not in a state that can be reset.
+        """
+        self.machine.happen(Trigger.ASK_RESET)
+        self._drop_all(lambda: MoveSupersededError("reset() took over"))
+        self._begin(reset(self._at_rest()))
+
+    def release(self) -> None:
+        """Begin an automatic release.
+
+        Raises:
+            InvalidStateError: not in FAULT.
+            NotActivatedError: the gripper is reset; raising rACT for the release would activate it.
+        """
+        if self.machine.state is State.FAULT and self.status is not None and not self.status.activation_echo:
+            raise NotActivatedError("the gripper is reset: there is nothing to release")
+        self.machine.happen(Trigger.ASK_RELEASE)
+        self._drop_all(lambda: MoveSupersededError("atr() took over"))
+        self._begin(automatic_release(self._at_rest()))
+
+    def stop(self) -> None:
+        """The hand is being stopped: nothing more is taken, and whoever waits is told."""
+        self._activating = self._procedure is not None and self.machine.state in (
+            State.DO_ACTIVATION,
+            State.WF_ACTIVATION,
+        )
+        self.machine.happen(Trigger.ASK_STOP)
+        self._drop_all(lambda: NotStartedError("the hand was stopped"))
+        self._procedure = self._step = None
+
+    def shut_down(self) -> None:
+        """Begin to stop the fingers, if there is anything to stop.
+
+        An activation that this hand began is taken back (rACT = 0): clearing rGTO would not stop it.
+        """
+        status = self.status
+        if status is None:
+            return
+        if self._activating:
+            self._begin(reset(self._at_rest()))
+        elif status.go_echo or not self._watch.is_settled(status.timestamp):
+            # A gripper that lost its activation unnoticed must not be activated by our shutdown.
+            self._begin(shutdown(replace(self._base(), activate=status.activation_echo)))
+
+    # -- the cycle -------------------------------------------------------------------------------------
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a procedure is under way."""
+        return self._procedure is not None
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether an axis moves, or will because of a command that does not act yet."""
+        status = self.status
+        if status is None or self.machine.state not in RUNNING:
+            return status is not None and status.is_moving
+        return (
+            status.is_moving
+            or bool(self._desk.positions)
+            or self._sent is not None
+            or not self._watch.is_settled(status.timestamp)
+        )
+
+    def speeds(self) -> dict[Finger, int]:
+        """The speed each axis has or is about to get."""
+        return {
+            axis: self._desk.speeds.get(axis, request.speed)
+            for axis, request in zip(AXES, self._image.axes, strict=True)
+        }
+
+    def move_timeout(self, position: int, axes: Finger, speed: int | None) -> float:
+        """The default time-out of a move from where the axes are, in seconds."""
+        assert self.status is not None, "the hand is running, so a status has been read"
+        speeds = self.speeds() if speed is None else dict.fromkeys(AXES, speed)
+        return default_timeout(position, axes, self.status, speeds)
+
+    def found(self, status: RobotiqStatus, *, activate: bool) -> None:
+        """Take in the first status after the link was opened; the policy says whether to activate."""
+        self.status = status
+        if activate and look(status) is Trigger.SEEN_RESET:
+            self.activate()
+        else:
+            self.see(status)
+
+    def take_request(self, now: float) -> Request | None:
+        """The image to write in this cycle, or None. It counts as sent from here on."""
+        if self._step is not None:
+            image, self._step = self._step, None
+            self._sent = Desk()
+            self._send(image, now)
+            return image
+        if self._procedure is not None or self._desk.is_empty:
+            return None
+        composed = self._compose(now)
+        if composed is None:
+            return None
+        if self._desk.only_holds and composed == self._base():
+            self._desk = Desk()
+            self._deliver()
+            return None
+        if self._desk.halt is not None:
+            # The halt leaves alone; what was asked after it follows once the gripper has stopped.
+            self._sent = Desk(halt=self._desk.halt)
+            self._desk.halt = None
+        else:
+            self._sent, self._desk = self._desk, Desk()
+        number = self._send(composed, now)
+        if self._sent.positions:
+            self._moves = [(move, number if at < 0 else at) for move, at in self._moves]
+        return composed
+
+    def acknowledged(self, now: float) -> None:
+        """The image was acknowledged."""
+        sent, self._sent = self._sent, None
+        assert sent is not None, "nothing was sent"
+        self._watch.acknowledged(now)
+        number = self._watch.last_number
+        tell(sent.waiting)
+        self._halting += [(number, delivery) for delivery in sent.halt or ()]
+        if self._procedure is not None or self._desk.is_empty:
+            self._deliver()
+
+    def see(self, status: RobotiqStatus) -> None:
+        """Take in a status, read after everything that was acknowledged so far."""
+        self.status = status
+        if self._procedure is not None:
+            if self._step is None and self._sent is None:
+                self._advance(self._procedure, status)
+            return
+        before = self.machine.state
+        after = self.machine.happen(look(status))
+        if after in RUNNING:
+            if before not in RUNNING:
+                self._enter_running(before, status)
+            else:
+                self._compare(status)
+            self._follow(status)
+        elif before in RUNNING:
+            self._leave_running(after, status)
+
+    def lost(self, why: RobotiqError | None = None) -> None:
+        """The link is down: what was not acknowledged is dropped, never to be sent again."""
+        self.machine.happen(Trigger.LINK_LOST)
+
+        def failure() -> RobotiqError:
+            error = ConnectionLostError(f"the link went down before this was done: {why}")
+            error.__cause__ = why
+            return error
+
+        self._drop_all(failure)
+        self._procedure = self._step = None
+        self._adoption = None
+
+    def refuse_unless_running(self, trigger: Trigger) -> None:
+        """Refuse what is not possible now, with the error that tells why.
+
+        Raises:
+            RobotiqError: NotStarted, ConnectionLost, NotActivated, GripperFault or InvalidState.
+        """
+        state = self.machine.state
+        if state in RUNNING or (trigger is Trigger.ASK_HALT and state is State.FAULT):
+            return
+        match state:
+            case State.DISCONNECTED:
+                raise ConnectionLostError("the link is down and being opened again")
+            case State.DO_SHUTDOWN | State.SHUTDOWN:
+                raise NotStartedError("the hand is not started")
+            case State.RESET:
+                raise NotActivatedError("the gripper is not activated: call activate() or recover()")
+            case State.FAULT | State.ATR_DONE:
+                assert self.status is not None, "a fault was read from a status"
+                raise GripperFaultError(self.status.fault)
+        raise refusal(trigger, state)
+
+    # -- inside ----------------------------------------------------------------------------------------
+
+    def _send(self, image: Request, now: float) -> int:
+        self._image = image
+        self._adoption = None
+        self._unsure_until = 0.0
+        return self._watch.writing(image, now)
+
+    def _compose(self, now: float) -> Request | None:
+        """The image with everything asked, or None while it is too early to tell."""
+        status, desk = self.status, self._desk
+        assert status is not None, "a hand that takes commands has read a status"
+        if self._adoption is not None and not self._adoption.is_certain:
+            return None
+        base = self._base()
+        if desk.halt is not None:
+            return replace(base, go=False)
+        if desk.positions and not base.go:
+            # Raising rGTO wakes every axis. Where the fingers stopped is known once the halt has acted.
+            if status.go_echo and not self._watch.is_settled(now):
+                return None
+            base = base.with_positions(
+                {axis: status.position(axis) for axis in AXES if axis not in self._gripping}
+            )
+        held = {
+            axis: status.position(axis)
+            for axis in AXES
+            if axis in desk.hold and self._drifts(axis, base, now)
+        }
+        positions = held | desk.positions
+        return replace(
+            base,
+            go=base.go or bool(desk.positions),
+            axes=tuple(
+                AxisRequest(
+                    positions.get(axis, old.position),
+                    desk.speeds.get(axis, old.speed),
+                    desk.forces.get(axis, old.force),
+                )
+                for axis, old in zip(AXES, base.axes, strict=True)
+            ),
+        )
+
+    def _drifts(self, axis: Finger, base: Request, now: float) -> bool:
+        """Whether an axis moves or is about to: then holding it means asking for where it is.
+
+        An axis in contact keeps its request, and with it its grip; so does one that stands.
+        """
+        status = self.status
+        assert status is not None
+        if not base.go:
+            return False
+        what, position, request = status.finger_status(axis), status.position(axis), base.position(axis)
+        if what is ObjectStatus.IN_MOTION:
+            return True
+        if self._watch.is_settled(now) or status.requested_position(axis) == request:
+            return False
+        # The request is not acting yet. One that presses on against the same contact changes nothing.
+        presses_on = (what is ObjectStatus.CONTACT_CLOSING and request > position) or (
+            what is ObjectStatus.CONTACT_OPENING and request < position
+        )
+        return not presses_on
+
+    def _base(self) -> Request:
+        """The image that the next one is made from."""
+        return self._image if self._adoption is None else self._adoption.request(self._image.axes)
+
+    def _at_rest(self) -> Request:
+        """The image with every axis asked to be where it is: nothing a raised rGTO could wake."""
+        assert self.status is not None, "procedures begin after the first status"
+        status = self.status
+        return replace(self._base(), go=False).with_positions({axis: status.position(axis) for axis in AXES})
+
+    def _begin(self, procedure: Procedure) -> None:
+        self._procedure = procedure
+        self._step = next(procedure)
+        self._gripping = Finger(0)
+
+    def _advance(self, procedure: Procedure, status: RobotiqStatus) -> None:
+        """Hand the status to the procedure; at its end, see where that leaves the hand."""
+        try:
+            self._step = procedure.send(status)
+            return
+        except StopIteration:
+            pass
+        except RobotiqError as error:
+            log.warning("%s", error)
+        self._procedure = None
+        self._watch.restart(self._image, signature_of_status(status), status.timestamp)
+        self.machine.happen(look(status))
+
+    def _deliver(self) -> None:
+        """A request was acknowledged: a DO_ state, or RUNNING_CC, is over."""
+        if self.machine.state in (State.DO_ACTIVATION, State.DO_ATR, State.DO_RESET, State.RUNNING_CC):
+            self.machine.happen(Trigger.DELIVERED)
+
+    def _enter_running(self, before: State, status: RobotiqStatus) -> None:
+        """The gripper turned out active: go on from the image it shows, or adopt it."""
+        shown = self._watch.observe(status)
+        if before is State.DISCONNECTED:
+            self._unsure_until = status.timestamp + WINDOW_S
+        if shown is None:
+            self._adopt(status)
+        elif before is State.DISCONNECTED:
+            self._image = shown
+            self._watch.adopt(shown, signature_of_status(status), status.timestamp)
+
+    def _adopt(self, status: RobotiqStatus) -> None:
+        """Take the gripper as it is, without writing."""
+        self._gripping = Finger(0)
+        self._adoption = Adoption(status)
+        self._adopted = self._base()
+        self._watch.adopt(self._adopted, signature_of_status(status), status.timestamp)
+
+    def _compare(self, status: RobotiqStatus) -> None:
+        """Notice another client."""
+        shown = self._watch.observe(status)
+        if shown is None:
+            self._take_over(status)
+        elif self._adoption is not None and shown is self._adopted:
+            self._adoption.watch(status)
+        elif status.timestamp < self._unsure_until:
+            # Nothing was written since the link came back, and now an older write shows: go on from it.
+            self._image, self._adoption = shown, None
+
+    def _take_over(self, status: RobotiqStatus) -> None:
+        """Another client commands the gripper: take over its requests, or our next write undoes them."""
+        self.foreign_commands += 1
+        log.warning("another client commands the gripper: %r", status)
+        self._adopt(status)
+        self._end_moves(
+            lambda: MoveSupersededError("another client commands the gripper"),
+            lambda move: not move.is_under(status),
+            sent_only=True,
+        )
+
+    def _follow(self, status: RobotiqStatus) -> None:
+        """Tell callers what has come true with this status."""
+        if status.go_echo:
+            self._gripping = status.contacts
+        self._tell_halted(status)
+        for move, number in self._moves[:]:
+            if number < 0:
+                continue
+            move.observe(status)
+            if self._watch.acts(number, status.timestamp) and move.has_arrived(status):
+                self._moves = [(each, at) for each, at in self._moves if each is not move]
+                move.end(move.result(status))
+
+    def _tell_halted(self, status: RobotiqStatus) -> None:
+        now = [
+            (n, d) for n, d in self._halting if not status.go_echo or self._watch.acts(n, status.timestamp)
+        ]
+        self._halting = [each for each in self._halting if each not in now]
+        tell(delivery for _, delivery in now)
+
+    def _leave_running(self, after: State, status: RobotiqStatus) -> None:
+        """The gripper is not active any more, or reports a fault: nothing asked before may resume."""
+        fault = status.fault
+        if after in (State.FAULT, State.ATR_DONE):
+            failure: Failure = lambda: GripperFaultError(fault)  # noqa: E731
+        else:
+            failure = lambda: NotActivatedError("the gripper lost its activation")  # noqa: E731
+        drifting = Finger(0)
+        for axis in AXES:
+            if status.go_echo and status.finger_status(axis) is ObjectStatus.IN_MOTION:
+                drifting |= axis
+        for move, _ in self._moves:
+            drifting |= move.axes
+        self._drop_all(failure)
+        if after is State.FAULT and drifting and self._adoption is None:
+            self._desk.put_hold(drifting)
+
+    def _drop_all(self, failure: Failure) -> None:
+        """Nothing asked so far will happen: tell everybody."""
+        desks, self._desk, self._sent = (self._desk, self._sent or Desk()), Desk(), None
+        halting, self._halting = self._halting, []
+        for desk in desks:
+            desk.fail(failure)
+        tell((delivery for _, delivery in halting), failure)
+        self._end_moves(failure)
+
+    def _end_moves(
+        self, failure: Failure, which: Callable[[Move], bool] = lambda _: True, *, sent_only: bool = False
+    ) -> None:
+        ending = [each for each in self._moves if which(each[0]) and not (sent_only and each[1] < 0)]
+        self._moves = [each for each in self._moves if each not in ending]
+        for move, _ in ending:
+            move.end(failure())

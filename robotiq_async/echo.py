@@ -1,0 +1,128 @@
+"""What was written and what the gripper shows of it.
+
+A write acts one device cycle after it is acknowledged, and a slow device may show the one before last or
+skip one. So a status is compared with every image of the last half second and the one before those: if
+it shows one of them it is ours; if it shows something else, another client commands the gripper.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Final
+
+from .procedures import Signature, signature_of, signature_of_status
+from .request import Request
+from .status import RobotiqStatus
+
+WINDOW_S: Final = 0.5
+"""How long after its acknowledgement a write may still be about to show; the slowest device cycle that is
+reckoned with is 0.2 s."""
+SILENT_S: Final = 0.05
+"""How long a change without an echo (speed, force) is given to act: five cycles of a 100 Hz device."""
+
+
+@dataclass(slots=True)
+class _Written:
+    number: int
+    image: Request
+    signature: Signature
+    time: float
+    acknowledged: bool = False
+
+
+class EchoWatch:
+    """Compares echoes with what was written. Fed with writes and statuses; keeps no clock."""
+
+    def __init__(self) -> None:
+        """Know nothing yet: :meth:`restart` tells what the gripper shows."""
+        self._written: deque[_Written] = deque()
+        self._number = 0
+        self._shown: _Written | None = None
+
+    @property
+    def last_number(self) -> int:
+        """The number of the last image."""
+        return self._number
+
+    def restart(self, image: Request, signature: Signature, now: float) -> None:
+        """Take an image for what the gripper has now, and a signature for how it shows; forget the rest."""
+        self._number += 1
+        self._shown = _Written(self._number, image, signature, now, acknowledged=True)
+        self._written = deque([self._shown])
+
+    def adopt(self, image: Request, signature: Signature, now: float) -> None:
+        """The same, but what has not shown yet may still come.
+
+        That is a write that was on its way when another client wrote, or one that was not acknowledged
+        before the link went down: it may have arrived all the same.
+        """
+        shown = self._shown.number if self._shown is not None else self._number
+        waiting = [each for each in self._written if each.number > shown]
+        self.restart(image, signature, now)
+        for each in waiting:
+            self._number += 1
+            self._written.append(_Written(self._number, each.image, each.signature, now, acknowledged=True))
+
+    def writing(self, image: Request, now: float) -> int:
+        """An image is about to be sent; returns the number it goes by."""
+        self._number += 1
+        self._written.append(_Written(self._number, image, signature_of(image), now))
+        return self._number
+
+    def acknowledged(self, now: float) -> None:
+        """The last image was acknowledged."""
+        self._written[-1].acknowledged = True
+        self._written[-1].time = now
+
+    def observe(self, status: RobotiqStatus) -> Request | None:
+        """The image that a status shows, or None if it shows none of ours.
+
+        The gripper takes images in order, so the first one that fits, counted from the one shown last,
+        is the one shown. An older one may come back for as long as it is remembered.
+        """
+        self._forget(status.timestamp)
+        signature = signature_of_status(status)
+        # The usual case first: nothing has changed since the last poll.
+        if self._shown is not None and self._shown.signature == signature:
+            return self._shown.image
+        fitting = [each for each in self._written if each.signature == signature]
+        if not fitting:
+            return None
+        number = self._shown.number if self._shown is not None else 0
+        newer = [each for each in fitting if each.number > number]
+        if newer:
+            self._shown = newer[0]
+        return (newer or fitting)[0].image
+
+    def acts(self, number: int, now: float) -> bool:
+        """Whether the image of this number, or a later one, acts by now.
+
+        That is when its echo has been seen, or when enough time has passed since its acknowledgement.
+        """
+        if self._shown is not None and self._shown.number >= number:
+            return True
+        waiting = [each for each in self._written if each.number <= number]
+        if not waiting or self._shown is None:
+            return True
+        last = waiting[-1]
+        if not last.acknowledged:
+            return False
+        age = now - last.time
+        if age >= WINDOW_S:
+            return True
+        waiting = [self._shown, *(each for each in waiting if each.number > self._shown.number)]
+        if any(each.signature != last.signature for each in waiting):
+            return False
+        # The echo cannot tell the waiting images apart. Equal ones change nothing; a speed or a force does.
+        return age >= SILENT_S or all(each.image == last.image for each in waiting)
+
+    def is_settled(self, now: float) -> bool:
+        """Whether the last image acts by now."""
+        return self.acts(self._number, now)
+
+    def _forget(self, now: float) -> None:
+        """Drop what is older than the window, but for the newest of that."""
+        written = self._written
+        while len(written) > 1 and written[1].acknowledged and now - written[1].time > WINDOW_S:
+            written.popleft()

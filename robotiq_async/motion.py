@@ -1,0 +1,121 @@
+"""Moves: what was asked of which axes, when it has ended, and with what result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from .closing_time import STROKE_COUNTS, closing_time
+from .enums import AXES, Finger, ObjectStatus
+from .errors import RobotiqError
+from .status import RobotiqStatus
+
+MARGIN_S: Final = 2.0
+"""Added to twice the expected time for the default time-out of a move."""
+
+
+@dataclass(frozen=True, slots=True)
+class MoveResult:
+    """How a move ended. A contact is a result, not an error.
+
+    Attributes:
+        outcomes: for each addressed axis, how it ended.
+        positions: for each addressed axis, where it ended, in counts.
+        contacts: the addressed axes stopped by a contact.
+        duration: seconds from the call to the status that ended the move.
+        peak_current_ma: for each addressed axis, the highest motor current seen, in milliampere.
+        status: the status that ended the move.
+    """
+
+    outcomes: Mapping[Finger, ObjectStatus]
+    positions: Mapping[Finger, int]
+    contacts: Finger
+    duration: float
+    peak_current_ma: Mapping[Finger, int]
+    status: RobotiqStatus
+
+    @property
+    def object_detected(self) -> bool:
+        """Whether a contact stopped at least one addressed axis."""
+        return bool(self.contacts)
+
+
+class Move:
+    """One awaited move. Ends exactly once, with a result or an error."""
+
+    def __init__(
+        self,
+        position: int,
+        axes: Finger,
+        now: float,
+        done: Callable[[MoveResult | RobotiqError], None],
+    ) -> None:
+        """Address axes.
+
+        Args:
+            position: target in counts.
+            axes: the addressed axes.
+            now: monotonic seconds of the call.
+            done: called once, with the result or the error.
+        """
+        self.position = position
+        self.axes = axes
+        self.is_sent = False
+        self._started = now
+        self._peak = dict.fromkeys((axis for axis in AXES if axis in axes), 0)
+        self._done: Callable[[MoveResult | RobotiqError], None] | None = done
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether result or error have been handed over."""
+        return self._done is None
+
+    def end(self, outcome: MoveResult | RobotiqError) -> None:
+        """Hand over the outcome, the first time."""
+        done, self._done = self._done, None
+        if done is not None:
+            done(outcome)
+
+    def observe(self, status: RobotiqStatus) -> None:
+        """Take in the currents of a status read after the command was sent."""
+        for axis, peak in self._peak.items():
+            self._peak[axis] = max(peak, status.current_ma(axis))
+
+    def is_under(self, status: RobotiqStatus) -> bool:
+        """Whether a status echoes this request for every addressed axis."""
+        return status.go_echo and all(status.requested_position(axis) == self.position for axis in self._peak)
+
+    def has_arrived(self, status: RobotiqStatus) -> bool:
+        """Whether a status shows every addressed axis at rest under this request."""
+        return self.is_under(status) and all(
+            status.finger_status(axis) is not ObjectStatus.IN_MOTION for axis in self._peak
+        )
+
+    def result(self, status: RobotiqStatus) -> MoveResult:
+        """The result, from the status that ended the move."""
+        return MoveResult(
+            outcomes=MappingProxyType({axis: status.finger_status(axis) for axis in self._peak}),
+            positions=MappingProxyType({axis: status.position(axis) for axis in self._peak}),
+            contacts=status.contacts & self.axes,
+            duration=status.timestamp - self._started,
+            peak_current_ma=MappingProxyType(dict(self._peak)),
+            status=status,
+        )
+
+
+def default_timeout(
+    position: int, axes: Finger, status: RobotiqStatus, speeds: Mapping[Finger, int]
+) -> float:
+    """Seconds a move may take: twice the expected time plus 2 s.
+
+    The expected time is that of the slowest addressed axis, from the distance in counts and the closing
+    times of the thesis (table A1.1). The scissor has no published figure and is taken for a finger.
+    """
+    expected = max(
+        abs(position - status.position(axis)) / STROKE_COUNTS * closing_time(speeds[axis])
+        for axis in AXES
+        if axis in axes
+    )
+    return 2 * expected + MARGIN_S
