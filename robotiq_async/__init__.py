@@ -1,0 +1,124 @@
+"""Asyncio-native client for the Robotiq 3-Finger gripper (S-Model).
+
+The map; each module imports only what stands above it::
+
+    enums        the names of the field                        no I/O, no clock,
+    errors       everything that is raised                     no event loop
+    checks       argument checks
+    registers    the bit fields, as data
+    status       RobotiqStatus, decoded from eight registers
+    request      Request, encoded into eight registers
+    closing_time the thesis's closing times
+    machine      states, triggers and the table of both
+    procedures   activation, reset, release, shutdown as generators
+    echo         what was written and what the gripper shows of it
+    adoption     what an axis was asked to do by somebody else
+    desk         what callers have asked for
+    motion       moves and their results
+    core         decides what to write, learns from what is read
+    ------------------------------------------------------------
+    address      which gripper                                 asyncio from here on
+    reply        every byte of a reply, checked
+    link         transports; the only module that uses pymodbus
+    simulated    the transport of sim://
+    statistics   figures about the polling
+    streams      async iterators
+    owner        the one task that owns the link
+    options      checked options of a hand
+    waiting      callers that wait for a state
+    hand         RobotiqHand
+    ------------------------------------------------------------
+    simulator    a simulated gripper and its Modbus servers (shares enums, registers, status, request)
+    cli          the command line
+
+Nothing of this has run on real hardware yet.
+"""
+
+from .enums import (
+    CLOSED,
+    FORCE_MAX,
+    FORCE_MIN,
+    OPEN,
+    SPEED_MAX,
+    SPEED_MIN,
+    WIDTH_NORMAL,
+    WIDTH_PINCH,
+    WIDTH_WIDE,
+    Fault,
+    Finger,
+    Initialization,
+    Mode,
+    ObjectStatus,
+    Severity,
+    State,
+)
+from .errors import (
+    ActivationTimeoutError,
+    ConnectFailedError,
+    ConnectionLostError,
+    GripperFaultError,
+    InvalidStateError,
+    MoveSupersededError,
+    MoveTimeoutError,
+    NotActivatedError,
+    NotStartedError,
+    ProtocolError,
+    ResponseTimeoutError,
+    RobotiqConnectionError,
+    RobotiqError,
+    RobotiqStateError,
+    StateTimeoutError,
+)
+from .hand import RobotiqHand
+from .link import Transport
+from .machine import Trigger
+from .motion import MoveResult
+from .owner import ReconnectPolicy
+from .statistics import Statistics
+from .status import RobotiqStatus
+from .streams import Stream, Transition
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "CLOSED",
+    "FORCE_MAX",
+    "FORCE_MIN",
+    "OPEN",
+    "SPEED_MAX",
+    "SPEED_MIN",
+    "WIDTH_NORMAL",
+    "WIDTH_PINCH",
+    "WIDTH_WIDE",
+    "ActivationTimeoutError",
+    "ConnectFailedError",
+    "ConnectionLostError",
+    "Fault",
+    "Finger",
+    "GripperFaultError",
+    "Initialization",
+    "InvalidStateError",
+    "Mode",
+    "MoveResult",
+    "MoveSupersededError",
+    "MoveTimeoutError",
+    "NotActivatedError",
+    "NotStartedError",
+    "ObjectStatus",
+    "ProtocolError",
+    "ReconnectPolicy",
+    "ResponseTimeoutError",
+    "RobotiqConnectionError",
+    "RobotiqError",
+    "RobotiqHand",
+    "RobotiqStateError",
+    "RobotiqStatus",
+    "Severity",
+    "State",
+    "StateTimeoutError",
+    "Statistics",
+    "Stream",
+    "Transition",
+    "Transport",
+    "Trigger",
+]

@@ -1,0 +1,82 @@
+"""Addresses: one string says which gripper."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+TCP_PORT: Final = 502
+"""The port of Modbus TCP, and the gripper's."""
+
+FORMS: Final = (
+    "tcp://HOST[:PORT] (or bare HOST or HOST:PORT), "
+    "rtu:///dev/ttyUSB0 (a serial port; rtu://COM3 on Windows), sim://"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Address:
+    """A checked address.
+
+    Attributes:
+        kind: "tcp", "rtu" or "sim".
+        host: host name or IP address (tcp), device of the serial port (rtu), empty (sim).
+        port: TCP port; 0 for the others.
+    """
+
+    kind: Literal["tcp", "rtu", "sim"]
+    host: str = ""
+    port: int = 0
+
+    def __str__(self) -> str:
+        """The address in its full form."""
+        if self.kind == "tcp":
+            host = f"[{self.host}]" if ":" in self.host else self.host
+            return f"tcp://{host}:{self.port}"
+        return f"{self.kind}://{self.host}"
+
+
+def parse_address(address: object) -> Address:
+    """The address in a string.
+
+    Raises:
+        TypeError: not a string.
+        ValueError: malformed; the message shows the accepted forms.
+    """
+    if not isinstance(address, str):
+        raise TypeError(f"address must be a string, got {address!r}; accepted: {FORMS}")
+    scheme, separator, rest = address.partition("://")
+    if not separator:
+        scheme, rest = "tcp", address
+    if scheme == "sim" and not rest:
+        return Address("sim")
+    if scheme == "rtu" and rest.strip("/") and rest == rest.strip() and "\0" not in rest:
+        return Address("rtu", rest)
+    if scheme == "tcp":
+        host, port = _host_and_port(rest)
+        if host and port is not None:
+            return Address("tcp", host.lower(), port)
+    raise ValueError(f"malformed address {address!r}; accepted: {FORMS}")
+
+
+def _host_and_port(text: str) -> tuple[str, int | None]:
+    """Split HOST, HOST:PORT, [IPv6] or [IPv6]:PORT; the port is None where it is malformed."""
+    if text.startswith("["):
+        host, bracket, rest = text[1:].partition("]")
+        if not bracket or ":" not in host or not set(host) <= set("0123456789abcdefABCDEF:.%"):
+            return "", None
+        separator, port = rest[:1], rest[1:]
+        if rest and separator != ":":
+            return "", None
+    else:
+        host, separator, port = text.partition(":")
+        if not set(host) <= _HOST_CHARACTERS or host.startswith((".", "-")):
+            return "", None
+    if not separator:
+        return host, TCP_PORT
+    if not (port.isascii() and port.isdigit() and 1 <= int(port) <= 65535):
+        return host, None
+    return host, int(port)
+
+
+_HOST_CHARACTERS: Final = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-_")

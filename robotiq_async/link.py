@@ -1,0 +1,318 @@
+"""The link to one gripper. The only module that talks to pymodbus (the simulator's server aside).
+
+pymodbus does the framing and the transport; what it leaves to its user is done here:
+
+* One client object per connection, no retries and no reconnecting of its own: both would send a motion
+  twice.
+* Every byte that arrives is checked before pymodbus sees it (reply.py). Anything but the whole right
+  answer, in time, ends the exchange *and* the connection: on a link that is out of step the next reply
+  could be the answer to this request.
+* Time-outs are a watchdog of ours. pymodbus's own is ``asyncio.wait_for``, which on Python 3.11 swallows
+  a cancellation that lands together with the reply, and which a loop that was held up takes for silence
+  although the reply is waiting in the socket.
+* Foreign exceptions stop here.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable, Sequence
+from typing import Any, Final, Protocol, runtime_checkable
+
+import anyio
+from pymodbus import FramerType
+from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
+from pymodbus.exceptions import ModbusException
+from pymodbus.pdu import ModbusPDU
+
+from .address import Address
+from .errors import (
+    ConnectFailedError,
+    ConnectionLostError,
+    ProtocolError,
+    ResponseTimeoutError,
+    RobotiqConnectionError,
+)
+from .registers import REGISTER_COUNT, RegisterMap, Registers
+from .reply import Expected, expected_reply
+
+STALL_S: Final = 0.02
+"""A watchdog that wakes this much late was held up by the loop, and the reply may be waiting unread."""
+
+# pymodbus logs its send and receive history at ERROR on every time-out; what matters of it is said in our
+# exceptions. Whoever sets a level on its logger gets what they ask for.
+_pymodbus_log = logging.getLogger("pymodbus.logging")
+if _pymodbus_log.level == logging.NOTSET:
+    _pymodbus_log.setLevel(logging.CRITICAL + 1)
+
+
+@runtime_checkable
+class Transport(Protocol):
+    """What a hand needs of a link. Pass an object of this shape instead of an address for other buses.
+
+    One task calls it, one call at a time. After any failure the transport is closed, and :meth:`open`
+    begins anew.
+    """
+
+    @property
+    def is_open(self) -> bool:
+        """Whether requests can be sent."""
+
+    async def open(self) -> None:
+        """Connect.
+
+        Raises:
+            RobotiqConnectionError: nobody answers, or not what was expected.
+        """
+
+    async def read(self) -> Registers:
+        """The eight status registers.
+
+        Raises:
+            RobotiqConnectionError: no clean answer in time; the transport is closed.
+        """
+
+    async def write(self, registers: Sequence[int]) -> None:
+        """Write the eight request registers, exactly once.
+
+        Raises:
+            RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
+        """
+
+    async def close(self) -> None:
+        """Disconnect; never fails, and does nothing when closed."""
+
+
+class ModbusTransport:
+    """A gripper behind Modbus TCP or a serial line (Modbus RTU)."""
+
+    def __init__(
+        self,
+        address: Address,
+        registers: RegisterMap,
+        *,
+        connect_timeout: float,
+        response_timeout: float,
+    ) -> None:
+        """Keep what is needed to connect; opens nothing.
+
+        Args:
+            address: a tcp or rtu address.
+            registers: where the blocks lie, and the device id.
+            connect_timeout: seconds for connecting.
+            response_timeout: seconds for one answer.
+        """
+        self._address = address
+        self._map = registers
+        self._connect_timeout = connect_timeout
+        self._response_timeout = response_timeout
+        self._serial = address.kind == "rtu"
+        self._client: AsyncModbusTcpClient | AsyncModbusSerialClient | None = None
+        self._expected: Expected | None = None
+        self._failure: RobotiqConnectionError | None = None
+        self._probe = 0
+
+    @property
+    def is_open(self) -> bool:
+        """Whether requests can be sent."""
+        return self._client is not None
+
+    async def open(self) -> None:
+        """Connect; over a serial line, also make sure that no answer from before is still to come.
+
+        Raises:
+            ConnectFailedError: refused, unreachable, no such port, or no pyserial.
+            ProtocolError: a serial device answers, but not what was asked.
+            ResponseTimeoutError: a serial port can be opened, but nobody answers.
+        """
+        await self.close()
+        self._failure = self._expected = None
+        client = self._make_client()
+        try:
+            with anyio.fail_after(self._connect_timeout):
+                connected = await client.connect()
+        except TimeoutError:
+            client.close()
+            raise ConnectFailedError(
+                str(self._address), f"no connection within {self._connect_timeout:g} s"
+            ) from None
+        except Exception as error:
+            client.close()
+            raise ConnectFailedError(str(self._address), str(error)) from error
+        except BaseException:
+            client.close()
+            raise
+        if not connected:
+            client.close()
+            what = "cannot open the serial port" if self._serial else "connection refused or host unreachable"
+            raise ConnectFailedError(str(self._address), what)
+        self._client = client
+        if self._serial:
+            await self._resynchronise()
+
+    async def read(self) -> Registers:
+        """The eight status registers.
+
+        Raises:
+            RobotiqConnectionError: no clean answer in time; the transport is closed.
+        """
+        return await self._read(REGISTER_COUNT)
+
+    async def write(self, registers: Sequence[int]) -> None:
+        """Write the eight request registers with one FC16, exactly once.
+
+        Raises:
+            RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
+        """
+        client = self._connected()
+        await self._exchange(
+            lambda: client.write_registers(self._map.request, list(registers), device_id=self._map.device_id)
+        )
+
+    async def close(self) -> None:
+        """Disconnect; does nothing when closed."""
+        self._drop()
+
+    # -- one exchange ----------------------------------------------------------------------------------
+
+    async def _read(self, count: int) -> Registers:
+        client = self._connected()
+        read = client.read_input_registers if self._map.read_function == 4 else client.read_holding_registers
+        response = await self._exchange(
+            lambda: read(self._map.status, count=count, device_id=self._map.device_id)
+        )
+        registers = tuple(response.registers)
+        if len(registers) != count:
+            self._drop()
+            raise ProtocolError(f"{len(registers)} registers instead of {count}")
+        return registers
+
+    def _connected(self) -> AsyncModbusTcpClient | AsyncModbusSerialClient:
+        if self._failure is not None:
+            # The link broke, or something arrived that nobody had asked for, between two requests.
+            failure, self._failure = self._failure, None
+            self._drop()
+            raise failure
+        if self._client is None:
+            raise ConnectionLostError(f"not connected to {self._address}")
+        return self._client
+
+    async def _exchange(self, send: Callable[[], Awaitable[ModbusPDU]]) -> ModbusPDU:
+        """Send one request and wait for its answer; on anything else the connection is given up."""
+        watchdog = self._watch()
+        try:
+            response = await send()
+        except RobotiqConnectionError:
+            self._drop()
+            raise
+        except ModbusException as error:
+            self._drop()
+            raise ConnectionLostError(str(error)) from error
+        except OSError as error:
+            self._drop()
+            raise ConnectionLostError(f"{self._address}: {error}") from error
+        except BaseException:
+            # Cancelled in the middle of an exchange: its answer must not become that of another one.
+            self._drop()
+            raise
+        finally:
+            watchdog()
+            self._expected = None
+        return response
+
+    def _watch(self) -> Callable[[], None]:
+        """Fail the exchange when it takes too long; returns what calls the watchdog off."""
+        loop = asyncio.get_running_loop()
+
+        def arm(seconds: float) -> asyncio.TimerHandle:
+            deadline = loop.time() + seconds
+            return loop.call_at(deadline, expire, deadline)
+
+        def expire(deadline: float) -> None:
+            nonlocal timer
+            if loop.time() - deadline > STALL_S:
+                # The loop was held up, not necessarily the gripper: let it read what has come.
+                timer = arm(STALL_S)
+                return
+            self._fail(
+                ResponseTimeoutError(f"{self._address} did not answer within {self._response_timeout:g} s")
+            )
+
+        timer = arm(self._response_timeout)
+        return lambda: timer.cancel()
+
+    def _fail(self, error: RobotiqConnectionError) -> None:
+        """End the exchange in flight with an error; without one, keep the error for the next."""
+        client = self._client
+        if client is None:
+            return
+        future = client.ctx.response_future
+        if self._expected is not None and not future.done():
+            future.set_exception(error)
+        elif self._failure is None:
+            self._failure = error
+
+    def _drop(self) -> None:
+        client, self._client = self._client, None
+        if client is not None:
+            client.close()
+
+    # -- what pymodbus calls ---------------------------------------------------------------------------
+
+    def _trace_packet(self, sending: bool, data: bytes) -> bytes:
+        """Every frame that is sent, and the bytes received so far for one: returns what pymodbus may see."""
+        if sending:
+            self._expected = expected_reply(data, serial=self._serial)
+            return data
+        try:
+            if self._expected is None:
+                raise ProtocolError(f"{len(data)} bytes that nobody asked for: {data.hex(' ')}")
+            complete = self._expected.is_complete(data)
+        except ProtocolError as error:
+            self._fail(error)
+            return b""
+        return data if complete else b""
+
+    def _trace_connect(self, connected: bool) -> None:
+        if not connected:
+            self._fail(ConnectionLostError(f"{self._address} closed the connection"))
+
+    # -- connecting ------------------------------------------------------------------------------------
+
+    def _make_client(self) -> AsyncModbusTcpClient | AsyncModbusSerialClient:
+        # timeout=None: wait_for becomes a plain await, and the watchdogs above are the only time-outs.
+        options: dict[str, Any] = {
+            "retries": 0,
+            "reconnect_delay": 0,
+            "timeout": None,
+            "trace_packet": self._trace_packet,
+            "trace_connect": self._trace_connect,
+        }
+        if not self._serial:
+            return AsyncModbusTcpClient(self._address.host, port=self._address.port, **options)
+        try:
+            import serial  # noqa: F401, PLC0415
+        except ImportError:
+            raise ConnectFailedError(
+                str(self._address), "serial ports need pyserial: pip install 'robotiq-async[serial]'"
+            ) from None
+        return AsyncModbusSerialClient(
+            self._address.host,
+            framer=FramerType.RTU,
+            baudrate=115200,
+            bytesize=8,
+            parity="N",
+            stopbits=1,
+            **options,
+        )
+
+    async def _resynchronise(self) -> None:
+        """Make sure that no answer to an earlier request is still on its way.
+
+        Serial replies carry no number. So after opening, one to seven registers are read instead of
+        eight, a different count each time: a late answer has another length and is found out, and the
+        gripper answers in order, so that once the right length is back nothing older can follow.
+        """
+        self._probe = self._probe % (REGISTER_COUNT - 1) + 1
+        await self._read(self._probe)

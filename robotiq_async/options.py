@@ -1,0 +1,100 @@
+"""The options of a hand, checked, and the transport they describe."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+from .address import parse_address
+from .checks import check_byte, check_int, check_seconds
+from .link import ModbusTransport, Transport
+from .owner import ReconnectPolicy
+from .registers import REGISTER_COUNT, RTU_REGISTERS, TCP_REGISTERS
+from .simulated import SimulatedTransport
+
+POLL_INTERVAL_S: Final = 0.005
+"""200 Hz, as the thesis polled; the manual names 200 Hz for RTU and 100 Hz for TCP."""
+CONNECT_TIMEOUT_S: Final = 2.0
+RESPONSE_TIMEOUT_S: Final = 0.4
+"""Two of these, a read in flight and a write, still end within the second that a write may take."""
+ACTIVATION_TIMEOUT_S: Final = 20.0
+"""What clients of the real gripper wait for (registers.md of the project's sources)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """Everything a hand is constructed with, checked."""
+
+    transport: Transport
+    address: str
+    poll_interval: float
+    activation_timeout: float
+    policy: ReconnectPolicy | None
+    speed: int
+    force: int
+
+
+def check_options(
+    address: object,
+    *,
+    device_id: object,
+    poll_interval: object,
+    connect_timeout: object,
+    response_timeout: object,
+    activation_timeout: object,
+    reconnect: object,
+    speed: object,
+    force: object,
+    request_address: object,
+    status_address: object,
+) -> Options:
+    """Check every option and make the transport; opens nothing and needs no running loop.
+
+    Raises:
+        TypeError: an option of the wrong type; named with value and range.
+        ValueError: an option outside its range, or a malformed address.
+    """
+    connect_s = check_seconds("connect_timeout", connect_timeout, 0.01, 5.0)
+    response_s = check_seconds("response_timeout", response_timeout, 0.005, 0.5)
+    if isinstance(address, str):
+        parsed = parse_address(address)
+        registers = RTU_REGISTERS if parsed.kind == "rtu" else TCP_REGISTERS
+        if device_id is not None:
+            registers = replace(registers, device_id=check_int("device_id", device_id, 1, 247))
+        last = 0x10000 - REGISTER_COUNT
+        if request_address is not None:
+            registers = replace(registers, request=check_int("request_address", request_address, 0, last))
+        if status_address is not None:
+            registers = replace(registers, status=check_int("status_address", status_address, 0, last))
+        transport: Transport
+        if parsed.kind == "sim":
+            transport = SimulatedTransport(registers, connect_timeout=connect_s, response_timeout=response_s)
+            name = f"sim://#{id(transport):x}"  # every sim:// is a gripper of its own
+        else:
+            transport = ModbusTransport(
+                parsed, registers, connect_timeout=connect_s, response_timeout=response_s
+            )
+            name = str(parsed)
+    elif isinstance(address, Transport):
+        transport, name = address, f"<{type(address).__name__} at {id(address):#x}>"
+    else:
+        raise TypeError(f"address must be a string or a Transport, got {address!r}")
+    return Options(
+        transport=transport,
+        address=name,
+        poll_interval=check_seconds("poll_interval", poll_interval, 0.001, 0.1),
+        activation_timeout=check_seconds("activation_timeout", activation_timeout, 0.01, 120.0),
+        policy=_check_reconnect(reconnect),
+        speed=check_byte("speed", speed),
+        force=check_byte("force", force),
+    )
+
+
+def _check_reconnect(reconnect: object) -> ReconnectPolicy | None:
+    if isinstance(reconnect, ReconnectPolicy):
+        return reconnect
+    if reconnect is True:
+        return ReconnectPolicy()
+    if reconnect is False:
+        return None
+    raise TypeError(f"reconnect must be True, False or a ReconnectPolicy, got {reconnect!r}")

@@ -1,0 +1,297 @@
+"""The one task that owns the link: connects, polls, writes, reconnects and shuts down.
+
+Nobody else touches the transport; callers leave what they want with the core and wait beside it. So no
+request is ever cancelled in flight, the link stays in step, and start() and stop() may be called from
+different tasks.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import anyio
+
+from .checks import check_seconds
+from .core import Core
+from .errors import (
+    ConnectFailedError,
+    ConnectionLostError,
+    NotStartedError,
+    ResponseTimeoutError,
+    RobotiqConnectionError,
+    RobotiqError,
+)
+from .link import Transport
+from .machine import Trigger
+from .statistics import Counters
+from .status import RobotiqStatus
+
+log = logging.getLogger("robotiq_async")
+
+SHUTDOWN_S: Final = 1.2
+"""Time to reach the gripper once more and to see the fingers stop. With an exchange of 0.4 s in flight
+stop() still ends within its promised 2 s."""
+LATE_WARNING_S: Final = 1.0
+"""At most one warning about late polls in this time."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReconnectPolicy:
+    """What becomes of a lost link.
+
+    Attributes:
+        first_delay: seconds before the first try, 0..10.
+        max_delay: the delay doubles up to this, in seconds, 0.01..60.
+        give_up_after: seconds after which the hand gives up; None tries for ever.
+        activate: whether a gripper that comes back without its activation is activated. The fingers
+            MOVE then, without anybody having asked at that moment: leave it off unless nothing can be
+            in their way.
+    """
+
+    first_delay: float = 0.05
+    max_delay: float = 2.0
+    give_up_after: float | None = None
+    activate: bool = False
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            TypeError: not a number, or activate is not a bool.
+            ValueError: outside its range.
+        """
+        check_seconds("first_delay", self.first_delay, 0.0, 10.0)
+        check_seconds("max_delay", self.max_delay, 0.01, 60.0)
+        if self.give_up_after is not None:
+            check_seconds("give_up_after", self.give_up_after, 0.0, 86400.0)
+        if not isinstance(self.activate, bool):
+            raise TypeError(f"activate must be True or False, got {self.activate!r}")
+
+
+class Owner:
+    """Runs one hand's link from start to stop. :meth:`run` is the body of its task."""
+
+    def __init__(
+        self,
+        transport: Transport,
+        core: Core,
+        counters: Counters,
+        *,
+        address: str,
+        activate: bool,
+        poll_interval: float,
+        policy: ReconnectPolicy | None,
+        first_sequence: int,
+        publish: Callable[[RobotiqStatus], None],
+    ) -> None:
+        """Prepare; must be made inside a running event loop.
+
+        Args:
+            transport: the link; nobody else may use it.
+            core: what decides.
+            counters: what is counted.
+            address: for messages.
+            activate: whether a reset gripper is activated after the first read.
+            poll_interval: seconds between polls.
+            policy: what becomes of a lost link; None gives up at once.
+            first_sequence: number of the first status.
+            publish: called with each status, after the core has seen it.
+        """
+        self._transport = transport
+        self._core = core
+        self._counters = counters
+        self._address = address
+        self._activate = activate
+        self._interval = poll_interval
+        self._policy = policy
+        self.sequence = first_sequence
+        self._publish = publish
+        self._loop = asyncio.get_running_loop()
+        self.connected: asyncio.Future[None] = self._loop.create_future()
+        """Done when the first status has been taken in; holds the error when there was none."""
+        self.failure: RobotiqConnectionError | None = None
+        """Why the hand gave up, if it did."""
+        self._stopping = False
+        self._halt_at_stop = True
+        self._interruptible: anyio.CancelScope | None = None
+        self._deadline = 0.0
+        self._last_poll = 0.0
+        self._warned = 0.0
+
+    def request_stop(self, *, halt: bool) -> None:
+        """Ask the task to end; with ``halt`` it stops the fingers first. Never blocks."""
+        if not self._stopping:
+            self._stopping, self._halt_at_stop = True, halt
+        if self._interruptible is not None:
+            self._interruptible.cancel()
+
+    async def run(self) -> None:
+        """Own the link until asked to stop, or until the policy gives up."""
+        try:
+            if await self._first_contact():
+                await self._poll()
+        finally:
+            await self._finish()
+            self._tell_connected(NotStartedError("the hand was stopped while it connected"))
+
+    # -- connecting ------------------------------------------------------------------------------------
+
+    async def _first_contact(self) -> bool:
+        try:
+            status = await self._contact()
+        except (ResponseTimeoutError, ConnectionLostError) as error:
+            failed = ConnectFailedError(self._address, f"connected, but nobody answers: {error}")
+            failed.__cause__ = error
+            self._tell_connected(failed)
+            return False
+        except RobotiqConnectionError as error:
+            self._tell_connected(error)
+            return False
+        if status is None:
+            return False
+        self._take_in(status, self._activate)
+        self._tell_connected(None)
+        return True
+
+    def _tell_connected(self, failure: RobotiqError | None) -> None:
+        """Tell start(), unless it knows already or does not wait any more."""
+        if self.connected.done():
+            return
+        if failure is None:
+            self.connected.set_result(None)
+        else:
+            self.connected.set_exception(failure)
+
+    async def _contact(self) -> RobotiqStatus | None:
+        """Open the link and read once; None when asked to stop meanwhile."""
+        with anyio.CancelScope() as self._interruptible:
+            if not self._stopping:
+                await self._transport.open()
+                return self._status(await self._transport.read())
+        return None
+
+    def _take_in(self, status: RobotiqStatus, activate: bool) -> None:
+        self._core.found(status, activate=activate)
+        self._publish(status)
+        self._last_poll = 0.0
+        self._deadline = self._loop.time()
+
+    async def _reconnect(self, why: RobotiqConnectionError) -> bool:
+        """Open the link again; False when that is given up, or when asked to stop."""
+        log.warning("link lost: %s", why)
+        self._core.lost(why)
+        policy = self._policy
+        if policy is None:
+            self.failure = why
+            return False
+        lost_at, delay = self._loop.time(), policy.first_delay
+        while not self._stopping:
+            with anyio.CancelScope() as self._interruptible:
+                await asyncio.sleep(delay)
+            try:
+                status = await self._contact()
+            except RobotiqConnectionError as error:
+                log.debug("still no link: %s", error)
+                if policy.give_up_after is not None and self._loop.time() - lost_at >= policy.give_up_after:
+                    self.failure = error
+                    return False
+                delay = min(max(2 * delay, 0.01), policy.max_delay)
+                continue
+            if status is not None:
+                self._counters.reconnects += 1
+                log.warning("link back after %.2f s", self._loop.time() - lost_at)
+                self._take_in(status, policy.activate)
+                return True
+        return False
+
+    # -- polling ---------------------------------------------------------------------------------------
+
+    async def _poll(self) -> None:
+        while not self._stopping:
+            await self._tick()
+            if self._stopping:
+                return
+            try:
+                await self._cycle()
+            except RobotiqConnectionError as error:
+                if not await self._reconnect(error):
+                    return
+
+    async def _cycle(self) -> None:
+        """Write what has changed, then read."""
+        counters, loop = self._counters, self._loop
+        request = self._core.take_request(loop.time())
+        if request is not None:
+            await self._transport.write(request.registers)
+            counters.writes += 1
+            self._core.acknowledged(loop.time())
+        sent = loop.time()
+        status = self._status(await self._transport.read())
+        counters.round_trips.append(status.timestamp - sent)
+        if self._last_poll:
+            counters.periods.append(sent - self._last_poll)
+        self._last_poll = sent
+        self._core.see(status)
+        self._publish(status)
+
+    def _status(self, registers: tuple[int, ...]) -> RobotiqStatus:
+        status = RobotiqStatus(registers, self._loop.time(), self.sequence)
+        self.sequence += 1
+        self._counters.polls += 1
+        return status
+
+    async def _tick(self) -> None:
+        """Wait for the next tick. Deadlines are absolute; a missed one is counted and skipped."""
+        loop, interval = self._loop, self._interval
+        self._deadline += interval
+        late = loop.time() - self._deadline
+        if late >= interval:
+            missed = int(late / interval)
+            self._counters.overruns += missed
+            self._deadline += missed * interval
+            self._warn_late(late)
+        await asyncio.sleep(max(0.0, self._deadline - loop.time()))
+        late = loop.time() - self._deadline
+        self._counters.longest_stall = max(self._counters.longest_stall, late)
+
+    def _warn_late(self, late: float) -> None:
+        now = self._loop.time()
+        if now - self._warned >= LATE_WARNING_S:
+            self._warned = now
+            log.warning(
+                "polling is %.0f ms late: something holds up the event loop (%d polls missed so far)",
+                1000 * late,
+                self._counters.overruns,
+            )
+
+    # -- the end ---------------------------------------------------------------------------------------
+
+    async def _finish(self) -> None:
+        """Stop the fingers if that is possible in time, then disconnect."""
+        self._stopping = True
+        self._core.stop()
+        try:
+            with anyio.move_on_after(SHUTDOWN_S, shield=True) as scope:
+                if self._halt_at_stop and self._core.status is not None:
+                    await self._stop_fingers()
+            if scope.cancelled_caught:
+                log.warning("the gripper did not confirm in time that the fingers were stopped")
+        except RobotiqConnectionError as error:
+            log.warning("the fingers could not be told to stop: %s", error)
+        finally:
+            await self._transport.close()
+            self._core.machine.happen(Trigger.STOPPED)
+
+    async def _stop_fingers(self) -> None:
+        if not self._transport.is_open:
+            # A gripper that lost its client goes on moving: try once more.
+            await self._transport.open()
+            self._core.status = self._status(await self._transport.read())
+        self._core.shut_down()
+        while self._core.is_busy:
+            await self._cycle()
+            await asyncio.sleep(self._interval)

@@ -1,0 +1,81 @@
+"""The transport behind ``sim://``: a simulated gripper in this program, reached over real Modbus TCP."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from .address import parse_address
+from .link import ModbusTransport
+from .registers import RegisterMap, Registers
+
+if TYPE_CHECKING:
+    from .simulator import SimulatedGripper, SimulatorServer
+
+
+class SimulatedTransport:
+    """Starts a simulator on loopback when opened. The gripper outlives the connection, as a real one."""
+
+    def __init__(self, registers: RegisterMap, *, connect_timeout: float, response_timeout: float) -> None:
+        """Keep what is needed to connect; starts nothing."""
+        self._map = registers
+        self._connect_timeout = connect_timeout
+        self._response_timeout = response_timeout
+        self._gripper: SimulatedGripper | None = None
+        self._server: SimulatorServer | None = None
+        self._inner: ModbusTransport | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether requests can be sent."""
+        return self._inner is not None and self._inner.is_open
+
+    async def open(self) -> None:
+        """Start the simulator if it does not run, and connect to it.
+
+        Raises:
+            RobotiqConnectionError: loopback does not work.
+        """
+        if self._inner is None:
+            # The only place that imports the simulator at run time, and only for sim://.
+            from .simulator import SimulatedGripper, SimulatorServer  # noqa: PLC0415
+
+            self._gripper = self._gripper or SimulatedGripper()
+            self._server = SimulatorServer(self._gripper)
+            await self._server.start()
+            self._inner = ModbusTransport(
+                parse_address(self._server.address),
+                self._map,
+                connect_timeout=self._connect_timeout,
+                response_timeout=self._response_timeout,
+            )
+        await self._inner.open()
+
+    async def read(self) -> Registers:
+        """The eight status registers.
+
+        Raises:
+            RobotiqConnectionError: no clean answer in time; the connection is closed.
+        """
+        return await self._connected().read()
+
+    async def write(self, registers: Sequence[int]) -> None:
+        """Write the eight request registers, exactly once.
+
+        Raises:
+            RobotiqConnectionError: no clean acknowledgement in time; the connection is closed.
+        """
+        await self._connected().write(registers)
+
+    async def close(self) -> None:
+        """Disconnect and stop the simulator's server; does nothing when closed."""
+        inner, self._inner = self._inner, None
+        server, self._server = self._server, None
+        if inner is not None:
+            await inner.close()
+        if server is not None:
+            await server.stop()
+
+    def _connected(self) -> ModbusTransport:
+        assert self._inner is not None, "opened before it is used"
+        return self._inner

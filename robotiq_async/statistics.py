@@ -1,0 +1,76 @@
+"""Statistics: how well the polling goes."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Final
+
+SAMPLES: Final = 2000
+"""Periods and round trips that percentiles are taken from: 10 s at 200 Hz."""
+
+
+@dataclass(frozen=True, slots=True)
+class Statistics:
+    """A snapshot of a hand's polling since its start. Percentiles are of the last 2000 polls.
+
+    Attributes:
+        polls: statuses read.
+        writes: requests acknowledged.
+        overruns: ticks that were missed and skipped.
+        period_p50: median seconds between two polls; 0 before the second poll.
+        period_p99: 99th percentile of the same.
+        round_trip_p50: median seconds from sending a read to its reply; 0 before the first poll.
+        round_trip_p99: 99th percentile of the same.
+        longest_stall: longest time a tick came late, in seconds: the event loop was held up.
+        reconnects: times the link was opened again.
+        foreign_commands: times another client was seen to command the gripper.
+    """
+
+    polls: int
+    writes: int
+    overruns: int
+    period_p50: float
+    period_p99: float
+    round_trip_p50: float
+    round_trip_p99: float
+    longest_stall: float
+    reconnects: int
+    foreign_commands: int
+
+
+class Counters:
+    """What the owner task counts."""
+
+    __slots__ = ("longest_stall", "overruns", "periods", "polls", "reconnects", "round_trips", "writes")
+
+    def __init__(self) -> None:
+        """Begin at zero."""
+        self.polls = 0
+        self.writes = 0
+        self.overruns = 0
+        self.reconnects = 0
+        self.longest_stall = 0.0
+        self.periods: deque[float] = deque(maxlen=SAMPLES)
+        self.round_trips: deque[float] = deque(maxlen=SAMPLES)
+
+    def snapshot(self, foreign_commands: int) -> Statistics:
+        """The figures so far."""
+        periods, round_trips = sorted(self.periods), sorted(self.round_trips)
+        return Statistics(
+            polls=self.polls,
+            writes=self.writes,
+            overruns=self.overruns,
+            period_p50=_percentile(periods, 0.50),
+            period_p99=_percentile(periods, 0.99),
+            round_trip_p50=_percentile(round_trips, 0.50),
+            round_trip_p99=_percentile(round_trips, 0.99),
+            longest_stall=self.longest_stall,
+            reconnects=self.reconnects,
+            foreign_commands=foreign_commands,
+        )
+
+
+def _percentile(ordered: list[float], share: float) -> float:
+    """The value that this share of an ordered list does not exceed; 0 for an empty list."""
+    return ordered[min(len(ordered) - 1, int(share * len(ordered)))] if ordered else 0.0

@@ -1,0 +1,137 @@
+"""Async iterators over what happens to a hand.
+
+Plain classes and not async generators: an iterator that is dropped in the middle has nothing to clean up
+in another task.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import weakref
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, Self, TypeVar
+
+from .enums import State
+from .errors import RobotiqError
+from .machine import Trigger
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """One change of state.
+
+    Attributes:
+        source: the state before.
+        target: the state after.
+        trigger: what made it happen.
+        timestamp: monotonic seconds (the event loop's clock).
+    """
+
+    source: State
+    target: State
+    trigger: Trigger
+    timestamp: float
+
+
+class Stream(Generic[T]):
+    """An async iterator with one reader; made by a :class:`Channel`.
+
+    Attributes:
+        missed: items that were dropped because the reader was slow.
+    """
+
+    def __init__(self, buffer: int | None) -> None:
+        """Keep up to ``buffer`` items, the newest ones; None keeps all."""
+        self.missed = 0
+        self._items: deque[T] = deque(maxlen=buffer)
+        self._waiting: asyncio.Future[None] | None = None
+        self._ended = False
+        self._failure: Callable[[], RobotiqError] | None = None
+
+    def __aiter__(self) -> Self:
+        """The stream itself."""
+        return self
+
+    async def __anext__(self) -> T:
+        """The next item. A cancelled wait loses nothing.
+
+        Raises:
+            StopAsyncIteration: the hand was stopped, or the stream was closed.
+            RobotiqConnectionError: the hand gave up on its link.
+            RuntimeError: another task is waiting on the same stream.
+        """
+        if not self._items and not self._ended:
+            if self._waiting is not None:
+                raise RuntimeError("a stream has one reader; open another with statuses() or transitions()")
+            self._waiting = asyncio.get_running_loop().create_future()
+            try:
+                await self._waiting
+            finally:
+                self._waiting = None
+        if self._items:
+            return self._items.popleft()
+        if self._failure is not None:
+            raise self._failure()
+        raise StopAsyncIteration
+
+    async def aclose(self) -> None:
+        """End the stream; a waiting reader ends too. Idempotent."""
+        self._items.clear()
+        self.end(None)
+
+    def push(self, item: T) -> None:
+        """Hand an item to the reader; the oldest one is dropped when the buffer is full."""
+        if self._ended:
+            return
+        if len(self._items) == self._items.maxlen:
+            self.missed += 1
+        self._items.append(item)
+        self._wake()
+
+    def end(self, failure: Callable[[], RobotiqError] | None) -> None:
+        """No more items: the reader gets what is left, then the end or the failure."""
+        if not self._ended:
+            self._ended, self._failure = True, failure
+            self._wake()
+
+    def _wake(self) -> None:
+        if self._waiting is not None and not self._waiting.done():
+            self._waiting.set_result(None)
+
+
+class Channel(Generic[T]):
+    """Spreads items over any number of streams. A stream nobody holds any more is forgotten."""
+
+    def __init__(self) -> None:
+        """Begin without readers."""
+        self._streams: weakref.WeakSet[Stream[T]] = weakref.WeakSet()
+        self._failure: Callable[[], RobotiqError] | None = None
+
+    def open(self, buffer: int | None) -> Stream[T]:
+        """A new stream. Before a start it waits; after the hand gave up it raises the reason."""
+        stream: Stream[T] = Stream(buffer)
+        if self._failure is not None:
+            stream.end(self._failure)
+        else:
+            self._streams.add(stream)
+        return stream
+
+    def reopen(self) -> None:
+        """The hand starts: what it gave up on before does not count any more."""
+        self._failure = None
+
+    def push(self, item: T) -> None:
+        """Hand an item to every stream."""
+        for stream in self._streams:
+            stream.push(item)
+
+    def end(self, failure: Callable[[], RobotiqError] | None = None) -> None:
+        """End every stream, quietly or with a failure."""
+        self._failure = failure
+        streams, self._streams = self._streams, weakref.WeakSet()
+        for stream in streams:
+            stream.end(failure)
