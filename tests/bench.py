@@ -1,0 +1,135 @@
+"""A bench without I/O: the core on one side, a simulated gripper on the other, one clock by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from robotiq_async import Finger, MoveResult, RobotiqError, RobotiqStatus, State
+from robotiq_async.core import Core
+from robotiq_async.machine import Machine, Trigger
+from robotiq_async.motion import Move
+from robotiq_async.registers import Registers
+from robotiq_async.simulator import SimulatedGripper
+
+POLL_S = 0.005
+
+
+class Outcome:
+    """What a caller was told; told twice is a failure."""
+
+    def __init__(self) -> None:
+        self.told: list[object] = []
+
+    def __call__(self, outcome: object) -> None:
+        self.told.append(outcome)
+        assert len(self.told) == 1, f"told twice: {self.told}"
+
+    @property
+    def is_told(self) -> bool:
+        return bool(self.told)
+
+    @property
+    def result(self) -> MoveResult:
+        assert isinstance(self.told[0], MoveResult), self.told
+        return self.told[0]
+
+    @property
+    def error(self) -> RobotiqError:
+        assert isinstance(self.told[0], RobotiqError), self.told
+        return self.told[0]
+
+
+class Bench:
+    """Steps the core and the gripper through cycles of write, acknowledgement and read."""
+
+    def __init__(self, *, device_cycle: float = 0.005, gripper: SimulatedGripper | None = None) -> None:
+        self.now = 100.0
+        self.gripper = gripper or SimulatedGripper(lambda: self.now, device_cycle=device_cycle)
+        self.transitions: list[tuple[State, State, Trigger]] = []
+        self.machine = Machine(lambda *change: self.transitions.append(change))
+        self.core = Core(self.machine, 128, 64)
+        self.written: list[Registers] = []
+        self.polls = 0
+
+    # -- the link --------------------------------------------------------------------------------------
+
+    def status(self) -> RobotiqStatus:
+        self.polls += 1
+        return RobotiqStatus(self.gripper.status_registers(), self.now, self.polls)
+
+    def connect(self, *, activate: bool = True) -> None:
+        self.core.found(self.status(), activate=activate)
+
+    def step(self, *, answer: bool = True) -> None:
+        """One cycle; without an answer the write arrives and the link goes down before it is known."""
+        self.now += POLL_S
+        request = self.core.take_request(self.now)
+        if request is not None:
+            self.written.append(request.registers)
+            self.gripper.write(0, request.registers)
+            if not answer:
+                self.core.lost(None)
+                return
+            self.core.acknowledged(self.now)
+        self.core.see(self.status())
+
+    def run(self, seconds: float) -> None:
+        for _ in range(round(seconds / POLL_S)):
+            self.step()
+
+    def until(self, condition: Callable[[], bool], seconds: float = 30.0) -> float:
+        """Step until something is true; returns how long it took."""
+        began = self.now
+        while not condition():
+            assert self.now - began < seconds, f"not within {seconds} s: {self.core.status!r}"
+            self.step()
+        return self.now - began
+
+    # -- a caller --------------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        self.connect()
+        self.until(lambda: self.state is State.RUNNING_IDLE)
+
+    @property
+    def state(self) -> State:
+        return self.machine.state
+
+    @property
+    def latest(self) -> RobotiqStatus:
+        assert self.core.status is not None
+        return self.core.status
+
+    def move(
+        self, position: int, axes: Finger = Finger.ABC, speed: int | None = None, force: int | None = None
+    ) -> tuple[Move, Outcome]:
+        outcome = Outcome()
+        move = Move(position, axes, self.now, outcome)
+        self.core.move(move, speed, force)
+        return move, outcome
+
+    def moved(self, position: int, axes: Finger = Finger.ABC, **options: int) -> MoveResult:
+        """A move, waited for."""
+        _, outcome = self.move(position, axes, **options)
+        self.until(lambda: outcome.is_told)
+        return outcome.result
+
+    def command(
+        self,
+        axes: Finger,
+        position: int | None = None,
+        speed: int | None = None,
+        force: int | None = None,
+    ) -> Outcome:
+        outcome = Outcome()
+        self.core.command(axes, position, speed, force, outcome)
+        return outcome
+
+    def halt(self) -> Outcome:
+        outcome = Outcome()
+        self.core.halt(outcome)
+        return outcome
+
+    def positions(self) -> dict[Finger, int]:
+        status = self.status()
+        return {axis: status.position(axis) for axis in (Finger.A, Finger.B, Finger.C, Finger.SCISSOR)}

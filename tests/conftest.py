@@ -1,0 +1,24 @@
+"""What every test relies on: nothing is left running, and the loop complains about what it sees."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator
+
+import pytest
+import pytest_asyncio
+
+
+@pytest_asyncio.fixture(autouse=True)
+async def nothing_left_running(caplog: pytest.LogCaptureFixture) -> AsyncIterator[None]:
+    """Fail a test that leaves a task behind or that the event loop had to complain about."""
+    caplog.set_level(logging.ERROR, logger="asyncio")
+    before = asyncio.all_tasks()
+    yield
+    left = [task for task in asyncio.all_tasks() - before - {asyncio.current_task()} if not task.done()]
+    for task in left:
+        task.cancel()
+    assert not left, f"tasks left running: {left}"
+    complaints = [record.getMessage() for record in caplog.records if record.name == "asyncio"]
+    assert not complaints, f"the event loop complained: {complaints}"
