@@ -1,0 +1,27 @@
+"""A simulated gripper, and servers that put it on a wire.
+
+=====================  ====================================================================
+module                 what it holds
+=====================  ====================================================================
+``gripper``            :class:`SimulatedGripper`: clock, registers, objects, faults, power
+``controller``         the firmware: activation, modes, release, faults, who drives which axis
+``control``            what a request asks of the axes, and the fixed sequences, as data
+``axis``               one axis: motion, stops, contacts, current
+``faults``             the faults that are present, and when they end
+``report``             the status registers
+``server``             :class:`SimulatorServer`: Modbus TCP
+``serial_server``      :class:`SerialSimulatorServer`: Modbus RTU on a serial line
+``endpoint``           what both servers have in common
+``bank``               which register is found at which address
+``connection``         one client; ``framing`` cuts its bytes into requests
+``replies``            lost, late and mangled replies
+=====================  ====================================================================
+
+The physics (the first six) import neither pymodbus nor asyncio.
+"""
+
+from .gripper import SimulatedGripper
+from .serial_server import SerialSimulatorServer
+from .server import SimulatorServer
+
+__all__ = ["SerialSimulatorServer", "SimulatedGripper", "SimulatorServer"]

@@ -1,0 +1,102 @@
+"""One client of a simulator: pymodbus's request handler, fed and drained by us."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol
+
+from pymodbus.pdu import ExceptionResponse
+from pymodbus.server.requesthandler import ServerRequestHandler
+
+from .framing import BadFrameError, Frame, refusal
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from pymodbus.server.base import ModbusBaseServer
+
+
+class Endpoint(Protocol):
+    """What a connection asks of the simulator it belongs to."""
+
+    @property
+    def answers_nobody(self) -> bool:
+        """Whether the gripper is without power."""
+
+    def take(self, inbox: bytearray) -> Frame | None:
+        """Cut the next request out of what has arrived."""
+
+    def is_addressed(self, unit: int) -> bool:
+        """Whether a unit id means this gripper."""
+
+    def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
+        """What to send for a reply, as a reply policy gives it."""
+
+
+class Connection(ServerRequestHandler):
+    """Hands pymodbus one request at a time and sends its replies as the endpoint's policy says.
+
+    pymodbus's own handler loses what arrives beside the request it works on, answers some malformed
+    requests with function code 0, and knows no misbehaviour.
+    """
+
+    def __init__(self, owner: ModbusBaseServer, endpoint: Endpoint) -> None:
+        """A connection that was just accepted."""
+        super().__init__(owner, None, None, None)  # type: ignore[no-untyped-call]
+        self._endpoint = endpoint
+        self._inbox = bytearray()
+        self._answering = False
+
+    def data_received(self, data: bytes) -> None:
+        """Take bytes from the client; a gripper without power does not even hear them."""
+        if not self._endpoint.answers_nobody:
+            self._inbox += data
+            self._answer_next()
+
+    def send(self, data: bytes, addr: tuple[Any, ...] | None = None) -> None:  # noqa: ARG002
+        """Send a reply, or what the policy makes of it, and go on with the next request."""
+        self._answering = False
+        parts = self._endpoint.deliver(data)
+        if parts is None:
+            self.hang_up()
+            return
+        for delay, part in parts:
+            if delay > 0:
+                self.loop.call_later(delay, self._write, part)
+            else:
+                self._write(part)
+        if self._inbox:
+            self.loop.call_soon(self._answer_next)
+
+    def hang_up(self) -> None:
+        """Drop the connection at once, with what has not been sent."""
+        if self.is_active():
+            self.transport.abort()  # type: ignore[attr-defined]
+            self.close()
+
+    def _answer_next(self) -> None:
+        """Hand over requests until one is being worked on or none is complete."""
+        while not self._answering and self.is_active():
+            try:
+                frame = self._endpoint.take(self._inbox)
+            except BadFrameError:
+                self.hang_up()
+                return
+            if frame is None:
+                return
+            if self._endpoint.is_addressed(frame.unit):
+                self._answer(frame)
+
+    def _answer(self, frame: Frame) -> None:
+        self._answering = True
+        if (code := refusal(frame.pdu)) is not None:
+            self.pdu_send(ExceptionResponse(frame.pdu[0], code, frame.unit, frame.transaction))
+            return
+        self.recv_buffer = b""
+        super().data_received(frame.raw)
+        if self.last_pdu is None:  # a wrong checksum: no answer, and what follows is suspect too
+            self._answering = False
+            self._inbox.clear()
+
+    def _write(self, part: bytes) -> None:
+        if self.is_active() and part:
+            self.transport.write(part)  # type: ignore[attr-defined]

@@ -1,0 +1,130 @@
+"""What the servers on either kind of link have in common: life, gripper and misbehaviour."""
+
+from __future__ import annotations
+
+import asyncio
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, Self
+
+from robotiq_async.checks import check_int
+
+from .connection import Connection
+from .gripper import SimulatedGripper
+from .replies import Replies, ReplyPolicy
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from types import TracebackType
+
+    from pymodbus.server.base import ModbusBaseServer
+
+    from .framing import Frame
+
+
+class SimulatorEndpoint(ABC):
+    """A simulated gripper on a link.
+
+    Attributes:
+        gripper: what answers. It keeps its state when the server is stopped and started again.
+        replies: the misbehaviour that is in force unless ``policy`` is replaced.
+        policy: decides what becomes of each reply.
+    """
+
+    def __init__(self, gripper: SimulatedGripper | None, device_id: int | None) -> None:
+        """A server that is not started.
+
+        Raises:
+            TypeError: device_id is not an int.
+            ValueError: device_id is outside 0..255.
+        """
+        self.gripper = SimulatedGripper() if gripper is None else gripper
+        self.replies = Replies()
+        self.policy: ReplyPolicy = self.replies
+        self._device_id = None if device_id is None else check_int("device_id", device_id, 0, 255)
+        self._server: ModbusBaseServer | None = None
+
+    async def __aenter__(self) -> Self:
+        await self.start()
+        return self
+
+    async def __aexit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        await self.stop()
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the server has been started and not stopped."""
+        return self._server is not None
+
+    @property
+    @abstractmethod
+    def address(self) -> str:
+        """What a client is given to find this gripper."""
+
+    async def start(self) -> None:
+        """Begin to answer.
+
+        Raises:
+            RuntimeError: it is running already.
+            OSError: the address or the serial port cannot be opened.
+        """
+        if self._server is not None:
+            raise RuntimeError(f"{type(self).__name__} is running already, at {self.address}")
+        self._server = await self._open()
+
+    async def stop(self) -> None:
+        """Drop all connections and stop listening. Bounded in time; without effect when it is not running."""
+        server, self._server = self._server, None
+        if server is None:
+            return
+        _hang_up(server)
+        server.close()
+        # Two turns of the loop: answers that pymodbus was working on end, and transports close their files.
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+
+    def cut(self) -> None:
+        """Drop all connections now; new ones are welcome.
+
+        Raises:
+            RuntimeError: the server is not running.
+        """
+        _hang_up(self._running())
+
+    @abstractmethod
+    async def _open(self) -> ModbusBaseServer:
+        """A pymodbus server that listens."""
+
+    def _running(self) -> ModbusBaseServer:
+        if self._server is None:
+            raise RuntimeError(f"{type(self).__name__} is not running: start() comes first")
+        return self._server
+
+    # What connections ask (see connection.Endpoint).
+
+    @property
+    def answers_nobody(self) -> bool:
+        """Whether the gripper is without power."""
+        return not self.gripper.is_powered
+
+    @abstractmethod
+    def take(self, inbox: bytearray) -> Frame | None:
+        """Cut the next request out of what has arrived."""
+
+    def is_addressed(self, unit: int) -> bool:
+        """Whether a unit id means this gripper; units in the field answer any."""
+        return self._device_id is None or unit == self._device_id
+
+    def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
+        """What to send for a reply."""
+        return self.policy(reply)
+
+
+def _hang_up(server: ModbusBaseServer) -> None:
+    for connection in list(server.active_connections.values()):
+        assert isinstance(connection, Connection)
+        connection.hang_up()

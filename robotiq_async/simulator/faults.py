@@ -1,0 +1,66 @@
+"""The faults that are present, and when they end."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from robotiq_async.enums import Fault, Severity
+
+BLOCKED_AFTER: Final = 20.0
+"""Seconds of interference on the scissor after which the minor fault becomes a major one (manual)."""
+
+_RANK: Final = {Severity.NONE: 0, Severity.PRIORITY: 1, Severity.MINOR: 2, Severity.MAJOR: 3}
+
+
+class PresentFaults:
+    """A set of faults with end times. Times are simulated seconds."""
+
+    def __init__(self) -> None:
+        """No fault."""
+        self._ends: dict[Fault, float] = {}
+        self._escalates_at = math.inf
+
+    def begin(self, fault: Fault, time: float, duration: float | None) -> None:
+        """Add a fault, for a while or (None) until it is cleared."""
+        self._ends[fault] = math.inf if duration is None else time + duration
+        if fault is Fault.SCISSOR_INTERFERENCE:
+            self._escalates_at = time + BLOCKED_AFTER
+
+    def clear(self) -> None:
+        """End every fault."""
+        self._ends.clear()
+        self._escalates_at = math.inf
+
+    @property
+    def changes_at(self) -> float:
+        """When the next fault ends or escalates."""
+        return min((self._escalates_at, *self._ends.values()))
+
+    def update(self, time: float) -> None:
+        """End what ends at this time; interference that has lasted 20 s becomes the major fault."""
+        self._ends = {fault: end for fault, end in self._ends.items() if end > time}
+        if Fault.SCISSOR_INTERFERENCE not in self._ends:
+            self._escalates_at = math.inf
+        elif self._escalates_at <= time:
+            del self._ends[Fault.SCISSOR_INTERFERENCE]
+            self.begin(Fault.SCISSOR_BLOCKED, time, None)
+            self._escalates_at = math.inf
+
+    @property
+    def worst(self) -> Fault:
+        """The most serious fault; NONE without any."""
+        return max(self._ends, key=lambda fault: _RANK[fault.severity], default=Fault.NONE)
+
+    @property
+    def stops_scissor(self) -> bool:
+        """Whether a minor or major fault keeps the scissor from moving."""
+        return any(fault.is_serious for fault in self._ends)
+
+    @property
+    def stops_fingers(self) -> bool:
+        """Whether a minor or major fault keeps the fingers from moving.
+
+        Interference on the scissor leaves the fingers alone as long as it is minor.
+        """
+        return any(fault.is_serious and fault is not Fault.SCISSOR_INTERFERENCE for fault in self._ends)

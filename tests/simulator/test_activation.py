@@ -1,0 +1,266 @@
+"""Activation, reset, device cycle, partial writes and power."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from robotiq_async.enums import AXES, Fault, Finger, Initialization, Mode, ObjectStatus
+from robotiq_async.request import AxisRequest, Request
+from robotiq_async.simulator import SimulatedGripper
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tests.simulator.conftest import Bench
+
+
+def test_activation_closes_and_opens_the_fingers(bench: Bench) -> None:
+    began = bench.now
+    bench.write(activate=True)
+    assert bench.status.initialization is Initialization.ACTIVATING
+    assert bench.status.activation_echo
+    assert not bench.status.is_moving
+    assert bench.gripper.is_moving
+    bench.settle()
+    assert bench.status.initialization is Initialization.COMPLETE
+    assert bench.gripper.travel(Finger.A) == 2 * 235
+    assert bench.positions == (6, 6, 6, 137)
+    assert 2 < bench.now - began < 20
+
+
+@pytest.mark.parametrize(("mode", "scissor"), [(0, 137), (1, 219), (2, 24), (3, 24)])
+def test_activation_takes_the_scissor_to_the_mode(bench: Bench, mode: int, scissor: int) -> None:
+    bench.activate(mode=Mode(mode))
+    assert bench.gripper.position(Finger.SCISSOR) == scissor
+    assert bench.status.mode == mode
+
+
+def test_activation_twice_without_reset_moves_nothing(active: Bench) -> None:
+    before = active.gripper.travel(Finger.A)
+    active.write(activate=True)
+    active.wait(5)
+    assert active.gripper.travel(Finger.A) == before
+
+
+def test_failed_activation(bench: Bench) -> None:
+    bench.gripper.fail_activation = True
+    bench.write(activate=True)
+    bench.settle()
+    assert bench.fault is Fault.ACTIVATION_FAULT
+    assert bench.status.initialization is Initialization.ACTIVATING
+    bench.go(255)
+    bench.wait(5)
+    assert not bench.gripper.is_moving
+    assert bench.fault is Fault.ACTIVATION_FAULT
+    bench.write(activate=False, go=False)
+    assert bench.fault is Fault.NONE
+    assert not bench.gripper.fail_activation
+    bench.activate()
+
+
+def test_a_request_during_activation_waits_for_it(bench: Bench) -> None:
+    bench.write(activate=True)
+    bench.go(200)
+    assert bench.fault is Fault.ACTIVATION_PENDING
+    assert bench.words == (0x19, 0x00)
+    bench.settle()
+    assert bench.fault is Fault.NONE
+    assert bench.positions[:3] == (200, 200, 200)
+
+
+def test_a_go_without_activation(bench: Bench) -> None:
+    bench.go(255)
+    bench.wait(5)
+    assert bench.fault is Fault.NOT_ACTIVATED
+    assert bench.positions == (6, 6, 6, 137)
+    bench.write(go=False)
+    assert bench.fault is Fault.NONE
+
+
+def test_reset_stops_at_once_and_clears(active: Bench) -> None:
+    active.go(255)
+    active.wait(1)
+    active.write(activate=False, go=False)
+    stopped_at = active.positions
+    status = active.status
+    assert active.words == (0, 0)
+    assert not status.activation_echo
+    assert status.is_reset
+    active.wait(5)
+    assert active.positions == stopped_at
+    assert not active.gripper.is_moving
+
+
+def test_reset_during_activation(bench: Bench) -> None:
+    bench.write(activate=True)
+    bench.wait(1)
+    bench.write(activate=False)
+    assert bench.words == (0, 0)
+    assert not bench.gripper.is_moving
+
+
+def test_rewriting_the_image_changes_nothing(active: Bench) -> None:
+    active.gripper.place_object(Finger.B, 100)
+    active.close()
+    before = active.gripper.status_registers()
+    for _ in range(5):
+        active.write()
+        active.wait(1)
+    assert active.gripper.status_registers() == before
+
+
+# Device cycle and partial writes.
+
+
+def test_a_write_takes_effect_one_cycle_later(make_bench: Callable[..., Bench]) -> None:
+    bench = make_bench(device_cycle=0.25)
+    image = Request(activate=True, individual_fingers=False, individual_scissor=False).registers
+    bench.gripper.write(0, image)
+    assert bench.gripper.request_registers == image
+    assert bench.gripper.status_registers()[0] == 0
+    bench.wait(0.249)
+    assert bench.gripper.status_registers()[0] == 0
+    bench.wait(0.001)
+    assert bench.gripper.status_registers()[0] == 0x1100
+
+
+def test_writes_within_one_cycle_take_effect_one_after_the_other(make_bench: Callable[..., Bench]) -> None:
+    bench = make_bench(device_cycle=1.0)
+    echoes = []
+    for position in (10, 20, 30):
+        bench.gripper.write(1, [position])
+        bench.wait(0.25)
+    for _ in range(6):
+        echoes.append(bench.status.requested_position(Finger.A))
+        bench.wait(0.125)
+    assert echoes == [0, 0, 10, 10, 20, 20]
+
+
+def test_without_a_device_cycle_a_write_takes_effect_at_once() -> None:
+    gripper = SimulatedGripper(lambda: 0.0, device_cycle=0)
+    gripper.write(0, [0x0100])
+    assert gripper.status_registers()[0] == 0x1100
+
+
+def test_partial_writes_keep_the_other_registers(bench: Bench) -> None:
+    bench.gripper.write(0, [0x0100, 1, 2, 3, 4, 5, 6, 7])
+    bench.gripper.write(2, [0xAAAA, 0xBBBB])
+    bench.gripper.write(7, [0xCCCC])
+    assert bench.gripper.request_registers == (0x0100, 1, 0xAAAA, 0xBBBB, 4, 5, 6, 0xCCCC)
+
+
+def test_writes_are_recorded_with_their_time(bench: Bench) -> None:
+    bench.gripper.write(0, [0x0100])
+    bench.wait(1)
+    bench.gripper.write(1, [0x00FF])
+    assert bench.gripper.writes == (
+        (1000.0, (0x0100, 0, 0, 0, 0, 0, 0, 0)),
+        (1001.0, (0x0100, 0x00FF, 0, 0, 0, 0, 0, 0)),
+    )
+
+
+@pytest.mark.parametrize(
+    ("offset", "registers", "error", "message"),
+    [
+        (-1, [0], ValueError, "address_offset"),
+        (8, [0], ValueError, "address_offset"),
+        (1, [0] * 8, ValueError, r"expected 1\.\.7"),
+        (0, [], ValueError, "expected 1"),
+        (0, [0x10000], ValueError, "registers"),
+        (0, [1.0], TypeError, "registers"),
+    ],
+)
+def test_bad_writes_change_nothing(
+    bench: Bench, offset: int, registers: list[int], error: type[Exception], message: str
+) -> None:
+    with pytest.raises(error, match=message):
+        bench.gripper.write(offset, registers)
+    assert bench.gripper.request_registers == (0,) * 8
+    assert bench.gripper.writes == ()
+
+
+# Power.
+
+
+def test_power_cycle_loses_everything_but_the_position(individual: Bench) -> None:
+    individual.close(100)
+    individual.gripper.power_cycle()
+    assert individual.words == (0, 0)
+    assert individual.gripper.request_registers == (0,) * 8
+    assert individual.positions == (100, 100, 100, 100)
+    individual.write(activate=True)
+    assert individual.status.initialization is Initialization.ACTIVATING
+
+
+def test_power_cycle_stops_motion_and_forgets_pending_writes(active: Bench) -> None:
+    active.go(255)
+    active.wait(0.5)
+    active.gripper.write(0, [0x0100])
+    active.gripper.power_cycle()
+    before = active.positions
+    active.wait(5)
+    assert active.positions == before
+    assert active.words == (0, 0)
+
+
+def test_writes_without_power_are_lost(active: Bench) -> None:
+    active.gripper.power_cycle(off_time=2.0)
+    assert not active.gripper.is_powered
+    assert active.gripper.status_registers() == (0,) * 8
+    active.write(activate=True)
+    assert active.gripper.request_registers == (0,) * 8
+    active.wait(2)
+    assert active.gripper.is_powered
+    assert active.words == (0, 0)
+
+
+def test_power_cycle_clears_faults(active: Bench) -> None:
+    active.gripper.inject_fault(Fault.ACTIVATION_FAULT)
+    active.gripper.power_cycle()
+    assert active.fault is Fault.NONE
+
+
+def test_a_gripper_that_is_not_switched_on(make_bench: Callable[..., Bench]) -> None:
+    bench = make_bench(powered=False)
+    bench.wait(1e6)
+    assert not bench.gripper.is_powered
+    bench.gripper.power_on()
+    bench.activate()
+
+
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        ({"device_cycle": -0.1}, ValueError),
+        ({"device_cycle": "1"}, TypeError),
+        ({"speedup": 0}, ValueError),
+        ({"speedup": float("inf")}, ValueError),
+        ({"scissor_limit": (0, 100)}, ValueError),
+        ({"scissor_limit": (100, 99)}, ValueError),
+    ],
+)
+def test_bad_options(
+    make_bench: Callable[..., Bench], options: dict[str, object], error: type[Exception]
+) -> None:
+    with pytest.raises(error, match=next(iter(options))):
+        make_bench(**options)
+
+
+def test_inspection_takes_one_axis(bench: Bench) -> None:
+    for ask in (bench.gripper.position, bench.gripper.target, bench.gripper.travel):
+        with pytest.raises(ValueError, match="finger"):
+            ask(Finger.ABC)
+
+
+def test_the_first_command_after_activation_moves_the_addressed_axis_only(bench: Bench) -> None:
+    bench.activate(individual_fingers=True, individual_scissor=True)
+    here = {axis: bench.gripper.travel(axis) for axis in AXES}
+    bench.write(
+        go=True,
+        axes=tuple(AxisRequest(90 if axis is Finger.C else bench.gripper.position(axis)) for axis in AXES),
+    )
+    bench.settle()
+    assert [axis for axis in AXES if bench.gripper.travel(axis) != here[axis]] == [Finger.C]
+    assert set(bench.outcomes) == {ObjectStatus.AT_POSITION}

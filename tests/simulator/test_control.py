@@ -1,0 +1,180 @@
+"""Simple control, individual control and the modes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from robotiq_async.enums import AXES, Fault, Finger, Initialization, Mode, ObjectStatus
+from robotiq_async.request import AxisRequest
+
+if TYPE_CHECKING:
+    from tests.simulator.conftest import Bench
+
+
+def test_simple_control_lets_a_drive_all_fingers(active: Bench) -> None:
+    active.go({Finger.A: 200, Finger.B: 30, Finger.C: 40})
+    active.settle()
+    assert active.positions == (200, 200, 200, 137)
+
+
+def test_the_echoes_of_simple_control_are_the_own_registers(active: Bench) -> None:
+    """The trap: B and C stand at 200 and echo what nobody drives them to."""
+    active.go({Finger.A: 200, Finger.B: 30, Finger.C: 40, Finger.SCISSOR: 50})
+    active.settle()
+    assert [active.status.requested_position(axis) for axis in AXES] == [200, 30, 40, 50]
+
+
+def test_simple_control_uses_speed_and_force_of_a(active: Bench) -> None:
+    active.write(axes=(AxisRequest(0, 0, 0), AxisRequest(0, 255, 0), AxisRequest(0, 255, 0), AxisRequest()))
+    active.go({Finger.A: 200}, speed=0)
+    active.wait(5)
+    assert len(set(active.positions[:3])) == 1
+    assert active.gripper.is_moving
+
+
+def test_raising_individual_control_under_go_hands_over_at_once(active: Bench) -> None:
+    active.go({Finger.A: 200, Finger.B: 30, Finger.C: 40, Finger.SCISSOR: 50})
+    active.settle()
+    active.write(individual_fingers=True)
+    assert active.gripper.is_moving
+    active.settle()
+    assert active.positions == (200, 30, 40, 137)
+    active.write(individual_scissor=True)
+    active.settle()
+    assert active.positions == (200, 30, 40, 50)
+
+
+def test_raising_individual_control_with_loaded_registers_moves_nothing(active: Bench) -> None:
+    active.go(200)
+    active.settle()
+    active.write(axes=tuple(AxisRequest(active.gripper.position(axis)) for axis in AXES))
+    before = [active.gripper.travel(axis) for axis in AXES]
+    active.write(individual_fingers=True, individual_scissor=True)
+    active.wait(5)
+    assert [active.gripper.travel(axis) for axis in AXES] == before
+
+
+def test_individual_axes_go_their_own_ways(individual: Bench) -> None:
+    individual.go({Finger.A: 50, Finger.B: 100, Finger.C: 150, Finger.SCISSOR: 200})
+    individual.settle()
+    assert individual.positions == (50, 100, 150, 200)
+
+
+@pytest.mark.parametrize(("mode", "scissor"), [(Mode.PINCH, 219), (Mode.WIDE, 24), (Mode.SCISSOR, 24)])
+def test_mode_change_opens_first_and_returns(active: Bench, mode: Mode, scissor: int) -> None:
+    active.close(100)
+    active.write(mode=mode)
+    status = active.status
+    assert status.initialization is Initialization.CHANGING_MODE
+    assert status.fault is Fault.MODE_CHANGE_PENDING
+    assert not status.is_moving
+    active.wait(0.3)
+    assert active.positions[0] < 100
+    assert active.positions[3] == 137, "the scissor waits for the fingers"
+    while active.status.initialization is Initialization.CHANGING_MODE:
+        assert not (active.positions[0] > 6 and active.positions[3] != 137)
+        active.wait(0.05)
+    assert active.fault is Fault.NONE
+    active.settle()
+    if mode is not Mode.SCISSOR:
+        assert active.positions == (100, 100, 100, scissor)
+
+
+def test_mode_change_without_go_leaves_the_fingers_open(active: Bench) -> None:
+    active.close(100)
+    active.write(go=False, mode=Mode.WIDE)
+    assert active.fault is Fault.NONE
+    active.settle()
+    assert active.positions == (6, 6, 6, 24)
+    assert active.words == (0x35, 0x00)
+
+
+def test_pinch_mode_closes_to_113(active: Bench) -> None:
+    active.write(mode=Mode.PINCH)
+    active.settle()
+    active.close()
+    assert active.positions == (113, 113, 113, 219)
+    assert active.outcomes == (ObjectStatus.AT_POSITION,) * 4
+
+
+def test_scissor_mode_grips_with_the_scissor_alone(active: Bench) -> None:
+    active.write(mode=Mode.SCISSOR)
+    active.settle()
+    fingers = [active.gripper.travel(axis) for axis in AXES[:3]]
+    active.close()
+    assert active.positions == (6, 6, 6, 232)
+    assert active.outcomes == (ObjectStatus.AT_POSITION,) * 4
+    active.close(0)
+    assert active.positions == (6, 6, 6, 24)
+    assert [active.gripper.travel(axis) for axis in AXES[:3]] == fingers
+
+
+def test_scissor_mode_leaves_the_fingers_where_they_are(active: Bench) -> None:
+    active.write(mode=Mode.SCISSOR)
+    active.settle()
+    active.go({Finger.A: 50, Finger.B: 100, Finger.C: 150}, individual_fingers=True)
+    active.settle()
+    active.go(255, individual_fingers=False)
+    active.settle()
+    assert active.positions == (50, 100, 150, 232)
+
+
+def test_scissor_mode_feels_an_object(active: Bench) -> None:
+    active.write(mode=Mode.SCISSOR)
+    active.settle()
+    active.gripper.place_object(Finger.SCISSOR, 150)
+    active.close()
+    assert active.positions[3] == 150
+    assert active.outcomes[3] is ObjectStatus.CONTACT_CLOSING
+
+
+def test_the_mode_is_ignored_under_individual_scissor_control(individual: Bench) -> None:
+    before = individual.positions
+    individual.write(mode=Mode.PINCH)
+    individual.wait(5)
+    assert individual.positions == before
+    assert individual.status.initialization is Initialization.COMPLETE
+    assert individual.status.mode is Mode.PINCH
+
+
+def test_giving_the_scissor_back_to_the_mode_is_a_mode_change(individual: Bench) -> None:
+    individual.write(individual_scissor=False, mode=Mode.WIDE)
+    assert individual.status.initialization is Initialization.CHANGING_MODE
+    individual.settle()
+    assert individual.positions[3] == 24
+
+
+def test_another_mode_on_the_way_replaces_the_first(active: Bench) -> None:
+    active.write(mode=Mode.PINCH)
+    active.wait(0.1)
+    active.write(mode=Mode.WIDE)
+    active.settle()
+    assert active.positions[3] == 24
+
+
+def test_individual_scissor_control_abandons_a_mode_change(active: Bench) -> None:
+    active.go(6)
+    active.write(mode=Mode.PINCH)
+    active.wait(0.1)
+    assert active.positions[3] > 137
+    active.go({Finger.SCISSOR: 50}, individual_scissor=True)
+    assert active.status.initialization is Initialization.COMPLETE
+    active.settle()
+    assert active.positions[3] == 50
+
+
+def test_a_mode_change_during_activation_follows_it(bench: Bench) -> None:
+    bench.write(activate=True)
+    bench.write(mode=Mode.PINCH)
+    bench.settle()
+    assert bench.positions == (6, 6, 6, 219)
+    assert bench.status.initialization is Initialization.COMPLETE
+
+
+def test_leaving_pinch_gives_the_fingers_their_stroke_back(bench: Bench) -> None:
+    bench.activate(mode=Mode.PINCH)
+    bench.go(255, mode=Mode.BASIC)
+    bench.settle()
+    assert bench.positions == (241, 241, 241, 137)

@@ -1,0 +1,207 @@
+"""How far, how fast, and where the axes end."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from statistics import mean
+from typing import TYPE_CHECKING
+
+import pytest
+
+from robotiq_async.closing_time import CLOSED_READING, OPEN_READING, STROKE_COUNTS, closing_time
+from robotiq_async.enums import AXES, Finger, ObjectStatus
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tests.simulator.conftest import Bench
+
+_TABLE = Path(__file__).parent.parent / "data" / "closing_time_ms.csv"
+
+
+def _measured() -> dict[int, float]:
+    """Seconds of a full closing by speed value: thesis, table A1.1, mean of three runs."""
+    with _TABLE.open(newline="") as table:
+        return {
+            int(row["speed_value"]): mean(int(row[f"run_{run}_ms"]) for run in (1, 2, 3)) / 1000
+            for row in csv.DictReader(table)
+        }
+
+
+MEASURED = _measured()
+
+
+@pytest.mark.parametrize(("speed", "seconds"), MEASURED.items())
+def test_full_closing_takes_as_long_as_measured(active: Bench, speed: int, seconds: float) -> None:
+    began = active.now
+    active.go(255, speed=speed)
+    while active.status.is_moving:
+        active.wait(0.001)
+    assert active.now - began == pytest.approx(seconds, rel=0.01)
+    assert active.gripper.position(Finger.A) >= 240
+
+
+def test_closing_time_between_the_measured_values() -> None:
+    assert closing_time(2) == pytest.approx((closing_time(0) + closing_time(4)) / 2)
+    assert closing_time(253) == pytest.approx((2 * closing_time(252) + closing_time(255)) / 3)
+    assert closing_time(254) == pytest.approx((closing_time(252) + 2 * closing_time(255)) / 3)
+
+
+def test_closing_time_falls_with_the_speed() -> None:
+    times = [closing_time(speed) for speed in range(256)]
+    assert times == sorted(times, reverse=True)
+    assert len(set(times)) == 256
+
+
+@pytest.mark.parametrize("speed", [-1, 256])
+def test_closing_time_range(speed: int) -> None:
+    with pytest.raises(ValueError, match=r"speed must be in 0\.\.255"):
+        closing_time(speed)
+
+
+def test_stroke() -> None:
+    assert STROKE_COUNTS == CLOSED_READING - OPEN_READING == 235
+
+
+@pytest.mark.parametrize(
+    ("asked", "reading"), [(0, 6), (6, 6), (7, 7), (100, 100), (240, 240), (241, 241), (255, 241)]
+)
+def test_finger_readings(individual: Bench, asked: int, reading: int) -> None:
+    individual.close(100 if asked < 100 else 50)
+    individual.go({Finger.A: asked})
+    individual.settle()
+    status = individual.status
+    assert status.position(Finger.A) == reading
+    assert status.requested_position(Finger.A) == asked
+    assert status.finger_status(Finger.A) is ObjectStatus.AT_POSITION
+
+
+@pytest.mark.parametrize(("asked", "reading"), [(0, 24), (24, 24), (100, 100), (232, 232), (255, 232)])
+def test_scissor_readings(individual: Bench, asked: int, reading: int) -> None:
+    individual.go({Finger.SCISSOR: asked})
+    individual.settle()
+    status = individual.status
+    assert status.position(Finger.SCISSOR) == reading
+    assert status.requested_position(Finger.SCISSOR) == asked
+    assert status.finger_status(Finger.SCISSOR) is ObjectStatus.AT_POSITION
+
+
+def test_a_limit_replaces_the_request_and_the_echo_keeps_it(make_bench: Callable[..., Bench]) -> None:
+    bench = make_bench(scissor_limit=(100, 150))
+    bench.activate_individually()
+    bench.go({Finger.SCISSOR: 220})
+    bench.settle()
+    assert bench.gripper.target(Finger.SCISSOR) == 150
+    assert bench.status.position(Finger.SCISSOR) == 150
+    assert bench.status.requested_position(Finger.SCISSOR) == 220
+    assert bench.status.finger_status(Finger.SCISSOR) is ObjectStatus.AT_POSITION
+
+
+def test_a_new_target_on_the_way_turns_the_finger_round(individual: Bench) -> None:
+    individual.go({Finger.A: 255})
+    individual.wait(1)
+    turned_at = individual.gripper.position(Finger.A)
+    individual.go({Finger.A: 6})
+    individual.settle()
+    assert individual.gripper.position(Finger.A) == 6
+    assert individual.gripper.travel(Finger.A) > 2 * (turned_at - 6)
+
+
+def test_a_new_speed_on_the_way_counts_from_there(individual: Bench) -> None:
+    began = individual.now
+    individual.go({Finger.A: 241}, speed=0)
+    individual.wait(2)
+    way_left = 241 - individual.gripper.position(Finger.A)
+    individual.go({Finger.A: 241}, speed=255)
+    individual.settle()
+    expected = 2 + way_left / STROKE_COUNTS * closing_time(255)
+    assert individual.now - began == pytest.approx(expected, abs=0.1)
+
+
+def test_halt_stops_where_the_finger_is(active: Bench) -> None:
+    active.go(255)
+    active.wait(1)
+    active.write(go=False)
+    stopped_at = active.positions
+    assert 7 < stopped_at[0] < 240
+    active.wait(10)
+    assert active.positions == stopped_at
+    assert not active.gripper.is_moving
+    assert not active.status.is_moving
+
+
+def test_going_again_resumes(active: Bench) -> None:
+    active.go(255)
+    active.wait(1)
+    active.write(go=False)
+    active.wait(1)
+    active.write(go=True)
+    active.settle()
+    assert active.positions[:3] == (241, 241, 241)
+
+
+def test_retargeting_to_the_reading_moves_nothing(individual: Bench) -> None:
+    """What a hand does to an axis it does not address."""
+    individual.go(200)
+    individual.wait(0.777)
+    individual.write(go=False)
+    before = [individual.gripper.travel(axis) for axis in AXES]
+    individual.go({axis: individual.gripper.position(axis) for axis in AXES})
+    individual.wait(5)
+    assert [individual.gripper.travel(axis) for axis in AXES] == before
+    assert set(individual.outcomes) == {ObjectStatus.AT_POSITION}
+
+
+def test_only_the_commanded_axis_moves(individual: Bench) -> None:
+    before = {axis: individual.gripper.travel(axis) for axis in AXES}
+    individual.go({Finger.B: 100})
+    individual.settle()
+    moved = {axis for axis in AXES if individual.gripper.travel(axis) != before[axis]}
+    assert moved == {Finger.B}
+    assert individual.gripper.travel(Finger.B) == before[Finger.B] + 94
+
+
+def test_target_and_position_are_inspected_while_moving(individual: Bench) -> None:
+    individual.go({Finger.A: 255})
+    assert individual.gripper.is_moving
+    assert individual.gripper.target(Finger.A) == 241
+    individual.wait(1)
+    assert 6 < individual.gripper.position(Finger.A) < 241
+    individual.write(go=False)
+    assert individual.gripper.target(Finger.A) == individual.gripper.position(Finger.A)
+
+
+def test_current_at_rest_moving_and_gripping(individual: Bench) -> None:
+    gripper = individual.gripper
+    assert individual.status.current(Finger.A) == 0
+    individual.go({Finger.A: 255}, speed=0)
+    slow = individual.status.current(Finger.A)
+    individual.go({Finger.A: 255}, speed=255)
+    fast = individual.status.current(Finger.A)
+    assert 5 <= slow < fast <= 30
+    gripper.place_object(Finger.A, 200)
+    individual.settle()
+    weak = individual.status.current(Finger.A)
+    individual.go({Finger.A: 255}, force=255)
+    strong = individual.status.current(Finger.A)
+    assert 10 <= weak < strong <= 120
+    individual.write(go=False)
+    assert individual.status.current(Finger.A) == 0
+
+
+def test_speedup(make_bench: Callable[..., Bench]) -> None:
+    bench = make_bench(speedup=10.0, device_cycle=0)
+    bench.write(activate=True)
+    bench.settle()
+    began = bench.now
+    bench.go(255, speed=128)
+    while bench.gripper.is_moving:
+        bench.wait(0.001)
+    assert bench.now - began == pytest.approx(closing_time(128) / 10, abs=0.002)
+
+
+def test_a_clock_that_stands_still_stops_everything(active: Bench) -> None:
+    active.go(255)
+    before = active.gripper.status_registers()
+    assert all(active.gripper.status_registers() == before for _ in range(100))

@@ -1,0 +1,197 @@
+"""The simulated gripper on a serial line: a pseudo terminal, and RTU frames made by hand."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import struct
+from typing import TYPE_CHECKING
+
+import pytest
+
+from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
+from robotiq_async.simulator.framing import Frame, take_rtu
+from robotiq_async.status import RobotiqStatus
+
+pytest.importorskip("serial")
+pty = pytest.importorskip("pty")
+tty = pytest.importorskip("tty")
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Iterator
+
+
+def with_crc(frame: bytes) -> bytes:
+    """The frame and its CRC-16/MODBUS, low byte first."""
+    crc = 0xFFFF
+    for byte in frame:
+        crc ^= byte
+        for _ in range(8):
+            crc = crc >> 1 ^ (0xA001 if crc & 1 else 0)
+    return frame + crc.to_bytes(2, "little")
+
+
+def test_the_checksum_itself() -> None:
+    assert with_crc(b"123456789")[-2:] == (0x4B37).to_bytes(2, "little")
+
+
+class Line:
+    """A pseudo terminal: the simulator opens the port, the test holds the other end."""
+
+    def __init__(self) -> None:
+        self.master, self.slave = os.openpty()
+        tty.setraw(self.master)
+        tty.setraw(self.slave)
+        os.set_blocking(self.master, False)
+        self.port = os.ttyname(self.slave)
+
+    def send(self, frame: bytes) -> None:
+        os.write(self.master, frame)
+
+    async def receive(self, size: int) -> bytes:
+        """Exactly this many bytes."""
+        loop = asyncio.get_running_loop()
+        arrived = asyncio.Event()
+        loop.add_reader(self.master, arrived.set)
+        data = b""
+        try:
+            async with asyncio.timeout(5):
+                while len(data) < size:
+                    arrived.clear()
+                    await arrived.wait()
+                    data += os.read(self.master, size - len(data))
+        finally:
+            loop.remove_reader(self.master)
+        return data
+
+    async def ask(self, pdu: bytes, answer_size: int, unit: int = 9) -> bytes:
+        """The PDU that answers, checked."""
+        self.send(with_crc(bytes([unit]) + pdu))
+        answer = await self.receive(1 + answer_size + 2)
+        assert answer == with_crc(answer[:-2])
+        assert answer[0] == unit
+        return answer[1:-2]
+
+    async def read_status(self) -> RobotiqStatus:
+        answer = await self.ask(bytes.fromhex("03 07d0 0008"), 18)
+        assert answer[:2] == b"\x03\x10"
+        return RobotiqStatus.from_registers(struct.unpack(">8H", answer[2:]))
+
+    def close(self) -> None:
+        os.close(self.master)
+        os.close(self.slave)
+
+
+class AttentiveServer(SerialSimulatorServer):
+    """Tells when it has dealt with all that was sent: a serial line has no packets to tell requests apart."""
+
+    def __init__(self, port: str, gripper: SimulatedGripper) -> None:
+        super().__init__(port, gripper)
+        self.heard = asyncio.Event()
+
+    def take(self, inbox: bytearray) -> Frame | None:
+        frame = super().take(inbox)
+        if not inbox:
+            self.heard.set()
+        return frame
+
+
+@pytest.fixture
+def line() -> Iterator[Line]:
+    line = Line()
+    yield line
+    line.close()
+
+
+@pytest.fixture
+async def server(line: Line) -> AsyncIterator[AttentiveServer]:
+    async with AttentiveServer(line.port, SimulatedGripper(speedup=100.0)) as server:
+        yield server
+
+
+async def test_activation(server: AttentiveServer, line: Line) -> None:
+    write = bytes.fromhex("10 03e8 0008 10 0100 0000 0000 0000 0000 0000 0000 0000")
+    assert await line.ask(write, 5) == bytes.fromhex("10 03e8 0008")
+    while not (await line.read_status()).is_activated:
+        pass
+    assert server.gripper.request_registers[0] == 0x0100
+
+
+async def test_partial_write_and_read_back(server: AttentiveServer, line: Line) -> None:
+    assert await line.ask(bytes.fromhex("10 03ea 0002 04 aaaa bbbb"), 5) == bytes.fromhex("10 03ea 0002")
+    assert await line.ask(bytes.fromhex("06 03eb 1234"), 5) == bytes.fromhex("06 03eb 1234")
+    assert await line.ask(bytes.fromhex("03 03ea 0002"), 6) == bytes.fromhex("03 04 aaaa 1234")
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        with_crc(bytes.fromhex("09 05 0000 ff00")),
+        with_crc(bytes.fromhex("09 03 07d0 0009")),
+        with_crc(bytes.fromhex("09 06 07d0 0001")),
+        with_crc(bytes.fromhex("09 03 07d0 0000")),
+        bytes.fromhex("09 03 07d0 0008 0000"),
+        bytes.fromhex("ff ff ff"),
+    ],
+)
+async def test_a_bad_request_gets_no_answer(server: AttentiveServer, line: Line, frame: bytes) -> None:
+    line.send(frame)
+    await asyncio.wait_for(server.heard.wait(), 5)
+    assert (await line.read_status()).is_reset
+
+
+async def test_a_wrong_checksum_takes_along_what_follows(server: AttentiveServer, line: Line) -> None:
+    line.send(bytes.fromhex("09 03 07d0 0008 0000 09 03"))
+    await asyncio.wait_for(server.heard.wait(), 5)
+    assert (await line.read_status()).is_reset
+
+
+@pytest.mark.parametrize("request_", ["09 03 07d0 0008", "09 06 03e8 0100", "09 10 03e8 0001 02 0100"])
+def test_a_request_in_single_bytes(request_: str) -> None:
+    whole = with_crc(bytes.fromhex(request_))
+    inbox = bytearray()
+    frames = []
+    for byte in whole:
+        inbox.append(byte)
+        frames.append(take_rtu(inbox))
+    assert frames[:-1] == [None] * (len(whole) - 1)
+    assert frames[-1] == (whole, 9, 0, whole[1:-2])
+    assert not inbox
+
+
+async def test_only_the_own_unit_is_answered(line: Line) -> None:
+    async with SerialSimulatorServer(line.port, device_id=9):
+        line.send(with_crc(bytes.fromhex("08 03 07d0 0008")))
+        assert (await line.read_status()).is_reset
+
+
+async def test_misbehaviour(server: AttentiveServer, line: Line) -> None:
+    server.replies.drop()
+    line.send(with_crc(bytes.fromhex("09 06 03e9 1234")))
+    assert await line.ask(bytes.fromhex("03 03e9 0001"), 4) == bytes.fromhex("03 02 1234")
+
+
+async def test_life(line: Line) -> None:
+    server = SerialSimulatorServer(line.port)
+    assert server.address == f"rtu://{line.port}"
+    await server.start()
+    with pytest.raises(RuntimeError, match="running already"):
+        await server.start()
+    await server.stop()
+    await server.stop()
+    await server.start()
+    assert (await line.read_status()).is_reset
+    await server.stop()
+
+
+async def test_a_port_that_does_not_exist() -> None:
+    server = SerialSimulatorServer("/dev/no-such-port")
+    with pytest.raises(OSError, match="no-such-port"):
+        await server.start()
+    assert not server.is_running
+
+
+async def test_without_pyserial(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+    with pytest.raises(ImportError, match=r"robotiq-async\[serial\]"):
+        await SerialSimulatorServer(line.port).start()
