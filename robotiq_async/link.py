@@ -47,6 +47,14 @@ if _pymodbus_log.level == logging.NOTSET:
     _pymodbus_log.setLevel(logging.CRITICAL + 1)
 
 
+class _ExchangeEndedError(Exception):
+    """Carries the reason through pymodbus, which would take a TimeoutError for its own."""
+
+    def __init__(self, reason: RobotiqConnectionError) -> None:
+        self.reason = reason
+        super().__init__(str(reason))
+
+
 @runtime_checkable
 class Transport(Protocol):
     """What a hand needs of a link. Pass an object of this shape instead of an address for other buses.
@@ -182,11 +190,7 @@ class ModbusTransport:
         response = await self._exchange(
             lambda: read(self._map.status, count=count, device_id=self._map.device_id)
         )
-        registers = tuple(response.registers)
-        if len(registers) != count:
-            self._drop()
-            raise ProtocolError(f"{len(registers)} registers instead of {count}")
-        return registers
+        return tuple(response.registers)
 
     def _connected(self) -> AsyncModbusTcpClient | AsyncModbusSerialClient:
         if self._failure is not None:
@@ -203,9 +207,9 @@ class ModbusTransport:
         watchdog = self._watch()
         try:
             response = await send()
-        except RobotiqConnectionError:
+        except _ExchangeEndedError as ended:
             self._drop()
-            raise
+            raise ended.reason from None
         except ModbusException as error:
             self._drop()
             raise ConnectionLostError(str(error)) from error
@@ -249,7 +253,7 @@ class ModbusTransport:
             return
         future = client.ctx.response_future
         if self._expected is not None and not future.done():
-            future.set_exception(error)
+            future.set_exception(_ExchangeEndedError(error))
         elif self._failure is None:
             self._failure = error
 

@@ -1,0 +1,98 @@
+"""The hand on a serial line: pseudo-terminals and the simulator's RTU server."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+import pytest_asyncio
+
+from robotiq_async import ConnectFailedError, ConnectionLostError, Fault, Finger, RobotiqHand, State
+from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
+from tests.hand.conftest import Clock
+from tests.serial_line import SerialLine
+
+A = Finger.A
+
+
+@pytest_asyncio.fixture
+async def line(tmp_path: Path) -> AsyncIterator[SerialLine]:
+    with SerialLine(tmp_path) as line:
+        yield line
+
+
+@pytest_asyncio.fixture
+async def serial_server(line: SerialLine, clock: Clock) -> AsyncIterator[SerialSimulatorServer]:
+    async with SerialSimulatorServer(line.far, SimulatedGripper(clock, speedup=10)) as server:
+        yield server
+
+
+@pytest_asyncio.fixture
+async def serial_hand(
+    line: SerialLine, serial_server: SerialSimulatorServer
+) -> AsyncIterator[RobotiqHand]:
+    async with RobotiqHand(f"rtu://{line.near}", response_timeout=0.1) as hand:
+        yield hand
+
+
+async def test_a_move_over_a_serial_line(
+    serial_hand: RobotiqHand, serial_server: SerialSimulatorServer
+) -> None:
+    serial_server.gripper.place_object(Finger.B, 100)
+    result = await serial_hand.move(200, speed=255)
+    assert result.contacts == Finger.B
+    assert result.positions[A] == pytest.approx(200, abs=2)
+    assert serial_hand.statistics.reconnects == 0
+
+
+async def test_no_such_port(tmp_path: Path) -> None:
+    hand = RobotiqHand(f"rtu://{tmp_path}/ttyNONE")
+    with pytest.raises(ConnectFailedError):
+        await hand.start()
+
+
+async def test_nobody_on_the_line(line: SerialLine) -> None:
+    hand = RobotiqHand(f"rtu://{line.near}", response_timeout=0.1)
+    began = time.monotonic()
+    with pytest.raises(ConnectFailedError):
+        await hand.start()
+    assert time.monotonic() - began < 5
+
+
+async def test_a_pulled_line_comes_back(
+    serial_hand: RobotiqHand, serial_server: SerialSimulatorServer, line: SerialLine
+) -> None:
+    moving = asyncio.create_task(serial_hand.move(255, speed=0))
+    await serial_hand.wait_for_state(State.RUNNING_CC)
+    async for _ in serial_hand.statuses():
+        if serial_server.gripper.is_moving:
+            break
+    writes = len(serial_server.gripper.writes)
+    line.pull()
+    with pytest.raises(ConnectionLostError):
+        await moving
+    line.plug()
+    await serial_hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
+    assert len(serial_server.gripper.writes) == writes
+    await serial_hand.move(20, A)
+
+
+@pytest.mark.parametrize("held_s", [0.05, 0.12, 0.3])
+async def test_replies_held_back_never_become_a_status(
+    serial_hand: RobotiqHand, serial_server: SerialSimulatorServer, line: SerialLine, held_s: float
+) -> None:
+    line.held = []
+    await asyncio.get_running_loop().run_in_executor(None, time.sleep, held_s)
+    serial_server.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
+    changed_at = asyncio.get_running_loop().time()
+    statuses = serial_hand.statuses(buffer=1000)
+    line.let_go()  # what was held back says that there is no fault
+    async for status in statuses:
+        # A reply within the time-out may be as old as that; then it was asked for at that time, too.
+        age = status.timestamp - changed_at
+        assert status.fault or age < 0.1, f"{age:.3f} s old: {status!r}"
+        if age > 0.3:
+            break

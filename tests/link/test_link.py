@@ -1,0 +1,236 @@
+"""ModbusTransport against a server that answers byte for byte what the test says.
+
+The frames are made by hand here: neither pymodbus nor our own code takes part on this side.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+
+import pytest
+
+from robotiq_async import (
+    ConnectFailedError,
+    ConnectionLostError,
+    ProtocolError,
+    ResponseTimeoutError,
+    RobotiqConnectionError,
+)
+from robotiq_async.address import parse_address
+from robotiq_async.link import ModbusTransport
+from robotiq_async.registers import TCP_REGISTERS
+
+STATUS = bytes(range(16))
+REGISTERS = tuple(int.from_bytes(STATUS[n : n + 2], "big") for n in range(0, 16, 2))
+IMAGE = (0x0900, 0x0C00, 0, 0, 0, 0, 0, 0)
+
+Answer = Callable[[bytes], list[bytes] | None]
+"""Gets a request frame; gives the pieces to send, each in a segment of its own; None closes."""
+
+
+def good(request: bytes) -> bytes:
+    """The right answer to a request of function 4 or 16."""
+    pdu = bytes((4, 16)) + STATUS if request[7] == 4 else request[7:12]
+    return request[:4] + (len(pdu) + 1).to_bytes(2, "big") + request[6:7] + pdu
+
+
+class Scripted:
+    """A Modbus TCP server whose answers are scripted."""
+
+    def __init__(self) -> None:
+        self.answer: Answer = lambda request: [good(request)]
+        self.requests: list[bytes] = []
+        self.connections = 0
+        self.writers: list[asyncio.StreamWriter] = []
+
+    async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self.connections += 1
+        self.writers.append(writer)
+        with contextlib.suppress(ConnectionError, asyncio.IncompleteReadError):
+            while True:
+                header = await reader.readexactly(6)
+                request = header + await reader.readexactly(int.from_bytes(header[4:6], "big"))
+                self.requests.append(request)
+                pieces = self.answer(request)
+                if pieces is None:
+                    break
+                for piece in pieces:
+                    writer.write(piece)
+                    await writer.drain()
+                    await asyncio.sleep(0)
+                    await asyncio.sleep(0)
+        writer.close()
+
+
+@asynccontextmanager
+async def linked(answer: Answer | None = None) -> AsyncIterator[tuple[ModbusTransport, Scripted]]:
+    scripted = Scripted()
+    if answer is not None:
+        scripted.answer = answer
+    server = await asyncio.start_server(scripted.serve, "127.0.0.1", 0)
+    port = server.sockets[0].getsockname()[1]
+    transport = ModbusTransport(
+        parse_address(f"127.0.0.1:{port}"), TCP_REGISTERS, connect_timeout=1.0, response_timeout=0.1
+    )
+    await transport.open()
+    try:
+        yield transport, scripted
+    finally:
+        await transport.close()
+        for writer in scripted.writers:
+            writer.close()
+        server.close()
+        for _ in range(5):
+            await asyncio.sleep(0)
+
+
+async def test_a_read_and_a_write() -> None:
+    async with linked() as (transport, scripted):
+        assert await transport.read() == REGISTERS
+        await transport.write(IMAGE)
+        assert transport.is_open
+    read, write = scripted.requests
+    assert read[6:] == bytes.fromhex("02 04 0000 0008")
+    assert write[6:] == bytes.fromhex("02 10 0000 0008 10 0900 0c00") + bytes(12)
+
+
+async def test_a_reply_in_pieces_is_a_reply() -> None:
+    async with linked(lambda request: [good(request)[n : n + 1] for n in range(25)]) as (transport, _):
+        assert await transport.read() == REGISTERS
+
+
+def put(reply: bytes, at: int, value: bytes) -> bytes:
+    return reply[:at] + value + reply[at + len(value) :]
+
+
+WRONG: dict[str, Callable[[bytes], bytes]] = {
+    "transaction": lambda reply: put(reply, 0, b"\x7f\x7f"),
+    "transaction 0": lambda reply: put(reply, 0, b"\0\0"),
+    "protocol": lambda reply: put(reply, 2, b"\0\1"),
+    "unit": lambda reply: put(reply, 6, b"\x63"),
+    "function": lambda reply: put(reply, 7, b"\x03"),
+    "unknown function": lambda reply: put(reply, 7, b"\x63"),
+    "length": lambda reply: put(reply, 4, b"\0\7"),
+    "short, and consistent": lambda reply: reply[:4] + b"\0\5" + reply[6:8] + b"\2" + reply[9:11],
+    "long, and consistent": lambda reply: reply[:4] + b"\0\x15" + reply[6:8] + b"\x12" + reply[9:] + b"\0\0",
+    "byte count": lambda reply: put(reply, 8, b"\x08"),
+    "byte count beyond the frame": lambda reply: put(reply, 8, b"\xff"),
+    "two in one segment": lambda reply: reply * 2,
+    "one byte more": lambda reply: reply + b"\0",
+    "an exception": lambda reply: reply[:4] + b"\0\3" + reply[6:7] + bytes((reply[7] | 0x80, 2)),
+    "garbage": lambda _: b"GET / HTTP/1.1\r\n\r\n",
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+async def test_a_wrong_reply_to_a_read_is_never_taken(what: str, caplog: pytest.LogCaptureFixture) -> None:
+    async with linked(lambda request: [WRONG[what](good(request))]) as (transport, scripted):
+        with pytest.raises(ProtocolError) as caught:
+            await transport.read()
+        assert not transport.is_open
+        if what == "an exception":
+            assert "illegal data address" in str(caught.value)
+        scripted.answer = lambda request: [good(request)]
+        await transport.open()
+        assert await transport.read() == REGISTERS
+        assert scripted.connections == 2
+    assert not [record for record in caplog.records if record.levelno >= logging.WARNING]
+
+
+@pytest.mark.parametrize("at", range(12))
+async def test_a_wrong_echo_of_a_write_is_never_taken(at: int) -> None:
+    def corrupt(request: bytes) -> list[bytes]:
+        reply = good(request)
+        return [put(reply, at, bytes((reply[at] ^ 0x21,)))]
+
+    async with linked(corrupt) as (transport, scripted):
+        with pytest.raises(ProtocolError):
+            await transport.write(IMAGE)
+        assert not transport.is_open
+        assert len(scripted.requests) == 1
+
+
+@pytest.mark.parametrize("size", [0, 1, 7, 24])
+async def test_half_a_reply_is_a_timeout(size: int) -> None:
+    async with linked(lambda request: [good(request)[:size]]) as (transport, _):
+        with pytest.raises(ResponseTimeoutError) as caught:
+            await transport.read()
+        assert isinstance(caught.value, TimeoutError)
+        assert not transport.is_open
+
+
+async def test_a_closed_connection_ends_the_request_at_once() -> None:
+    async with linked(lambda _: None) as (transport, _):
+        loop = asyncio.get_running_loop()
+        began = loop.time()
+        with pytest.raises(ConnectionLostError):
+            await transport.read()
+        assert loop.time() - began < 0.05
+        with pytest.raises(ConnectionLostError):
+            await transport.read()
+
+
+async def test_an_unanswered_write_is_sent_once() -> None:
+    async with linked(lambda _: []) as (transport, scripted):
+        with pytest.raises(ResponseTimeoutError):
+            await transport.write(IMAGE)
+        await transport.open()
+        scripted.answer = lambda request: [good(request)]
+        await transport.read()
+        assert [request[7] for request in scripted.requests] == [16, 4]
+
+
+async def test_what_nobody_asked_for_spoils_the_link() -> None:
+    async with linked() as (transport, scripted):
+        assert await transport.read() == REGISTERS
+        scripted.writers[-1].write(good(scripted.requests[-1]))
+        for _ in range(20):
+            await asyncio.sleep(0)
+        with pytest.raises(ProtocolError, match="nobody asked for"):
+            await transport.read()
+        assert not transport.is_open
+
+
+async def test_a_cancelled_request_spoils_the_link() -> None:
+    async with linked(lambda _: []) as (transport, scripted):
+        reading = asyncio.create_task(transport.read())
+        while not scripted.requests:
+            await asyncio.sleep(0)
+        reading.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await reading
+        assert not transport.is_open
+
+
+async def test_a_closed_transport_says_so_and_closes_twice() -> None:
+    async with linked() as (transport, _):
+        await transport.close()
+        await transport.close()
+        with pytest.raises(ConnectionLostError):
+            await transport.read()
+        with pytest.raises(ConnectionLostError):
+            await transport.write(IMAGE)
+
+
+async def test_opening_again_leaves_no_old_connection() -> None:
+    async with linked() as (transport, scripted):
+        for _ in range(3):
+            await transport.open()
+            await transport.read()
+        assert scripted.connections == 4
+
+
+async def test_nobody_at_the_address() -> None:
+    for address in ("127.0.0.1:1", "rtu:///dev/does-not-exist", "tcp://host.invalid"):
+        transport = ModbusTransport(
+            parse_address(address), TCP_REGISTERS, connect_timeout=1.0, response_timeout=0.1
+        )
+        with pytest.raises(ConnectFailedError) as caught:
+            await transport.open()
+        assert caught.value.address in str(caught.value)
+        assert isinstance(caught.value, RobotiqConnectionError)
+        assert not transport.is_open

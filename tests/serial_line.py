@@ -1,0 +1,88 @@
+"""A serial line made of two pseudo-terminals, with a person's hand on the cable."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import pty
+import tty
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+
+class SerialLine:
+    """Two ports joined by a cable: what goes in at one comes out at the other.
+
+    The near port has a name of its own (a link in a folder), so that it can be pulled and put back.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.near = folder / "ttyNEAR"
+        self.held: list[bytes] | None = None
+        """Bytes on their way to the near end, while they are held back."""
+        self._loop = asyncio.get_running_loop()
+        self._near_master = -1
+        self._near_slave = -1
+        self._far_master, self._far_slave = self._pair()
+        self.far = os.ttyname(self._far_slave)
+        self._loop.add_reader(self._far_master, self._from_far)
+
+    def __enter__(self) -> Self:
+        self.plug()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.pull()
+        self._loop.remove_reader(self._far_master)
+        for descriptor in (self._far_master, self._far_slave):
+            os.close(descriptor)
+
+    def plug(self) -> None:
+        """Put the near port in place."""
+        self._near_master, self._near_slave = self._pair()
+        self.near.symlink_to(os.ttyname(self._near_slave))
+        self._loop.add_reader(self._near_master, self._from_near)
+
+    def pull(self) -> None:
+        """Pull the near port out."""
+        if self._near_master < 0:
+            return
+        self._loop.remove_reader(self._near_master)
+        self.near.unlink()
+        for descriptor in (self._near_master, self._near_slave):
+            os.close(descriptor)
+        self._near_master = -1
+
+    def let_go(self) -> None:
+        """Deliver what was held back."""
+        held, self.held = self.held or [], None
+        for data in held:
+            self._to_near(data)
+
+    @staticmethod
+    def _pair() -> tuple[int, int]:
+        master, slave = pty.openpty()
+        tty.setraw(slave)
+        os.set_blocking(master, False)
+        return master, slave
+
+    def _from_near(self) -> None:
+        with contextlib.suppress(OSError):
+            os.write(self._far_master, os.read(self._near_master, 4096))
+
+    def _from_far(self) -> None:
+        with contextlib.suppress(OSError):
+            data = os.read(self._far_master, 4096)
+            if self.held is not None:
+                self.held.append(data)
+            else:
+                self._to_near(data)
+
+    def _to_near(self, data: bytes) -> None:
+        if self._near_master >= 0:
+            with contextlib.suppress(OSError):
+                os.write(self._near_master, data)
