@@ -15,7 +15,7 @@ import logging
 from collections.abc import Callable
 from dataclasses import replace
 
-from .adoption import Adoption
+from .adoption import Adoption, agrees
 from .desk import Delivery, Desk, Failure, tell
 from .echo import WINDOW_S, EchoWatch
 from .enums import AXES, Finger, ObjectStatus, State
@@ -245,8 +245,10 @@ class Core:
         if composed is None:
             return None
         if self._desk.only_holds and composed == self._base():
-            self._desk = Desk()
-            self._deliver()
+            # Nothing drifts; but what was written before may not act yet, and then something might.
+            if self._watch.is_settled(now):
+                self._desk = Desk()
+                self._deliver()
             return None
         if self._desk.halt is not None:
             # The halt leaves alone; what was asked after it follows once the gripper has stopped.
@@ -287,6 +289,8 @@ class Core:
             self._follow(status)
         elif before in RUNNING:
             self._leave_running(after, status)
+        elif after is State.FAULT and before is State.FAULT:
+            self._compare(status)
 
     def lost(self, why: RobotiqError | None = None) -> None:
         """The link is down: what was not acknowledged is dropped, never to be sent again."""
@@ -347,9 +351,7 @@ class Core:
                 {axis: status.position(axis) for axis in AXES if axis not in self._gripping}
             )
         held = {
-            axis: status.position(axis)
-            for axis in AXES
-            if axis in desk.hold and self._drifts(axis, base, now)
+            axis: status.position(axis) for axis in AXES if axis in desk.hold and self._drifts(axis, base)
         }
         positions = held | desk.positions
         return replace(
@@ -365,25 +367,18 @@ class Core:
             ),
         )
 
-    def _drifts(self, axis: Finger, base: Request, now: float) -> bool:
+    def _drifts(self, axis: Finger, base: Request) -> bool:
         """Whether an axis moves or is about to: then holding it means asking for where it is.
 
-        An axis in contact keeps its request, and with it its grip; so does one that stands.
+        An axis in contact keeps its request, and with it its grip; so does one that stands where it was
+        asked to. What an axis does may still come from the request before this one: then the two disagree.
         """
         status = self.status
         assert status is not None
-        if not base.go:
-            return False
-        what, position, request = status.finger_status(axis), status.position(axis), base.position(axis)
-        if what is ObjectStatus.IN_MOTION:
-            return True
-        if self._watch.is_settled(now) or status.requested_position(axis) == request:
-            return False
-        # The request is not acting yet. One that presses on against the same contact changes nothing.
-        presses_on = (what is ObjectStatus.CONTACT_CLOSING and request > position) or (
-            what is ObjectStatus.CONTACT_OPENING and request < position
+        what, position = status.finger_status(axis), status.position(axis)
+        return base.go and (
+            what is ObjectStatus.IN_MOTION or not agrees(base.position(axis), what, position, direction=0)
         )
-        return not presses_on
 
     def _base(self) -> Request:
         """The image that the next one is made from."""
@@ -485,15 +480,11 @@ class Core:
             failure: Failure = lambda: GripperFaultError(fault)  # noqa: E731
         else:
             failure = lambda: NotActivatedError("the gripper lost its activation")  # noqa: E731
-        drifting = Finger(0)
-        for axis in AXES:
-            if status.go_echo and status.finger_status(axis) is ObjectStatus.IN_MOTION:
-                drifting |= axis
-        for move, _ in self._moves:
-            drifting |= move.axes
         self._drop_all(failure)
-        if after is State.FAULT and drifting and self._adoption is None:
-            self._desk.put_hold(drifting)
+        if after is State.FAULT and self._adoption is None:
+            # Which axes drift is decided when the hold is written: a command that was sent just before
+            # may not act yet, and its motion would begin when the fault clears.
+            self._desk.put_hold(Finger.ALL)
 
     def _drop_all(self, failure: Failure) -> None:
         """Nothing asked so far will happen: tell everybody."""

@@ -71,6 +71,39 @@ def test_a_motion_nobody_awaits_does_not_resume_either(bench: Bench) -> None:
     assert bench.gripper.position(A) < 200
 
 
+def test_a_command_sent_just_before_the_fault_does_not_begin_to_act_when_it_clears() -> None:
+    bench = Bench(device_cycle=0.2)
+    bench.start()
+    bench.command(A, position=149)
+    bench.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 1.0)
+    bench.run(3.0)
+    assert bench.state is State.RUNNING_IDLE
+    assert bench.gripper.position(A) <= 7
+
+
+def test_a_write_lost_before_the_fault_does_not_begin_to_act_when_it_clears() -> None:
+    bench = Bench(device_cycle=0.2)
+    bench.start()
+    bench.command(A, position=149)
+    bench.step(answer=False)
+    bench.connect(activate=False)
+    bench.step()
+    bench.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 1.0)
+    bench.run(3.0)
+    assert bench.state is State.RUNNING_IDLE
+    assert bench.gripper.position(A) <= 7
+
+
+def test_an_axis_that_the_fault_keeps_from_starting_is_held() -> None:
+    bench = Bench(device_cycle=0.0)
+    bench.start()
+    bench.moved(6)
+    bench.command(A, position=107)
+    bench.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 1.0)
+    bench.run(3.0)
+    assert bench.gripper.position(A) <= 7
+
+
 def test_a_grip_is_kept_over_a_minor_fault(bench: Bench) -> None:
     bench.gripper.place_object(A, 60)
     bench.moved(255, A)

@@ -1,0 +1,88 @@
+"""Both sides against a Modbus implementation that shares no code with pymodbus."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+
+import pytest
+from pyModbusTCP.client import ModbusClient
+from pyModbusTCP.server import DataBank, ModbusServer
+
+from robotiq_async import Finger, RobotiqHand, State
+from robotiq_async.request import AxisRequest, Request
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.status import RobotiqStatus
+
+A = Finger.A
+
+
+class GripperBank(DataBank):  # type: ignore[misc]  # pyModbusTCP is untyped
+    """Another implementation's registers, with a simulated gripper behind them."""
+
+    def __init__(self, gripper: SimulatedGripper) -> None:
+        super().__init__()
+        self.gripper = gripper
+
+    def get_input_registers(self, address: int, number: int = 1, srv_info: object = None) -> list[int] | None:  # noqa: ARG002
+        if address + number > 8:
+            return None
+        return list(self.gripper.status_registers()[address : address + number])
+
+    def set_holding_registers(self, address: int, word_list: list[int], srv_info: object = None) -> bool | None:  # noqa: ARG002
+        if address + len(word_list) > 8:
+            return None
+        self.gripper.write(address, word_list)
+        return True
+
+
+async def test_the_hand_with_a_server_that_is_not_pymodbus() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = probe.getsockname()[1]
+    gripper = SimulatedGripper(speedup=20)
+    gripper.place_object(A, 150)
+    server = ModbusServer("127.0.0.1", port, no_block=True, data_bank=GripperBank(gripper))
+    server.start()
+    try:
+        async with RobotiqHand(f"127.0.0.1:{port}") as hand:
+            assert hand.state is State.RUNNING_IDLE
+            result = await hand.close()
+            assert result.contacts == A
+            assert result.positions[Finger.B] >= 240
+            assert hand.statistics.reconnects == 0
+    finally:
+        server.stop()
+
+
+async def test_the_simulator_with_a_client_that_is_not_pymodbus() -> None:
+    async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
+        client = ModbusClient(host="127.0.0.1", port=server.port, unit_id=2, auto_open=True)
+
+        def status() -> RobotiqStatus:
+            registers = client.read_input_registers(0, 8)
+            assert registers is not None, client.last_error_as_txt
+            return RobotiqStatus.from_registers(registers)
+
+        def grasp() -> RobotiqStatus:
+            assert client.write_multiple_registers(0, list(Request(activate=True).registers))
+            while not status().is_activated:
+                pass
+            axes = (AxisRequest(255, 255, 100),) * 3 + (AxisRequest(137, 255, 100),)
+            assert client.write_multiple_registers(0, list(Request(activate=True, go=True, axes=axes).registers))
+            while status().requested_position(A) != 255 or status().is_moving:
+                pass
+            return status()
+
+        held = await asyncio.to_thread(grasp)
+        client.close()
+    assert held.position(A) >= 240
+    assert held.registers[0] == 0xF9FF, "position reached, all axes"
+
+
+@pytest.mark.parametrize(("address", "count"), [(7, 2), (8, 1), (100, 8), (65535, 1)])
+async def test_a_bad_address_is_answered_with_the_modbus_exception(address: int, count: int) -> None:
+    async with SimulatorServer() as server:
+        client = ModbusClient(host="127.0.0.1", port=server.port, unit_id=2, auto_open=True)
+        assert await asyncio.to_thread(client.read_input_registers, address, count) is None
+        assert client.last_except == 2, client.last_except_as_txt
+        client.close()
