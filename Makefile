@@ -44,7 +44,8 @@ clean:  ## Remove what the other commands made
 	rm -rf $(VENV) build dist site .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
 	find robotiq_async tests demo -type d -name __pycache__ -prune -exec rm -rf {} +
 
-# uv is several times quicker than pip, but nothing depends on it: without uv, or when it fails, pip does the work.
+# uv is several times quicker than pip, but nothing depends on it. When it fails, whatever the reason, pip does
+# the work or says what is wrong.
 $(STAMP): pyproject.toml constraints.txt
 	@command -v $(PYTHON) >/dev/null || { \
 		echo "There is no '$(PYTHON)' here. robotiq_async needs Python 3.11 or newer:" \
@@ -55,9 +56,10 @@ $(STAMP): pyproject.toml constraints.txt
 	@echo "Setting up $(VENV), once (this takes up to a minute)"
 	@$(PYTHON) -m venv --clear $(VENV) || { \
 		echo "'$(PYTHON) -m venv' failed; on Debian and Ubuntu it needs the package python3-venv." >&2; exit 1; }
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check uv \
-		&& $(BIN)/python -m uv pip install --quiet --python $(BIN)/python -c constraints.txt -e '.[all,dev]' \
-		|| { echo "Installing with uv failed; trying pip" >&2; \
+	@{ $(BIN)/python -m pip install --quiet --disable-pip-version-check uv \
+		&& $(BIN)/python -m uv pip install --quiet --python $(BIN)/python -c constraints.txt -e '.[all,dev]'; \
+		} >/dev/null 2>&1 \
+		|| { echo "uv did not work here; installing with pip, which takes a little longer"; \
 			$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[all,dev]'; } \
-		|| { echo "Installing the dependencies failed (see above); the package index must be reachable." >&2; exit 1; }
+		|| { echo "Installing the dependencies failed (see above). The package index must be reachable, once." >&2; exit 1; }
 	@touch $@

@@ -1,0 +1,31 @@
+"""The command line ``robotiq-async``; its dependencies come with the extra ``cli``.
+
+One file per sub-command, listed in :mod:`.app`, the only place that knows them all. A sub-command is an
+async function: cyclopts makes its options and its help from signature and docstring, and :mod:`.run`
+runs it, ends it on a signal and turns its errors into exit codes::
+
+    0  success
+    1  the gripper or the link failed: one line on stderr
+    2  wrong usage
+    128 + N  ended by signal N (130: Ctrl-C)
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code; the arguments default to those of the process."""
+    try:
+        from .run import run
+    except ModuleNotFoundError as error:
+        if error.name != "cyclopts":
+            raise
+        print(
+            "robotiq-async: the command line needs cyclopts: pip install 'robotiq-async[cli]'",
+            file=sys.stderr,
+        )
+        return 1
+    return run(sys.argv[1:] if arguments is None else arguments)

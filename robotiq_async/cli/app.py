@@ -1,0 +1,35 @@
+"""The list of sub-commands."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from cyclopts import App
+
+from .. import __version__
+from .demo import demo
+from .move import move
+from .simulate import simulate
+from .status import status
+
+COMMANDS: Final = (demo, simulate, status, move)
+"""A new sub-command is a module with a function of its name, and an entry here."""
+
+_HELP = """Control a Robotiq 3-Finger gripper, or a simulated one.
+
+Every command but simulate takes the address of a gripper as its last argument:
+
+    tcp://192.168.1.11   Modbus TCP; tcp:// and the port (:502) may be left out
+    rtu:///dev/ttyUSB0   Modbus RTU on a serial line (extra serial)
+    sim://               the default: a gripper simulated inside the command
+
+Nothing here has run on real hardware yet.
+"""
+
+
+def build() -> App:
+    """The command line; whatever is slow to import is imported by the sub-command that needs it."""
+    app = App(name="robotiq-async", help=_HELP, help_format="plaintext", version=__version__)
+    for command in COMMANDS:
+        app.command(command)
+    return app

@@ -1,0 +1,81 @@
+"""Arguments that several sub-commands share: the address, bytes, masks of fingers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Annotated
+
+from cyclopts import Parameter, Token
+
+from ..enums import AXES, Finger
+
+
+class UsageError(Exception):
+    """The command line asks for something that does not exist: exit code 2."""
+
+
+@contextmanager
+def usage() -> Iterator[None]:
+    """Around the construction of library objects: a value they refuse is wrong usage.
+
+    Raises:
+        UsageError: in place of ValueError and TypeError.
+    """
+    try:
+        yield
+    except (ValueError, TypeError) as error:
+        raise UsageError(str(error)) from error
+
+
+def _integer(name: str, low: int, high: int) -> Callable[[object, Sequence[Token]], int]:
+    """A converter for integers in low..high; ``name`` is for an argument that has no option name."""
+
+    # cyclopts' own converter would take 1.5 for 2.
+    def convert(_type: object, tokens: Sequence[Token]) -> int:
+        text, where = tokens[0].value, tokens[0].keyword or name
+        if not re.fullmatch(r"[+-]?[0-9]{1,9}", text) or not low <= int(text) <= high:
+            raise UsageError(f"{where} must be an integer in {low}..{high}, got {text!r}")
+        return int(text)
+
+    return convert
+
+
+def _fingers(_type: object, tokens: Sequence[Token]) -> Finger:
+    mask = Finger(0)
+    for word in tokens[0].value.upper().split(","):
+        mask |= _axes(word.strip())
+    return mask
+
+
+def _axes(word: str) -> Finger:
+    if word in Finger.__members__:
+        return Finger[word]
+    letters = {axis.name: axis for axis in AXES if axis.name is not None}
+    if word and set(word) <= set("ABC"):
+        mask = Finger(0)
+        for letter in word:
+            mask |= letters[letter]
+        return mask
+    raise UsageError(f"--fingers must name axes (ABC, or A,B, or scissor, or all), got {word!r}")
+
+
+Address = Annotated[
+    str,
+    Parameter(help="The gripper: tcp://HOST[:PORT], rtu:///dev/ttyUSB0 or sim:// (a simulated one)."),
+]
+Position = Annotated[int, Parameter(converter=_integer("POSITION", 0, 255))]
+Byte = Annotated[int, Parameter(converter=_integer("the value", 0, 255), metavar="0..255")]
+Port = Annotated[int, Parameter(converter=_integer("the port", 0, 65535), metavar="0..65535")]
+Fingers = Annotated[
+    Finger,
+    Parameter(
+        converter=_fingers,
+        n_tokens=1,
+        accepts_keys=False,  # cyclopts makes --fingers.a and so on of a flag otherwise.
+        metavar="AXES",
+        show_choices=False,
+        show_default=lambda mask: mask.name,
+    ),
+]

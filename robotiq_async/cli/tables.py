@@ -1,0 +1,64 @@
+"""What people read: tables of a status and of the outcome of a move."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from ..enums import AXES, Fault, Finger, ObjectStatus
+
+if TYPE_CHECKING:
+    from .. import MoveResult, RobotiqHand, RobotiqStatus
+
+
+def print_status(hand: RobotiqHand) -> None:
+    """State and fault in a line each, then a row for every axis."""
+    last = hand.status
+    print(f"{hand.state.name}: {_activation(last)}, {'moving' if last.is_moving else 'not moving'}")
+    if last.fault is not Fault.NONE:
+        print(f"{last.fault.severity.value} fault 0x{int(last.fault):02X}: {last.fault.description}")
+    rows = [
+        (
+            last.position(axis),
+            last.requested_position(axis),
+            _object(last, axis),
+            last.current_ma(axis),
+        )
+        for axis in AXES
+    ]
+    _print_table(("position", "requested", "object", "mA"), AXES, rows)
+
+
+def _object(status: RobotiqStatus, axis: Finger) -> str:
+    # The gripper also says "in motion" of an axis that was never told to go.
+    seen = status.finger_status(axis)
+    return "-" if seen is ObjectStatus.IN_MOTION and not axis & status.moving else seen.name
+
+
+def _activation(status: RobotiqStatus) -> str:
+    if status.is_activated:
+        return "active"
+    return "reset" if status.is_reset else "activating or changing mode"
+
+
+def print_outcomes(result: MoveResult) -> None:
+    """A row for every axis of the move, then how long it took."""
+    axes = [axis for axis in AXES if axis in result.outcomes]
+    rows = [
+        (result.positions[axis], result.outcomes[axis].name, result.peak_current_ma[axis]) for axis in axes
+    ]
+    _print_table(("position", "outcome", "peak mA"), axes, rows)
+    print(f"{result.duration:.2f} s, {'an object is in the way' if result.object_detected else 'no contact'}")
+
+
+def _print_table(heads: Sequence[str], axes: Sequence[Finger], rows: Sequence[Sequence[object]]) -> None:
+    table = Table("axis", box=box.SIMPLE_HEAD)
+    for head in heads:
+        table.add_column(head, justify="left" if head in ("object", "outcome") else "right")
+    for axis, row in zip(axes, rows, strict=True):
+        table.add_row(axis.name, *map(str, row))
+    Console().print(table)

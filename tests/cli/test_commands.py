@@ -1,0 +1,168 @@
+"""status and move, against a simulated gripper of this process."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import signal
+import socket
+import time
+from collections.abc import AsyncIterator, Sequence
+from typing import TYPE_CHECKING
+
+import pytest
+
+from robotiq_async import Fault, Finger
+from robotiq_async import registers as reg
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+
+if TYPE_CHECKING:
+    from tests.cli.conftest import Shell
+
+ACTIVATE = (0x0100, 0, 0, 0, 0, 0, 0, 0)
+
+
+class WatchedGripper(SimulatedGripper):
+    """Tells when it is told to go, and can be made older at once."""
+
+    def __init__(self) -> None:
+        self.age = 0.0
+        self.went = asyncio.Event()
+        super().__init__(clock=lambda: time.monotonic() + self.age)
+
+    def write(self, address_offset: int, registers: Sequence[int]) -> None:
+        super().write(address_offset, registers)
+        if reg.rGTO.read(self.request_registers):
+            self.went.set()
+
+    def activate(self) -> None:
+        self.write(0, ACTIVATE)
+        self.age += 60.0
+
+
+@pytest.fixture
+async def server() -> AsyncIterator[SimulatorServer]:
+    async with SimulatorServer(SimulatedGripper(speedup=20.0)) as server:
+        yield server
+
+
+async def test_status_as_json(shell: Shell, server: SimulatorServer) -> None:
+    server.gripper.write(0, ACTIVATE)
+    outcome = await shell.run("status", "--json", server.address)
+    outcome.assert_succeeded()
+    reading = json.loads(outcome.out)
+    assert reading["fault"] == {"code": 0, "name": "NONE", "severity": "none", "description": "no fault"}
+    assert reading.keys() == {"state", "fault", "activated", "reset", "moving", "mode", "axes"}
+    assert list(reading["axes"]) == ["A", "B", "C", "SCISSOR"]
+    assert reading["axes"]["A"].keys() == {"position", "requested", "object", "current_ma"}
+    assert reading["mode"] == "BASIC"
+
+
+async def test_status_of_a_gripper_at_rest_and_in_words(shell: Shell, server: SimulatorServer) -> None:
+    outcome = await shell.run("status", server.address)
+    outcome.assert_succeeded()
+    assert outcome.out.startswith("RESET: reset, not moving\n")
+    assert "SCISSOR" in outcome.out
+
+
+async def test_status_only_reads(shell: Shell, server: SimulatorServer) -> None:
+    for form in (["status"], ["status", "--json"]):
+        assert (await shell.run(*form, server.address)).code == 0
+    assert server.gripper.writes == ()
+
+
+async def test_status_shows_a_fault(shell: Shell, server: SimulatorServer) -> None:
+    server.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    outcome = await shell.run("status", server.address)
+    assert outcome.code == 0
+    assert "FAULT" in outcome.out
+    assert "major fault 0x0E: interference on the scissor for more than 20 s" in outcome.out
+    reading = json.loads((await shell.run("status", "--json", server.address)).out)
+    assert (reading["fault"]["code"], reading["fault"]["severity"]) == (14, "major")
+
+
+async def test_move_activates_and_closes(shell: Shell, server: SimulatorServer) -> None:
+    outcome = await shell.run("move", "255", server.address)
+    outcome.assert_succeeded()
+    assert outcome.out.startswith("Activating: the fingers open and close.\n")
+    assert outcome.out.count("AT_POSITION") == 3
+    assert "no contact" in outcome.out
+    assert server.gripper.position(Finger.A) >= 240
+
+
+async def test_move_takes_fingers_speed_and_force(shell: Shell, server: SimulatorServer) -> None:
+    arguments = ["--fingers", "a,scissor", "--speed", "200", "--force", "10", "--timeout", "20"]
+    outcome = await shell.run("move", "100", server.address, *arguments)
+    assert outcome.code == 0
+    assert abs(server.gripper.position(Finger.A) - 100) <= 2
+    assert abs(server.gripper.position(Finger.SCISSOR) - 100) <= 2
+    assert server.gripper.position(Finger.B) < 10
+    last = [write.registers for write in server.gripper.writes if reg.rGTO.read(write.registers)][-1]
+    assert (reg.rSP[0].read(last), reg.rFR[0].read(last)) == (200, 10)
+
+
+async def test_a_contact_is_a_success(shell: Shell, server: SimulatorServer) -> None:
+    server.gripper.write(0, ACTIVATE)
+    assert (await shell.run("move", "0", server.address)).code == 0
+    server.gripper.place_object(Finger.B, position=120)
+    outcome = await shell.run("move", "255", server.address)
+    assert outcome.code == 0
+    assert outcome.out.count("CONTACT_CLOSING") == 1
+    assert "an object is in the way" in outcome.out
+
+
+async def test_move_in_fault_fails(shell: Shell, server: SimulatorServer) -> None:
+    server.gripper.inject_fault(Fault.ACTIVATION_FAULT)
+    (await shell.run("move", "255", server.address)).assert_failed(1, "fault")
+
+
+@pytest.mark.parametrize("command", [["status"], ["status", "--json"], ["move", "3"], ["demo", "--yes"]])
+async def test_nobody_there(shell: Shell, command: list[str]) -> None:
+    # Bound and not listening: connections are refused, and nobody else gets the port.
+    with socket.socket() as reserved:
+        reserved.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{reserved.getsockname()[1]}"
+        outcome = await shell.run(command[0], *command[1:], address)
+    outcome.assert_failed(1, address)
+
+
+async def test_no_such_serial_port(shell: Shell) -> None:
+    (await shell.run("status", "rtu:///dev/no-such-port")).assert_failed(1, "/dev/no-such-port")
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+async def test_a_signal_stops_the_fingers(shell: Shell, number: signal.Signals, code: int) -> None:
+    gripper = WatchedGripper()
+    gripper.activate()
+    async with SimulatorServer(gripper) as server:
+        process = await shell.start("move", "255", server.address, "--speed", "0")
+        async with asyncio.timeout(20):
+            await gripper.went.wait()
+        process.send_signal(number)
+        outcome = await shell.finish(process)
+    outcome.assert_failed(code, "interrupted")
+    assert not gripper.is_moving
+    assert not reg.rGTO.read(gripper.request_registers)
+    assert reg.rACT.read(gripper.request_registers)
+    assert gripper.position(Finger.A) < 200
+
+
+async def test_a_link_that_goes_down_under_a_move(shell: Shell) -> None:
+    gripper = WatchedGripper()
+    gripper.activate()
+    async with SimulatorServer(gripper) as server:
+        process = await shell.start("move", "255", server.address, "--speed", "0")
+        async with asyncio.timeout(20):
+            await gripper.went.wait()
+        await server.stop()
+        outcome = await shell.finish(process)
+    outcome.assert_failed(1, server.address, "the fingers could not be told to stop")
+
+
+async def test_a_reader_that_has_had_enough(shell: Shell, server: SimulatorServer) -> None:
+    process = await shell.start("status", "--json", server.address)
+    assert process.stdout is not None
+    process.stdout._transport.close()  # type: ignore[attr-defined]  # asyncio has no other way
+    outcome = await shell.finish(process)
+    assert outcome.code == 1
+    assert "Error" not in outcome.err

@@ -1,0 +1,104 @@
+"""Help, versions and wrong usage; most of it in this process, for speed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+import robotiq_async
+from robotiq_async.cli import main
+
+if TYPE_CHECKING:
+    from tests.cli.conftest import Shell
+
+WITHOUT = """
+import sys
+sys.modules["{}"] = None
+from robotiq_async.cli import main
+sys.exit(main([]))
+"""
+
+COMMANDS = ("demo", "simulate", "status", "move")
+
+
+def test_help_lists_every_command_and_the_addresses(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--help"]) == 0
+    out = capsys.readouterr().out
+    for word in (*COMMANDS, "tcp://", "rtu://", "sim://", "real hardware"):
+        assert word in out
+
+
+def test_no_arguments_show_the_help(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 0
+    assert "Usage: robotiq-async COMMAND" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_of_a_command_tells_of_the_address_and_gives_examples(
+    command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([command, "--help"]) == 0
+    out = capsys.readouterr().out
+    assert "address" in out.lower()
+    assert f"robotiq-async {command}" in out.partition("For example:")[2]
+
+
+@pytest.mark.parametrize("command", ["demo", "move"])
+def test_help_of_what_moves_says_so(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, "--help"]) == 0
+    assert "FINGERS MOVE" in " ".join(capsys.readouterr().out.split())
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.strip() == robotiq_async.__version__
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ("mvoe 3", ["mvoe", "move"]),
+        ("move", ["POSITION"]),
+        ("move 256", ["POSITION", "256", "0..255"]),
+        ("move -1", ["POSITION", "-1", "0..255"]),
+        ("move 1.5", ["POSITION", "1.5", "0..255"]),
+        ("move ten", ["POSITION", "ten", "0..255"]),
+        ("move 3 --speed 256", ["--speed", "256", "0..255"]),
+        ("move 3 --force -1", ["--force", "-1", "0..255"]),
+        ("move 3 --fingers D", ["--fingers", "'D'", "scissor"]),
+        ("move 3 --fingers A,,B", ["--fingers", "''"]),
+        ("move 3 --timeout 0", ["timeout", "0", "above 0"]),
+        ("move 3 --timeout nan", ["timeout", "nan"]),
+        ("move 3 --timeout soon", ["--timeout", "soon"]),
+        ("move 3 --wrong 4", ["--wrong"]),
+        ("move 3 ftp://gripper", ["ftp://gripper", "tcp://", "rtu://", "sim://"]),
+        ("move 3 sim:// 4", ["4"]),
+        ("status tcp://", ["tcp://", "rtu://", "sim://"]),
+        ("status [/b]", ["[/b]"]),
+        ("demo gripper:port", ["gripper:port", "tcp://"]),
+        ("simulate --port 65536", ["--port", "65536", "0..65535"]),
+        ("simulate --speedup 0", ["speedup", "0"]),
+        ("simulate --speedup -2", ["speedup", "-2"]),
+    ],
+)
+def test_wrong_usage_is_one_line_and_exit_code_2(
+    arguments: str, words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments.split()) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    for word in words:
+        assert word in err
+
+
+async def test_without_the_extra_one_line_names_it(shell: Shell) -> None:
+    outcome = await shell.finish(await shell.python("-c", WITHOUT.format("cyclopts")))
+    outcome.assert_failed(1, "cyclopts", "pip install 'robotiq-async[cli]'")
+
+
+async def test_another_missing_module_is_not_taken_for_the_extra(shell: Shell) -> None:
+    outcome = await shell.finish(await shell.python("-c", WITHOUT.format("json")))
+    assert outcome.code == 1
+    assert "robotiq-async[cli]" not in outcome.err

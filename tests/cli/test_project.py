@@ -1,0 +1,64 @@
+"""The project's own files."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import robotiq_async
+from robotiq_async import Finger
+from robotiq_async.cli import main
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+
+if TYPE_CHECKING:
+    from tests.cli.conftest import Shell
+
+ROOT = Path(__file__).parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+
+def test_one_version() -> None:
+    assert PROJECT["version"] == robotiq_async.__version__
+    assert f"## [{robotiq_async.__version__}]" in (ROOT / "CHANGELOG.md").read_text()
+
+
+def test_the_script_is_the_command_line() -> None:
+    script = EntryPoint("robotiq-async", PROJECT["scripts"]["robotiq-async"], "console_scripts")
+    assert script.load() is main
+
+
+def test_constraints_pin_versions_and_name_no_place() -> None:
+    lines = (ROOT / "constraints.txt").read_text().splitlines()
+    assert lines
+    for line in lines:
+        assert re.fullmatch(r"[a-z0-9.-]+==[0-9][a-z0-9.]*( ; .*)?", line), line
+        assert "://" not in line
+
+
+def test_every_dependency_is_pinned() -> None:
+    pinned = {line.partition("==")[0] for line in (ROOT / "constraints.txt").read_text().splitlines()}
+    wanted = [
+        *PROJECT["dependencies"],
+        *(d for extra in PROJECT["optional-dependencies"].values() for d in extra),
+    ]
+    names = {re.split(r"[\[<>=~! ]", text)[0].lower() for text in wanted}
+    assert names - {"robotiq-async"} <= pinned
+
+
+def test_no_package_index_is_named() -> None:
+    for name in ("pyproject.toml", "Makefile", ".ci/run"):
+        assert not re.search(r"index-url|find-links|simple/|://[^\s]*pypi", (ROOT / name).read_text()), name
+
+
+async def test_the_example_of_the_readme_runs(shell: Shell) -> None:
+    (example,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    async with SimulatorServer(SimulatedGripper(speedup=20.0)) as server:
+        server.gripper.place_object(Finger.ABC, position=150)
+        program = example.replace("tcp://192.168.1.11", server.address)
+        outcome = await shell.finish(await shell.python("-c", program))
+    outcome.assert_succeeded()
+    assert outcome.out.startswith("holding it with ")
+    assert outcome.out.count("\n") > 3
