@@ -1,0 +1,270 @@
+"""Addresses: every accepted form, and many that are not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robotiq_async.address import FORMS, Address, parse_address
+
+NAMES = st.text("abcdefghijklmnopqrstuvwxyz0123456789-_", min_size=1).filter(lambda name: name[0] != "-")
+PORTS = st.integers(1, 65535)
+
+
+# -- accepted ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "host", "port"),
+    [
+        ("tcp://192.168.1.11", "192.168.1.11", 502),
+        ("tcp://192.168.1.11:502", "192.168.1.11", 502),
+        ("tcp://192.168.1.11:5020", "192.168.1.11", 5020),
+        ("192.168.1.11", "192.168.1.11", 502),
+        ("192.168.1.11:1", "192.168.1.11", 1),
+        ("192.168.1.11:65535", "192.168.1.11", 65535),
+        ("gripper", "gripper", 502),
+        ("gripper:5020", "gripper", 5020),
+        ("tcp://gripper.local", "gripper.local", 502),
+        ("tcp://gripper-2.cell_1.example.org:502", "gripper-2.cell_1.example.org", 502),
+        ("localhost", "localhost", 502),
+        ("tcp://Gripper.LOCAL", "gripper.local", 502),
+        ("[::1]", "::1", 502),
+        ("[::1]:5020", "::1", 5020),
+        ("tcp://[::1]", "::1", 502),
+        ("tcp://[fe80::1]:502", "fe80::1", 502),
+        ("tcp://[FE80::ABCD]", "fe80::abcd", 502),
+        ("tcp://[::ffff:192.168.1.11]", "::ffff:192.168.1.11", 502),
+    ],
+)
+def test_a_tcp_address_names_host_and_port(text: str, host: str, port: int) -> None:
+    assert parse_address(text) == Address("tcp", host, port)
+
+
+@pytest.mark.parametrize(
+    "device", ["/dev/ttyUSB0", "/dev/serial/by-id/usb-FTDI_USB-RS485-if00", "COM3", "tty"]
+)
+def test_a_serial_address_names_the_port(device: str) -> None:
+    assert parse_address(f"rtu://{device}") == Address("rtu", device)
+
+
+def test_a_serial_port_keeps_its_spelling() -> None:
+    assert parse_address("rtu:///dev/ttyUSB0").host == "/dev/ttyUSB0"
+
+
+def test_the_simulated_gripper_needs_nothing_more() -> None:
+    assert parse_address("sim://") == Address("sim")
+
+
+@pytest.mark.parametrize(
+    ("text", "full"),
+    [
+        ("192.168.1.11", "tcp://192.168.1.11:502"),
+        ("Gripper:5020", "tcp://gripper:5020"),
+        ("[::1]", "tcp://[::1]:502"),
+        ("rtu:///dev/ttyUSB0", "rtu:///dev/ttyUSB0"),
+        ("rtu://COM3", "rtu://COM3"),
+        ("sim://", "sim://"),
+    ],
+)
+def test_an_address_prints_in_its_full_form(text: str, full: str) -> None:
+    assert str(parse_address(text)) == full
+
+
+@given(NAMES, PORTS, st.booleans(), st.booleans())
+def test_any_host_and_port_are_found_again_in_the_full_form(
+    host: str, port: int, with_scheme: bool, with_port: bool
+) -> None:
+    text = ("tcp://" if with_scheme else "") + host + (f":{port}" if with_port else "")
+    address = parse_address(text)
+    assert address == Address("tcp", host, port if with_port else 502)
+    assert parse_address(str(address)) == address
+
+
+@given(st.ip_addresses(v=6), PORTS)
+def test_any_ipv6_address_is_found_again_in_the_full_form(host: object, port: int) -> None:
+    address = parse_address(f"[{host}]:{port}")
+    assert address == Address("tcp", str(host), port)
+    assert parse_address(str(address)) == address
+
+
+@given(st.text())
+def test_any_text_is_an_address_or_a_value_error_that_shows_the_forms(text: str) -> None:
+    try:
+        address = parse_address(text)
+    except ValueError as error:
+        assert FORMS in str(error)  # noqa: PT017
+    else:
+        assert parse_address(str(address)) == address
+
+
+# -- malformed ---------------------------------------------------------------------------------------------
+
+
+def test_the_forms_are_those_of_the_contract() -> None:
+    for form in ("tcp://HOST", "HOST:PORT", "rtu:///dev/ttyUSB0", "sim://"):
+        assert form in FORMS
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        " ",
+        "tcp://",
+        "tcp:",
+        "tcp:/192.168.1.11",
+        "tcp:192.168.1.11",
+        "://",
+        "://host",
+        "http://192.168.1.11",
+        "udp://192.168.1.11",
+        "TCP://192.168.1.11",
+        " tcp://192.168.1.11",
+        "tcp ://192.168.1.11",
+        "tcp:// 192.168.1.11",
+        "192.168.1.11 ",
+        " 192.168.1.11",
+        "192.168.1.11\n",
+        "\t192.168.1.11",
+        "192.168. 1.11",
+        "host name",
+        "host\0name",
+        "tcp://host/",
+        "tcp://host:502/",
+        "tcp://host:502/path",
+        "tcp://host?unit=2",
+        "tcp://host#2",
+        "tcp://user@host",
+        "tcp://tcp://host",
+        "host,other",
+        ".host",
+        "-host",
+        "höst",
+        "\uff48ost",
+        "١٩٢.168.1.11",
+    ],
+)
+def test_a_malformed_host_or_scheme_is_a_value_error_that_shows_it_and_the_forms(text: str) -> None:
+    with pytest.raises(ValueError, match="malformed address") as caught:
+        parse_address(text)
+    assert repr(text) in str(caught.value)
+    assert FORMS in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "port",
+    [
+        "",
+        "0",
+        "00",
+        "65536",
+        "99999999",
+        "-1",
+        "+502",
+        " 502",
+        "502 ",
+        "5_02",
+        "5.02",
+        "1e3",
+        "0x1F6",
+        "modbus",
+        "502:502",
+        "\uff15\uff10\uff12",
+        "٥٠٢",
+        "50²",
+        "502\n",
+    ],
+)
+@pytest.mark.parametrize("host", ["192.168.1.11", "tcp://gripper", "tcp://[::1]"])
+def test_a_malformed_port_is_a_value_error_that_shows_it_and_the_forms(host: str, port: str) -> None:
+    with pytest.raises(ValueError, match="malformed address") as caught:
+        parse_address(f"{host}:{port}")
+    assert FORMS in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "::1",
+        "::1:502",
+        "fe80::1",
+        "tcp://::1",
+        "[::1",
+        "::1]",
+        "[]",
+        "[]:502",
+        "[::1]502",
+        "[::1]/",
+        "[::1]]",
+        "[[::1]]",
+        "[192.168.1.11]",
+        "[gripper]",
+        "[::g]",
+        "[: :1]",
+        "tcp://[::1] :502",
+    ],
+)
+def test_a_malformed_ipv6_address_is_a_value_error_that_shows_the_forms(text: str) -> None:
+    with pytest.raises(ValueError, match="malformed address") as caught:
+        parse_address(text)
+    assert FORMS in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "rtu://",
+        "rtu:///",
+        "rtu:////",
+        "rtu:",
+        "rtu:/dev/ttyUSB0",
+        "RTU:///dev/ttyUSB0",
+        "rtu:// ",
+        "rtu:// /dev/ttyUSB0",
+        "rtu:///dev/ttyUSB0 ",
+        "rtu:///dev/ttyUSB0\n",
+        "rtu:///dev/tty\0USB0",
+        "/dev/ttyUSB0",
+        "sim://x",
+        "sim:///",
+        "sim:// ",
+        "sim:",
+        "SIM://",
+    ],
+)
+def test_a_malformed_serial_or_simulated_address_is_a_value_error_that_shows_the_forms(text: str) -> None:
+    with pytest.raises(ValueError, match="malformed address") as caught:
+        parse_address(text)
+    assert FORMS in str(caught.value)
+
+
+@pytest.mark.parametrize("address", [None, 502, b"tcp://host", Path("/dev/ttyUSB0"), ("host", 502)], ids=repr)
+def test_what_is_not_a_string_is_a_type_error_that_shows_the_forms(address: object) -> None:
+    with pytest.raises(TypeError, match="address must be a string") as caught:
+        parse_address(address)
+    assert repr(address) in str(caught.value)
+    assert FORMS in str(caught.value)
+
+
+@pytest.mark.xfail(strict=True, reason="what stands in the brackets is checked for its characters only")
+@pytest.mark.parametrize("text", ["[:]", "[:::::]", "[1:2]", "[1::2::3]", "[::12345]", "[::1%]", "[%:]"])
+def test_what_is_no_ipv6_address_is_a_value_error(text: str) -> None:
+    with pytest.raises(ValueError, match="malformed address"):
+        parse_address(text)
+
+
+@pytest.mark.xfail(strict=True, reason="'%' is accepted, but the names of interfaces are not")
+@pytest.mark.parametrize("zone", ["eth0", "Ethernet", "enp3s0"])
+def test_a_link_local_address_names_its_interface_as_it_is_spelled(zone: str) -> None:
+    """A gripper on a cable of its own may have nothing but a link-local address."""
+    assert parse_address(f"tcp://[fe80::1%{zone}]:502") == Address("tcp", f"fe80::1%{zone}", 502)
+
+
+@pytest.mark.xfail(strict=True, reason="int() refuses more than 4300 digits with a message of its own")
+def test_a_port_of_any_length_is_a_value_error_that_shows_the_forms() -> None:
+    with pytest.raises(ValueError, match="malformed address"):
+        parse_address("host:" + "9" * 5000)

@@ -1,0 +1,291 @@
+"""What an adopted axis was asked to do, told from what it does."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robotiq_async.adoption import DIRECTION_WAIT_S, Adoption, agrees
+from robotiq_async.enums import AXES, Finger, Mode, ObjectStatus
+from robotiq_async.request import AxisRequest, Request
+from robotiq_async.status import RobotiqStatus
+from tests.words import status_of
+
+A, B, C, S = AXES
+MOVING, OPENING, CLOSING, THERE = ObjectStatus
+GO, HALTED = 0x39, 0x31
+SETTINGS = tuple(AxisRequest(0, 10 * n, 20 * n) for n in range(1, 5))
+
+
+def gripper(
+    *what: ObjectStatus,
+    byte_0: int = GO,
+    echo: tuple[int, ...] = (0, 0, 0, 0),
+    position: tuple[int, ...] = (0, 0, 0, 0),
+    at: float = 0.0,
+) -> RobotiqStatus:
+    """A status with what A, B, C and the scissor do."""
+    byte_1 = sum(each << 2 * n for n, each in enumerate(what))
+    return status_of(byte_0, byte_1, echo=echo, position=position, at=at)
+
+
+def adopted(*statuses: RobotiqStatus) -> Request:
+    """The request that statuses tell, the first one first."""
+    adoption = Adoption(statuses[0])
+    for status in statuses[1:]:
+        adoption.watch(status)
+    return adoption.request(SETTINGS)
+
+
+def positions(request: Request) -> list[int]:
+    return [request.position(axis) for axis in AXES]
+
+
+# -- the rules, in their order -----------------------------------------------------------------------------
+
+
+def test_an_echo_that_agrees_is_the_request() -> None:
+    status = gripper(THERE, CLOSING, OPENING, THERE, echo=(100, 220, 30, 255), position=(99, 150, 60, 241))
+    assert positions(adopted(status)) == [100, 220, 30, 255]
+
+
+@pytest.mark.parametrize("what", [MOVING, CLOSING])
+def test_b_and_c_under_simple_control_have_the_request_of_a(what: ObjectStatus) -> None:
+    """B and C echo 0 while they follow A."""
+    status = gripper(what, what, what, THERE, echo=(220, 0, 0, 0), position=(100, 101, 99, 137))
+    later = gripper(
+        what, what, what, THERE, echo=(220, 0, 0, 0), position=(105, 106, 104, 137), at=DIRECTION_WAIT_S
+    )
+    assert positions(adopted(status, later)) == [220, 220, 220, 137]
+
+
+def test_b_and_c_that_have_arrived_under_simple_control_have_the_request_of_a() -> None:
+    status = gripper(THERE, THERE, THERE, THERE, echo=(180, 0, 0, 0), position=(179, 181, 180, 137))
+    assert positions(adopted(status)) == [180, 180, 180, 137]
+
+
+def test_the_scissor_never_has_the_request_of_a() -> None:
+    status = gripper(THERE, THERE, THERE, THERE, echo=(137, 0, 0, 0), position=(137, 137, 137, 137))
+    assert positions(adopted(status)) == [137, 137, 137, 137]
+    held = gripper(CLOSING, CLOSING, CLOSING, CLOSING, echo=(220, 0, 0, 0), position=(100, 100, 100, 100))
+    assert positions(adopted(held)) == [220, 220, 220, 255]
+
+
+def test_the_own_echo_of_b_comes_before_that_of_a() -> None:
+    status = gripper(CLOSING, CLOSING, CLOSING, THERE, echo=(255, 200, 210, 0), position=(150, 150, 150, 0))
+    assert positions(adopted(status)) == [255, 200, 210, 0]
+
+
+def test_the_echo_of_a_is_not_taken_either_where_it_does_not_agree() -> None:
+    status = gripper(THERE, CLOSING, OPENING, THERE, echo=(100, 0, 255, 0), position=(100, 150, 60, 6))
+    assert positions(adopted(status)) == [100, 255, 0, 0]
+
+
+def test_a_closing_contact_without_a_request_that_agrees_goes_on_closing() -> None:
+    status = gripper(CLOSING, CLOSING, CLOSING, CLOSING, position=(150, 151, 152, 100))
+    assert positions(adopted(status)) == [255] * 4
+
+
+def test_an_opening_contact_without_a_request_that_agrees_goes_on_opening() -> None:
+    status = gripper(
+        OPENING, OPENING, OPENING, OPENING, echo=(255, 255, 255, 255), position=(150, 151, 152, 100)
+    )
+    assert positions(adopted(status)) == [0] * 4
+
+
+def test_an_axis_at_a_software_limit_stays_there() -> None:
+    """The limit is reported as reached, while the echo keeps the request beyond it."""
+    status = gripper(THERE, THERE, THERE, THERE, echo=(255, 255, 255, 255), position=(180, 181, 182, 219))
+    assert positions(adopted(status)) == [180, 181, 182, 219]
+
+
+def test_an_axis_that_moves_against_every_echo_stays_where_it_is() -> None:
+    first = gripper(THERE, MOVING, THERE, THERE, echo=(0, 0, 0, 0), position=(6, 100, 6, 6))
+    later = gripper(THERE, MOVING, THERE, THERE, echo=(0, 0, 0, 0), position=(6, 110, 6, 6), at=0.1)
+    assert positions(adopted(first, later)) == [0, 110, 0, 0]
+
+
+@pytest.mark.parametrize("what", ObjectStatus)
+def test_a_halted_gripper_has_its_own_positions_as_requests(what: ObjectStatus) -> None:
+    status = gripper(
+        what, what, what, what, byte_0=HALTED, echo=(200, 200, 200, 200), position=(100, 200, 201, 137)
+    )
+    request = adopted(status)
+    assert positions(request) == [100, 200, 201, 137]
+    assert not request.go
+
+
+# -- what an axis does and what it may have been asked -----------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("request_", "what", "position", "direction", "expected"),
+    [
+        # At the requested position, within one or two counts.
+        (100, THERE, 100, 0, True),
+        (100, THERE, 98, 0, True),
+        (100, THERE, 102, 0, True),
+        (100, THERE, 97, 0, False),
+        (100, THERE, 103, 0, False),
+        # Fully open reads 6-7 although 0 was asked, fully closed 240 or more although 255 was asked.
+        (0, THERE, 6, 0, True),
+        (0, THERE, 7, 0, True),
+        (0, THERE, 20, 0, False),
+        (255, THERE, 240, 0, True),
+        (255, THERE, 241, 0, True),
+        (255, THERE, 255, 0, True),
+        (255, THERE, 230, 0, False),
+        (0, THERE, 137, 0, False),
+        # A contact while closing needs a request further closed, one while opening further open.
+        (151, CLOSING, 150, 0, True),
+        (150, CLOSING, 150, 0, False),
+        (0, CLOSING, 150, 0, False),
+        (149, OPENING, 150, 0, True),
+        (150, OPENING, 150, 0, False),
+        (255, OPENING, 150, 0, False),
+        # A moving axis goes towards its request.
+        (200, MOVING, 100, 0, True),
+        (200, MOVING, 100, 5, True),
+        (200, MOVING, 100, -5, False),
+        (0, MOVING, 100, 5, False),
+        (0, MOVING, 100, -5, True),
+        (100, MOVING, 100, 0, False),
+        (100, MOVING, 100, 5, False),
+    ],
+)
+def test_a_request_agrees_with_what_an_axis_does(
+    request_: int, what: ObjectStatus, position: int, direction: int, expected: bool
+) -> None:
+    assert agrees(request_, what, position, direction) is expected
+
+
+# -- directions --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("moved", "expected"), [(1, 220), (20, 220), (-1, 0), (-20, 0)], ids=["+1", "+20", "-1", "-20"]
+)
+def test_the_direction_of_b_tells_its_own_echo_from_that_of_a(moved: int, expected: int) -> None:
+    first = gripper(MOVING, MOVING, THERE, THERE, echo=(220, 0, 0, 0), position=(100, 100, 6, 6))
+    later = gripper(
+        MOVING, MOVING, THERE, THERE, echo=(220, 0, 0, 0), position=(120, 100 + moved, 6, 6), at=0.02
+    )
+    assert adopted(first, later).position(B) == expected
+
+
+def test_nothing_is_certain_before_every_moving_axis_has_shown_its_direction() -> None:
+    adoption = Adoption(gripper(MOVING, MOVING, THERE, THERE, position=(100, 100, 6, 6)))
+    assert not adoption.is_certain
+    adoption.watch(gripper(MOVING, MOVING, THERE, THERE, position=(101, 100, 6, 6), at=0.01))
+    assert not adoption.is_certain
+    adoption.watch(gripper(MOVING, MOVING, THERE, THERE, position=(101, 99, 6, 6), at=0.02))
+    assert adoption.is_certain
+
+
+def test_an_axis_that_stays_where_it_is_is_not_waited_for_any_longer_than_a_count_takes() -> None:
+    adoption = Adoption(gripper(MOVING, THERE, THERE, THERE, position=(100, 0, 0, 0), at=5.0))
+    adoption.watch(
+        gripper(MOVING, THERE, THERE, THERE, position=(100, 0, 0, 0), at=5.0 + DIRECTION_WAIT_S / 2)
+    )
+    assert not adoption.is_certain
+    adoption.watch(gripper(MOVING, THERE, THERE, THERE, position=(100, 0, 0, 0), at=5.001 + DIRECTION_WAIT_S))
+    assert adoption.is_certain
+
+
+def test_a_slow_axis_has_the_time_to_show_its_direction() -> None:
+    # The slowest full closing takes 10.021 s (thesis, table A1.1) for 235 counts.
+    assert DIRECTION_WAIT_S > 2 * 10.021 / 235
+
+
+@pytest.mark.parametrize("byte_0", [GO, HALTED])
+@pytest.mark.parametrize("what", [OPENING, CLOSING, THERE])
+def test_a_gripper_at_rest_is_certain_at_once(byte_0: int, what: ObjectStatus) -> None:
+    assert Adoption(gripper(what, what, what, what, byte_0=byte_0)).is_certain
+
+
+def test_a_gripper_that_was_never_told_to_go_is_certain_at_once() -> None:
+    assert Adoption(status_of(0x31, 0x00)).is_certain
+
+
+# -- the rest of the image ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mode", Mode)
+@pytest.mark.parametrize("byte_0", [GO, HALTED, 0x30])
+def test_activation_go_and_mode_are_taken_over(mode: Mode, byte_0: int) -> None:
+    request = adopted(gripper(THERE, THERE, THERE, THERE, byte_0=byte_0 | mode << 1))
+    assert request.activate == bool(byte_0 & 0x01)
+    assert request.go == bool(byte_0 & 0x08)
+    assert request.mode is mode
+    assert not request.release
+
+
+def test_every_axis_gets_its_own_registers() -> None:
+    request = adopted(gripper(THERE, THERE, THERE, THERE))
+    assert request.individual_fingers
+    assert request.individual_scissor
+
+
+def test_speed_and_force_have_no_echo_and_come_from_the_settings() -> None:
+    request = adopted(gripper(THERE, THERE, THERE, THERE))
+    assert [(axis.speed, axis.force) for axis in request.axes] == [(10, 20), (20, 40), (30, 60), (40, 80)]
+
+
+# -- any gripper -------------------------------------------------------------------------------------------
+
+BYTES4 = st.tuples(*[st.integers(0, 255)] * 4)
+WHATS = st.tuples(*[st.sampled_from(ObjectStatus)] * 4)
+
+
+@given(WHATS, BYTES4, BYTES4, BYTES4, st.booleans())
+def test_an_adopted_gripper_neither_turns_round_nor_lets_go(
+    whats: tuple[ObjectStatus, ...],
+    echo: tuple[int, ...],
+    before: tuple[int, ...],
+    now: tuple[int, ...],
+    go: bool,
+) -> None:
+    byte_0 = GO if go else HALTED
+    request = adopted(
+        gripper(*whats, byte_0=byte_0, echo=echo, position=before),
+        gripper(*whats, byte_0=byte_0, echo=echo, position=now, at=DIRECTION_WAIT_S),
+    )
+    assert request.go == go
+    for axis, what, first, position in zip(AXES, whats, before, now, strict=True):
+        asked = request.position(axis)
+        if not go:
+            assert asked == position
+            continue
+        match what:
+            case ObjectStatus.CONTACT_CLOSING:
+                assert asked > position or asked == 255, "the grip was relaxed"
+            case ObjectStatus.CONTACT_OPENING:
+                assert asked < position or asked == 0, "the grip was relaxed"
+            case ObjectStatus.AT_POSITION:
+                within = abs(asked - position) <= 2
+                assert within or (asked <= 7 and position <= 9) or (asked >= 240 and position >= 238)
+            case ObjectStatus.IN_MOTION:
+                assert (asked - position) * (position - first) >= 0, "the axis was turned round"
+
+
+@given(WHATS, BYTES4, BYTES4)
+def test_a_request_is_an_echo_an_end_or_where_the_axis_is(
+    whats: tuple[ObjectStatus, ...], echo: tuple[int, ...], position: tuple[int, ...]
+) -> None:
+    request = adopted(gripper(*whats, echo=echo, position=position))
+    for number, axis in enumerate(AXES):
+        possible = {echo[number], position[number], 0, 255}
+        if axis in Finger.B | Finger.C:
+            possible.add(echo[0])
+        assert request.position(axis) in possible
+
+
+@given(BYTES4, BYTES4)
+def test_individual_requests_of_a_holding_gripper_are_kept_as_they_are(
+    position: tuple[int, ...], by: tuple[int, ...]
+) -> None:
+    """Under individual control every echo is worth trusting."""
+    echo = tuple(min(255, each + 1 + more) for each, more in zip(position, by, strict=True))
+    request = adopted(gripper(CLOSING, CLOSING, CLOSING, CLOSING, echo=echo, position=position))
+    assert positions(request) == list(echo)

@@ -1,0 +1,125 @@
+"""The tree of errors and what each of them carries."""
+
+from __future__ import annotations
+
+import pickle
+
+import pytest
+
+from robotiq_async import errors
+from robotiq_async.enums import Fault, State
+from tests.words import status_of
+
+TREE: dict[str, tuple[str, ...]] = {
+    "RobotiqError": ("Exception",),
+    "RobotiqStateError": ("RobotiqError",),
+    "NotStartedError": ("RobotiqStateError",),
+    "InvalidStateError": ("RobotiqStateError",),
+    "NotActivatedError": ("RobotiqStateError",),
+    "GripperFaultError": ("RobotiqStateError",),
+    "ActivationTimeoutError": ("RobotiqStateError", "TimeoutError"),
+    "StateTimeoutError": ("RobotiqStateError", "TimeoutError"),
+    "MoveTimeoutError": ("RobotiqStateError", "TimeoutError"),
+    "MoveSupersededError": ("RobotiqStateError",),
+    "RobotiqConnectionError": ("RobotiqError", "ConnectionError"),
+    "ConnectFailedError": ("RobotiqConnectionError",),
+    "ConnectionLostError": ("RobotiqConnectionError",),
+    "ResponseTimeoutError": ("RobotiqConnectionError", "TimeoutError"),
+    "ProtocolError": ("RobotiqConnectionError",),
+}
+"""The contract's tree: each error with its bases."""
+
+
+def classes() -> dict[str, type[BaseException]]:
+    return {
+        name: each
+        for name, each in vars(errors).items()
+        if isinstance(each, type) and issubclass(each, BaseException)
+    }
+
+
+def test_the_tree_is_that_of_the_contract() -> None:
+    assert {name: tuple(base.__name__ for base in each.__bases__) for name, each in classes().items()} == TREE
+
+
+def test_the_tree_is_drawn_in_the_module() -> None:
+    assert errors.__doc__ is not None
+    for name in TREE:
+        assert name in errors.__doc__
+
+
+def test_a_refusal_tells_the_state_and_the_states_that_would_do() -> None:
+    error = errors.InvalidStateError("not now", State.RESET, [State.FAULT, State.FAULT])
+    assert str(error) == "not now"
+    assert error.state is State.RESET
+    assert error.allowed == frozenset({State.FAULT})
+
+
+def test_a_fault_error_tells_code_severity_and_description() -> None:
+    error = errors.GripperFaultError(Fault.SCISSOR_BLOCKED)
+    assert error.fault is Fault.SCISSOR_BLOCKED
+    assert "0x0E" in str(error)
+    assert "major" in str(error)
+    assert Fault.SCISSOR_BLOCKED.description in str(error)
+
+
+def test_a_fault_error_of_an_unassigned_code_tells_its_number() -> None:
+    assert "0x0C" in str(errors.GripperFaultError(Fault(0x0C)))
+
+
+def test_a_fault_error_takes_a_message_of_its_own() -> None:
+    assert str(errors.GripperFaultError(Fault.ACTIVATION_FAULT, "as told")) == "as told"
+
+
+def test_a_timed_out_move_tells_the_last_status() -> None:
+    status = status_of(0x39, 0xC0)
+    assert errors.MoveTimeoutError("too slow", status).status is status
+
+
+def test_a_failed_connection_tells_address_and_reason() -> None:
+    error = errors.ConnectFailedError("tcp://192.168.1.11:502", "refused")
+    assert error.address == "tcp://192.168.1.11:502"
+    assert "tcp://192.168.1.11:502" in str(error)
+    assert "refused" in str(error)
+
+
+def test_time_outs_and_lost_links_are_caught_by_the_names_python_has_for_them() -> None:
+    timeouts = {name for name, each in classes().items() if issubclass(each, TimeoutError)}
+    assert timeouts == {name for name in TREE if "Timeout" in name}
+    connection = {name for name, each in classes().items() if issubclass(each, ConnectionError)}
+    assert connection == {
+        "RobotiqConnectionError",
+        "ConnectFailedError",
+        "ConnectionLostError",
+        "ResponseTimeoutError",
+        "ProtocolError",
+    }
+
+
+@pytest.mark.parametrize(
+    "name", ["NotStartedError", "NotActivatedError", "ConnectionLostError", "ProtocolError"]
+)
+def test_a_plain_error_survives_pickling(name: str) -> None:
+    error = pickle.loads(pickle.dumps(classes()[name]("why")))
+    assert type(error) is classes()[name]
+    assert str(error) == "why"
+
+
+@pytest.mark.xfail(
+    strict=True, reason="errors with attributes cannot be unpickled: args hold the message only"
+)
+@pytest.mark.parametrize(
+    "error",
+    [
+        errors.InvalidStateError("not now", State.RESET, [State.FAULT]),
+        errors.GripperFaultError(Fault.SCISSOR_BLOCKED),
+        errors.MoveTimeoutError("too slow", status_of(0x39, 0xC0)),
+        errors.ConnectFailedError("tcp://192.168.1.11:502", "refused"),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_an_error_with_attributes_survives_pickling(error: errors.RobotiqError) -> None:
+    again = pickle.loads(pickle.dumps(error))
+    assert type(again) is type(error)
+    assert str(again) == str(error)
+    assert vars(again) == vars(error)

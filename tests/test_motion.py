@@ -1,0 +1,204 @@
+"""Moves: when one has ended, what came of it, and how long it may take."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robotiq_async.enums import AXES, Finger, ObjectStatus
+from robotiq_async.errors import MoveSupersededError, RobotiqError
+from robotiq_async.motion import MARGIN_S, Move, MoveResult, default_timeout
+from tests.words import status_of
+
+A, B, C, S = AXES
+ABC = Finger.ABC
+
+
+def move(
+    position: int = 255, axes: Finger = ABC, now: float = 10.0
+) -> tuple[Move, list[MoveResult | RobotiqError]]:
+    told: list[MoveResult | RobotiqError] = []
+    return Move(position, axes, now, told.append), told
+
+
+# -- when it has ended -------------------------------------------------------------------------------------
+
+
+def test_a_move_has_arrived_when_every_addressed_axis_rests_under_its_request() -> None:
+    each, _ = move(255)
+    assert each.has_arrived(status_of(0xF9, 0xFF, echo=255))
+    assert each.has_arrived(status_of(0xB9, 0xEA, echo=(255, 255, 255, 0)))
+
+
+@pytest.mark.parametrize("byte_1", [0b11_11_11_00, 0b11_11_00_11, 0b11_00_11_11])
+def test_a_move_has_not_arrived_while_one_addressed_axis_moves(byte_1: int) -> None:
+    each, _ = move(255)
+    assert not each.has_arrived(status_of(0x39, byte_1, echo=255))
+
+
+def test_an_axis_that_is_not_addressed_may_move_on() -> None:
+    each, _ = move(255, A | B)
+    assert each.has_arrived(status_of(0x39, 0b00_00_11_11, echo=(255, 255, 0, 0)))
+
+
+@pytest.mark.parametrize("echo", [(254, 255, 255, 0), (255, 0, 255, 0), (255, 255, 100, 0)])
+def test_a_move_has_not_arrived_while_one_echo_shows_another_request(echo: tuple[int, ...]) -> None:
+    each, _ = move(255)
+    assert not each.is_under(status_of(0xF9, 0xFF, echo=echo))
+    assert not each.has_arrived(status_of(0xF9, 0xFF, echo=echo))
+
+
+def test_a_halted_gripper_is_not_under_a_move() -> None:
+    each, _ = move(255)
+    assert not each.is_under(status_of(0xF1, 0xFF, echo=255))
+    assert not each.has_arrived(status_of(0xF1, 0xFF, echo=255))
+
+
+def test_a_moving_gripper_is_under_its_move() -> None:
+    each, _ = move(255)
+    assert each.is_under(status_of(0x39, 0xC0, echo=255))
+    assert not each.has_arrived(status_of(0x39, 0xC0, echo=255))
+
+
+def test_arriving_does_not_depend_on_the_position_reached() -> None:
+    """Open stops at 6-7 although 0 was asked, closed at 240 or above."""
+    each, _ = move(0)
+    assert each.has_arrived(status_of(0xF9, 0xFF, echo=0, position=7))
+
+
+# -- the outcome is handed over once -----------------------------------------------------------------------
+
+
+def test_a_move_ends_once_with_the_first_outcome() -> None:
+    each, told = move()
+    assert not each.has_ended
+    first, second = MoveSupersededError("first"), MoveSupersededError("second")
+    each.end(first)
+    each.end(second)
+    each.end(each.result(status_of(0xF9, 0xFF)))
+    assert told == [first]
+    assert each.has_ended
+
+
+def test_a_move_counts_as_ended_while_its_outcome_is_handed_over() -> None:
+    seen: list[bool] = []
+    each = Move(255, ABC, 0.0, lambda _: seen.append(each.has_ended))
+    each.end(MoveSupersededError("now"))
+    assert seen == [True]
+
+
+# -- the result --------------------------------------------------------------------------------------------
+
+
+def held() -> MoveResult:
+    """A and B hold something, C is closed, the scissor touches something too."""
+    each, _ = move(255, ABC, now=10.0)
+    each.observe(status_of(0x39, 0xC0, echo=255, current=(15, 5, 0, 200)))
+    each.observe(status_of(0x39, 0xC0, echo=255, current=(3, 40, 1, 0)))
+    last = status_of(
+        0x79, 0b10_11_10_10, echo=255, position=(150, 151, 241, 99), current=(9, 9, 9, 9), at=12.5
+    )
+    each.observe(last)
+    return each.result(last)
+
+
+def test_a_result_tells_outcome_and_position_of_each_addressed_axis() -> None:
+    result = held()
+    assert dict(result.outcomes) == {
+        A: ObjectStatus.CONTACT_CLOSING,
+        B: ObjectStatus.CONTACT_CLOSING,
+        C: ObjectStatus.AT_POSITION,
+    }
+    assert dict(result.positions) == {A: 150, B: 151, C: 241}
+
+
+def test_a_result_tells_contacts_of_addressed_axes_only() -> None:
+    result = held()
+    assert result.contacts == A | B
+    assert result.object_detected
+
+
+def test_a_contact_while_opening_is_an_object_too() -> None:
+    each, _ = move(0, A)
+    result = each.result(status_of(0x79, 0b11_11_11_01, echo=0))
+    assert dict(result.outcomes) == {A: ObjectStatus.CONTACT_OPENING}
+    assert result.contacts == A
+    assert result.object_detected
+
+
+def test_without_a_contact_nothing_was_detected() -> None:
+    each, _ = move(255, A)
+    result = each.result(status_of(0x79, 0b10_10_10_11, echo=255))
+    assert result.contacts == Finger(0)
+    assert not result.object_detected
+
+
+def test_a_result_tells_the_highest_current_of_each_addressed_axis() -> None:
+    assert dict(held().peak_current_ma) == {A: 150, B: 400, C: 90}
+
+
+def test_a_result_tells_the_time_from_the_call_to_the_last_status() -> None:
+    result = held()
+    assert result.duration == 2.5
+    assert result.status.timestamp == 12.5
+
+
+def test_a_result_cannot_be_changed() -> None:
+    result = held()
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        result.contacts = ABC  # type: ignore[misc]
+    for mapping in (result.outcomes, result.positions, result.peak_current_ma):
+        with pytest.raises(TypeError):
+            mapping[A] = 0  # type: ignore[index]
+
+
+def test_a_result_does_not_change_with_what_is_seen_later() -> None:
+    each, _ = move(255, A)
+    result = each.result(status_of(0xF9, 0xFF))
+    each.observe(status_of(0xF9, 0xFF, current=255))
+    assert dict(result.peak_current_ma) == {A: 0}
+
+
+# -- the default time-out ----------------------------------------------------------------------------------
+
+SLOWEST_S, FASTEST_S = 10.021, 2.119
+"""A full closing, 6 to 241 (thesis, table A1.1)."""
+
+
+def timeout(position: int, axes: Finger, at: int | tuple[int, ...], speed: int | tuple[int, ...]) -> float:
+    speeds = dict(zip(AXES, speed if isinstance(speed, tuple) else (speed,) * 4, strict=True))
+    return default_timeout(position, axes, status_of(0x31, position=at), speeds)
+
+
+@pytest.mark.parametrize(("speed", "seconds"), [(0, SLOWEST_S), (255, FASTEST_S)])
+def test_a_full_closing_may_take_twice_its_measured_time_and_two_seconds(speed: int, seconds: float) -> None:
+    assert timeout(241, ABC, 6, speed) == pytest.approx(2 * seconds + 2)
+    assert timeout(6, ABC, 241, speed) == pytest.approx(2 * seconds + 2)
+
+
+def test_half_the_distance_takes_half_the_time() -> None:
+    assert timeout(118, A, 6, 0) == pytest.approx(2 * SLOWEST_S * 112 / 235 + 2)
+
+
+def test_no_distance_leaves_the_margin() -> None:
+    assert timeout(100, ABC, 100, 0) == MARGIN_S == 2.0
+
+
+def test_the_slowest_addressed_axis_counts() -> None:
+    assert timeout(241, A | B, 6, (255, 0, 255, 255)) == pytest.approx(2 * SLOWEST_S + 2)
+    assert timeout(241, A | B, (240, 6, 6, 6), (0, 255, 0, 0)) == pytest.approx(2 * FASTEST_S + 2)
+
+
+def test_axes_that_are_not_addressed_do_not_count() -> None:
+    assert timeout(241, A, 6, (255, 0, 0, 0)) == pytest.approx(2 * FASTEST_S + 2)
+
+
+@given(st.integers(0, 255), st.integers(1, 15), st.integers(0, 255), st.integers(0, 255))
+def test_any_move_may_take_at_least_the_margin_and_at_most_the_slowest_full_stroke(
+    position: int, axes: int, at: int, speed: int
+) -> None:
+    seconds = timeout(position, Finger(axes), at, speed)
+    assert 2.0 <= seconds <= 2 * SLOWEST_S * 255 / 235 + 2.0

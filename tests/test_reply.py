@@ -1,0 +1,263 @@
+"""Every byte of a reply: frames of the Modbus specification, whole, cut, longer and corrupted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robotiq_async.errors import ProtocolError
+from robotiq_async.reply import Expected, expected_reply
+
+TRANSACTION = "12 34"
+VALUES = "31 00 00 00 ff 06 00 00 07 00 00 06 00 00 89 00"
+IMAGE = "09 0c 00 11 12 13 21 22 23 31 32 33 41 42 43 00"
+
+
+class Case:
+    """A request frame, its good reply, and which bytes of that can be checked."""
+
+    def __init__(self, request: str, reply: str, *, serial: bool, checked: range, function: int) -> None:
+        self.request = bytes.fromhex(request)
+        self.reply = bytes.fromhex(reply)
+        self.serial = serial
+        self.checked = checked
+        self.function = function
+
+    @property
+    def expected(self) -> Expected:
+        return expected_reply(self.request, serial=self.serial)
+
+
+# The check sums of the serial frames are the ones of the Modbus specification's algorithm; they are not
+# looked at here.
+CASES = {
+    "tcp read": Case(
+        f"{TRANSACTION} 00 00 00 06 02 04 00 00 00 08",
+        f"{TRANSACTION} 00 00 00 13 02 04 10 {VALUES}",
+        serial=False,
+        checked=range(9),
+        function=4,
+    ),
+    "tcp write": Case(
+        f"{TRANSACTION} 00 00 00 17 02 10 00 00 00 08 10 {IMAGE}",
+        f"{TRANSACTION} 00 00 00 06 02 10 00 00 00 08",
+        serial=False,
+        checked=range(12),
+        function=16,
+    ),
+    "tcp read of holding registers": Case(
+        f"{TRANSACTION} 00 00 00 06 02 03 07 d0 00 08",
+        f"{TRANSACTION} 00 00 00 13 02 03 10 {VALUES}",
+        serial=False,
+        checked=range(9),
+        function=3,
+    ),
+    "rtu read": Case(
+        "09 03 07 d0 00 08 45 c9", f"09 03 10 {VALUES} aa bb", serial=True, checked=range(3), function=3
+    ),
+    "rtu write": Case(
+        f"09 10 03 e8 00 08 10 {IMAGE} aa bb",
+        "09 10 03 e8 00 08 aa bb",
+        serial=True,
+        checked=range(6),
+        function=16,
+    ),
+    "rtu probe of three registers": Case(
+        "09 03 07 d0 00 03 aa bb",
+        "09 03 06 31 00 00 00 ff 06 aa bb",
+        serial=True,
+        checked=range(3),
+        function=3,
+    ),
+}
+
+every_case = pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+
+
+def exception_reply(case: Case, code: int) -> bytes:
+    refusal = bytes((case.function | 0x80, code))
+    if case.serial:
+        return case.reply[:1] + refusal + b"\xaa\xbb"
+    return case.reply[:4] + b"\x00\x03" + case.reply[6:7] + refusal
+
+
+def corrupted(frame: bytes, positions: range) -> Iterator[tuple[int, bytes]]:
+    """The frame with one byte changed: every position, every other value."""
+    for position in positions:
+        for change in range(1, 256):
+            yield position, frame[:position] + bytes((frame[position] ^ change,)) + frame[position + 1 :]
+
+
+def is_ever_complete(expected: Expected, frame: bytes) -> bool:
+    """Whether any of the growing beginnings of a frame is taken for the whole answer."""
+    for end in range(len(frame) + 1):
+        try:
+            if expected.is_complete(frame[:end]):
+                return True
+        except ProtocolError:
+            return False
+    return False
+
+
+# -- the good reply ----------------------------------------------------------------------------------------
+
+
+@every_case
+def test_the_good_reply_is_complete(case: Case) -> None:
+    assert case.expected.is_complete(case.reply)
+
+
+@every_case
+def test_a_good_reply_is_incomplete_until_its_last_byte(case: Case) -> None:
+    for end in range(len(case.reply)):
+        assert not case.expected.is_complete(case.reply[:end])
+
+
+@every_case
+@pytest.mark.parametrize("more", [b"\x00", b"\xff" * 3])
+def test_a_good_reply_with_something_behind_it_is_refused(case: Case, more: bytes) -> None:
+    with pytest.raises(ProtocolError, match=f"{len(more)} bytes more"):
+        case.expected.is_complete(case.reply + more)
+
+
+@every_case
+def test_two_good_replies_at_once_are_refused(case: Case) -> None:
+    with pytest.raises(ProtocolError):
+        case.expected.is_complete(2 * case.reply)
+
+
+@every_case
+@given(values=st.binary(min_size=16, max_size=16))
+def test_the_values_that_are_read_are_not_looked_at(case: Case, values: bytes) -> None:
+    """There is nothing to compare them with; TCP or the check sum of RTU vouches for them."""
+    if case.function == 16:
+        return
+    start = case.checked.stop
+    count = case.reply[start - 1]
+    reply = case.reply[:start] + values[:count] + case.reply[start + count :]
+    assert case.expected.is_complete(reply)
+
+
+# -- one wrong byte ----------------------------------------------------------------------------------------
+
+
+def test_the_bytes_that_can_be_checked_are_all_but_values_and_check_sums() -> None:
+    for case in CASES.values():
+        unchecked = len(case.reply) - len(case.checked)
+        values = (
+            0
+            if case.function == 16
+            else 2 * int.from_bytes(case.request[-4:-2] if case.serial else case.request[-2:])
+        )
+        assert unchecked == values + (2 if case.serial else 0)
+
+
+@every_case
+def test_no_reply_with_one_wrong_byte_is_ever_taken_for_the_answer(case: Case) -> None:
+    count = 0
+    for position, frame in corrupted(case.reply, case.checked):
+        assert not is_ever_complete(case.expected, frame), f"byte {position}: {frame.hex(' ')}"
+        count += 1
+    assert count == 255 * len(case.checked)
+
+
+@every_case
+def test_a_whole_reply_with_one_wrong_byte_is_refused_at_once(case: Case) -> None:
+    for _, frame in corrupted(case.reply, case.checked):
+        with pytest.raises(ProtocolError):
+            case.expected.is_complete(frame)
+
+
+@every_case
+def test_a_wrong_byte_is_refused_as_soon_as_it_is_seen(case: Case) -> None:
+    for position, frame in corrupted(case.reply, case.checked):
+        if (
+            frame[position] == case.function | 0x80
+            and frame[:position] == case.reply[: len(case.expected.header)]
+        ):
+            continue  # the beginning of an exception reply
+        with pytest.raises(ProtocolError, match="not the answer"):
+            case.expected.is_complete(frame[: position + 1])
+
+
+@every_case
+def test_no_exception_reply_with_one_wrong_byte_is_ever_taken_for_the_answer(case: Case) -> None:
+    good = exception_reply(case, 2)
+    for _, frame in corrupted(good, range(len(good))):
+        assert not is_ever_complete(case.expected, frame)
+
+
+@every_case
+@given(frame=st.binary(max_size=40))
+def test_noise_is_never_taken_for_the_answer(case: Case, frame: bytes) -> None:
+    assert frame[: case.checked.stop] == case.reply[: case.checked.stop] or not is_ever_complete(
+        case.expected, frame
+    )
+
+
+# -- the wrong answer --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("transaction", ["12 33", "00 00", "34 12"])
+@pytest.mark.parametrize("name", ["tcp read", "tcp write"])
+def test_the_answer_to_another_request_is_refused(name: str, transaction: str) -> None:
+    case = CASES[name]
+    with pytest.raises(ProtocolError, match="not the answer"):
+        case.expected.is_complete(bytes.fromhex(transaction) + case.reply[2:])
+
+
+@pytest.mark.parametrize(
+    ("asked", "answered"),
+    [
+        ("tcp read", "tcp write"),
+        ("tcp write", "tcp read"),
+        ("rtu read", "rtu write"),
+        ("rtu write", "rtu read"),
+        ("rtu read", "rtu probe of three registers"),
+        ("rtu probe of three registers", "rtu read"),
+    ],
+)
+def test_the_answer_to_the_other_kind_of_request_is_refused(asked: str, answered: str) -> None:
+    with pytest.raises(ProtocolError, match="not the answer"):
+        CASES[asked].expected.is_complete(CASES[answered].reply)
+
+
+@pytest.mark.parametrize("count", sorted(set(range(1, 9)) - {3}))
+def test_a_late_answer_of_another_length_is_not_that_of_a_probe(count: int) -> None:
+    case = CASES["rtu probe of three registers"]
+    late = bytes((9, 3, 2 * count)) + bytes(2 * count) + b"\xaa\xbb"
+    assert not is_ever_complete(case.expected, late)
+
+
+@pytest.mark.parametrize("name", ["tcp read", "tcp write"])
+def test_the_length_field_counts_what_follows_it(name: str) -> None:
+    case = CASES[name]
+    assert int.from_bytes(case.expected.header[4:6]) == len(case.reply) - 6
+
+
+# -- exception replies -------------------------------------------------------------------------------------
+
+
+@every_case
+@pytest.mark.parametrize("code", [1, 2, 3, 4, 6, 11, 99])
+def test_an_exception_reply_is_a_protocol_error_that_tells_function_and_code(case: Case, code: int) -> None:
+    with pytest.raises(ProtocolError, match=f"refuses function {case.function}: exception {code} "):
+        case.expected.is_complete(exception_reply(case, code))
+
+
+def test_an_exception_reply_is_explained() -> None:
+    case = CASES["tcp read"]
+    with pytest.raises(ProtocolError, match="illegal data address"):
+        case.expected.is_complete(exception_reply(case, 2))
+
+
+@every_case
+def test_an_exception_reply_that_comes_in_pieces_is_never_an_answer(case: Case) -> None:
+    reply = exception_reply(case, 2)
+    assert not is_ever_complete(case.expected, reply)
+    # From the function code on it is known for what it is, and waited for.
+    for end in range(len(case.expected.header) + 1, len(reply)):
+        assert not case.expected.is_complete(reply[:end])

@@ -1,0 +1,277 @@
+"""RobotiqStatus against the words of the manual."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robotiq_async import Fault, Finger, Initialization, Mode, ObjectStatus, RobotiqStatus
+from robotiq_async.enums import AXES
+from tests.words import bytes_of, registers_of, status_of
+
+A, B, C, S = AXES
+BLOCKS = st.tuples(*[st.integers(0, 0xFFFF)] * 8)
+
+PER_AXIS: list[Callable[[RobotiqStatus, Finger], object]] = [
+    RobotiqStatus.finger_status,
+    RobotiqStatus.position,
+    RobotiqStatus.requested_position,
+    RobotiqStatus.current,
+    RobotiqStatus.current_ma,
+]
+
+
+# -- the words of the manual -------------------------------------------------------------------------------
+
+
+def test_an_activating_gripper_is_neither_active_nor_reset_nor_moving() -> None:
+    status = status_of(0x11, 0x00)
+    assert status.initialization is Initialization.ACTIVATING
+    assert status.activation_echo
+    assert not status.is_activated
+    assert not status.is_reset
+    assert not status.is_moving
+
+
+def test_a_ready_gripper_that_was_never_told_to_go_does_not_move_although_every_motion_field_is_zero() -> (
+    None
+):
+    status = status_of(0x31, 0x00)
+    assert status.is_activated
+    assert not status.go_echo
+    assert status.motion == 0
+    assert [status.finger_status(axis) for axis in AXES] == [ObjectStatus.IN_MOTION] * 4
+    assert not status.is_moving
+    assert status.moving == Finger(0)
+
+
+def test_a_closing_gripper_moves_its_fingers_and_not_the_scissor() -> None:
+    status = status_of(0x39, 0xC0)
+    assert status.is_moving
+    assert status.moving == Finger.ABC
+    assert status.finger_status(S) is ObjectStatus.AT_POSITION
+    assert status.contacts == Finger(0)
+
+
+def test_a_held_object_is_a_contact_while_closing_of_all_three_fingers() -> None:
+    status = status_of(0xB9, 0xEA)
+    assert [status.finger_status(axis) for axis in (A, B, C)] == [ObjectStatus.CONTACT_CLOSING] * 3
+    assert status.contacts == Finger.ABC
+    assert not status.is_moving
+    assert status.motion == 2
+
+
+def test_a_reached_position_is_no_contact() -> None:
+    status = status_of(0xF9, 0xFF)
+    assert [status.finger_status(axis) for axis in AXES] == [ObjectStatus.AT_POSITION] * 4
+    assert status.contacts == Finger(0)
+    assert not status.is_moving
+    assert status.motion == 3
+
+
+def test_a_reset_gripper_is_reset() -> None:
+    status = status_of(0x00, 0x00)
+    assert status.is_reset
+    assert not status.activation_echo
+    assert not status.is_activated
+
+
+def test_one_is_a_contact_while_opening_and_two_a_contact_while_closing() -> None:
+    # A: 01, B: 10, C: 00, scissor: 11.
+    status = status_of(0x79, 0b11_00_10_01)
+    assert status.finger_status(A) is ObjectStatus.CONTACT_OPENING
+    assert status.finger_status(B) is ObjectStatus.CONTACT_CLOSING
+    assert status.finger_status(C) is ObjectStatus.IN_MOTION
+    assert status.finger_status(S) is ObjectStatus.AT_POSITION
+    assert status.contacts == A | B
+    assert status.moving == C
+
+
+def test_a_current_of_fifteen_counts_is_150_milliampere() -> None:
+    status = status_of(0x39, current=(0x0F, 0, 1, 0xFF))
+    assert [status.current(axis) for axis in AXES] == [15, 0, 1, 255]
+    assert [status.current_ma(axis) for axis in AXES] == [150, 0, 10, 2550]
+
+
+@pytest.mark.parametrize("mode", range(4))
+def test_the_mode_is_echoed_in_bits_one_and_two(mode: int) -> None:
+    assert status_of(0x31 | mode << 1).mode is Mode(mode)
+
+
+@pytest.mark.parametrize("initialization", range(4))
+@pytest.mark.parametrize("go", [0, 1])
+@pytest.mark.parametrize("what", range(4))
+def test_an_axis_moves_only_while_told_to_go_and_fully_active(
+    initialization: int, go: int, what: int
+) -> None:
+    status = status_of(0x01 | go << 3 | initialization << 4, what | 0b11_11_11_00)
+    moves = go == 1 and initialization == 3 and what == 0
+    assert status.is_moving == moves
+    assert status.moving == (A if moves else Finger(0))
+
+
+def test_a_contact_stays_visible_when_the_go_bit_is_cleared() -> None:
+    assert status_of(0xB1, 0xEA).contacts == Finger.ABC
+
+
+# -- every status ------------------------------------------------------------------------------------------
+
+
+@given(BLOCKS)
+def test_any_eight_registers_are_a_status_that_answers_everything(block: tuple[int, ...]) -> None:
+    status = RobotiqStatus.from_registers(block)
+    content = bytes_of(block)
+    for number, axis in enumerate(AXES):
+        assert status.requested_position(axis) == content[3 + 3 * number]
+        assert status.position(axis) == content[4 + 3 * number]
+        assert status.current(axis) == content[5 + 3 * number]
+        assert status.current_ma(axis) == 10 * content[5 + 3 * number]
+        assert status.finger_status(axis) == content[1] >> 2 * number & 3
+    assert status.activation_echo == bool(content[0] & 1)
+    assert status.mode == content[0] >> 1 & 3
+    assert status.go_echo == bool(content[0] & 8)
+    assert status.initialization == content[0] >> 4 & 3
+    assert status.motion == content[0] >> 6
+    assert int(status.fault) == content[2] & 0x0F
+    assert (status.fault is Fault.NONE) == (content[2] & 0x0F == 0)
+    assert status.is_moving == bool(status.moving)
+    assert not status.moving & status.contacts
+    assert status.registers == block
+    assert repr(status)
+
+
+@given(BLOCKS, BLOCKS)
+def test_equal_registers_make_equal_statuses_and_different_ones_different(
+    one: tuple[int, ...], other: tuple[int, ...]
+) -> None:
+    first, second = RobotiqStatus.from_registers(one), RobotiqStatus.from_registers(other)
+    assert (first == second) == (one == other)
+    assert first == RobotiqStatus.from_registers(one)
+    assert hash(first) == hash(RobotiqStatus.from_registers(one))
+
+
+@pytest.mark.parametrize("high_nibble", range(16))
+@pytest.mark.parametrize("code", range(16))
+def test_the_high_nibble_of_the_fault_byte_is_no_part_of_the_code(high_nibble: int, code: int) -> None:
+    assert int(status_of(0x31, fault=high_nibble << 4 | code).fault) == code
+
+
+@pytest.mark.parametrize("code", range(1, 16))
+def test_no_code_but_zero_is_no_fault(code: int) -> None:
+    assert status_of(0x31, fault=code).fault is not Fault.NONE
+
+
+# -- a value object ----------------------------------------------------------------------------------------
+
+
+def test_a_status_gives_its_registers_timestamp_and_sequence_back() -> None:
+    block = registers_of(range(16))
+    status = RobotiqStatus.from_registers(list(block), timestamp=12.5, sequence=7)
+    assert status.registers == block
+    assert type(status.registers) is tuple
+    assert status.timestamp == 12.5
+    assert status.sequence == 7
+
+
+def test_without_a_timestamp_and_a_number_both_are_zero() -> None:
+    status = RobotiqStatus.from_registers([0] * 8)
+    assert (status.timestamp, status.sequence) == (0.0, 0)
+
+
+def test_statuses_of_different_polls_differ() -> None:
+    status = status_of(0x31, at=1.0, sequence=1)
+    assert status == status_of(0x31, at=1.0, sequence=1)
+    assert status != status_of(0x31, at=2.0, sequence=1)
+    assert status != status_of(0x31, at=1.0, sequence=2)
+    assert status != status.registers
+
+
+def test_a_status_can_be_a_member_of_a_set() -> None:
+    assert len({status_of(0x31), status_of(0x31), status_of(0x39)}) == 2
+
+
+@pytest.mark.parametrize(
+    "name", ["registers", "timestamp", "sequence", "fault", "note", "_registers", "_sequence"]
+)
+def test_a_status_cannot_be_changed(name: str) -> None:
+    status = status_of(0x39, 0xC0, at=1.0, sequence=3)
+    with pytest.raises(AttributeError):
+        setattr(status, name, 1)
+    assert status == status_of(0x39, 0xC0, at=1.0, sequence=3)
+
+
+def test_a_status_cannot_be_made_anew_in_place() -> None:
+    status = status_of(0x39, 0xC0)
+    with pytest.raises(AttributeError):
+        RobotiqStatus.__init__(status, (0,) * 8)
+    assert status == status_of(0x39, 0xC0)
+
+
+def test_a_status_survives_copying_and_pickling() -> None:
+    status = status_of(0xB9, 0xEA, 0x0B, echo=255, position=(1, 2, 3, 4), current=5, at=1.5, sequence=9)
+    for again in (copy.copy(status), copy.deepcopy(status), pickle.loads(pickle.dumps(status))):
+        assert again == status
+        assert (again.registers, again.timestamp, again.sequence) == (
+            status.registers,
+            status.timestamp,
+            status.sequence,
+        )
+
+
+def test_the_repr_tells_what_a_person_looks_for_first() -> None:
+    text = repr(
+        status_of(
+            0xB9, 0xEA, 0x0C, echo=255, position=(151, 152, 153, 137), current=(9, 8, 7, 0), sequence=42
+        )
+    )
+    for part in (
+        "#42",
+        "COMPLETE",
+        "go=1",
+        "UNKNOWN_0x0C",
+        "A=151->255 CONTACT_CLOSING 90mA",
+        "SCISSOR=137->255",
+    ):
+        assert part in text
+
+
+# -- arguments ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("read", PER_AXIS)
+@pytest.mark.parametrize(
+    "mask", [Finger.ABC, Finger.ALL, Finger.A | Finger.SCISSOR, Finger(0), 3, 0, 16, -1], ids=repr
+)
+def test_a_mask_is_a_value_error(read: Callable[[RobotiqStatus, Finger | int], object], mask: int) -> None:
+    with pytest.raises(ValueError, match="finger must be one of"):
+        read(status_of(0x31), mask)
+
+
+@pytest.mark.parametrize("read", PER_AXIS)
+@pytest.mark.parametrize("axis", [1.0, True, "A", None])
+def test_what_is_not_an_integer_is_a_type_error(
+    read: Callable[[RobotiqStatus, object], object], axis: object
+) -> None:
+    with pytest.raises(TypeError, match="finger must be one Finger"):
+        read(status_of(0x31), axis)
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_an_axis_may_be_given_as_its_number(axis: Finger) -> None:
+    status = status_of(0x31, echo=(1, 2, 3, 4))
+    assert status.requested_position(int(axis)) == status.requested_position(axis) == AXES.index(axis) + 1
+
+
+@pytest.mark.parametrize(
+    ("registers", "error"),
+    [([0] * 7, ValueError), ([0] * 9, ValueError), ([0x10000] + [0] * 7, ValueError), ([0.0] * 8, TypeError)],
+    ids=["seven", "nine", "too large", "floats"],
+)
+def test_what_is_not_eight_registers_is_refused(registers: list[int], error: type[Exception]) -> None:
+    with pytest.raises(error, match="registers"):
+        RobotiqStatus.from_registers(registers)

@@ -1,0 +1,43 @@
+"""Status words built byte by byte after the manual, not with the library's own tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from robotiq_async.status import RobotiqStatus
+
+REQUEST_RESERVED = (0xE0, 0xF3, 0xFF, *(0,) * 12, 0xFF)
+"""For each of the sixteen request bytes the bits that must be written 0 (rGLV and rAAC among them)."""
+
+
+def registers_of(content: Sequence[int]) -> tuple[int, ...]:
+    """Eight registers of sixteen bytes: byte 2n is the high half of register n."""
+    assert len(content) == 16
+    return tuple(content[n] << 8 | content[n + 1] for n in range(0, 16, 2))
+
+
+def bytes_of(registers: Sequence[int]) -> list[int]:
+    """The sixteen bytes of eight registers, in the order of the wire."""
+    return [half for register in registers for half in (register >> 8, register & 0xFF)]
+
+
+def four(values: int | Sequence[int]) -> Sequence[int]:
+    """One value for A, B, C and the scissor, or four of them."""
+    return (values,) * 4 if isinstance(values, int) else values
+
+
+def status_of(
+    byte_0: int,
+    byte_1: int = 0x00,
+    fault: int = 0x00,
+    *,
+    echo: int | Sequence[int] = 0,
+    position: int | Sequence[int] = 0,
+    current: int | Sequence[int] = 0,
+    at: float = 0.0,
+    sequence: int = 0,
+) -> RobotiqStatus:
+    """A status from its first three bytes and what the four axes report."""
+    axes = zip(four(echo), four(position), four(current), strict=True)
+    content = [byte_0, byte_1, fault, *(byte for axis in axes for byte in axis), 0]
+    return RobotiqStatus.from_registers(registers_of(content), timestamp=at, sequence=sequence)
