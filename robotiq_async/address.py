@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from ipaddress import IPv6Address
 from typing import Final, Literal
 
 TCP_PORT: Final = 502
@@ -55,7 +56,7 @@ def parse_address(address: object) -> Address:
     if scheme == "tcp":
         host, port = _host_and_port(rest)
         if host and port is not None:
-            return Address("tcp", host.lower(), port)
+            return Address("tcp", host, port)
     raise ValueError(f"malformed address {address!r}; accepted: {FORMS}")
 
 
@@ -63,8 +64,14 @@ def _host_and_port(text: str) -> tuple[str, int | None]:
     """Split HOST, HOST:PORT, [IPv6] or [IPv6]:PORT; the port is None where it is malformed."""
     if text.startswith("["):
         host, bracket, rest = text[1:].partition("]")
-        if not bracket or ":" not in host or not set(host) <= set("0123456789abcdefABCDEF:.%"):
+        try:
+            IPv6Address(host)
+        except ValueError:
             return "", None
+        if not bracket:
+            return "", None
+        number, percent, zone = host.partition("%")
+        host = number.lower() + percent + zone
         separator, port = rest[:1], rest[1:]
         if rest and separator != ":":
             return "", None
@@ -72,9 +79,10 @@ def _host_and_port(text: str) -> tuple[str, int | None]:
         host, separator, port = text.partition(":")
         if not set(host) <= _HOST_CHARACTERS or host.startswith((".", "-")):
             return "", None
+        host = host.lower()
     if not separator:
         return host, TCP_PORT
-    if not (port.isascii() and port.isdigit() and 1 <= int(port) <= 65535):
+    if not (port.isascii() and port.isdigit() and len(port) <= 5 and 1 <= int(port) <= 65535):
         return host, None
     return host, int(port)
 

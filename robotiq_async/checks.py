@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import sys
 from typing import Final
 
 from .enums import Finger
@@ -74,7 +74,7 @@ def check_seconds(name: str, value: object, low: float, high: float) -> float:
     """
     if not isinstance(value, int | float) or isinstance(value, bool):
         raise TypeError(f"{name} must be seconds in {low}..{high}, got {value!r}")
-    if not math.isfinite(value) or not low <= value <= high:
+    if not low <= value <= high:
         raise ValueError(f"{name} must be seconds in {low}..{high}, got {value!r}")
     return float(value)
 
@@ -90,7 +90,7 @@ def check_timeout(name: str, value: object) -> float | None:
         return None
     if not isinstance(value, int | float) or isinstance(value, bool):
         raise TypeError(f"{name} must be None or seconds above 0, got {value!r}")
-    if not math.isfinite(value) or value <= 0:
+    if not 0 < value <= sys.float_info.max:
         raise ValueError(f"{name} must be None or seconds above 0, got {value!r}")
     return float(value)
 

@@ -85,7 +85,7 @@ class Core:
         position: int | None,
         speed: int | None,
         force: int | None,
-        waiting: Delivery | None = None,
+        delivery: Delivery | None = None,
     ) -> None:
         """Ask axes for a position, a speed, a force; goes out with the next write.
 
@@ -98,9 +98,7 @@ class Core:
                 lambda: MoveSupersededError(f"another command moves {axes!r}"),
                 lambda move: bool(move.axes & axes),
             )
-        self._desk.put(axes, position, speed, force)
-        if waiting is not None:
-            self._desk.waiting.append(waiting)
+        self._desk.put(axes, position, speed, force, delivery)
         self.machine.happen(Trigger.ASK_COMMAND)
 
     def move(self, move: Move, speed: int | None, force: int | None) -> None:
@@ -267,7 +265,7 @@ class Core:
         assert sent is not None, "nothing was sent"
         self._watch.acknowledged(now)
         number = self._watch.last_number
-        tell(sent.waiting)
+        tell((*sent.going, *sent.setting))
         self._halting += [(number, delivery) for delivery in sent.halt or ()]
         if self._procedure is not None or self._desk.is_empty:
             self._deliver()

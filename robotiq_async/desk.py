@@ -33,7 +33,8 @@ class Desk:
         forces: new force by axis.
         hold: axes to be held where they are, if they move.
         halt: callers of halt(); None when nobody asked to halt.
-        waiting: callers that wait for positions, speeds and forces.
+        going: callers that wait for a position to be sent.
+        setting: callers that wait for nothing but a speed or a force.
     """
 
     positions: dict[Finger, int] = field(default_factory=dict)
@@ -41,7 +42,8 @@ class Desk:
     forces: dict[Finger, int] = field(default_factory=dict)
     hold: Finger = NONE
     halt: list[Delivery] | None = None
-    waiting: list[Delivery] = field(default_factory=list)
+    going: list[Delivery] = field(default_factory=list)
+    setting: list[Delivery] = field(default_factory=list)
 
     @property
     def is_empty(self) -> bool:
@@ -53,13 +55,22 @@ class Desk:
         """Whether axes to be held are all there is."""
         return not (self.positions or self.speeds or self.forces or self.halt is not None)
 
-    def put(self, axes: Finger, position: int | None, speed: int | None, force: int | None) -> None:
+    def put(
+        self,
+        axes: Finger,
+        position: int | None,
+        speed: int | None,
+        force: int | None,
+        delivery: Delivery | None = None,
+    ) -> None:
         """Merge a command; the last value wins."""
         for changes, value in ((self.positions, position), (self.speeds, speed), (self.forces, force)):
             if value is not None:
                 changes.update(dict.fromkeys((axis for axis in AXES if axis in axes), value))
         if position is not None:
             self.hold &= ~axes
+        if delivery is not None:
+            (self.setting if position is None else self.going).append(delivery)
 
     def put_hold(self, axes: Finger) -> None:
         """Hold axes; a position that was not sent yet is dropped."""
@@ -69,18 +80,16 @@ class Desk:
         self.hold |= axes
 
     def put_halt(self, delivery: Delivery, superseded: Failure) -> None:
-        """Stop everything; what was asked before and not sent yet is dropped."""
-        if self.positions:
-            self.positions.clear()
-            tell(self.waiting, superseded)
-            self.waiting = []
+        """Stop everything; a position that was asked before and not sent yet is dropped."""
+        self.positions.clear()
+        going, self.going = self.going, []
+        tell(going, superseded)
         self.hold = NONE
         self.halt = [*(self.halt or ()), delivery]
 
     def fail(self, failure: Failure) -> None:
         """Tell everybody who waits that it will not happen."""
-        tell(self.waiting, failure)
-        tell(self.halt or (), failure)
+        tell((*self.going, *self.setting, *(self.halt or ())), failure)
 
 
 def tell(deliveries: Iterable[Delivery], failure: Failure | None = None) -> None:

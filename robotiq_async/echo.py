@@ -29,6 +29,8 @@ class _Written:
     signature: Signature
     time: float
     acknowledged: bool = False
+    doubtful: bool = False
+    """It may never have arrived: it counts while it may still act, and not as what the gripper has."""
 
 
 class EchoWatch:
@@ -62,7 +64,9 @@ class EchoWatch:
         self.restart(image, signature, now)
         for each in waiting:
             self._number += 1
-            self._written.append(_Written(self._number, each.image, each.signature, now, acknowledged=True))
+            self._written.append(
+                _Written(self._number, each.image, each.signature, now, acknowledged=True, doubtful=True)
+            )
 
     def writing(self, image: Request, now: float) -> int:
         """An image is about to be sent; returns the number it goes by."""
@@ -84,15 +88,17 @@ class EchoWatch:
         self._forget(status.timestamp)
         signature = signature_of_status(status)
         # The usual case first: nothing has changed since the last poll.
-        if self._shown is not None and self._shown.signature == signature:
-            return self._shown.image
+        shown = self._shown
+        if shown is not None and shown.signature == signature and shown.number >= self._written[0].number:
+            return shown.image
         fitting = [each for each in self._written if each.signature == signature]
         if not fitting:
             return None
-        number = self._shown.number if self._shown is not None else 0
+        number = shown.number if shown is not None else 0
         newer = [each for each in fitting if each.number > number]
         if newer:
             self._shown = newer[0]
+            self._shown.doubtful = False
         return (newer or fitting)[0].image
 
     def acts(self, number: int, now: float) -> bool:
@@ -122,7 +128,13 @@ class EchoWatch:
         return self.acts(self._number, now)
 
     def _forget(self, now: float) -> None:
-        """Drop what is older than the window, but for the newest of that."""
+        """Drop what is older than the window, but for the newest of that: the gripper has it, or ought to."""
         written = self._written
-        while len(written) > 1 and written[1].acknowledged and now - written[1].time > WINDOW_S:
+        if len(written) == 1:
+            return
+        for each in [each for each in written if each.doubtful and now - each.time > WINDOW_S]:
+            written.remove(each)
+        certain = [each for each in written if each.acknowledged and not each.doubtful]
+        old = [each for each in certain if now - each.time > WINDOW_S]
+        while old and written[0] is not old[-1]:
             written.popleft()

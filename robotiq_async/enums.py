@@ -129,6 +129,10 @@ class Fault(IntEnum):
         cls._value2member_map_[value] = member
         return member
 
+    def __reduce_ex__(self, protocol: object) -> tuple[type[Fault], tuple[int]]:
+        """Copy and pickle by value: some versions of Python go by name, and an unknown code has none."""
+        return Fault, (int(self),)
+
     @property
     def severity(self) -> Severity:
         """The class of the fault; an unknown code counts as MAJOR."""

@@ -23,7 +23,7 @@ Bad arguments are plain ValueError and TypeError: they are the program's mistake
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 from .enums import Fault, State
@@ -33,7 +33,17 @@ if TYPE_CHECKING:
 
 
 class RobotiqError(Exception):
-    """Base of everything the library raises about a gripper or its link."""
+    """Base of everything the library raises about a gripper or its link. Can be pickled and copied."""
+
+    def __reduce__(self) -> tuple[Callable[..., RobotiqError], tuple[object, ...], dict[str, object]]:
+        """Restore message and attributes without the constructor, which asks for other arguments."""
+        return _restore, (type(self), *self.args), vars(self)
+
+
+def _restore(kind: type[RobotiqError], *args: object) -> RobotiqError:
+    error = kind.__new__(kind)
+    error.args = args
+    return error
 
 
 class RobotiqStateError(RobotiqError):

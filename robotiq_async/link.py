@@ -228,6 +228,7 @@ class ModbusTransport:
     def _watch(self) -> Callable[[], None]:
         """Fail the exchange when it takes too long; returns what calls the watchdog off."""
         loop = asyncio.get_running_loop()
+        timer: asyncio.TimerHandle
 
         def arm(seconds: float) -> asyncio.TimerHandle:
             deadline = loop.time() + seconds

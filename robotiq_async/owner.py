@@ -35,6 +35,8 @@ log = logging.getLogger("robotiq_async")
 SHUTDOWN_S: Final = 1.2
 """Time to reach the gripper once more and to see the fingers stop. With an exchange of 0.4 s in flight
 stop() still ends within its promised 2 s."""
+LATE_S: Final = 0.05
+"""Later than this a poll is worth a warning; on a busy machine a few milliseconds are usual."""
 LATE_WARNING_S: Final = 1.0
 """At most one warning about late polls in this time."""
 
@@ -253,7 +255,8 @@ class Owner:
             missed = int(late / interval)
             self._counters.overruns += missed
             self._deadline += missed * interval
-            self._warn_late(late)
+            if late >= LATE_S:
+                self._warn_late(late)
         await asyncio.sleep(max(0.0, self._deadline - loop.time()))
         late = loop.time() - self._deadline
         self._counters.longest_stall = max(self._counters.longest_stall, late)

@@ -28,18 +28,16 @@ class Expected:
     """The one reply that answers a request.
 
     Attributes:
-        header: the bytes before the function code, as they must come: transaction, protocol, length and
-            unit over TCP; the unit alone over a serial line. In the length field of TCP the length of the
-            good reply stands.
-        pdu: function code and what must follow it.
-        size: bytes of the good reply, check sum included.
-        tail: bytes of check sum at the end, which are not checked here.
+        start: how the good reply begins: header, function code and what must follow it.
+        size: bytes of the good reply, check sum included. (The check sum itself is left to pymodbus.)
+        refusal: how an exception reply begins: header and function code.
+        refusal_size: bytes of an exception reply.
     """
 
-    header: bytes
-    pdu: bytes
+    start: bytes
     size: int
-    tail: int
+    refusal: bytes
+    refusal_size: int
 
     def is_complete(self, frame: bytes) -> bool:
         """Whether the bytes so far are the whole answer; False while more must come.
@@ -47,24 +45,15 @@ class Expected:
         Raises:
             ProtocolError: the bytes can not become the answer, or the device refuses the request.
         """
-        start = len(self.header)
-        function = self.pdu[0]
-        if len(frame) > start and frame[start] == function | 0x80:
-            return self._refused(frame, function)
-        want = self.header + self.pdu
-        got = frame[: len(want)]
-        if got != want[: len(got)]:
-            raise ProtocolError(f"not the answer: {frame.hex(' ')}, expected {want.hex(' ')}...")
-        if len(frame) > self.size:
-            raise ProtocolError(f"{len(frame) - self.size} bytes more than the answer: {frame.hex(' ')}")
-        return len(frame) == self.size
-
-    def _refused(self, frame: bytes, function: int) -> bool:
-        """An exception reply: complete, it is an error; until then wait for the rest."""
-        size = len(self.header) + 2 + self.tail
-        if len(frame) < size:
+        if _agree(frame, self.start):
+            if len(frame) > self.size:
+                raise ProtocolError(f"{len(frame) - self.size} bytes more than the answer: {frame.hex(' ')}")
+            return len(frame) == self.size
+        if not _agree(frame, self.refusal):
+            raise ProtocolError(f"not the answer: {frame.hex(' ')}, expected {self.start.hex(' ')}...")
+        if len(frame) < self.refusal_size:
             return False
-        code = frame[len(self.header) + 1]
+        function, code = self.refusal[-1] & 0x7F, frame[len(self.refusal)]
         raise ProtocolError(
             f"the gripper refuses function {function}: exception {code} ({_EXCEPTIONS.get(code, 'unknown')})"
         )
@@ -72,16 +61,31 @@ class Expected:
 
 def expected_reply(request: bytes, *, serial: bool) -> Expected:
     """The reply that answers a request frame of function 3, 4 or 16."""
-    start, tail = (1, 2) if serial else (7, 0)
-    function = request[start]
+    at, checksum = (1, 2) if serial else (7, 0)
+    function = request[at]
     if function == 16:
         # The echo of address and count.
-        pdu, size = request[start : start + 5], start + 5
+        pdu, payload = request[at : at + 5], 0
     else:
-        count = int.from_bytes(request[start + 3 : start + 5], "big")
-        pdu, size = bytes((function, 2 * count)), start + 2 + 2 * count
-    if serial:
-        return Expected(request[:1], pdu, size + tail, tail)
-    # MBAP: transaction and protocol as sent, length counted from the unit on, unit as sent.
-    header = request[:4] + (size - 6).to_bytes(2, "big") + request[6:7]
-    return Expected(header, pdu, size, tail)
+        payload = 2 * int.from_bytes(request[at + 3 : at + 5], "big")
+        pdu = bytes((function, payload))
+    return Expected(
+        start=_header(request, len(pdu) + payload, serial=serial) + pdu,
+        size=at + len(pdu) + payload + checksum,
+        refusal=_header(request, 2, serial=serial) + bytes((function | 0x80,)),
+        refusal_size=at + 2 + checksum,
+    )
+
+
+def _header(request: bytes, pdu_size: int, *, serial: bool) -> bytes:
+    """What stands before the function code of a reply: the unit, over TCP after the rest of the MBAP header.
+
+    Transaction, protocol and unit are those of the request; the length counts from the unit on.
+    """
+    return request[:1] if serial else request[:4] + (pdu_size + 1).to_bytes(2, "big") + request[6:7]
+
+
+def _agree(frame: bytes, start: bytes) -> bool:
+    """Whether the bytes so far fit the beginning."""
+    size = min(len(frame), len(start))
+    return frame[:size] == start[:size]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass
 from typing import Final
@@ -73,4 +74,4 @@ class Counters:
 
 def _percentile(ordered: list[float], share: float) -> float:
     """The value that this share of an ordered list does not exceed; 0 for an empty list."""
-    return ordered[min(len(ordered) - 1, int(share * len(ordered)))] if ordered else 0.0
+    return ordered[math.ceil(share * len(ordered)) - 1] if ordered else 0.0

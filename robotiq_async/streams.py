@@ -44,8 +44,12 @@ class Stream(Generic[T]):
         missed: items that were dropped because the reader was slow.
     """
 
-    def __init__(self, buffer: int | None) -> None:
-        """Keep up to ``buffer`` items, the newest ones; None keeps all."""
+    def __init__(self, buffer: int | None, kept: set[Stream[T]]) -> None:
+        """Keep up to ``buffer`` items, the newest ones; None keeps all.
+
+        While somebody waits the stream is in ``kept``: the task of that reader may be held by nothing else.
+        """
+        self._kept = kept
         self.missed = 0
         self._items: deque[T] = deque(maxlen=buffer)
         self._waiting: asyncio.Future[None] | None = None
@@ -64,13 +68,15 @@ class Stream(Generic[T]):
             RobotiqConnectionError: the hand gave up on its link.
             RuntimeError: another task is waiting on the same stream.
         """
-        if not self._items and not self._ended:
+        while not self._items and not self._ended:
             if self._waiting is not None:
                 raise RuntimeError("a stream has one reader; open another with statuses() or transitions()")
             self._waiting = asyncio.get_running_loop().create_future()
+            self._kept.add(self)
             try:
                 await self._waiting
             finally:
+                self._kept.discard(self)
                 self._waiting = None
         if self._items:
             return self._items.popleft()
@@ -109,11 +115,12 @@ class Channel(Generic[T]):
     def __init__(self) -> None:
         """Begin without readers."""
         self._streams: weakref.WeakSet[Stream[T]] = weakref.WeakSet()
+        self._waited_for: set[Stream[T]] = set()
         self._failure: Callable[[], RobotiqError] | None = None
 
     def open(self, buffer: int | None) -> Stream[T]:
         """A new stream. Before a start it waits; after the hand gave up it raises the reason."""
-        stream: Stream[T] = Stream(buffer)
+        stream: Stream[T] = Stream(buffer, self._waited_for)
         if self._failure is not None:
             stream.end(self._failure)
         else:

@@ -27,5 +27,5 @@ async def nothing_left_running(caplog: pytest.LogCaptureFixture) -> AsyncIterato
     for task in left:
         task.cancel()
     assert not left, f"tasks left running: {left}"
-    complaints = [record.getMessage() for record in caplog.records if record.name == "asyncio"]
+    complaints = [record.getMessage() for record in caplog.get_records("call") if record.name == "asyncio"]
     assert not complaints, f"the event loop complained: {complaints}"

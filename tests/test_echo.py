@@ -271,10 +271,6 @@ def test_a_long_life_does_not_make_the_watch_remember_more() -> None:
     assert len(watch._written) <= WINDOW_S * 10 + 2
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="what was shown last is taken for ours for ever, also when it was overwritten long ago",
-)
 def test_another_client_that_undoes_our_write_before_it_shows_is_noticed_after_the_window() -> None:
     """A client that repeats its own image faster than we poll: ours never shows."""
     watch = Watched(100)
@@ -313,10 +309,6 @@ def test_a_write_that_was_lost_with_the_link_is_waited_for_in_the_window_only() 
     assert watch.observe(shows(100, 20.0)) == image(100)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="a write lost with the link is remembered until the next two writes, not for the window",
-)
 def test_a_write_that_was_lost_with_the_link_is_foreign_when_it_shows_after_the_window() -> None:
     watch = Watched(100)
     watch.writing(image(200), 1.0)

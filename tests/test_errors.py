@@ -105,9 +105,6 @@ def test_a_plain_error_survives_pickling(name: str) -> None:
     assert str(error) == "why"
 
 
-@pytest.mark.xfail(
-    strict=True, reason="errors with attributes cannot be unpickled: args hold the message only"
-)
 @pytest.mark.parametrize(
     "error",
     [

@@ -16,10 +16,14 @@ BAD_MASKS = [0, 16, -1, True, 1.5, "A", None]
 
 async def refused(server: SimulatorServer, value: object, call: Callable[[], Any], name: str) -> None:
     writes = len(server.gripper.writes)
-    with pytest.raises((TypeError, ValueError)) as caught:
+
+    async def run() -> None:
         result = call()
         if result is not None:
             await result
+
+    with pytest.raises((TypeError, ValueError)) as caught:
+        await run()
     message = str(caught.value)
     assert name in message
     assert repr(value) in message or str(value) in message
@@ -101,7 +105,9 @@ def test_options(option: str, value: Any) -> None:
     assert repr(value) in str(caught.value)
 
 
-@pytest.mark.parametrize("address", ["", "tcp://", "http://x", "tcp://x:0", "rtu://", "sim://x", "a b", None, 7])
+@pytest.mark.parametrize(
+    "address", ["", "tcp://", "http://x", "tcp://x:0", "rtu://", "sim://x", "a b", None, 7]
+)
 def test_addresses(address: Any) -> None:
     with pytest.raises((TypeError, ValueError), match="address"):
         RobotiqHand(address)

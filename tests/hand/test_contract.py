@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 
 import pytest
 
@@ -161,11 +162,11 @@ async def test_move_times_out_and_holds(hand: RobotiqHand, server: SimulatorServ
         await hand.move(255, speed=0, timeout=0.2)
     assert isinstance(caught.value, TimeoutError)
     assert isinstance(caught.value.status, RobotiqStatus)
-    async for status in hand.statuses():
+    async for _ in hand.statuses():
         if not hand.is_moving:
             break
     assert not server.gripper.is_moving
-    assert status.position(A) < 200
+    assert hand.status.position(A) < 200
 
 
 async def test_halt(hand: RobotiqHand, server: SimulatorServer) -> None:
@@ -276,7 +277,9 @@ async def test_waiting_for_a_state_ends_with_stop(server: SimulatorServer) -> No
         await hand.wait_for_state(State.RUNNING_IDLE)
 
 
-async def test_transitions_opened_before_start_lose_nothing_and_end_after_stop(server: SimulatorServer) -> None:
+async def test_transitions_opened_before_start_lose_nothing_and_end_after_stop(
+    server: SimulatorServer,
+) -> None:
     hand = RobotiqHand(server.address)
     stream = hand.transitions()
 
@@ -290,7 +293,7 @@ async def test_transitions_opened_before_start_lose_nothing_and_end_after_stop(s
     seen = await collecting
     assert seen[0].source is State.DISCONNECTED
     assert seen[-1].target is State.SHUTDOWN
-    assert all(before.target is after.source for before, after in zip(seen, seen[1:], strict=False))
+    assert all(before.target is after.source for before, after in itertools.pairwise(seen))
     assert [each.target for each in seen].count(State.RUNNING_CC) == 20
     stamps = [each.timestamp for each in seen]
     assert stamps == sorted(stamps)
@@ -315,6 +318,7 @@ async def test_statuses_opened_before_start_wait_and_end_after_stop(server: Simu
 async def test_a_slow_reader_costs_only_itself(hand: RobotiqHand) -> None:
     slow, fast = hand.statuses(), hand.statuses()
     first = await anext(slow)
+    latest = first
     for _ in range(20):
         latest = await anext(fast)
     assert (await anext(slow)).sequence == latest.sequence

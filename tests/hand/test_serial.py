@@ -31,9 +31,7 @@ async def serial_server(line: SerialLine, clock: Clock) -> AsyncIterator[SerialS
 
 
 @pytest_asyncio.fixture
-async def serial_hand(
-    line: SerialLine, serial_server: SerialSimulatorServer
-) -> AsyncIterator[RobotiqHand]:
+async def serial_hand(line: SerialLine, serial_server: SerialSimulatorServer) -> AsyncIterator[RobotiqHand]:
     async with RobotiqHand(f"rtu://{line.near}", response_timeout=0.1) as hand:
         yield hand
 

@@ -24,12 +24,12 @@ class GripperBank(DataBank):  # type: ignore[misc]  # pyModbusTCP is untyped
         super().__init__()
         self.gripper = gripper
 
-    def get_input_registers(self, address: int, number: int = 1, srv_info: object = None) -> list[int] | None:  # noqa: ARG002
+    def get_input_registers(self, address: int, number: int = 1, *_: object) -> list[int] | None:
         if address + number > 8:
             return None
         return list(self.gripper.status_registers()[address : address + number])
 
-    def set_holding_registers(self, address: int, word_list: list[int], srv_info: object = None) -> bool | None:  # noqa: ARG002
+    def set_holding_registers(self, address: int, word_list: list[int], *_: object) -> bool | None:
         if address + len(word_list) > 8:
             return None
         self.gripper.write(address, word_list)
@@ -68,7 +68,9 @@ async def test_the_simulator_with_a_client_that_is_not_pymodbus() -> None:
             while not status().is_activated:
                 pass
             axes = (AxisRequest(255, 255, 100),) * 3 + (AxisRequest(137, 255, 100),)
-            assert client.write_multiple_registers(0, list(Request(activate=True, go=True, axes=axes).registers))
+            assert client.write_multiple_registers(
+                0, list(Request(activate=True, go=True, axes=axes).registers)
+            )
             while status().requested_position(A) != 255 or status().is_moving:
                 pass
             return status()

@@ -44,6 +44,7 @@ class Scripted:
     def __init__(self) -> None:
         self.answer: Answer = lambda request: [good(request)]
         self.requests: list[bytes] = []
+        self.asked = asyncio.Event()
         self.connections = 0
         self.writers: list[asyncio.StreamWriter] = []
 
@@ -55,6 +56,7 @@ class Scripted:
                 header = await reader.readexactly(6)
                 request = header + await reader.readexactly(int.from_bytes(header[4:6], "big"))
                 self.requests.append(request)
+                self.asked.set()
                 pieces = self.answer(request)
                 if pieces is None:
                     break
@@ -198,8 +200,7 @@ async def test_what_nobody_asked_for_spoils_the_link() -> None:
 async def test_a_cancelled_request_spoils_the_link() -> None:
     async with linked(lambda _: []) as (transport, scripted):
         reading = asyncio.create_task(transport.read())
-        while not scripted.requests:
-            await asyncio.sleep(0)
+        await scripted.asked.wait()
         reading.cancel()
         with pytest.raises(asyncio.CancelledError):
             await reading

@@ -39,6 +39,8 @@ class Device:
         self.keep = 0
         """Replies to be kept back from here on."""
         self.kept: list[bytes] = []
+        self.spoil = False
+        """Whether check sums are wrong from here on."""
         asyncio.get_running_loop().add_reader(descriptor, self._ready)
         self._inbox = b""
 
@@ -51,6 +53,8 @@ class Device:
             request, self._inbox = self._inbox[:size], self._inbox[size:]
             self.requests.append(request)
             reply = self._reply(request)
+            if self.spoil:
+                reply = reply[:-1] + bytes((reply[-1] ^ 1,))
             if self.keep:
                 self.keep -= 1
                 self.kept.append(reply)
@@ -129,6 +133,6 @@ async def test_a_late_reply_is_found_out_while_the_port_is_opened(tmp_path: Path
 
 async def test_a_wrong_check_sum_is_no_answer(tmp_path: Path) -> None:
     async with linked(tmp_path) as (transport, device):
-        device._reply = lambda _: b"\x09\x03\x10" + bytes(18)  # type: ignore[method-assign]  # the device's
+        device.spoil = True
         with pytest.raises(ResponseTimeoutError):
             await transport.read()
