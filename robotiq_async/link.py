@@ -18,7 +18,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Sequence
-from typing import Any, Final, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import anyio
 from pymodbus import FramerType
@@ -36,9 +36,6 @@ from .errors import (
 )
 from .registers import REGISTER_COUNT, RegisterMap, Registers
 from .reply import Expected, expected_reply
-
-STALL_S: Final = 0.02
-"""A watchdog that wakes this much late was held up by the loop, and the reply may be waiting unread."""
 
 # pymodbus logs its send and receive history at ERROR on every time-out; what matters of it is said in our
 # exceptions. Whoever sets a level on its logger gets what they ask for.
@@ -221,31 +218,22 @@ class ModbusTransport:
             self._drop()
             raise
         finally:
-            watchdog()
+            watchdog.cancel()
             self._expected = None
         return response
 
-    def _watch(self) -> Callable[[], None]:
-        """Fail the exchange when it takes too long; returns what calls the watchdog off."""
-        loop = asyncio.get_running_loop()
-        timer: asyncio.TimerHandle
+    def _watch(self) -> asyncio.TimerHandle:
+        """Fail the exchange when it takes too long; to be cancelled at its end.
 
-        def arm(seconds: float) -> asyncio.TimerHandle:
-            deadline = loop.time() + seconds
-            return loop.call_at(deadline, expire, deadline)
+        A loop that was held up reads before it looks at its timers: a reply that was waiting is in time.
+        """
 
-        def expire(deadline: float) -> None:
-            nonlocal timer
-            if loop.time() - deadline > STALL_S:
-                # The loop was held up, not necessarily the gripper: let it read what has come.
-                timer = arm(STALL_S)
-                return
-            self._fail(
-                ResponseTimeoutError(f"{self._address} did not answer within {self._response_timeout:g} s")
-            )
+        def expire() -> None:
+            if self._client is not None and not self._client.ctx.response_future.done():
+                waited = f"{self._response_timeout:g} s"
+                self._fail(ResponseTimeoutError(f"{self._address} did not answer within {waited}"))
 
-        timer = arm(self._response_timeout)
-        return lambda: timer.cancel()
+        return asyncio.get_running_loop().call_later(self._response_timeout, expire)
 
     def _fail(self, error: RobotiqConnectionError) -> None:
         """End the exchange in flight with an error; without one, keep the error for the next."""

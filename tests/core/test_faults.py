@@ -230,13 +230,13 @@ def test_the_shutdown_writes_nothing_when_nothing_goes(bench: Bench) -> None:
 
 def test_the_shutdown_never_activates_a_gripper_that_was_power_cycled_unnoticed(bench: Bench) -> None:
     bench.command(A, position=200)
-    bench.run(0.1)
-    bench.core.lost(None)
+    bench.step(answer=False)
     bench.gripper.power_cycle()
-    bench.now += 0.1
+    bench.now += 0.01
     bench.core.stop()
     bench.core.status = bench.status()
     bench.core.shut_down()
+    assert bench.core.is_busy, "the write that was not acknowledged may still act"
     bench.run(0.5)
     assert not bench.gripper.is_moving
     assert not bench.latest.activation_echo

@@ -275,6 +275,20 @@ def test_a_command_after_a_halt_moves_only_its_own_axes(bench: Bench) -> None:
     assert bench.gripper.position(A) == pytest.approx(100, abs=2)
 
 
+def test_a_command_after_a_halt_waits_until_a_slow_gripper_has_stopped() -> None:
+    bench = Bench(device_cycle=0.1)
+    bench.start()
+    bench.move(255, speed=255)
+    bench.run(0.5)
+    bench.halt()
+    _, outcome = bench.move(0, A)
+    bench.until(lambda: not bench.latest.go_echo)
+    travel = {axis: bench.gripper.travel(axis) for axis in (B, C)}
+    bench.until(lambda: outcome.is_told)
+    for axis in (B, C):
+        assert bench.gripper.travel(axis) - travel[axis] <= 1, axis
+
+
 def test_a_grip_survives_a_halt_and_a_command_to_another_axis(bench: Bench) -> None:
     bench.gripper.place_object(B, 60)
     bench.moved(255, B)

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import time
 
 import pytest
 from pyModbusTCP.client import ModbusClient
 from pyModbusTCP.server import DataBank, ModbusServer
 
 from robotiq_async import Finger, RobotiqHand, State
+from robotiq_async.address import parse_address
+from robotiq_async.link import ModbusTransport
+from robotiq_async.registers import TCP_REGISTERS
 from robotiq_async.request import AxisRequest, Request
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.status import RobotiqStatus
@@ -51,6 +55,28 @@ async def test_the_hand_with_a_server_that_is_not_pymodbus() -> None:
             assert result.positions[Finger.B] >= 240
             assert hand.statistics.reconnects == 0
     finally:
+        server.stop()
+
+
+async def test_a_reply_that_waits_while_the_loop_is_held_up_is_an_answer() -> None:
+    """The server runs in a thread of its own, so the reply comes while the application holds the loop."""
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = probe.getsockname()[1]
+    server = ModbusServer("127.0.0.1", port, no_block=True, data_bank=GripperBank(SimulatedGripper()))
+    server.start()
+    transport = ModbusTransport(
+        parse_address(f"127.0.0.1:{port}"), TCP_REGISTERS, connect_timeout=1.0, response_timeout=0.1
+    )
+    try:
+        await transport.open()
+        for _ in range(5):
+            reading = asyncio.create_task(transport.read())
+            await asyncio.sleep(0)  # the request is on its way
+            time.sleep(0.3)  # noqa: ASYNC251  # three times the time-out
+            assert len(await reading) == 8
+            assert transport.is_open
+    finally:
+        await transport.close()
         server.stop()
 
 
