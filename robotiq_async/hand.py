@@ -217,6 +217,7 @@ class RobotiqHand:
                     await asyncio.wait({task})
                 except asyncio.CancelledError as error:
                     cancelled = error
+        self._on_owner_done(task)
         if cancelled is not None:
             raise cancelled
 
@@ -623,7 +624,9 @@ class RobotiqHand:
         self._running[key] = self
 
     def _on_owner_done(self, task: asyncio.Task[None]) -> None:
-        """The owner task has ended: nobody may wait for it any longer."""
+        """The owner task has ended: nobody may wait for it any longer. Called by whoever sees it first."""
+        if self._task is not task:
+            return
         if self._running.get(self._options.address) is self:
             del self._running[self._options.address]
         self._task = None

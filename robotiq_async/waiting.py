@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 
 from .enums import State
-from .errors import NotStartedError, RobotiqError
+from .errors import RobotiqError
 
 _Waiter = tuple[Collection[State], Mapping[State, Callable[[], RobotiqError]], asyncio.Future[State]]
 
@@ -48,8 +48,6 @@ class StateWaiters:
                 future.set_result(state)
             elif state in failing:
                 future.set_exception(failing[state]())
-            elif state is State.SHUTDOWN:
-                future.set_exception(NotStartedError("the hand was stopped"))
 
     def fail(self, failure: Callable[[], RobotiqError]) -> None:
         """Nothing more will happen."""

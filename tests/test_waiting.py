@@ -8,7 +8,7 @@ import gc
 import pytest
 
 from robotiq_async.enums import Fault, State
-from robotiq_async.errors import ConnectionLostError, GripperFaultError, NotStartedError, RobotiqError
+from robotiq_async.errors import ConnectionLostError, GripperFaultError, RobotiqError
 from robotiq_async.waiting import StateWaiters
 
 
@@ -59,12 +59,13 @@ async def test_what_is_waited_for_comes_before_what_fails(waiters: StateWaiters)
         assert await reached is State.RESET
 
 
-async def test_a_shutdown_ends_every_wait(waiters: StateWaiters) -> None:
+async def test_a_shutdown_alone_does_not_tell_why_and_ends_no_wait(waiters: StateWaiters) -> None:
+    """Whether the hand was stopped or gave up is told by fail(), right after."""
     with waiters.watching({State.RESET}, {}) as reached:
-        waiters.reached(State.DO_SHUTDOWN)
-        assert not reached.done()
         waiters.reached(State.SHUTDOWN)
-        with pytest.raises(NotStartedError):
+        assert not reached.done()
+        waiters.fail(lost)
+        with pytest.raises(ConnectionLostError):
             await reached
 
 
