@@ -1,4 +1,4 @@
-"""A simulated gripper behind real Modbus TCP, ten times as fast as life, and a hand on it."""
+"""A simulated gripper behind real Modbus TCP, twenty-five times as fast as life, and a hand on it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ async def clock() -> Clock:
 
 @pytest_asyncio.fixture
 async def server(clock: Clock) -> AsyncIterator[SimulatorServer]:
-    async with SimulatorServer(SimulatedGripper(clock, speedup=10)) as server:
+    async with SimulatorServer(SimulatedGripper(clock, speedup=25)) as server:
         yield server
 
 

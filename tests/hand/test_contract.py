@@ -336,8 +336,11 @@ async def test_statuses_with_aclosing(hand: RobotiqHand) -> None:
 
 async def test_statistics(hand: RobotiqHand) -> None:
     await hand.move(60)
+    statuses = hand.statuses()
+    for _ in range(20):
+        await anext(statuses)
     statistics = hand.statistics
-    assert statistics.polls > 10
+    assert statistics.polls > 20
     assert statistics.writes >= 2
     assert statistics.reconnects == statistics.foreign_commands == 0
     assert 0.001 < statistics.period_p50 < 0.05

@@ -26,7 +26,7 @@ async def line(tmp_path: Path) -> AsyncIterator[SerialLine]:
 
 @pytest_asyncio.fixture
 async def serial_server(line: SerialLine, clock: Clock) -> AsyncIterator[SerialSimulatorServer]:
-    async with SerialSimulatorServer(line.far, SimulatedGripper(clock, speedup=10)) as server:
+    async with SerialSimulatorServer(line.far, SimulatedGripper(clock, speedup=25)) as server:
         yield server
 
 
