@@ -47,10 +47,10 @@ class Expected:
         """
         if _agree(frame, self.start):
             if len(frame) > self.size:
-                raise ProtocolError(f"{len(frame) - self.size} bytes more than the answer: {frame.hex(' ')}")
+                raise ProtocolError(f"{len(frame) - self.size} bytes more than the answer: {_show(frame)}")
             return len(frame) == self.size
         if not _agree(frame, self.refusal):
-            raise ProtocolError(f"not the answer: {frame.hex(' ')}, expected {self.start.hex(' ')}...")
+            raise ProtocolError(f"not the answer: {_show(frame)}, expected {_show(self.start)}...")
         if len(frame) < self.refusal_size:
             return False
         function, code = self.refusal[-1] & 0x7F, frame[len(self.refusal)]
@@ -83,6 +83,11 @@ def _header(request: bytes, pdu_size: int, *, serial: bool) -> bytes:
     Transaction, protocol and unit are those of the request; the length counts from the unit on.
     """
     return request[:1] if serial else request[:4] + (pdu_size + 1).to_bytes(2, "big") + request[6:7]
+
+
+def _show(frame: bytes) -> str:
+    """Bytes for a message; what talks nonsense often talks a lot."""
+    return frame.hex(" ") if len(frame) <= 32 else f"{frame[:32].hex(' ')}... ({len(frame)} bytes)"
 
 
 def _agree(frame: bytes, start: bytes) -> bool:
