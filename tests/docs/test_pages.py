@@ -1,0 +1,130 @@
+"""Links lead somewhere, code runs, and quoted messages are the library's."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+from pathlib import Path
+from types import CodeType, FunctionType
+from typing import Any
+
+import pytest
+
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from tests.docs.pages import DOCS, PAGES, ROOT, Block, blocks, prose
+
+FRONT = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]
+TUTORIAL = DOCS / "tutorial.md"
+"""Has a test of its own: its blocks belong together."""
+
+
+def name(page: object) -> str:
+    return str(page.relative_to(ROOT)) if isinstance(page, Path) else ""
+
+
+def read(page: Path) -> str:
+    return page.read_text(encoding="utf-8")
+
+
+# -- links ---------------------------------------------------------------------------------------------
+
+
+def links(page: Path) -> list[str]:
+    """The relative links of a page."""
+    targets = re.findall(r"\]\(([^)\s]+)\)", prose(read(page)))
+    return [target for target in targets if not re.match(r"[a-z]+:", target)]
+
+
+def anchors(page: Path) -> set[str]:
+    """The names that headings get: lower case, without punctuation, blanks as hyphens."""
+    headings = re.findall(r"^#+ (.+)$", prose(read(page)), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", [*PAGES, *FRONT], ids=name)
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in links(page):
+        path, _, anchor = target.partition("#")
+        file = (page.parent / path).resolve() if path else page
+        assert file.exists(), f"{name(page)}: {target}"
+        if anchor:
+            assert anchor in anchors(file), f"{name(page)}: {target}"
+
+
+def test_every_page_can_be_reached() -> None:
+    seen, todo = set(), [DOCS / "index.md"]
+    while todo:
+        page = todo.pop()
+        if page in seen or page.suffix != ".md" or not page.exists():
+            continue
+        seen.add(page)
+        todo += [
+            (page.parent / target.partition("#")[0]).resolve() for target in links(page) if target[0] != "#"
+        ]
+    assert set(PAGES) <= seen
+
+
+# -- code ----------------------------------------------------------------------------------------------
+
+
+CODE = [
+    (page, block)
+    for page in PAGES
+    if page != TUTORIAL
+    for block in blocks(read(page))
+    if block.language == "python"
+]
+
+
+def compiled(page: Path, block: Block, address: str) -> CodeType:
+    source = "\n" * (block.line - 1) + block.text.replace("tcp://192.168.1.11", address)
+    code = compile(source, str(page), "exec", ast.PyCF_ALLOW_TOP_LEVEL_AWAIT, dont_inherit=True)
+    assert isinstance(code, CodeType)
+    return code
+
+
+@pytest.mark.parametrize(("page", "block"), CODE, ids=lambda value: name(value) or f"line {value.line}")
+async def test_code_runs(page: Path, block: Block, restored_logging: None) -> None:
+    async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
+        names: dict[str, Any] = {}
+        outcome = FunctionType(compiled(page, block, server.address), names)()
+        if inspect.iscoroutine(outcome):
+            await outcome
+        for function in [value for key, value in names.items() if key.startswith("test_")]:
+            await function()
+
+
+# -- messages ------------------------------------------------------------------------------------------
+
+
+def source() -> str:
+    """The library's code, with strings that are split over lines put together and values left out."""
+    text = "\n".join(read(file) for file in sorted((ROOT / "robotiq_async").rglob("*.py")))
+    text = re.sub(r'"\s*\n\s*f?"', "", text)
+    return re.sub(r"\{[^{}\n]*\}", "...", text)
+
+
+def is_from(words: str, known: str) -> bool:
+    """Whether the library has these words; a value may stand in one place among them."""
+    blanks = [found.start() for found in re.finditer(" ", words)]
+    return words in known or any(words[:at] in known and words[at + 1 :] in known for at in blanks)
+
+
+def test_quoted_messages_are_the_librarys() -> None:
+    known = source()
+    page = read(DOCS / "how-to" / "troubleshooting.md")
+    quoted = [line for block in blocks(page) if block.language == "text" for line in block.text.splitlines()]
+    quoted += re.findall(r"^\| `([^|]+)` \|", page, re.MULTILINE)
+    pieces = [
+        piece.strip(" `,:()")
+        for line in quoted
+        for piece in re.split(r"\.\.\.|`, `|: |tcp://192\S+|\d+", line)
+    ]
+    assert len(pieces) > 20
+    assert [piece for piece in pieces if not is_from(piece, known)] == []
+
+
+def test_a_message_that_the_library_does_not_have_is_told_apart() -> None:
+    assert is_from("another hand runs on", source())
+    assert not is_from("your gripper is on fire", source())

@@ -1,0 +1,108 @@
+"""The tutorial, typed as it stands: each block runs and prints what the page shows."""
+
+from __future__ import annotations
+
+import ast
+import asyncio
+import contextlib
+import io
+import sys
+from collections.abc import Coroutine
+from doctest import ELLIPSIS, OutputChecker
+from itertools import pairwise
+from types import CodeType, FunctionType
+from typing import Any
+
+import pytest
+
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from tests.docs.pages import DOCS, ROOT, Block, blocks
+
+BLOCKS = blocks((DOCS / "tutorial.md").read_text(encoding="utf-8"))
+TYPED = [
+    (code, output)
+    for code, output in pairwise(BLOCKS)
+    if code.language == "python" and "asyncio.run(" not in code.text
+]
+"""What is typed at the prompt, each with the output that the page shows for it."""
+(PROGRAM,) = [pair for pair in pairwise(BLOCKS) if "asyncio.run(" in pair[0].text]
+
+
+def compiled(block: Block) -> CodeType:
+    """A block as ``python -m asyncio`` compiles it, with the page's line numbers."""
+    code = compile(
+        "\n" * (block.line - 1) + block.text,
+        "tutorial.md",
+        "exec",
+        ast.PyCF_ALLOW_TOP_LEVEL_AWAIT,
+        dont_inherit=True,
+    )
+    assert isinstance(code, CodeType)
+    return code
+
+
+async def typed(block: Block, names: dict[str, Any]) -> str:
+    """What a block prints."""
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        outcome = FunctionType(compiled(block), names)()
+        if isinstance(outcome, Coroutine):
+            await outcome
+    return printed.getvalue()
+
+
+def agree(shown: str, printed: str) -> bool:
+    return OutputChecker().check_output(shown, printed, ELLIPSIS)
+
+
+def test_every_python_block_shows_its_output() -> None:
+    assert len(TYPED) >= 9
+    assert all(output.language == "text" for _, output in [*TYPED, PROGRAM])
+    assert {block.language for block in BLOCKS} == {"sh", "python", "text"}
+
+
+async def test_typing_the_tutorial() -> None:
+    names: dict[str, Any] = {"asyncio": asyncio}
+    try:
+        for code, output in TYPED:
+            printed = await typed(code, names)
+            assert agree(output.text, printed), f"line {code.line} of tutorial.md printed:\n{printed}"
+    finally:
+        # Only when a block failed is there something left to stop.
+        for name in {"hand", "server"} & names.keys():
+            await names[name].stop()
+
+
+async def test_the_program_at_its_end(tmp_path: Any) -> None:
+    code, output = PROGRAM
+    program = tmp_path / "grasp.py"
+    program.write_text(code.text, encoding="utf-8")
+    async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
+        process = await asyncio.create_subprocess_exec(
+            sys.executable,
+            str(program),
+            server.address,
+            env={"PYTHONPATH": str(ROOT)},
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.STDOUT,
+        )
+        printed, _ = await asyncio.wait_for(process.communicate(), 30)
+    assert process.returncode == 0, printed.decode()
+    assert agree(output.text, printed.decode())
+
+
+def test_blocks_can_be_pasted() -> None:
+    """At the prompt an empty line ends what is indented, and nothing else does."""
+    goes_on = ("except", "else", "finally", " ")
+    for code, _ in TYPED:
+        for line, following in pairwise([*code.text.split("\n")]):
+            if not line:
+                assert not following.startswith(" "), f"line {code.line}: {following!r}"
+            if line.startswith(" ") and following:
+                assert following.startswith(goes_on), f"line {code.line}: {following!r}"
+        assert not code.text.splitlines()[-1].startswith(" "), f"line {code.line}: the end is missing"
+
+
+@pytest.mark.parametrize("shown", ["tcp:...", "x"])
+def test_the_comparison_of_outputs_tells_them_apart(shown: str) -> None:
+    assert agree(f"{shown}\n", "tcp://127.0.0.1:5020\n") == (shown != "x")
