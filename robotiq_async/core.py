@@ -14,6 +14,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Final
 
 from .adoption import Adoption, agrees
 from .desk import Delivery, Desk, Failure, tell
@@ -41,6 +42,10 @@ from .request import AxisRequest, Request
 from .status import RobotiqStatus
 
 log = logging.getLogger("robotiq_async")
+
+
+_COMMANDED: Final = RUNNING | {State.FAULT}
+"""The states in which the gripper follows requests, ours or another client's."""
 
 
 class Core:
@@ -279,16 +284,15 @@ class Core:
             return
         before = self.machine.state
         after = self.machine.happen(look(status))
-        if after in RUNNING:
-            if before not in RUNNING:
-                self._enter_running(before, status)
-            else:
-                self._compare(status)
-            self._follow(status)
-        elif before in RUNNING:
+        if before in RUNNING and after not in RUNNING:
             self._leave_running(after, status)
-        elif after is State.FAULT and before is State.FAULT:
-            self._compare(status)
+        elif after in _COMMANDED:
+            if before in _COMMANDED:
+                self._compare(status)
+            else:
+                self._enter(before, status)
+        if after in RUNNING:
+            self._follow(status)
 
     def lost(self, why: RobotiqError | None = None) -> None:
         """The link is down: what was not acknowledged is dropped, never to be sent again."""
@@ -411,8 +415,8 @@ class Core:
         if self.machine.state in (State.DO_ACTIVATION, State.DO_ATR, State.DO_RESET, State.RUNNING_CC):
             self.machine.happen(Trigger.DELIVERED)
 
-    def _enter_running(self, before: State, status: RobotiqStatus) -> None:
-        """The gripper turned out active: go on from the image it shows, or adopt it."""
+    def _enter(self, before: State, status: RobotiqStatus) -> None:
+        """The gripper turned out to follow requests: go on from the image it shows, or adopt it."""
         shown = self._watch.observe(status)
         if before is State.DISCONNECTED:
             self._unsure_until = status.timestamp + WINDOW_S

@@ -22,6 +22,10 @@ class Finger(IntFlag):
     ABC = 7
     ALL = 15
 
+    def __str__(self) -> str:
+        """The axes by name, ``A|B``; ``none`` for the empty mask."""
+        return "|".join(str(axis.name) for axis in self) or "none"
+
 
 AXES: Final = (Finger.A, Finger.B, Finger.C, Finger.SCISSOR)
 """The four axes in the order of their registers."""

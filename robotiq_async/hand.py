@@ -394,7 +394,7 @@ class RobotiqHand:
             RobotiqError: not connected, or in a sequence that rGTO does not stop (activation, automatic
                 release: there :meth:`reset` does), or the link went down before the acknowledgement.
         """
-        core = self._started()
+        core = self._connected()
         await self._told(core.halt)
 
     # -- activation, faults ----------------------------------------------------------------------------
@@ -410,7 +410,7 @@ class RobotiqHand:
             ActivationTimeoutError: not finished within the activation time-out.
             RobotiqError: not possible now, or the link went down.
         """
-        core = self._started()
+        core = self._connected()
         if self.state in RUNNING:
             return
         if self.state in (State.FAULT, State.ATR_DONE):
@@ -427,7 +427,7 @@ class RobotiqHand:
             StateTimeoutError: the gripper did not report the reset within 5 s.
             RobotiqError: not possible now, or the link went down.
         """
-        core = self._started()
+        core = self._connected()
         await self._reach(
             {State.RESET},
             RESET_TIMEOUT_S,
@@ -448,7 +448,7 @@ class RobotiqHand:
             StateTimeoutError: the release was not finished within 60 s.
             RobotiqError: the link went down.
         """
-        core = self._started()
+        core = self._connected()
         await self._reach(
             {State.ATR_DONE},
             RELEASE_TIMEOUT_S,
@@ -606,13 +606,18 @@ class RobotiqHand:
 
     # -- inside ----------------------------------------------------------------------------------------
 
+    @property
+    def _key(self) -> str:
+        """What two hands on one gripper have in common."""
+        return self._options.address.replace("//localhost:", "//127.0.0.1:")
+
     def _claim(self) -> None:
         """Own the address in this process.
 
         Raises:
             InvalidStateError: it is owned already.
         """
-        key = self._options.address
+        key = self._key
         owner = self._running.get(key)
         if owner is not None and owner._task is not None and not owner._task.get_loop().is_closed():  # noqa: SLF001
             who = "this hand" if owner is self else "another hand"
@@ -627,8 +632,8 @@ class RobotiqHand:
         """The owner task has ended: nobody may wait for it any longer. Called by whoever sees it first."""
         if self._task is not task:
             return
-        if self._running.get(self._options.address) is self:
-            del self._running[self._options.address]
+        if self._running.get(self._key) is self:
+            del self._running[self._key]
         self._task = None
         failure: Callable[[], RobotiqError] | None = None
         if not task.cancelled() and (bug := task.exception()) is not None:
@@ -657,6 +662,18 @@ class RobotiqHand:
                 raise self._link_lost()
             raise NotStartedError("the hand is not started: use 'async with' or start()")
         return self._core
+
+    def _connected(self) -> Core:
+        """The core of a hand that has its link.
+
+        Raises:
+            NotStartedError: not started, or stopped.
+            ConnectionLostError: the link is down.
+        """
+        core = self._started()
+        if self.state is State.DISCONNECTED:
+            raise self._link_lost()
+        return core
 
     def _current_status(self) -> RobotiqStatus:
         self._started()

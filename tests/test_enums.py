@@ -167,3 +167,10 @@ class TestAnUnassignedCode:
 def test_what_does_not_fit_into_four_bits_is_no_fault_code(value: object) -> None:
     with pytest.raises(ValueError, match="not a valid Fault"):
         Fault(value)  # type: ignore[arg-type]
+
+
+def test_a_mask_prints_as_the_names_of_its_axes() -> None:
+    assert str(Finger.A) == "A"
+    assert f"holding it with {Finger.A | Finger.C}" == "holding it with A|C"
+    assert str(Finger.ALL) == "A|B|C|SCISSOR"
+    assert str(Finger(0)) == "none"

@@ -402,9 +402,10 @@ async def test_sim_address_runs_over_real_modbus_tcp() -> None:
 
 
 async def test_two_hands_on_one_address(hand: RobotiqHand, server: SimulatorServer) -> None:
-    other = RobotiqHand(server.address.removeprefix("tcp://"))
-    with pytest.raises(InvalidStateError):
-        await other.start()
+    for spelled in (server.address, server.address.removeprefix("tcp://"), f"localhost:{server.port}"):
+        other = RobotiqHand(spelled)
+        with pytest.raises(InvalidStateError):
+            await other.start()
     await hand.stop()
     await other.start()
     await other.stop()

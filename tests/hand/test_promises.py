@@ -406,3 +406,48 @@ async def test_a_held_up_loop_is_noticed_and_survived(
     assert statistics.overruns - overruns >= 100
     assert statistics.longest_stall > 0.5
     assert len([record for record in caplog.records if "holds up" in record.message]) <= 2
+
+
+# -- a link that is down: nothing is begun, not even later ----------------------------------------------
+
+
+async def test_while_the_link_is_down_no_sequence_can_be_asked_for(
+    hand: RobotiqHand, server: SimulatorServer
+) -> None:
+    server.refuse()
+    server.cut()
+    await hand.wait_for_state(State.DISCONNECTED)
+    writes = len(server.gripper.writes)
+    for call in (hand.activate, hand.reset, hand.atr, hand.halt, hand.recover):
+        with pytest.raises(ConnectionLostError):
+            await call()
+    assert hand.state is State.DISCONNECTED
+    await server.accept()
+    await hand.wait_for_state(State.RUNNING_IDLE)
+    await settled(hand)
+    assert len(server.gripper.writes) == writes
+
+
+async def test_nothing_can_be_asked_for_while_it_connects(server: SimulatorServer) -> None:
+    server.replies.delay(0.1)
+    hand = RobotiqHand(server.address)
+    starting = asyncio.create_task(hand.start(activate=False))
+    await asyncio.sleep(0)
+    for call in (hand.activate, hand.reset, hand.atr, hand.halt):
+        with pytest.raises(ConnectionLostError):
+            await call()
+    await starting
+    assert hand.state is State.RESET
+    await hand.stop()
+
+
+async def test_a_gripper_found_in_fault_is_not_taken_for_one_that_others_command(
+    server: SimulatorServer,
+) -> None:
+    server.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    async with RobotiqHand(server.address) as hand:
+        async for status in hand.statuses():
+            if status.sequence > 10:
+                break
+        assert hand.state is State.FAULT
+        assert hand.statistics.foreign_commands == 0
