@@ -14,6 +14,7 @@ The map; each module imports only what stands above it::
     echo         what was written and what the gripper shows of it
     adoption     what an axis was asked to do by somebody else
     desk         what callers have asked for
+    compose      the next image, from what callers have asked
     motion       moves and their results
     core         decides what to write, learns from what is read
     ------------------------------------------------------------

@@ -16,10 +16,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from .adoption import Adoption, agrees
+from .adoption import Adoption
+from .compose import compose
 from .desk import Delivery, Desk, Failure, tell
 from .echo import WINDOW_S, EchoWatch
-from .enums import AXES, Finger, ObjectStatus, State
+from .enums import AXES, Finger, State
 from .errors import (
     ConnectionLostError,
     GripperFaultError,
@@ -337,50 +338,16 @@ class Core:
         return self._watch.writing(image, now)
 
     def _compose(self, now: float) -> Request | None:
-        """The image with everything asked, or None while it is too early to tell."""
+        """The image with everything asked, or None while it is too early to tell. A halt is never early."""
         status, desk = self.status, self._desk
         assert status is not None, "a hand that takes commands has read a status"
-        if self._adoption is not None and not self._adoption.is_certain:
-            return None
-        base = self._base()
-        if desk.halt is not None:
-            return replace(base, go=False)
-        if desk.positions and not base.go:
-            # Raising rGTO wakes every axis. Where the fingers stopped is known once the halt has acted.
-            if status.go_echo and not self._watch.is_settled(now):
+        if desk.halt is None:
+            if self._adoption is not None and not self._adoption.is_certain:
                 return None
-            base = base.with_positions(
-                {axis: status.position(axis) for axis in AXES if axis not in self._gripping}
-            )
-        held = {
-            axis: status.position(axis) for axis in AXES if axis in desk.hold and self._drifts(axis, base)
-        }
-        positions = held | desk.positions
-        return replace(
-            base,
-            go=base.go or bool(desk.positions),
-            axes=tuple(
-                AxisRequest(
-                    positions.get(axis, old.position),
-                    desk.speeds.get(axis, old.speed),
-                    desk.forces.get(axis, old.force),
-                )
-                for axis, old in zip(AXES, base.axes, strict=True)
-            ),
-        )
-
-    def _drifts(self, axis: Finger, base: Request) -> bool:
-        """Whether an axis moves or is about to: then holding it means asking for where it is.
-
-        An axis in contact keeps its request, and with it its grip; so does one that stands where it was
-        asked to. What an axis does may still come from the request before this one: then the two disagree.
-        """
-        status = self.status
-        assert status is not None
-        what, position = status.finger_status(axis), status.position(axis)
-        return base.go and (
-            what is ObjectStatus.IN_MOTION or not agrees(base.position(axis), what, position, direction=0)
-        )
+            if desk.positions and not self._base().go and status.go_echo and not self._watch.is_settled(now):
+                # Where the fingers stop is known once the halt has acted.
+                return None
+        return compose(self._base(), desk, status, self._gripping)
 
     def _base(self) -> Request:
         """The image that the next one is made from."""

@@ -27,6 +27,7 @@ PURE = [
     "echo",
     "adoption",
     "desk",
+    "compose",
     "motion",
     "core",
 ]

@@ -92,6 +92,19 @@ def test_a_halted_gripper_is_adopted_where_it_stands() -> None:
     assert bench.gripper.position(A) <= 7
 
 
+def test_a_halt_does_not_wait_for_an_axis_to_show_its_direction() -> None:
+    bench = used_by_another()
+    bench.gripper.write(0, image(dict.fromkeys(AXES, 220), speed=0))
+    bench.now += 1.0
+    bench.connect()
+    halted = bench.halt()
+    bench.step()
+    assert len(bench.written) == 1
+    bench.until(lambda: halted.is_told, 0.05)
+    assert halted.told == [None]
+    assert not bench.gripper.is_moving
+
+
 # -- another client ----------------------------------------------------------------------------------------
 
 
