@@ -243,7 +243,7 @@ class Core:
             self._sent = Desk()
             self._send(image, now)
             return image
-        if self._procedure is not None or self._desk.is_empty:
+        if self._procedure is not None or self._desk.is_empty or self.machine.state not in _COMMANDED:
             return None
         composed = self._compose(now)
         if composed is None:
@@ -285,13 +285,14 @@ class Core:
             return
         before = self.machine.state
         after = self.machine.happen(look(status))
-        if before in RUNNING and after not in RUNNING:
-            self._leave_running(after, status)
+        if before in _COMMANDED and after not in (before, *RUNNING):
+            self._leave(after, status)
         elif after in _COMMANDED:
             if before in _COMMANDED:
                 self._compare(status)
             else:
                 self._enter(before, status)
+        self._tell_halted(status)
         if after in RUNNING:
             self._follow(status)
 
@@ -426,7 +427,6 @@ class Core:
         """Tell callers what has come true with this status."""
         if status.go_echo:
             self._gripping = status.contacts
-        self._tell_halted(status)
         for move, number in self._moves[:]:
             if number < 0:
                 continue
@@ -442,7 +442,7 @@ class Core:
         self._halting = [each for each in self._halting if each not in now]
         tell(delivery for _, delivery in now)
 
-    def _leave_running(self, after: State, status: RobotiqStatus) -> None:
+    def _leave(self, after: State, status: RobotiqStatus) -> None:
         """The gripper is not active any more, or reports a fault: nothing asked before may resume."""
         fault = status.fault
         if after in (State.FAULT, State.ATR_DONE):

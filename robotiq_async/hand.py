@@ -158,6 +158,7 @@ class RobotiqHand:
 
         Raises:
             InvalidStateError: this hand is started already, or another one runs on the same address.
+            NotStartedError: stop() was called meanwhile.
             ConnectFailedError: nobody answers within the connect time-out.
             RobotiqConnectionError: somebody answers, but not a gripper; or the link went down again.
             GripperFaultError: the activation that was begun ended in a fault.
@@ -391,8 +392,11 @@ class RobotiqHand:
         the same. In RESET nothing moves and nothing is sent.
 
         Raises:
-            RobotiqError: not connected, or in a sequence that rGTO does not stop (activation, automatic
-                release: there :meth:`reset` does), or the link went down before the acknowledgement.
+            GripperFaultError: in ATR_DONE; nothing moves.
+            InvalidStateError: in a sequence that rGTO does not stop (activation, automatic release: there
+                :meth:`reset` does).
+            MoveSupersededError: reset() took over before it was sent.
+            RobotiqError: not connected, or the link went down before the acknowledgement.
         """
         core = self._connected()
         await self._told(core.halt)
@@ -472,7 +476,9 @@ class RobotiqHand:
 
         Raises:
             StateTimeoutError: not active in time.
+            ActivationTimeoutError: the new activation took longer than the activation time-out.
             GripperFaultError: the new activation ended in a fault.
+            NotActivatedError: the gripper was reset during the new activation.
             RobotiqError: the link went down, or the hand was stopped.
         """
         limit = check_timeout("timeout", timeout) or RECOVER_TIMEOUT_S

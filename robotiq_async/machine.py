@@ -6,7 +6,7 @@ Three kinds of events move the hand from state to state:
 
 * what its user asks for (``ASK_``): refused, with a list of the states that would do, where the table
   has no entry. A refusal changes nothing.
-* what a status shows (``SEEN_``): every status is one of six sights, see :func:`look`. The gripper does
+* what a status shows (``SEEN_``): every status is one of five sights, see :func:`look`. The gripper does
   what it does, so a sight is never refused; where the table has no entry it says nothing new.
 * what became of the link and of a request (``DELIVERED``, ``LINK_LOST``, ``STOPPED``).
 

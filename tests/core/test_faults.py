@@ -240,3 +240,36 @@ def test_the_shutdown_never_activates_a_gripper_that_was_power_cycled_unnoticed(
     bench.run(0.5)
     assert not bench.gripper.is_moving
     assert not bench.latest.activation_echo
+
+
+@pytest.mark.parametrize("moving", [True, False])
+@pytest.mark.parametrize("code", [0x09, 0x0A, 0x0E])
+def test_halt_in_fault_is_told_while_the_fault_lasts(bench: Bench, code: int, moving: bool) -> None:
+    if moving:
+        bench.move(255)
+        bench.run(0.5)
+    bench.gripper.inject_fault(code)
+    bench.run(0.1)
+    assert bench.state is State.FAULT
+    halted = bench.halt()
+    bench.until(lambda: halted.is_told, 0.7)
+    assert halted.told == [None]
+    assert not bench.latest.go_echo
+
+
+def test_what_waits_in_fault_is_not_written_to_a_gripper_that_lost_its_activation(bench: Bench) -> None:
+    """A hold or a halt carries rACT = 1: written after a power cycle it would activate."""
+    bench.move(255)
+    bench.run(0.5)
+    bench.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
+    bench.step()
+    assert bench.state is State.FAULT
+    halted = bench.halt()
+    writes = len(bench.written)
+    bench.gripper.power_cycle()
+    bench.core.see(bench.status())
+    assert isinstance(halted.error, NotActivatedError)
+    bench.run(0.5)
+    assert bench.state is State.RESET
+    assert len(bench.written) == writes
+    assert not bench.gripper.is_moving

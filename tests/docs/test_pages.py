@@ -1,4 +1,4 @@
-"""Links lead somewhere, code runs, and quoted messages are the library's."""
+"""Links lead somewhere, code runs, quoted messages are the library's, and what is generated is fresh."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from typing import Any
 
 import pytest
 
+from docs import make_diagram, make_pages
+from robotiq_async.enums import State
+from robotiq_async.machine import TRANSITIONS, Trigger
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.docs.pages import DOCS, PAGES, ROOT, Block, blocks, prose
 
@@ -63,6 +66,38 @@ def test_every_page_can_be_reached() -> None:
             (page.parent / target.partition("#")[0]).resolve() for target in links(page) if target[0] != "#"
         ]
     assert set(PAGES) <= seen
+
+
+# -- what is made from the code --------------------------------------------------------------------------
+
+
+def test_nothing_is_stale(capsys: pytest.CaptureFixture[str]) -> None:
+    assert make_pages.main(["--check"]) == 0, capsys.readouterr().out
+
+
+def test_a_stale_page_is_named_and_made_again(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    picture = tmp_path / "picture.svg"
+    monkeypatch.setattr(make_diagram, "PICTURE", picture)
+    assert make_pages.main(["--check"]) == 1
+    assert capsys.readouterr().out == "picture.svg is stale: run docs/make_pages.py\n"
+    assert not picture.exists()
+    assert make_pages.main([]) == 0
+    assert picture.read_text(encoding="utf-8") == make_diagram.draw()
+    assert make_pages.main(["--check"]) == 0
+
+
+def test_what_the_notes_of_the_picture_say_of_stop_and_a_lost_link_is_so() -> None:
+    """They stand for these entries, whatever else is drawn between the same two boxes."""
+    for state, row in TRANSITIONS.items():
+        assert row.get(Trigger.ASK_STOP) is (
+            None if state in (State.DO_SHUTDOWN, State.SHUTDOWN) else State.DO_SHUTDOWN
+        )
+        assert row.get(Trigger.LINK_LOST) is {
+            State.DO_SHUTDOWN: State.DO_SHUTDOWN,
+            State.SHUTDOWN: None,
+        }.get(state, State.DISCONNECTED)
 
 
 # -- code ----------------------------------------------------------------------------------------------

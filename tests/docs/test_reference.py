@@ -102,6 +102,16 @@ def test_every_error_stands_under_its_base() -> None:
             )
 
 
+def test_what_each_call_raises_is_there() -> None:
+    (section,) = re.findall(r"^### What each call raises\n(.*?)^### ", REFERENCE, re.MULTILINE | re.DOTALL)
+    rows = re.findall(r"^\| ([^|]+) \| ([^|]+) \|$", section, re.MULTILINE)
+    calls = [call for first, _ in rows for call in re.findall(r"`(\w+)`", first)]
+    assert sorted(calls) == sorted(public(RobotiqHand))
+    builtin = {"TypeError", "ValueError", "RuntimeError"}
+    errors = set(re.findall(r"\w+Error\b", section)) - builtin
+    assert errors <= set(robotiq_async.__all__)
+
+
 def _line_of(text: str, name: str) -> int:
     return next(n for n, line in enumerate(text.splitlines()) if re.search(rf"\b{name}\b", line))
 

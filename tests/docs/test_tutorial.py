@@ -10,6 +10,7 @@ import sys
 from collections.abc import Coroutine
 from doctest import ELLIPSIS, OutputChecker
 from itertools import pairwise
+from pathlib import Path
 from types import CodeType, FunctionType
 from typing import Any
 
@@ -25,7 +26,13 @@ TYPED = [
     if code.language == "python" and "asyncio.run(" not in code.text
 ]
 """What is typed at the prompt, each with the output that the page shows for it."""
-(PROGRAM,) = [pair for pair in pairwise(BLOCKS) if "asyncio.run(" in pair[0].text]
+(PROGRAM,) = [pair for pair in pairwise(BLOCKS) if "\nasyncio.run(" in pair[0].text]
+(TEST,) = [
+    (code, output)
+    for code, (_, output) in zip(BLOCKS, pairwise(BLOCKS[1:]), strict=False)
+    if "def test_" in code.text
+]
+"""Between a test and its output stands the command that runs it."""
 
 
 def compiled(block: Block) -> CodeType:
@@ -56,8 +63,8 @@ def agree(shown: str, printed: str) -> bool:
 
 
 def test_every_python_block_shows_its_output() -> None:
-    assert len(TYPED) >= 9
-    assert all(output.language == "text" for _, output in [*TYPED, PROGRAM])
+    assert len(TYPED) >= 11
+    assert all(output.language == "text" for _, output in [*TYPED, PROGRAM, TEST])
     assert {block.language for block in BLOCKS} == {"sh", "python", "text"}
 
 
@@ -73,22 +80,34 @@ async def test_typing_the_tutorial() -> None:
             await names[name].stop()
 
 
-async def test_the_program_at_its_end(tmp_path: Any) -> None:
+async def test_the_program_at_its_end(tmp_path: Path) -> None:
     code, output = PROGRAM
     program = tmp_path / "grasp.py"
     program.write_text(code.text, encoding="utf-8")
     async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
-        process = await asyncio.create_subprocess_exec(
-            sys.executable,
-            str(program),
-            server.address,
-            env={"PYTHONPATH": str(ROOT)},
-            stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.STDOUT,
-        )
-        printed, _ = await asyncio.wait_for(process.communicate(), 30)
+        printed = await run(str(program), server.address)
+    assert agree(output.text, printed), printed
+
+
+async def test_the_test_at_its_end(tmp_path: Path) -> None:
+    code, output = TEST
+    (tmp_path / "test_grasp.py").write_text(code.text, encoding="utf-8")
+    printed = await run("-m", "pytest", "-q", "-p", "no:cacheprovider", str(tmp_path / "test_grasp.py"))
+    assert agree(output.text, printed), printed
+
+
+async def run(*arguments: str) -> str:
+    """What Python prints when it is called with these arguments."""
+    process = await asyncio.create_subprocess_exec(
+        sys.executable,
+        *arguments,
+        env={"PYTHONPATH": str(ROOT)},
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.STDOUT,
+    )
+    printed, _ = await asyncio.wait_for(process.communicate(), 30)
     assert process.returncode == 0, printed.decode()
-    assert agree(output.text, printed.decode())
+    return printed.decode()
 
 
 def test_blocks_can_be_pasted() -> None:
