@@ -408,8 +408,9 @@ class Core:
             self._take_over(status)
         elif self._adoption is not None and shown is self._adopted:
             self._adoption.watch(status)
-        elif status.timestamp < self._unsure_until:
-            # Nothing was written since the link came back, and now an older write shows: go on from it.
+        elif self._adoption is not None or status.timestamp < self._unsure_until:
+            # Nothing was written since the link came back, or since another client wrote, and now an older
+            # write of ours shows: go on from it.
             self._image, self._adoption = shown, None
 
     def _take_over(self, status: RobotiqStatus) -> None:

@@ -158,6 +158,24 @@ def test_a_move_that_another_client_leaves_alone_goes_on(bench: Bench) -> None:
     assert bench.core.foreign_commands == 1
 
 
+def test_our_write_that_shows_after_another_clients_is_what_counts() -> None:
+    # Another client's write and ours are on their way together; ours acts last and sends B and C back.
+    bench = used_by_another(device_cycle=0.03)
+    bench.connect()
+    bench.moved(20, S)
+    bench.run(1.0)
+    bench.gripper.write(0, image({A: 90, B: 90, C: 90, S: 90}))
+    ours = bench.command(A, position=200)
+    bench.run(1.0)
+    bench.until(lambda: not bench.core.is_moving)
+    assert ours.told == [None]
+    assert bench.core.foreign_commands == 1
+    before = travels(bench)
+    bench.moved(60, B)
+    moved = {axis for axis, travel in travels(bench).items() if travel != before[axis]}
+    assert moved == {B}
+
+
 def test_a_reset_by_another_client_is_a_lost_activation(bench: Bench) -> None:
     _, outcome = bench.move(255)
     bench.run(0.3)
