@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from .address import parse_address
 from .link import ModbusTransport
 from .registers import RegisterMap, Registers
-
-if TYPE_CHECKING:
-    from .simulator import SimulatedGripper, SimulatorServer
 
 
 class SimulatedTransport:
@@ -18,11 +14,15 @@ class SimulatedTransport:
 
     def __init__(self, registers: RegisterMap, *, connect_timeout: float, response_timeout: float) -> None:
         """Keep what is needed to connect; starts nothing."""
+        # The only place that imports the simulator at run time, and only for sim://. Here and not in open():
+        # it takes tens of milliseconds, for which a loop that runs already would be held up.
+        from .simulator import SimulatedGripper, SimulatorServer  # noqa: PLC0415
+
+        self._gripper = SimulatedGripper()
+        self._server = SimulatorServer(self._gripper)
         self._map = registers
         self._connect_timeout = connect_timeout
         self._response_timeout = response_timeout
-        self._gripper: SimulatedGripper | None = None
-        self._server: SimulatorServer | None = None
         self._inner: ModbusTransport | None = None
 
     @property
@@ -37,11 +37,6 @@ class SimulatedTransport:
             RobotiqConnectionError: loopback does not work.
         """
         if self._inner is None:
-            # The only place that imports the simulator at run time, and only for sim://.
-            from .simulator import SimulatedGripper, SimulatorServer  # noqa: PLC0415
-
-            self._gripper = self._gripper or SimulatedGripper()
-            self._server = SimulatorServer(self._gripper)
             await self._server.start()
             self._inner = ModbusTransport(
                 parse_address(self._server.address),
@@ -70,11 +65,9 @@ class SimulatedTransport:
     async def close(self) -> None:
         """Disconnect and stop the simulator's server; does nothing when closed."""
         inner, self._inner = self._inner, None
-        server, self._server = self._server, None
         if inner is not None:
             await inner.close()
-        if server is not None:
-            await server.stop()
+        await self._server.stop()
 
     def _connected(self) -> ModbusTransport:
         assert self._inner is not None, "opened before it is used"

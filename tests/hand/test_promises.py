@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import sys
 import time
+from asyncio.subprocess import PIPE
 from collections.abc import AsyncIterator
+from pathlib import Path
 
 import anyio
 import pytest
@@ -26,8 +29,9 @@ from robotiq_async import (
 )
 from robotiq_async.enums import AXES
 from robotiq_async.request import AxisRequest, Request
-from robotiq_async.simulator import SimulatorServer
+from robotiq_async.simulator import SimulatorServer, parse_troubles
 
+ROOT = Path(__file__).parents[2]
 A, B, C, S = AXES
 
 
@@ -61,6 +65,19 @@ async def test_start_on_a_silent_gripper_ends_within_five_seconds(server: Simula
     with pytest.raises(ConnectFailedError):
         await RobotiqHand(server.address).start()
     assert time.monotonic() - began < 5.0
+
+
+@pytest.mark.parametrize("what", ["drop on write once", "silence once", "exception on write once", "reset"])
+async def test_a_stop_that_was_not_heard_is_sent_again(
+    hand: RobotiqHand, server: SimulatorServer, what: str
+) -> None:
+    await hand.set_position(255)
+    await until_moving(server, hand)
+    (trouble,) = parse_troubles(what)
+    await server.adversary.begin(trouble)
+    await hand.stop()
+    assert not server.gripper.is_moving
+    assert not Request.from_registers(server.gripper.request_registers).go
 
 
 @pytest.mark.parametrize("what", ["silence", "refuse"])
@@ -388,6 +405,25 @@ async def test_a_fault_ends_a_move_and_nothing_resumes(hand: RobotiqHand, server
 
 
 # -- never holds the loop -----------------------------------------------------------------------------------
+
+
+async def test_the_first_start_imports_nothing(server: SimulatorServer) -> None:
+    # An import holds up the loop: anyio's backend, loaded at first use, did so for 20 ms.
+    program = f"""
+import asyncio, sys
+from robotiq_async import RobotiqHand
+
+async def main():
+    before = set(sys.modules)
+    async with RobotiqHand({server.address!r}) as hand:
+        await hand.move(30)
+    print(*(set(sys.modules) - before))
+
+asyncio.run(main())
+"""
+    process = await asyncio.create_subprocess_exec(sys.executable, "-c", program, stdout=PIPE, cwd=ROOT)
+    out, _ = await process.communicate()
+    assert (process.returncode, out.decode().split()) == (0, [])
 
 
 async def test_a_held_up_loop_is_noticed_and_survived(
