@@ -23,6 +23,7 @@ from robotiq_async import ReconnectPolicy, RobotiqHand, registers  # noqa: E402
 from robotiq_async.enums import Fault, Initialization, Mode, ObjectStatus, Severity  # noqa: E402
 from robotiq_async.machine import TRANSITIONS, Trigger  # noqa: E402
 from robotiq_async.registers import RTU_REGISTERS, TCP_REGISTERS, Field  # noqa: E402
+from robotiq_async.simulator.trouble import KINDS  # noqa: E402
 
 DOCS: Final = ROOT / "docs"
 
@@ -180,6 +181,26 @@ def reconnect_policy() -> str:
     return _arguments(ReconnectPolicy, "Attributes")
 
 
+# -- simulator -----------------------------------------------------------------------------------------
+
+
+def troubles() -> str:
+    """What can go wrong with the simulator."""
+    return table(
+        ["kind", "what goes wrong", "VALUE", "unless said", "link"],
+        (
+            [
+                f"`{name}`",
+                kind.meaning,
+                "" if kind.value is None else f"{kind.value:g}",
+                "once" if kind.lasts == 0 else "for ever",
+                kind.link or "",
+            ]
+            for name, kind in KINDS.items()
+        ),
+    )
+
+
 def _arguments(documented: Callable[..., object], section: str) -> str:
     parameters = inspect.signature(documented).parameters
     text = inspect.getdoc(documented) or ""
@@ -214,6 +235,7 @@ PAGES: Final[dict[str, dict[str, Callable[[], str]]]] = {
         "gIMC": progress_codes,
         "gFLT": faults,
     },
+    "how-to/simulator.md": {"troubles": troubles},
     "reference.md": {"options": options, "reconnect": reconnect_policy},
 }
 """The tables of each page."""

@@ -14,7 +14,10 @@ module                 what it holds
 ``endpoint``           what both servers have in common
 ``bank``               which register is found at which address
 ``connection``         one client; ``framing`` cuts its bytes into requests
-``replies``            lost, late and mangled replies
+``replies``            lost, late and mangled replies, switched by hand
+``trouble``            what can go wrong, as data and as words: :class:`Trouble`, :func:`parse_troubles`
+``adversary``          makes troubles happen, one at a time or by a plan
+``damage``             what troubles do to the bytes of a reply
 =====================  ====================================================================
 
 The physics (the first six) import neither pymodbus nor asyncio.
@@ -23,5 +26,6 @@ The physics (the first six) import neither pymodbus nor asyncio.
 from .gripper import SimulatedGripper
 from .serial_server import SerialSimulatorServer
 from .server import SimulatorServer
+from .trouble import Trouble, parse_troubles
 
-__all__ = ["SerialSimulatorServer", "SimulatedGripper", "SimulatorServer"]
+__all__ = ["SerialSimulatorServer", "SimulatedGripper", "SimulatorServer", "Trouble", "parse_troubles"]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+import socket
+import struct
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from pymodbus.pdu import ExceptionResponse
 from pymodbus.server.requesthandler import ServerRequestHandler
@@ -13,6 +15,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from pymodbus.server.base import ModbusBaseServer
+
+_LINGER_NOT: Final = struct.pack("ii", 1, 0)
+"""SO_LINGER on, for no time at all: closing the socket then resets the connection."""
 
 
 class Endpoint(Protocol):
@@ -25,8 +30,8 @@ class Endpoint(Protocol):
     def take(self, inbox: bytearray) -> Frame | None:
         """Cut the next request out of what has arrived."""
 
-    def is_addressed(self, unit: int) -> bool:
-        """Whether a unit id means this gripper."""
+    def hears(self, frame: Frame) -> bool:
+        """Whether a request is heard, and meant for this gripper."""
 
     def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
         """What to send for a reply, as a reply policy gives it."""
@@ -67,9 +72,12 @@ class Connection(ServerRequestHandler):
         if self._inbox:
             self.loop.call_soon(self._answer_next)
 
-    def hang_up(self) -> None:
-        """Drop the connection at once, with what has not been sent."""
+    def hang_up(self, *, reset: bool = False) -> None:
+        """Drop the connection at once, with what has not been sent; a reset tells the client so (RST)."""
         if self.is_active():
+            line = self.transport.get_extra_info("socket") if reset else None
+            if line is not None:
+                line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _LINGER_NOT)
             self.transport.abort()  # type: ignore[attr-defined]
             self.close()
 
@@ -83,7 +91,7 @@ class Connection(ServerRequestHandler):
                 return
             if frame is None:
                 return
-            if self._endpoint.is_addressed(frame.unit):
+            if self._endpoint.hears(frame):
                 self._answer(frame)
 
     def _answer(self, frame: Frame) -> None:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 from robotiq_async.checks import check_int
 
+from .adversary import Adversary
 from .connection import Connection
 from .gripper import SimulatedGripper
 from .replies import Replies, ReplyPolicy
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from pymodbus.server.base import ModbusBaseServer
 
     from .framing import Frame
+    from .trouble import Link
 
 
 class SimulatorEndpoint(ABC):
@@ -27,8 +29,11 @@ class SimulatorEndpoint(ABC):
     Attributes:
         gripper: what answers. It keeps its state when the server is stopped and started again.
         replies: the misbehaviour that is in force unless ``policy`` is replaced.
-        policy: decides what becomes of each reply.
+        policy: decides what becomes of each reply that no trouble is about.
+        adversary: makes troubles happen.
     """
+
+    link: ClassVar[Link]
 
     def __init__(self, gripper: SimulatedGripper | None, device_id: int | None) -> None:
         """A server that is not started.
@@ -40,6 +45,7 @@ class SimulatorEndpoint(ABC):
         self.gripper = SimulatedGripper() if gripper is None else gripper
         self.replies = Replies()
         self.policy: ReplyPolicy = self.replies
+        self.adversary = Adversary(self)
         self._device_id = None if device_id is None else check_int("device_id", device_id, 0, 255)
         self._server: ModbusBaseServer | None = None
 
@@ -81,19 +87,23 @@ class SimulatorEndpoint(ABC):
         server, self._server = self._server, None
         if server is None:
             return
-        _hang_up(server)
+        hang_up(server)
         server.close()
         # Two turns of the loop: answers that pymodbus was working on end, and transports close their files.
         await asyncio.sleep(0)
         await asyncio.sleep(0)
 
-    def cut(self) -> None:
-        """Drop all connections now; new ones are welcome.
+    def cut(self, *, reset: bool = False) -> None:  # noqa: ARG002
+        """Drop all connections. On a serial line there are none."""
+        self._running()
 
-        Raises:
-            RuntimeError: the server is not running.
-        """
-        _hang_up(self._running())
+    def refuse(self) -> None:
+        """Refuse new connections. On a serial line there are none."""
+        self._running()
+
+    async def accept(self) -> None:
+        """Accept connections again. On a serial line there are none."""
+        self._running()
 
     @abstractmethod
     async def _open(self) -> ModbusBaseServer:
@@ -115,16 +125,18 @@ class SimulatorEndpoint(ABC):
     def take(self, inbox: bytearray) -> Frame | None:
         """Cut the next request out of what has arrived."""
 
-    def is_addressed(self, unit: int) -> bool:
-        """Whether a unit id means this gripper; units in the field answer any."""
-        return self._device_id is None or unit == self._device_id
+    def hears(self, frame: Frame) -> bool:
+        """Whether a request is heard, and meant for this gripper; units in the field answer any unit id."""
+        return self._device_id in (None, frame.unit) and self.adversary.hears()
 
     def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
         """What to send for a reply."""
-        return self.policy(reply)
+        damaged = self.adversary.damage(reply)
+        return self.policy(reply) if damaged is None else damaged
 
 
-def _hang_up(server: ModbusBaseServer) -> None:
+def hang_up(server: ModbusBaseServer, *, reset: bool = False) -> None:
+    """Drop all connections of a server."""
     for connection in list(server.active_connections.values()):
         assert isinstance(connection, Connection)
-        connection.hang_up()
+        connection.hang_up(reset=reset)

@@ -119,7 +119,9 @@ class SimulatedGripper:
             return
         self._written = list(checked)
         self._writes.append(Write(self._clock(), checked))
-        self._pending.append((self._time + self._cycle, Request.from_registers(checked)))
+        # In their order, also when the device cycle has become shorter meanwhile.
+        due = max(self._time + self._cycle, self._pending[-1][0] if self._pending else 0.0)
+        self._pending.append((due, Request.from_registers(checked)))
         self._catch_up()
 
     @property
@@ -253,6 +255,15 @@ class SimulatedGripper:
         self._off_until = self._time + off_time
 
     # Inspection.
+
+    @property
+    def device_cycle(self) -> float:
+        """Simulated seconds between a write and its effect."""
+        return self._cycle
+
+    @device_cycle.setter
+    def device_cycle(self, value: float) -> None:
+        self._cycle = check_seconds("device_cycle", value, 0, _LONGEST)
 
     @property
     def speedup(self) -> float:

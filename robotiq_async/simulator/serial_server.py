@@ -26,6 +26,8 @@ class SerialSimulatorServer(SimulatorEndpoint):
     replies (manual), so a bad request gets no answer.
     """
 
+    link = "rtu"
+
     def __init__(
         self, port: str, gripper: SimulatedGripper | None = None, *, device_id: int | None = None
     ) -> None:

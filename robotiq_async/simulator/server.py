@@ -11,7 +11,7 @@ from robotiq_async.checks import check_int, check_seconds
 
 from .bank import RegisterBank
 from .connection import Connection
-from .endpoint import SimulatorEndpoint
+from .endpoint import SimulatorEndpoint, hang_up
 from .framing import Frame, take_tcp
 
 if TYPE_CHECKING:
@@ -29,6 +29,8 @@ class SimulatorServer(SimulatorEndpoint):
     other functions, addresses and counts get the Modbus exceptions 1, 2 and 3. Bytes that are no Modbus TCP
     end the connection. Requests of one connection are answered in order.
     """
+
+    link = "tcp"
 
     def __init__(
         self,
@@ -63,6 +65,17 @@ class SimulatorServer(SimulatorEndpoint):
     def address(self) -> str:
         """The address for :class:`~robotiq_async.RobotiqHand`."""
         return f"tcp://{self._host}:{self._port}"
+
+    def cut(self, *, reset: bool = False) -> None:
+        """Drop all connections now; new ones are welcome.
+
+        Args:
+            reset: reset them (RST) in place of closing them in order (FIN).
+
+        Raises:
+            RuntimeError: the server is not running.
+        """
+        hang_up(self._running(), reset=reset)
 
     def refuse(self) -> None:
         """Refuse new connections until :meth:`accept`; those that exist go on.
