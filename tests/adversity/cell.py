@@ -1,0 +1,174 @@
+"""One cell of the table: one trouble in one phase, and everything that is promised about it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from dataclasses import replace
+from itertools import pairwise
+from typing import NamedTuple, Self
+
+from robotiq_async import Finger, RobotiqError, State
+from robotiq_async.enums import AXES
+from robotiq_async.machine import RUNNING
+from robotiq_async.registers import Registers
+from robotiq_async.simulator import parse_troubles
+from robotiq_async.simulator.trouble import KINDS
+from tests.adversity.phases import TARGET, Call, Phase
+from tests.adversity.world import World
+
+LINE_PULLED = "line pulled"
+"""A trouble that is not the simulator's: the serial port is gone."""
+PATIENCE_S = 2.0
+"""So long a trouble goes on when the call does not end because of it; then it ends, and the call may."""
+IDLE_S = 1.0
+"""So long a trouble goes on when there is no call."""
+ESCALATION_S = 5.0
+"""Interference is a major fault after this time (20 s of the gripper, which is five times as fast)."""
+MOVES_EVERYTHING = ("foreign", "release")
+SETTLED = (*RUNNING, State.RESET, State.FAULT, State.ATR_DONE, State.SHUTDOWN)
+
+
+async def outcome(world: World, phase: Phase, words: str) -> str:
+    """Let it happen and say how the call ended, and where the hand came to rest; as in the table.
+
+    Raises:
+        AssertionError: a promise was broken.
+    """
+    call = await phase.reach(world)
+    if call is not None and phase.name == "connecting" and words in ("reset", "close"):
+        call = await _begun(world, call)  # there must be a connection to lose
+    before = Before.of(world)
+    async with trouble(world, words, on_write=phase.on_write) as end:
+        task = None if call is None else asyncio.ensure_future(call())
+        await asyncio.wait({task or asyncio.ensure_future(asyncio.sleep(IDLE_S))}, timeout=PATIENCE_S)
+        if words.endswith("for ever"):
+            await asyncio.sleep(ESCALATION_S)
+        else:
+            await end()
+        told = _noticed(world) if task is None else await _told(task, before.time + phase.bound)
+        await _rest(world)
+        state = world.hand.state
+        if phase.name == "stopping" and abs(world.gripper.position(Finger.A) - TARGET) <= 2:
+            told += ", fingers went on"
+        _check_motions(world, before, phase, words.split()[0])
+        await _works(world)
+        world.check_no_stale_status()
+        world.check_loop()
+    return f"{told} → {state.name}"
+
+
+class Before(NamedTuple):
+    """What the world was like when the trouble began."""
+
+    time: float
+    travels: dict[Finger, float]
+    writes: int
+    requests: Registers
+
+    @classmethod
+    def of(cls, world: World) -> Self:
+        world.states.clear()
+        gripper = world.gripper
+        return cls(world.loop.time(), world.travels(), len(gripper.writes), gripper.request_registers)
+
+
+@asynccontextmanager
+async def trouble(
+    world: World, words: str, *, on_write: bool
+) -> AsyncIterator[Callable[[], Awaitable[None]]]:
+    """A trouble that lasts until what this yields is called and awaited, at most as long as the block."""
+    if words == LINE_PULLED:
+        assert world.line is not None
+        line = world.line
+        line.pull()
+
+        async def plug() -> None:
+            line.plug()
+
+        yield plug
+        return
+    (what,) = parse_troubles(words)
+    if on_write and KINDS[what.kind].damage is not None:
+        what = replace(what, on="write")
+    ongoing = await world.server.adversary.begin(what)
+
+    async def end() -> None:
+        await world.server.adversary.end(ongoing)
+
+    try:
+        yield end
+    finally:
+        await end()
+
+
+async def _begun(world: World, call: Call) -> Call:
+    """Begin a call, and wait until the gripper has heard of it."""
+    task = asyncio.ensure_future(call())
+    await world.until(lambda: bool(world.server.heard))
+    return lambda: task
+
+
+async def _told(task: asyncio.Future[object], deadline: float) -> str:
+    """What the caller was told."""
+    try:
+        async with asyncio.timeout_at(deadline):
+            await task
+    except RobotiqError as error:
+        return type(error).__name__.removesuffix("Error")
+    return "done"
+
+
+def _noticed(world: World) -> str:
+    """What the user of an idle hand could notice."""
+    for state, words in (
+        (State.DISCONNECTED, "link lost"),
+        (State.FAULT, "fault"),
+        (State.ATR_DONE, "fault"),
+    ):
+        if state in world.states:
+            return words
+    return "taken over" if world.hand.statistics.foreign_commands else "nothing"
+
+
+async def _rest(world: World) -> None:
+    """Wait until the hand stays in one state, and whatever it moves has come to rest."""
+    async with asyncio.timeout(40):
+        while True:
+            state = world.hand.state
+            await asyncio.sleep(0.6)
+            if world.hand.state is state and state in SETTLED and not world.gripper.is_moving:
+                return
+
+
+def _check_motions(world: World, before: Before, phase: Phase, kind: str) -> None:
+    """No command was sent twice, neither in a row nor the one of the phase; only addressed axes moved."""
+    motions = world.motions(before.writes)
+    assert all(one != another for one, another in pairwise(motions)), motions
+    assert sum(motion[0] == TARGET for motion in motions) <= 1, motions
+    if kind in MOVES_EVERYTHING:
+        return
+    _check_travel(world, before.travels, phase.addressed)
+    if phase.name == "holding" and kind != "power-cut":
+        assert world.gripper.request_registers == before.requests, "the grip was relaxed"
+
+
+def _check_travel(world: World, before: dict[Finger, float], addressed: Finger) -> None:
+    after = world.travels()
+    moved = {axis: after[axis] - before[axis] for axis in AXES if axis not in addressed}
+    assert not any(moved.values()), f"axes moved that nobody addressed: {moved}"
+
+
+async def _works(world: World) -> None:
+    """The hand is as good as new: it can be recovered if need be, and moves one axis and no other."""
+    hand = world.hand
+    if hand.state is State.SHUTDOWN:
+        await hand.start()
+    await hand.recover()
+    before = world.travels()
+    result = await hand.move(60, Finger.B, speed=255)
+    assert abs(result.positions[Finger.B] - 60) <= 2
+    _check_travel(world, before, Finger.B)
+    await hand.stop()
+    assert hand.state is State.SHUTDOWN

@@ -1,0 +1,111 @@
+"""What the hand can be doing when something goes wrong: how it gets there, and what is promised then."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import Any
+
+from robotiq_async import Fault, Finger, State
+from tests.adversity.world import World
+
+A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
+NOBODY = Finger(0)
+TARGET = 200
+
+Call = Callable[[], Awaitable[Any]]
+
+
+@dataclass(frozen=True)
+class Phase:
+    """One column of the table.
+
+    Attributes:
+        name: as in the table.
+        reach: brings a world there and returns the call that is awaited then, if there is one.
+        addressed: the axes that the call may move.
+        bound: seconds within which the call ends, whatever goes wrong.
+        on_write: whether a trouble about replies is meant for the write of the call. Otherwise the poll
+            before it would meet the trouble, and nothing would ever be written.
+    """
+
+    name: str
+    reach: Callable[[World], Awaitable[Call | None]]
+    addressed: Finger
+    bound: float
+    on_write: bool = False
+
+
+async def connecting(world: World) -> Call:
+    await world.activate_beforehand()
+    return world.hand.start
+
+
+async def activating(world: World) -> Call:
+    await world.hand.start(activate=False)
+    call = asyncio.create_task(world.hand.activate())
+    await world.until_state(State.WF_ACTIVATION)
+    await world.until_moving()
+    return lambda: call
+
+
+async def idle(world: World) -> None:
+    await world.activate_beforehand()
+    await world.hand.start()
+
+
+async def command_pending(world: World) -> Call:
+    await idle(world)
+    return lambda: world.hand.set_position(TARGET, A)
+
+
+async def moving(world: World) -> Call:
+    await idle(world)
+    call = asyncio.create_task(world.hand.move(TARGET, A, speed=0))
+    await world.until_moving()
+    return lambda: call
+
+
+async def holding(world: World) -> None:
+    world.gripper.place_object(A | B | C, 100)
+    await idle(world)
+    result = await world.hand.close(speed=255)
+    assert result.contacts == A | B | C
+
+
+async def resetting(world: World) -> Call:
+    await idle(world)
+    return world.hand.reset
+
+
+async def releasing(world: World) -> Call:
+    await idle(world)
+    await world.hand.move(TARGET, A | B | C, speed=255)
+    world.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    await world.until_state(State.FAULT)
+    call = asyncio.create_task(world.hand.atr())
+    await world.until_state(State.WF_ATR)
+    await world.until_moving()
+    return lambda: call
+
+
+async def stopping(world: World) -> Call:
+    await idle(world)
+    await world.hand.set_speed(0)
+    await world.hand.set_position(TARGET, A)
+    await world.until_moving()
+    return world.hand.stop
+
+
+PHASES = (
+    Phase("connecting", connecting, NOBODY, 5.0),
+    Phase("activating", activating, A | B | C | S, 25.0),
+    Phase("idle", idle, NOBODY, 0.0),
+    Phase("command pending", command_pending, A, 1.0, on_write=True),
+    Phase("moving", moving, A, 25.0),
+    Phase("holding", holding, NOBODY, 0.0),
+    Phase("resetting", resetting, NOBODY, 5.0, on_write=True),
+    Phase("releasing", releasing, A | B | C | S, 65.0),
+    Phase("stopping", stopping, A, 2.0, on_write=True),
+)

@@ -1,0 +1,57 @@
+"""Reads the table of docs/under-fault.md."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from robotiq_async.simulator import parse_troubles
+from robotiq_async.simulator.trouble import KINDS
+from tests.adversity.cell import LINE_PULLED
+from tests.adversity.phases import PHASES, Phase
+
+PAGE = Path(__file__).parents[2] / "docs" / "under-fault.md"
+
+
+class Cell(NamedTuple):
+    """One cell: a trouble on a kind of link, in a phase, and what comes of it."""
+
+    trouble: str
+    link: str
+    phase: Phase
+    outcome: str
+
+
+def cells() -> Iterator[Cell]:
+    """Every cell, for every kind of link it fits."""
+    head, *rows = (
+        [word.strip() for word in line.strip("|").split("|")]
+        for line in PAGE.read_text(encoding="utf-8").splitlines()
+        if line.startswith("|") and not line.startswith("| --")
+    )
+    phases = {phase.name: phase for phase in PHASES}
+    assert head[1:] == list(phases), "a column for each phase"
+    for troubles, *outcomes in rows:
+        for trouble in re.findall(r"`(.+?)`", troubles):
+            for words, link in variants(trouble):
+                for name, outcome in zip(head[1:], outcomes, strict=True):
+                    yield Cell(words, link, phases[name], outcome)
+
+
+def variants(trouble: str) -> Iterator[tuple[str, str]]:
+    """The forms in which a trouble of the table is tried, each with the kind of link."""
+    if trouble == LINE_PULLED:
+        yield trouble, "rtu"
+        return
+    (parsed,) = parse_troubles(trouble)
+    kind = KINDS[parsed.kind]
+    forms = [trouble]
+    if parsed.lasts is None and kind.damage is not None:
+        forms = [f"{trouble} once", f"{trouble} for 60"]
+    elif parsed.lasts is None and kind.lasts > 0:
+        forms = [f"{trouble} for 60"]
+    for link in ("tcp", "rtu"):
+        if kind.link in (None, link):
+            yield from ((form, link) for form in forms)

@@ -1,0 +1,28 @@
+"""Every trouble in every phase: the table of docs/under-fault.md, cell by cell."""
+
+from __future__ import annotations
+
+import pytest
+
+from robotiq_async.simulator.trouble import KINDS
+from tests.adversity.cell import outcome
+from tests.adversity.table import Cell, cells
+from tests.adversity.world import world
+from tests.virtual import run
+
+CELLS = list(cells())
+
+
+@pytest.mark.parametrize(
+    "cell", CELLS, ids=lambda cell: f"{cell.link}-{cell.phase.name}-{cell.trouble}".replace(" ", "_")
+)
+def test_cell(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def main() -> str:
+        async with world(cell.link, patch=monkeypatch) as here:
+            return await outcome(here, cell.phase, cell.trouble)
+
+    assert run(main) == cell.outcome
+
+
+def test_every_kind_of_trouble_is_in_the_table() -> None:
+    assert {cell.trouble.split()[0] for cell in CELLS} - {"line"} == set(KINDS)

@@ -1,0 +1,173 @@
+"""A gripper, its server and a hand in one virtual loop, with an eye on everything that is said and done."""
+
+from __future__ import annotations
+
+import asyncio
+from bisect import bisect_left, bisect_right
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass, field
+
+import pytest
+
+from robotiq_async import Finger, RobotiqConnectionError, RobotiqHand, RobotiqStatus, State
+from robotiq_async.enums import AXES
+from robotiq_async.registers import Registers
+from robotiq_async.request import AxisRequest, Request
+from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
+from robotiq_async.simulator.framing import Frame
+from tests.virtual import VirtualLoop
+from tests.virtual_line import VirtualLine
+
+LONGEST_HOLD_S = 0.020
+SPEEDUP = 5.0
+"""Of the gripper only: the link and the hand keep to their own times."""
+
+
+class StampedGripper(SimulatedGripper):
+    """Writes a number into the reserved last byte of each status, so that no two are alike."""
+
+    stamps: list[tuple[float, int]]
+    """When each status was given out, and its number."""
+
+    def status_registers(self) -> Registers:
+        registers = super().status_registers()
+        number = len(self.stamps) % 256
+        self.stamps.append((self._clock(), number))
+        return (*registers[:7], registers[7] & 0xFF00 | number)
+
+
+class Heard:
+    """Notes when each request came in, understood or not."""
+
+    heard: list[float]
+
+    def take(self, inbox: bytearray) -> Frame | None:
+        frame: Frame | None = super().take(inbox)  # type: ignore[misc]
+        if frame is not None:
+            self.heard.append(asyncio.get_running_loop().time())
+        return frame
+
+
+class TcpServer(Heard, SimulatorServer):
+    pass
+
+
+class RtuServer(Heard, SerialSimulatorServer):
+    pass
+
+
+@dataclass
+class World:
+    """All there is in one test."""
+
+    gripper: StampedGripper
+    server: TcpServer | RtuServer
+    line: VirtualLine | None
+    hand: RobotiqHand
+    statuses: list[RobotiqStatus] = field(default_factory=list)
+    states: list[State] = field(default_factory=list)
+
+    @property
+    def loop(self) -> VirtualLoop:
+        loop = asyncio.get_running_loop()
+        assert isinstance(loop, VirtualLoop)
+        return loop
+
+    async def activate_beforehand(self) -> None:
+        """Leave the gripper active and open, as another client would."""
+        axes = (AxisRequest(0, 255, 64),) * 3 + (AxisRequest(128, 255, 64),)
+        self.gripper.write(0, Request(activate=True, axes=axes).registers)
+        await asyncio.sleep(10)
+        self.gripper.write(0, Request(activate=True, go=True, axes=axes).registers)
+        await asyncio.sleep(10)
+
+    async def until(self, condition: Callable[[], bool]) -> None:
+        """Wait until something is true; half a minute at most, and in this loop that takes no time."""
+        async with asyncio.timeout(30):
+            while not condition():  # noqa: ASYNC110  # what is waited for tells nobody
+                await asyncio.sleep(0.0001)
+
+    async def until_moving(self) -> None:
+        await self.until(lambda: self.gripper.is_moving)
+
+    async def until_state(self, state: State) -> None:
+        await self.hand.wait_for_state(state, timeout=30)
+
+    def travels(self) -> dict[Finger, float]:
+        return {axis: self.gripper.travel(axis) for axis in AXES}
+
+    def motions(self, since: int = 0) -> list[tuple[int, ...]]:
+        """The positions asked by each write that set the axes going, from a number of writes on."""
+        images = [Request.from_registers(write.registers) for write in self.gripper.writes[since:]]
+        return [tuple(axis.position for axis in image.axes) for image in images if image.go]
+
+    def check_no_stale_status(self) -> None:
+        """Every status is the answer to the last request before it, and none came twice."""
+        numbers = [status.sequence for status in self.statuses]
+        assert numbers == sorted(set(numbers))
+        given_at = [at for at, _ in self.gripper.stamps]
+        for status in self.statuses:
+            index = bisect_right(given_at, status.timestamp) - 1
+            while index >= 0 and self.gripper.stamps[index][1] != status.registers[7] & 0xFF:
+                index -= 1
+            assert index >= 0, f"nobody ever sent {status!r}"
+            newer = bisect_right(self.server.heard, given_at[index])
+            asked_again = self.server.heard[newer : bisect_left(self.server.heard, status.timestamp)]
+            assert not asked_again, f"{status!r} answers an older request: asked again at {asked_again}"
+
+    def check_loop(self) -> None:
+        assert self.loop.longest_hold < LONGEST_HOLD_S, f"the loop was held for {self.loop.longest_hold} s"
+
+    async def watch(self) -> None:
+        """Collect what the hand reports, over starts and stops, until cancelled."""
+        while True:
+            with suppress(RobotiqConnectionError):
+                async for status in self.hand.statuses(buffer=1_000_000):
+                    self.statuses.append(status)
+            await asyncio.sleep(0.001)
+
+    async def watch_states(self) -> None:
+        while True:
+            with suppress(RobotiqConnectionError):
+                async for transition in self.hand.transitions():
+                    self.states.append(transition.target)
+            await asyncio.sleep(0.001)
+
+
+@asynccontextmanager
+async def world(
+    link: str = "tcp", *, patch: pytest.MonkeyPatch | None = None, **options: object
+) -> AsyncIterator[World]:
+    """A world whose gripper was just switched on, and a hand that is not started.
+
+    Args:
+        link: tcp or rtu.
+        patch: for rtu, where the fake serial ports are put in place.
+        options: for the hand.
+    """
+    loop = asyncio.get_running_loop()
+    gripper = StampedGripper(loop.time, speedup=SPEEDUP, device_cycle=0.005 * SPEEDUP)
+    gripper.stamps = []
+    line: VirtualLine | None = None
+    server: TcpServer | RtuServer
+    if link == "rtu":
+        assert patch is not None
+        line = VirtualLine(patch)
+        server, address = RtuServer(line.FAR, gripper), f"rtu://{line.NEAR}"
+    else:
+        server, address = TcpServer(gripper), ""
+    server.heard = []
+    async with server:
+        # 100 Hz over TCP and 200 Hz over a serial line, as the manual says.
+        options = {"poll_interval": 0.005 if link == "rtu" else 0.01} | options
+        hand = RobotiqHand(address or server.address, **options)  # type: ignore[arg-type]
+        here = World(gripper, server, line, hand)
+        watching = [asyncio.create_task(here.watch()), asyncio.create_task(here.watch_states())]
+        try:
+            yield here
+        finally:
+            for task in watching:
+                task.cancel()
+            await asyncio.gather(*watching, return_exceptions=True)
+            await hand.stop()

@@ -1,0 +1,218 @@
+"""An event loop whose time is not real: it jumps ahead when nothing is left to do.
+
+Seconds of polling pass in milliseconds, a time-out takes no time, two runs take the same course, and
+whoever waits for something that will never come is found out at once. Connections made in such a loop
+are made of memory; real descriptors (the fake serial line) work too, as long as what is written to one
+can be read from the other at once.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import selectors
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Coroutine
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+LATENCY_S = 0.0002
+"""What bytes need from one end of a connection to the other."""
+
+
+class NothingWillHappenError(AssertionError):
+    """Everybody waits, and nothing is going to happen."""
+
+
+class HoldWatch:
+    """Measures in real time how long callbacks keep the loop, without the time other processes took."""
+
+    def __init__(self) -> None:
+        self.longest = 0.0
+        self._began = 0.0
+        self._waited = 0.0
+        self._file = -1
+        with contextlib.suppress(OSError):
+            # CPU time, time spent waiting for a CPU (both ns), and slices: Linux only.
+            self._file = os.open(f"/proc/self/task/{threading.get_native_id()}/schedstat", os.O_RDONLY)
+
+    def begin(self) -> None:
+        self._waited = self._waiting()
+        self._began = time.perf_counter()
+
+    def end(self) -> None:
+        if self._began:
+            held = time.perf_counter() - self._began
+            if held > self.longest:
+                self.longest = max(self.longest, held - (self._waiting() - self._waited))
+
+    def close(self) -> None:
+        if self._file >= 0:
+            os.close(self._file)
+            self._file = -1
+
+    def _waiting(self) -> float:
+        return int(os.pread(self._file, 100, 0).split()[1]) / 1e9 if self._file >= 0 else 0.0
+
+
+class _Selector(selectors.DefaultSelector):
+    """Does not wait: it moves the clock."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.now = 1000.0
+        self.hold = HoldWatch()
+
+    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+        self.hold.end()
+        events = super().select(0)
+        if not events and timeout is None:
+            raise NothingWillHappenError("everybody waits, and nothing is going to happen")
+        if not events and timeout:
+            self.now += timeout
+        self.hold.begin()
+        return events
+
+    def close(self) -> None:
+        super().close()
+        self.hold.close()
+
+
+class VirtualLoop(asyncio.SelectorEventLoop):
+    """The loop; :meth:`time` is virtual, and connections stay inside."""
+
+    def __init__(self) -> None:
+        self._virtual = _Selector()
+        super().__init__(self._virtual)
+        self._listeners: dict[int, _Listener] = {}
+        self._next_port = 20000
+        self.complaints: list[str] = []
+        self.set_exception_handler(lambda _, context: self.complaints.append(repr(context)))
+
+    def time(self) -> float:
+        return self._virtual.now
+
+    @property
+    def longest_hold(self) -> float:
+        """The longest time, in real seconds, that callbacks have kept the loop."""
+        return self._virtual.hold.longest
+
+    # The signatures are asyncio's; what pymodbus and the simulator pass is all that is looked at.
+
+    async def create_server(self, factory: Any, _host: Any = None, port: Any = None, **_: Any) -> Any:  # type: ignore[override]
+        if not port:
+            self._next_port += 1
+            port = self._next_port
+        return _Listener(self._listeners, factory, port)
+
+    async def create_connection(self, factory: Any, _host: Any = None, port: Any = None, **_: Any) -> Any:  # type: ignore[override]
+        await asyncio.sleep(2 * LATENCY_S)
+        listener = self._listeners.get(port)
+        if listener is None:
+            raise ConnectionRefusedError(111, "nobody listens")
+        here, there = MemoryTransport(self), MemoryTransport(self)
+        here.peer, there.peer = there, here
+        there.attach(listener.factory())
+        here.attach(factory())
+        return here, here.protocol
+
+
+class _Listener:
+    """What create_server returns, as much of it as is used."""
+
+    def __init__(self, listeners: dict[int, _Listener], factory: Callable[[], Any], port: int) -> None:
+        self.factory = factory
+        self._listeners, self._port = listeners, port
+        if port in listeners:
+            raise OSError(98, "address in use")
+        listeners[port] = self
+        self.sockets = [self]
+
+    def getsockname(self) -> tuple[str, int]:
+        return "127.0.0.1", self._port
+
+    def is_serving(self) -> bool:
+        return self._listeners.get(self._port) is self
+
+    def close(self) -> None:
+        if self.is_serving():
+            del self._listeners[self._port]
+
+
+class MemoryTransport(asyncio.Transport):
+    """One end of a connection."""
+
+    def __init__(self, loop: VirtualLoop) -> None:
+        super().__init__()
+        self._loop = loop
+        self._closing = False
+        self._resets = False
+        self._arriving: deque[bytes | ConnectionResetError | None] = deque()
+        self.peer: MemoryTransport
+        self.protocol: Any = None
+
+    def attach(self, protocol: Any) -> None:
+        self.protocol = protocol
+        protocol.connection_made(self)
+
+    def write(self, data: Any) -> None:
+        if not self._closing:
+            self.peer.send_here(bytes(data))
+
+    def send_here(self, what: bytes | ConnectionResetError | None) -> None:
+        # Timers of the same instant come in any order; the queue keeps the bytes in theirs.
+        self._arriving.append(what)
+        self._loop.call_later(LATENCY_S, self._arrive)
+
+    def _arrive(self) -> None:
+        what = self._arriving.popleft()
+        if self._closing:
+            return
+        if isinstance(what, bytes):
+            self.protocol.data_received(what)
+        else:
+            if what is None:
+                self.protocol.eof_received()
+            self._lose(what)
+
+    def _lose(self, why: Exception | None) -> None:
+        if not self._closing:
+            self._closing = True
+            self._loop.call_soon(self.protocol.connection_lost, why)
+
+    def close(self) -> None:
+        if not self._closing:
+            self.peer.send_here(ConnectionResetError(104, "reset by peer") if self._resets else None)
+            self._lose(None)
+
+    abort = close
+
+    def is_closing(self) -> bool:
+        return self._closing
+
+    def get_extra_info(self, name: str, default: Any = None) -> Any:
+        return {"socket": self, "peername": ("memory", 1), "sockname": ("memory", 2)}.get(name, default)
+
+    def setsockopt(self, *_: Any) -> None:
+        """The simulator sets but one option: to reset the connection in place of closing it."""
+        self._resets = True
+
+
+def run(main: Callable[[], Coroutine[Any, Any, T]]) -> T:
+    """Run a coroutine function in a virtual loop; nothing may be left running or complained about.
+
+    Raises:
+        AssertionError: a task was left, or the loop had to complain.
+    """
+    with asyncio.Runner(loop_factory=VirtualLoop) as runner:
+        loop = runner.get_loop()
+        assert isinstance(loop, VirtualLoop)
+        result = runner.run(main())
+        left = asyncio.all_tasks(loop)
+        assert not left, f"tasks left running: {left}"
+        assert not loop.complaints, f"the event loop complained: {loop.complaints}"
+        return result

@@ -1,0 +1,89 @@
+"""A serial line for the virtual loop: what pyserial would open is a pair of sockets."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from typing import Any
+
+import pytest
+import serial
+
+
+class VirtualLine:
+    """Two serial ports and the cable between them, which can be pulled and put back."""
+
+    NEAR, FAR = "/dev/ttyNEAR", "/dev/ttyFAR"
+
+    def __init__(self, patch: pytest.MonkeyPatch) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._ports: dict[str, _Port] = {}
+        self._is_plugged = True
+        # pyserial is below what is tested; pymodbus asks it for a port and gets one of ours.
+        patch.setattr(serial, "serial_for_url", self._open)
+
+    def pull(self) -> None:
+        """Pull the near port out, as one pulls a USB adapter."""
+        self._is_plugged = False
+        if self.NEAR in self._ports:
+            self._ports[self.NEAR].lose()
+
+    def plug(self) -> None:
+        """Put it back."""
+        self._is_plugged = True
+
+    def _open(self, url: str, **_: Any) -> _Port:
+        if url == self.NEAR and not self._is_plugged:
+            raise serial.SerialException(2, f"could not open port {url}")
+        self._ports[url] = port = _Port(self, url, self._loop)
+        return port
+
+    def carry(self, sender: str, data: bytes) -> None:
+        """Bring bytes to the other port, if somebody has opened it."""
+        other = self._ports.get(self.FAR if sender == self.NEAR else self.NEAR)
+        if other is not None and self._is_plugged:
+            other.arrive(data)
+
+    def closed(self, port: _Port) -> None:
+        if self._ports.get(port.url) is port:
+            del self._ports[port.url]
+
+
+class _Port:
+    """As much of serial.Serial as pymodbus uses."""
+
+    def __init__(self, line: VirtualLine, url: str, loop: asyncio.AbstractEventLoop) -> None:
+        self.url = url
+        self.timeout = self.write_timeout = 0
+        self._line, self._loop = line, loop
+        self._mine, self._cable = socket.socketpair()
+        self._mine.setblocking(False)
+
+    def fileno(self) -> int:
+        return self._mine.fileno()
+
+    def read(self, size: int) -> bytes:
+        try:
+            data = self._mine.recv(size)
+        except BlockingIOError:
+            return b""
+        if not data:
+            raise serial.SerialException("device reports readiness to read but returned no data")
+        return data
+
+    def write(self, data: bytes) -> int:
+        # At 115200 baud a byte takes 87 us.
+        self._loop.call_later(len(data) * 87e-6, self._line.carry, self.url, data)
+        return len(data)
+
+    def arrive(self, data: bytes) -> None:
+        self._cable.send(data)
+
+    def lose(self) -> None:
+        self._line.closed(self)
+        self._cable.close()
+
+    def close(self) -> None:
+        self._line.closed(self)
+        self._mine.close()
+        self._cable.close()
