@@ -12,6 +12,7 @@ runs it, ends it on a signal and turns its errors into exit codes::
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Sequence
 
@@ -28,4 +29,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             file=sys.stderr,
         )
         return 1
+    except KeyboardInterrupt:
+        # Importing takes a quarter of a second, and nothing has happened yet.
+        print("robotiq-async: interrupted", file=sys.stderr)
+        return 128 + signal.SIGINT
     return run(sys.argv[1:] if arguments is None else arguments)

@@ -7,9 +7,10 @@ import inspect
 import os
 import signal
 import sys
-from collections.abc import Awaitable, Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Coroutine, Sequence
+from contextlib import closing, suppress
 from types import FrameType
+from typing import Self
 
 from cyclopts import CycloptsError
 
@@ -21,18 +22,10 @@ from .remarks import collected
 SUCCESS, FAILURE, WRONG_USAGE, SIGNALLED = 0, 1, 2, 128
 
 
-class _SignalError(Exception):
-    """A signal has ended the command."""
-
-    def __init__(self, number: int) -> None:
-        self.code = SIGNALLED + number
-        super().__init__("interrupted")
-
-
 def run(arguments: Sequence[str]) -> int:
     """Run the sub-command that the arguments name and return the exit code."""
-    with collected() as remarks:
-        code, problem = _outcome(arguments)
+    with collected() as remarks, _Signals() as signals:
+        code, problem = _outcome(arguments, signals)
     # A failure is one line, whatever it holds: it is read in logs and by scripts.
     lines = remarks if problem is None else ["; ".join((problem, *remarks))]
     for line in lines:
@@ -40,69 +33,85 @@ def run(arguments: Sequence[str]) -> int:
     return code
 
 
-def _outcome(arguments: Sequence[str]) -> tuple[int, str | None]:
+def _outcome(arguments: Sequence[str], signals: _Signals) -> tuple[int, str | None]:
     """The exit code and the reason, if there is one to tell."""
     try:
         command, bound, _ = build().parse_args(arguments, print_error=False, exit_on_error=False)
         outcome = command(*bound.args, **bound.kwargs)
-        if inspect.isawaitable(outcome):
-            _run_async(outcome)
+        if inspect.iscoroutine(outcome):
+            with closing(outcome):  # a signal may come before it has begun
+                signals.run(outcome)
         sys.stdout.flush()
     except (CycloptsError, UsageError) as error:
         return WRONG_USAGE, str(error)
     except RobotiqError as error:
         return FAILURE, str(error)
-    except _SignalError as error:
-        return error.code, str(error)
     except BrokenPipeError:
         # Whoever read the output has had enough (status | head); the flush at exit must not fail over it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILURE, None
     except KeyboardInterrupt:
-        return SIGNALLED + signal.SIGINT, "interrupted"
+        return SIGNALLED + (signals.received or signal.SIGINT), "interrupted"
     return SUCCESS, None
 
 
-def _run_async(work: Awaitable[None]) -> None:
-    """Run to the end; SIGINT and SIGTERM cancel, so that leaving ``async with`` stops the fingers.
+class _Signals:
+    """SIGINT and SIGTERM: the first one ends what runs, a second one has its ordinary effect.
 
-    Raises:
-        _SignalError: one of them came.
+    In the event loop that is a cancellation, so that leaving ``async with`` stops the fingers; elsewhere
+    it is a KeyboardInterrupt. While the loop is set up the signal is only noted: asyncio could not tell
+    an exception out of nowhere from one of its own.
     """
-    received: list[int] = []
 
-    async def cancellable() -> None:
-        task = asyncio.current_task()
-        assert task is not None
-        with _handling(task.cancel, received):
-            await work
+    def __init__(self) -> None:
+        self.received = 0
+        self._end: Callable[[], object] = _interrupt
 
-    try:
-        asyncio.run(cancellable())
-    except asyncio.CancelledError:
-        if not received:
-            raise
-        raise _SignalError(received[0]) from None
+    def __enter__(self) -> Self:
+        # A SIGINT that is ignored stays so: that is how a shell keeps Ctrl-C from its background jobs.
+        numbers = [n for n in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(n) is not signal.SIG_IGN]
+        self._previous = {number: signal.signal(number, self._handle) for number in numbers}
+        return self
 
-
-@contextmanager
-def _handling(stop: Callable[[], object], received: list[int]) -> Iterator[None]:
-    """Call ``stop`` in the running loop at the first signal; a second one has its ordinary effect."""
-    loop = asyncio.get_running_loop()
-
-    def handle(number: int, _frame: FrameType | None) -> None:
-        restore()
-        received.append(number)
-        loop.call_soon_threadsafe(stop)
-
-    def restore() -> None:
-        for number, handler in previous.items():
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._previous.items():
             signal.signal(number, handler)
 
-    # A SIGINT that is ignored stays so: that is how a shell keeps Ctrl-C from its background jobs.
-    numbers = [n for n in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(n) is not signal.SIG_IGN]
-    previous = {number: signal.signal(number, handle) for number in numbers}
-    try:
-        yield
-    finally:
-        restore()
+    def run(self, work: Coroutine[object, object, None]) -> None:
+        """Run to the end.
+
+        Raises:
+            KeyboardInterrupt: a signal came.
+        """
+        self._end = lambda: None
+        try:
+            with closing(self._cancellable(work)) as main:
+                asyncio.run(main)
+        except asyncio.CancelledError:
+            if not self.received:
+                raise
+            raise KeyboardInterrupt from None
+        finally:
+            self._end = _interrupt
+
+    async def _cancellable(self, work: Coroutine[object, object, None]) -> None:
+        loop, task = asyncio.get_running_loop(), asyncio.current_task()
+        assert task is not None
+
+        def cancel() -> None:
+            with suppress(RuntimeError):  # the loop has been closed meanwhile
+                loop.call_soon_threadsafe(task.cancel)
+
+        self._end = cancel
+        if self.received:
+            raise asyncio.CancelledError
+        await work
+
+    def _handle(self, number: int, _frame: FrameType | None) -> None:
+        self.__exit__()
+        self.received = number
+        self._end()
+
+
+def _interrupt() -> None:
+    raise KeyboardInterrupt

@@ -1,0 +1,66 @@
+"""Ctrl-C, whenever it comes: the fingers stop, the command says so in one line and ends with 130."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from asyncio.subprocess import Process
+from typing import TYPE_CHECKING
+
+import pytest
+
+from robotiq_async.request import Request
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+
+if TYPE_CHECKING:
+    from tests.cli.conftest import Shell
+
+LINES = (1, 6, 12, 20, 30, 40)
+"""After so many lines of the demo's output Ctrl-C comes; they lie in all of its parts."""
+
+
+def assert_fingers_stopped(server: SimulatorServer) -> None:
+    assert not server.gripper.is_moving
+    assert not Request.from_registers(server.gripper.request_registers).go
+
+
+async def interrupted(shell: Shell, process: Process) -> str:
+    """Press Ctrl-C and see it end; returns what else it printed."""
+    process.send_signal(signal.SIGINT)
+    outcome = await shell.finish(process)
+    outcome.assert_failed(130, "interrupted")
+    return outcome.out
+
+
+@pytest.mark.parametrize("command", [["demo", "--yes"], ["move", "255"], ["status"], ["simulate"]])
+async def test_while_it_is_still_importing(shell: Shell, command: list[str]) -> None:
+    process = await shell.python("-X", "importtime", "-m", "robotiq_async", *command)
+    assert process.stderr is not None
+    async for line in process.stderr:
+        if b"| " in line and line.split()[-1].startswith(b"cyclopts"):
+            break
+    process.send_signal(signal.SIGINT)
+    outcome = await shell.finish(process)
+    lines = [line for line in outcome.err.splitlines() if not line.startswith("import time:")]
+    assert (outcome.code, lines) == (130, ["robotiq-async: interrupted"])
+
+
+@pytest.mark.parametrize("lines", LINES)
+async def test_the_demo(shell: Shell, lines: int) -> None:
+    async with SimulatorServer(SimulatedGripper(speedup=10)) as server:
+        process = await shell.start("demo", "--yes", server.address)
+        for _ in range(lines):
+            assert await shell.read_line(process) is not None
+        await interrupted(shell, process)
+        assert_fingers_stopped(server)
+
+
+async def test_a_move_in_its_activation(shell: Shell) -> None:
+    async with SimulatorServer(SimulatedGripper(speedup=2)) as server:
+        process = await shell.start("move", "255", server.address)
+        async with asyncio.timeout(30):
+            while not server.gripper.is_moving:  # noqa: ASYNC110  # the gripper tells nobody
+                await asyncio.sleep(0.005)
+        await interrupted(shell, process)
+        assert not server.gripper.is_moving
+        assert not Request.from_registers(server.gripper.request_registers).activate
