@@ -65,11 +65,18 @@ class _Selector(selectors.DefaultSelector):
     def __init__(self) -> None:
         super().__init__()
         self.now = 1000.0
+        self.turns = 0
+        self.at_turn: tuple[int, Callable[[], object]] | None = None
         self.hold = HoldWatch()
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
         self.hold.end()
         events = super().select(0)
+        self.turns += 1
+        if self.at_turn is not None and self.turns >= self.at_turn[0]:
+            call, self.at_turn = self.at_turn[1], None
+            call()
+            return events
         if not events and timeout is None:
             raise NothingWillHappenError("everybody waits, and nothing is going to happen")
         if not events and timeout:
@@ -100,6 +107,10 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def longest_hold(self) -> float:
         """The longest time, in real seconds, that callbacks have kept the loop."""
         return self._virtual.hold.longest
+
+    def after_turns(self, count: int, call: Callable[[], object]) -> None:
+        """Call something after so many more turns of the loop: between any two callbacks, if need be."""
+        self._virtual.at_turn = (self._virtual.turns + count, call)
 
     # The signatures are asyncio's; what pymodbus and the simulator pass is all that is looked at.
 

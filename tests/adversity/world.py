@@ -137,17 +137,18 @@ class World:
 
 @asynccontextmanager
 async def world(
-    link: str = "tcp", *, patch: pytest.MonkeyPatch | None = None, **options: object
+    link: str = "tcp", *, patch: pytest.MonkeyPatch | None = None, speedup: float = SPEEDUP, **options: object
 ) -> AsyncIterator[World]:
     """A world whose gripper was just switched on, and a hand that is not started.
 
     Args:
         link: tcp or rtu.
         patch: for rtu, where the fake serial ports are put in place.
+        speedup: of the gripper.
         options: for the hand.
     """
     loop = asyncio.get_running_loop()
-    gripper = StampedGripper(loop.time, speedup=SPEEDUP, device_cycle=0.005 * SPEEDUP)
+    gripper = StampedGripper(loop.time, speedup=speedup, device_cycle=0.005 * speedup)
     gripper.stamps = []
     line: VirtualLine | None = None
     server: TcpServer | RtuServer

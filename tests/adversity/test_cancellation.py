@@ -1,0 +1,214 @@
+"""Every public call, cancelled in every turn of the loop while it runs, in the three ways people cancel."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from itertools import count
+from typing import Any, Literal
+
+import anyio
+import pytest
+
+from robotiq_async import Fault, Finger, RobotiqHand, State, StateTimeoutError
+from robotiq_async.machine import RUNNING
+from tests.adversity.world import World, world
+from tests.virtual import run
+
+A, B = Finger.A, Finger.B
+TARGET = 120
+SPEEDUP = 25.0
+"""Slow enough for a move to take dozens of polls, fast enough to walk through all of them."""
+
+AXIS_STOPS_WITHIN = 30
+"""Counts: at this speed an axis moves 6 in a poll of 10 ms, and two polls and a device cycle may pass."""
+
+Way = Literal["task.cancel", "asyncio.timeout", "anyio"]
+Call = Callable[[World], Awaitable[Any]]
+
+
+@dataclass(frozen=True)
+class Walk:
+    """A call, the state it is made in, and where the hand is when the call was cancelled.
+
+    Attributes:
+        call: makes the call.
+        ready: brings the hand there.
+        ends: the states in which the hand may come to rest.
+        speedup: of the gripper.
+    """
+
+    call: Call
+    ready: Callable[[World], Awaitable[None]]
+    ends: tuple[State, ...] = (State.RUNNING_IDLE,)
+    speedup: float = SPEEDUP
+
+
+async def active(world: World) -> None:
+    await world.activate_beforehand()
+    await world.hand.start()
+
+
+async def reset(world: World) -> None:
+    await world.hand.start(activate=False)
+
+
+async def in_fault(world: World) -> None:
+    await active(world)
+    world.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    await world.until_state(State.FAULT)
+
+
+async def moving(world: World) -> None:
+    await active(world)
+    await world.hand.set_speed(0)
+    await world.hand.set_position(TARGET, A)
+
+
+async def nothing(world: World) -> None:
+    """The hand is not started."""
+
+
+async def whole_life(world: World) -> None:
+    async with RobotiqHand(world.server.address) as hand:
+        await hand.move(TARGET, A, speed=0)
+
+
+async def never_in_reset(world: World) -> None:
+    with pytest.raises(StateTimeoutError):
+        await world.hand.wait_for_state(State.RESET, timeout=0.1)
+
+
+async def next_transition(world: World) -> None:
+    stream = world.hand.transitions()
+    world.hand.command(A, position=TARGET)
+    await anext(stream)  # RUNNING_CC, at once
+    await anext(stream)
+
+
+FAST = 2000.0
+RESTS = (State.RUNNING_IDLE, State.RESET)
+WALKS = {
+    "start, active": Walk(lambda world: world.hand.start(), World.activate_beforehand, (State.SHUTDOWN,)),
+    "start, reset": Walk(lambda world: world.hand.start(), nothing, (State.SHUTDOWN,), FAST),
+    "stop": Walk(lambda world: world.hand.stop(), moving, (State.SHUTDOWN,)),
+    "async with": Walk(whole_life, World.activate_beforehand, (State.DISCONNECTED,)),
+    "set_position": Walk(lambda world: world.hand.set_position(TARGET, A), active),
+    "set_speed": Walk(lambda world: world.hand.set_speed(7), active),
+    "set_force": Walk(lambda world: world.hand.set_force(7), active),
+    "move": Walk(lambda world: world.hand.move(TARGET, A, speed=0), active),
+    "open": Walk(lambda world: world.hand.open(A), moving),
+    "close": Walk(lambda world: world.hand.close(A), active),
+    "halt": Walk(lambda world: world.hand.halt(), moving),
+    "activate": Walk(lambda world: world.hand.activate(), reset, RESTS, FAST),
+    "reset": Walk(lambda world: world.hand.reset(), active, RESTS),
+    "atr": Walk(lambda world: world.hand.atr(), in_fault, (State.FAULT, State.ATR_DONE), 150.0),
+    "recover": Walk(lambda world: world.hand.recover(), in_fault, (State.FAULT, *RESTS), FAST),
+    "wait_for_state": Walk(never_in_reset, active),
+    "statuses": Walk(lambda world: anext(world.hand.statuses()), active),
+    "transitions": Walk(next_transition, active),
+}
+
+
+@pytest.mark.parametrize("way", ["task.cancel", "asyncio.timeout", "anyio"])
+@pytest.mark.parametrize("name", WALKS)
+def test_cancelled_in_every_turn(name: str, way: Way) -> None:
+    walk = WALKS[name]
+    for turn in count(2):  # in the first turn the call has not begun
+        if run(lambda: cancelled(walk, way, turn)) == "ended before":  # noqa: B023  # run at once
+            break
+    assert turn > 2, "there was nothing to cancel"
+
+
+async def cancelled(walk: Walk, way: Way, turn: int) -> str:
+    """Cancel the call after so many turns of the loop, look at what is left, and say how it ended."""
+    async with world(speedup=walk.speedup) as here:
+        await walk.ready(here)
+        how = await call_cancelled(here, walk.call, way, turn)
+        gone = here.gripper.travel(A)
+        await rest(here)
+        if how == "cancelled":
+            assert here.hand.state in walk.ends, here.hand.state
+            if walk in (WALKS["move"], WALKS["async with"]):
+                assert here.gripper.travel(A) - gone <= AXIS_STOPS_WITHIN, "nobody stopped it"
+        if how != "ended before" and here.hand.state is not State.DISCONNECTED:
+            await check_nothing_is_left(here)
+        return how
+
+
+async def call_cancelled(world: World, call: Call, way: Way, turn: int) -> str:
+    """Make the call and cancel it; says whether it was cancelled, ended all the same, or ended before."""
+    asked: list[float] = []
+    scope, limit = anyio.CancelScope(), asyncio.timeout(None)
+
+    async def caller() -> str:
+        if way == "anyio":
+            with scope:
+                await call(world)
+            return "cancelled" if scope.cancelled_caught else "ended"
+        if way == "asyncio.timeout":
+            try:
+                async with limit:
+                    await call(world)
+            except TimeoutError:
+                assert limit.expired()
+                return "cancelled"
+            return "ended"
+        await call(world)
+        return "ended"
+
+    def cancel() -> None:
+        if task.done():
+            return
+        asked.append(world.loop.time())
+        if way == "anyio":
+            scope.cancel()
+        elif way == "asyncio.timeout":
+            limit.reschedule(world.loop.time())
+        else:
+            task.cancel()
+
+    task = asyncio.create_task(caller())
+    world.loop.after_turns(turn, cancel)
+    await asyncio.wait({task})
+    if not asked:
+        return "ended before"
+    assert world.loop.time() - asked[0] < 2.0, "it took its time to end"
+    how = "cancelled" if task.cancelled() else task.result()
+    assert way != "task.cancel" or how == "cancelled", "the cancellation was swallowed"
+    return how
+
+
+async def rest(world: World) -> None:
+    """Wait until nothing moves and the hand stays where it is."""
+    async with asyncio.timeout(60):
+        while True:
+            state = world.hand.state
+            await asyncio.sleep(0.1)
+            if world.hand.state is state and not world.gripper.is_moving and settled(world.hand):
+                return
+
+
+def settled(hand: RobotiqHand) -> bool:
+    return hand.state in (*RUNNING, State.RESET, State.FAULT, State.ATR_DONE, State.SHUTDOWN) or (
+        hand.state is State.DISCONNECTED and hand._task is None
+    )
+
+
+async def check_nothing_is_left(world: World) -> None:
+    """Nobody waits, nothing is pending, the link is in step, and the next command moves only its axis."""
+    hand = world.hand
+    core = hand._core
+    assert not core._moves
+    assert core._desk.is_empty
+    assert not hand._waiters._waiters
+    assert hand.statistics.reconnects == 0
+    world.check_no_stale_status()
+    if hand.state is State.SHUTDOWN:
+        assert not world.gripper.is_moving
+        await hand.start()
+    await hand.recover()
+    before = world.travels()
+    await hand.move(60, B, speed=255)
+    assert {axis for axis, travel in world.travels().items() if travel != before[axis]} == {B}
