@@ -5,6 +5,8 @@
 
 PYTHON ?= python3
 ADDRESS ?= sim://
+MINUTES ?= 30
+LINK ?= tcp
 VENV := .venv
 BIN := $(VENV)/bin
 # Touched last, so it stands for a complete environment.
@@ -14,7 +16,7 @@ STAMP := $(VENV)/.complete
 unexport VIRTUAL_ENV CONDA_PREFIX PYTHONHOME PYTHONPATH PYTHONSTARTUP PIP_USER PIP_TARGET PIP_PREFIX UV_PYTHON
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint check format constraints clean
+.PHONY: help demo test soak fuzz explore lint check format constraints clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -24,6 +26,16 @@ demo: $(STAMP)  ## Run the demo on a simulated gripper (ADDRESS=... for a real o
 
 test: $(STAMP)  ## Run all tests
 	@$(BIN)/python -m pytest
+
+soak: $(STAMP)  ## Move under random faults for MINUTES=30 over LINK=tcp (or rtu), and print figures
+	@$(BIN)/python -m tests.adversity.soak --minutes $(MINUTES) --link $(LINK)
+
+fuzz: $(STAMP)  ## A million mutated replies through the decoder, 100,000 through a live link
+	@$(BIN)/python -m tests.adversity.fuzz
+
+explore: $(STAMP)  ## Try random examples that the tests do not, for some minutes
+	@HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest -o faulthandler_timeout=1800 \
+		tests/adversity/test_model.py tests/core/test_random.py
 
 lint: $(STAMP)  ## Check style and types
 	$(BIN)/ruff check

@@ -134,6 +134,8 @@ class Owner:
         self._interruptible: anyio.CancelScope | None = None
         self._deadline = 0.0
         self._last_poll = 0.0
+        self._stall = 0.0
+        """By how much the last tick came late."""
         self._warned = 0.0
 
     def request_stop(self, *, halt: bool) -> None:
@@ -271,18 +273,19 @@ class Owner:
             if late >= LATE_S:
                 self._warn_late(late)
         await asyncio.sleep(max(0.0, self._deadline - loop.time()))
-        late = loop.time() - self._deadline
-        self._counters.longest_stall = max(self._counters.longest_stall, late)
+        self._stall = loop.time() - self._deadline
+        self._counters.longest_stall = max(self._counters.longest_stall, self._stall)
 
     def _warn_late(self, late: float) -> None:
         now = self._loop.time()
-        if now - self._warned >= LATE_WARNING_S:
-            self._warned = now
-            log.warning(
-                "polling is %.0f ms late: something holds up the event loop (%d polls missed so far)",
-                1000 * late,
-                self._counters.overruns,
-            )
+        if now - self._warned < LATE_WARNING_S:
+            return
+        self._warned = now
+        # Late to wake up is the loop. A long exchange may be either: who was held up cannot tell.
+        held = "something holds up the event loop"
+        why = held if self._stall >= late / 2 else f"the gripper answers slowly, or {held}"
+        missed = self._counters.overruns
+        log.warning("polling is %.0f ms late: %s (%d polls missed so far)", 1000 * late, why, missed)
 
     # -- the end ---------------------------------------------------------------------------------------
 

@@ -41,21 +41,22 @@ class HoldWatch:
             self._file = os.open(f"/proc/self/task/{threading.get_native_id()}/schedstat", os.O_RDONLY)
 
     def begin(self) -> None:
-        self._waited = self._waiting()
+        self._waited = self.waiting()
         self._began = time.perf_counter()
 
     def end(self) -> None:
         if self._began:
             held = time.perf_counter() - self._began
             if held > self.longest:
-                self.longest = max(self.longest, held - (self._waiting() - self._waited))
+                self.longest = max(self.longest, held - (self.waiting() - self._waited))
 
     def close(self) -> None:
         if self._file >= 0:
             os.close(self._file)
             self._file = -1
 
-    def _waiting(self) -> float:
+    def waiting(self) -> float:
+        """Seconds for which this thread could have run and others did."""
         return int(os.pread(self._file, 100, 0).split()[1]) / 1e9 if self._file >= 0 else 0.0
 
 

@@ -173,6 +173,7 @@ class Adversary:
             case "foreign":
                 image = Request.from_registers(gripper.request_registers)
                 axes = tuple(AxisRequest(int(amount), axis.speed, axis.force) for axis in image.axes)
+                image = replace(image, individual_fingers=True, individual_scissor=True)
                 gripper.write(0, replace(image, go=True, axes=axes).registers)
             case "slow-device":
                 cycle, gripper.device_cycle = gripper.device_cycle, amount * gripper.speedup

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import asyncio
 from bisect import bisect_left, bisect_right
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
+from typing import Any
 
 import pytest
 
@@ -25,16 +26,28 @@ SPEEDUP = 5.0
 
 
 class StampedGripper(SimulatedGripper):
-    """Writes a number into the reserved last byte of each status, so that no two are alike."""
+    """Writes a number into the reserved last byte of each status, so that no two are alike.
 
-    stamps: list[tuple[float, int]]
-    """When each status was given out, and its number."""
+    Attributes:
+        stamps: when each status was given out, and its number.
+        images: every image that was written.
+    """
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.stamps: list[tuple[float, int]] = []
+        self.images: list[Registers] = []
+        self._number = 0
 
     def status_registers(self) -> Registers:
         registers = super().status_registers()
-        number = len(self.stamps) % 256
-        self.stamps.append((self._clock(), number))
-        return (*registers[:7], registers[7] & 0xFF00 | number)
+        self._number = (self._number + 1) % 256
+        self.stamps.append((self._clock(), self._number))
+        return (*registers[:7], registers[7] & 0xFF00 | self._number)
+
+    def write(self, address_offset: int, registers: Sequence[int]) -> None:
+        super().write(address_offset, registers)
+        self.images.append(self.request_registers)
 
 
 class Heard:
@@ -149,7 +162,6 @@ async def world(
     """
     loop = asyncio.get_running_loop()
     gripper = StampedGripper(loop.time, speedup=speedup, device_cycle=0.005 * speedup)
-    gripper.stamps = []
     line: VirtualLine | None = None
     server: TcpServer | RtuServer
     if link == "rtu":

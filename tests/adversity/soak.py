@@ -1,0 +1,297 @@
+"""Moves under random faults for as long as you like, in real time and over real connections.
+
+    python -m tests.adversity.soak --minutes 30
+
+A hand, a simulated gripper and everything that watches them share one event loop. In cycles of some
+seconds two users move axes, cancel, halt and run control loops, while the adversary cuts, delays, damages
+and refuses, and the application holds up the loop now and then. After each cycle everything comes to rest
+and is compared. Exits with 1 when a promise was broken.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import gc
+import logging
+import random
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import AsyncIterator, Awaitable, Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from robotiq_async import Finger, MoveResult, RobotiqError, RobotiqHand, State
+from robotiq_async.machine import RUNNING
+from robotiq_async.simulator import Trouble
+from tests.adversity.fuzz import resident
+from tests.adversity.watch import LoopWatch, WriteWatch, check
+from tests.adversity.world import RtuServer, StampedGripper, TcpServer, World
+from tests.serial_line import SerialLine
+
+SPEEDUP = 5.0
+CYCLE_S = (4.0, 12.0)
+ON_ANY_LINK = [
+    *(Trouble(kind) for kind in ("drop", "late", "half", "twice", "wrong-function", "wrong-length")),
+    *(Trouble(kind) for kind in ("wrong-count", "wrong-unit", "wrong-echo", "release", "foreign")),
+    Trouble("drop", on="write"),
+    Trouble("silence", lasts=0.0),
+    *(Trouble("delay", seconds) for seconds in (0.01, 0.1, 0.3)),
+    *(Trouble("slow-device", seconds) for seconds in (0.02, 0.2)),
+    *(Trouble("fault", code) for code in (5, 9, 12, 13)),
+    *(Trouble(kind) for kind in ("silence", "pieces", "power-cut", "interference")),
+]
+ON_TCP = [Trouble(kind) for kind in ("reset", "close", "refuse", "accept-silence", "exception")] + [
+    Trouble(kind) for kind in ("wrong-transaction", "wrong-protocol")
+]
+MOVES_EVERYTHING = ("foreign", "release")
+
+
+@dataclass
+class Soak:
+    """One run."""
+
+    world: World
+    line: SerialLine | None
+    rng: random.Random
+    loop: LoopWatch
+    writes: WriteWatch = field(default_factory=WriteWatch)
+    figures: Counter[str] = field(default_factory=Counter)
+    broken: list[str] = field(default_factory=list)
+    longest_stall: float = 0.0
+    everything_moved: bool = False
+
+    @property
+    def hand(self) -> RobotiqHand:
+        return self.world.hand
+
+    def breach(self, what: str) -> None:
+        self.broken.append(what)
+        print(f"BROKEN: {what}", file=sys.stderr, flush=True)  # noqa: T201
+
+    async def cycle(self) -> None:
+        """Some seconds of use and trouble, then rest, then a look at everything."""
+        axes = Finger(self.rng.randrange(1, 16))
+        before = self.world.travels()
+        self.writes.forget()
+        self.everything_moved = False
+        ends = time.monotonic() + self.rng.uniform(*CYCLE_S)
+        # Two users, on axes of their own where there are enough: who shares an axis supersedes the other.
+        masks = [axes & pair or axes for pair in (Finger.A | Finger.B, Finger.C | Finger.SCISSOR)]
+        users = [self.user(mask, ends) for mask in masks]
+        await asyncio.gather(*users, self.adversary(ends), self.application(ends))
+        await self.bounded("rest", 60.0, self.rest())
+        for axis, travel in self.world.travels().items():
+            if axis not in axes and travel != before[axis] and not self.everything_moved:
+                self.breach(f"{axis!r} moved, addressed were {axes!r}")
+        for each in check(self.world, self.writes, self.loop):
+            self.breach(each)
+        await self.restart()
+
+    async def user(self, axes: Finger, ends: float) -> None:
+        """Somebody who moves these axes."""
+        calls = (self.move, self.move, self.set_position, self.control_loop, self.cancelled_move, self.halt)
+        while time.monotonic() < ends:
+            mask = Finger(int(axes) & self.rng.randrange(1, 16)) or axes
+            await self.rng.choice(calls)(mask)
+            if self.hand.state not in RUNNING and self.rng.random() < 0.3:
+                self.everything_moved = True
+                await self.bounded("recover", 95.0, self.told("recover", self.hand.recover))
+            await asyncio.sleep(self.rng.choice((0.0, 0.0, 0.01, 0.1)))
+
+    async def move(self, axes: Finger) -> None:
+        self.figures["moves asked"] += 1
+        result = await self.bounded("move", 25.0, self.told("move", lambda: self.random_move(axes)))
+        if isinstance(result, MoveResult):
+            self.figures["moves done"] += 1
+
+    async def cancelled_move(self, axes: Finger) -> None:
+        self.figures["moves cancelled"] += 1
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(self.rng.uniform(0, 0.5)):
+                await self.told("move", lambda: self.random_move(axes))
+
+    def random_move(self, axes: Finger) -> Awaitable[MoveResult]:
+        speed, force = self.writes.next_settings()
+        return self.hand.move(self.rng.randrange(256), axes, speed=speed, force=force)
+
+    async def set_position(self, axes: Finger) -> None:
+        async def write() -> None:
+            speed, force = self.writes.next_settings()
+            self.hand.command(axes, speed=speed, force=force)  # leaves with the position
+            await self.hand.set_position(self.rng.randrange(256), axes)
+
+        await self.bounded("write", 1.0, self.told("write", write))
+
+    async def control_loop(self, axes: Finger) -> None:
+        for _ in range(self.rng.randrange(1, 40)):
+            try:
+                speed, force = self.writes.next_settings()
+                self.hand.command(axes, position=self.rng.randrange(256), speed=speed, force=force)
+                self.figures["commands"] += 1
+            except RobotiqError:
+                self.figures["commands refused"] += 1
+            await asyncio.sleep(0.005)
+
+    async def halt(self, _: Finger) -> None:
+        await self.bounded("halt", 2.0, self.told("halt", self.hand.halt))
+
+    async def told(self, what: str, call: Callable[[], Awaitable[Any]]) -> Any:
+        """Make a call; its error is counted if it is one of the contract, and a breach if not."""
+        try:
+            return await call()
+        except RobotiqError as error:
+            self.figures[f"{what}: {type(error).__name__}"] += 1
+        except Exception as error:  # noqa: BLE001  # that is what is looked for
+            self.breach(f"{what} raised {error!r}")
+
+    async def bounded(self, what: str, seconds: float, call: Awaitable[Any]) -> Any:
+        """A call ends in time. What the application and other processes took is not the library's."""
+        began = time.monotonic() - self.loop.lost
+        result = await call
+        took = time.monotonic() - self.loop.lost - began
+        if took > seconds:
+            self.breach(f"{what} took {took:.2f} s")
+        return result
+
+    async def adversary(self, ends: float) -> None:
+        """One trouble after the other."""
+        kinds = ON_ANY_LINK + (ON_TCP if self.line is None else [])
+        while time.monotonic() < ends:
+            await asyncio.sleep(self.rng.uniform(0.1, 1.5))
+            if self.line is not None and self.rng.random() < 0.1:
+                await self.pull(self.line)
+                continue
+            trouble = self.rng.choice(kinds)
+            self.figures["troubles"] += 1
+            self.figures[f"trouble: {trouble.kind}"] += 1
+            self.everything_moved |= trouble.kind in MOVES_EVERYTHING
+            async with self.world.server.adversary.making(trouble):
+                await asyncio.sleep(self.rng.choice((0.02, 0.2, 0.8)))
+                if trouble.kind == "foreign":
+                    self.writes.forget()
+                    self.world.gripper.images.clear()
+
+    async def pull(self, line: SerialLine) -> None:
+        self.figures["trouble: line pulled"] += 1
+        line.pull()
+        await asyncio.sleep(self.rng.choice((0.02, 0.5)))
+        line.plug()
+
+    async def application(self, ends: float) -> None:
+        """The program around the hand holds up the loop now and then."""
+        while time.monotonic() < ends:
+            await asyncio.sleep(self.rng.uniform(0.5, 4.0))
+            self.loop.hold_up(self.rng.choice((0.03, 0.1, 0.6)))
+            self.figures["loop held up"] += 1
+
+    async def rest(self) -> None:
+        """Recover, and wait until nothing moves."""
+        while True:
+            if self.hand.state is State.SHUTDOWN:
+                await self.told("start", self.hand.start)
+            elif self.hand.state not in RUNNING and self.hand.state is not State.DISCONNECTED:
+                self.everything_moved = True
+                await self.told("recover", self.hand.recover)
+            await asyncio.sleep(0.7)
+            if self.hand.state is State.RUNNING_IDLE and not self.hand.is_moving:
+                return
+
+    async def restart(self) -> None:
+        """Sometimes the hand is stopped and started again; the figures of its life are kept."""
+        statistics = self.hand.statistics
+        self.longest_stall = max(self.longest_stall, statistics.longest_stall)
+        if self.rng.random() > 0.2:
+            return
+        self.collect()
+        await self.bounded("stop", 2.0, self.hand.stop())
+        await self.bounded("start", 5.0, self.told("start", self.hand.start))
+        self.figures["restarts"] += 1
+
+    def collect(self) -> None:
+        """Add up what the hand counts from each of its starts."""
+        statistics = self.hand.statistics
+        self.longest_stall = max(self.longest_stall, statistics.longest_stall)
+        for name in ("polls", "writes", "overruns", "reconnects", "foreign_commands"):
+            self.figures[name] += getattr(statistics, name)
+
+
+@contextlib.asynccontextmanager
+async def soak(link: str, seed: int, loop: LoopWatch) -> AsyncIterator[Soak]:
+    """Everything in place, the hand started."""
+    gripper = StampedGripper(speedup=SPEEDUP, device_cycle=0.005 * SPEEDUP)
+    async with contextlib.AsyncExitStack() as stack:
+        line: SerialLine | None = None
+        server: TcpServer | RtuServer
+        if link == "rtu":
+            folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+            line = stack.enter_context(SerialLine(folder))
+            server, address = RtuServer(line.far, gripper), f"rtu://{line.near}"
+        else:
+            server, address = TcpServer(gripper), ""
+        server.heard = []
+        await stack.enter_async_context(server)
+        hand = await stack.enter_async_context(RobotiqHand(address or server.address))
+        world = World(gripper, server, None, hand)
+        watching = asyncio.create_task(world.watch())
+        yield Soak(world, line, random.Random(seed), loop)
+        watching.cancel()
+        await asyncio.gather(watching, return_exceptions=True)
+
+
+async def run(minutes: float, link: str, seed: int, loop: LoopWatch) -> int:
+    """Run it and print the figures as a table.
+
+    Returns:
+        The exit code.
+    """
+    began, memory = time.monotonic(), 0
+    async with soak(link, seed, loop) as it:
+        last_word = began
+        while time.monotonic() - began < 60 * minutes:
+            await it.cycle()
+            it.figures["cycles"] += 1
+            memory = memory or resident()  # what grows once has grown in the first cycle
+            if time.monotonic() - last_word > 60:
+                last_word = time.monotonic()
+                done = it.figures["moves done"]
+                passed = (last_word - began) / 60
+                print(f"{passed:5.1f} min  {done} moves done, {len(it.broken)} promises broken", flush=True)  # noqa: T201
+        it.collect()
+    rows = [
+        ("minutes", f"{(time.monotonic() - began) / 60:.1f}"),
+        ("promises broken", str(len(it.broken))),
+        *((name, str(it.figures[name])) for name in sorted(it.figures)),
+        ("longest stall that statistics saw, ms", f"{1000 * it.longest_stall:.0f}"),
+        ("longest hold by library, simulator and checks, ms", f"{1000 * loop.hold.longest:.1f}"),
+        ("memory growth after the first cycle, MiB", f"{(resident() - memory) / 2**20:.1f}"),
+    ]
+    print("\n".join(f"| {name} | {value} |" for name, value in [("figure", link), ("--", "--"), *rows]))  # noqa: T201
+    return 1 if it.broken else 0
+
+
+def main() -> int:
+    """Read the options and run."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--minutes", type=float, default=30.0, help="how long (default: 30)")
+    parser.add_argument(
+        "--link", choices=("tcp", "rtu"), default="tcp", help="Modbus TCP or a pseudo terminal"
+    )
+    parser.add_argument("--seed", type=int, default=int(time.time()), help="of everything that is random")
+    options = parser.parse_args()
+    print(f"seed {options.seed}", flush=True)  # noqa: T201
+    logging.getLogger("robotiq_async").setLevel(logging.CRITICAL)
+    gc.freeze()
+    loop = LoopWatch()
+    with asyncio.Runner(loop_factory=loop.make_loop) as runner:
+        return runner.run(run(options.minutes, options.link, options.seed, loop))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

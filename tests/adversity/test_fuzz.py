@@ -1,0 +1,32 @@
+"""A small part of the fuzzing: every run the same. The long one is ``make fuzz``."""
+
+from __future__ import annotations
+
+import logging
+import random
+
+import pytest
+
+from tests.adversity.fuzz import Line, decoder, live
+from tests.adversity.world import world
+from tests.virtual import run
+
+
+def test_the_decoder() -> None:
+    figures = decoder(100_000)
+    assert min(figures.values()) > 1000, f"one-sided: {figures}"
+
+
+@pytest.mark.parametrize("link", ["tcp", "rtu"])
+def test_a_live_link(link: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    async def main() -> dict[str, int]:
+        async with world(link, patch=monkeypatch) as here:
+            await here.activate_beforehand()
+            line = Line(random.Random(1), serial=link == "rtu", share=0.25)
+            address = here.server.address if here.line is None else f"rtu://{here.line.NEAR}"
+            return await live(here.server, address, line, 5000)
+
+    caplog.set_level(logging.CRITICAL, logger="robotiq_async")
+    figures = run(main)
+    assert figures["reconnects"] > 300
+    assert figures["statuses"] > 1000

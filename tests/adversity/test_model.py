@@ -1,0 +1,281 @@
+"""Random use over a live link that fails at random: what was written, what moved and what was reported.
+
+What an example has found becomes a test of its own, beside the code that was wrong (tests/core, tests/hand)
+or below. More of them: ``HYPOTHESIS_PROFILE=explore``.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Coroutine
+from contextlib import AsyncExitStack
+from typing import Any
+
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+
+from robotiq_async import Finger, MoveResult, ObjectStatus, RobotiqError, State
+from robotiq_async.enums import AXES
+from robotiq_async.machine import RUNNING
+from robotiq_async.request import Request
+from robotiq_async.simulator import Trouble
+from tests.adversity.world import World, world
+from tests.virtual import VirtualLoop
+
+ALL, NOBODY = Finger.ALL, Finger(0)
+masks = st.integers(1, 15).map(Finger)
+values = st.integers(0, 255)
+LINK_TROUBLES = [
+    Trouble("drop"),
+    Trouble("drop", on="write"),
+    Trouble("late"),
+    Trouble("half"),
+    Trouble("twice", on="write"),
+    Trouble("wrong-transaction"),
+    Trouble("exception", on="write"),
+    Trouble("silence", lasts=0),
+    Trouble("reset"),
+    Trouble("close"),
+]
+"""Troubles that end with the first request they meet."""
+LASTING_TROUBLES = [
+    Trouble("delay", 0.1),
+    Trouble("pieces", 0.01),
+    Trouble("slow-device", 0.2),
+    Trouble("silence"),
+    Trouble("refuse"),
+    Trouble("power-cut"),
+    Trouble("interference"),
+    Trouble("fault", 9),
+    Trouble("fault", 12),
+]
+
+
+class LiveUse(RuleBasedStateMachine):
+    """Whatever is done, and whatever goes wrong, the promises hold."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.runner = asyncio.Runner(loop_factory=VirtualLoop)
+        self.stack = AsyncExitStack()
+        self.calls: set[asyncio.Task[Any]] = set()
+        self.may_move = ALL
+        """Axes that somebody has given a reason to move since everything was last at rest."""
+        self.foreign = 0
+
+    def run(self, work: Coroutine[Any, Any, Any]) -> Any:
+        return self.runner.run(work)
+
+    @initialize()
+    def begin(self) -> None:
+        async def enter() -> World:
+            here = await self.stack.enter_async_context(world())
+            await here.activate_beforehand()
+            await here.hand.start()
+            return here
+
+        self.world: World = self.run(enter())
+        self.hand, self.gripper = self.world.hand, self.world.gripper
+        self.at_rest()
+
+    def teardown(self) -> None:
+        async def leave() -> None:
+            await self.hand.stop()
+            await asyncio.wait_for(asyncio.gather(*self.calls, return_exceptions=True), 1.0)
+            self.world.check_no_stale_status()
+            await self.stack.aclose()
+            left = asyncio.all_tasks() - {asyncio.current_task()}
+            assert not left, left
+
+        if hasattr(self, "world"):
+            self.run(leave())
+        loop = self.runner.get_loop()
+        assert isinstance(loop, VirtualLoop)
+        assert not loop.complaints, loop.complaints
+        self.runner.close()
+
+    def call(self, work: Coroutine[Any, Any, Any]) -> None:
+        """Somebody makes a call and waits for it; it is begun before this returns."""
+
+        async def begin() -> None:
+            self.calls.add(asyncio.create_task(work))
+            await asyncio.sleep(0)
+
+        self.run(begin())
+
+    @property
+    def running(self) -> bool:
+        return self.hand.state in RUNNING
+
+    # -- what users do ---------------------------------------------------------------------------------
+
+    @rule(axes=masks, position=values, speed=st.sampled_from([None, 0, 255]))
+    def move(self, axes: Finger, position: int, speed: int | None) -> None:
+        self.may_move |= axes
+        self.call(self.hand.move(position, axes, speed=speed))
+
+    @rule(axes=masks, position=values)
+    def set_position(self, axes: Finger, position: int) -> None:
+        self.may_move |= axes
+        self.call(self.hand.set_position(position, axes))
+
+    @rule(axes=masks, positions=st.lists(values, min_size=1, max_size=5), pause=st.sampled_from([0, 0.004]))
+    @precondition(lambda self: self.running)
+    def control_loop(self, axes: Finger, positions: list[int], pause: float) -> None:
+        async def loop() -> None:
+            for position in positions:
+                if self.hand.state in RUNNING:
+                    self.hand.command(axes, position=position)
+                await asyncio.sleep(pause)
+
+        self.may_move |= axes
+        self.run(loop())
+
+    @rule(axes=masks, force=values)
+    def set_force(self, axes: Finger, force: int) -> None:
+        self.call(self.hand.set_force(force, axes))
+
+    @rule()
+    def halt(self) -> None:
+        self.call(self.hand.halt())
+
+    @rule()
+    def reset(self) -> None:
+        self.call(self.hand.reset())
+
+    @rule()
+    def recover(self) -> None:
+        if not self.running:
+            self.may_move = ALL
+        self.call(self.hand.recover(timeout=30))
+
+    @rule()
+    @precondition(lambda self: self.hand.state is State.FAULT)
+    def atr(self) -> None:
+        self.may_move = ALL
+        self.call(self.hand.atr())
+
+    @rule(which=st.integers(0, 100))
+    @precondition(lambda self: any(not call.done() for call in self.calls))
+    def cancel(self, which: int) -> None:
+        waiting = sorted((call for call in self.calls if not call.done()), key=lambda call: call.get_name())
+        waiting[which % len(waiting)].cancel()
+        self.run(asyncio.sleep(0))
+
+    @rule(activate=st.booleans())
+    def stop_and_start(self, activate: bool) -> None:
+        async def again() -> None:
+            began = self.world.loop.time()
+            await self.hand.stop()
+            assert self.world.loop.time() - began < 2.0
+            try:
+                await self.hand.start(activate=activate)
+            except RobotiqError:
+                await self.hand.start(activate=False)
+
+        if activate:
+            self.may_move = ALL
+        self.run(again())
+
+    @rule(seconds=st.sampled_from([0.0007, 0.01, 0.03, 0.3]))
+    def wait(self, seconds: float) -> None:
+        self.run(asyncio.sleep(seconds))
+
+    # -- what goes wrong -------------------------------------------------------------------------------
+
+    @rule(axes=masks, position=st.integers(20, 230))
+    def something_is_in_the_way(self, axes: Finger, position: int) -> None:
+        self.gripper.place_object(axes, position)
+
+    @rule(trouble=st.sampled_from(LINK_TROUBLES))
+    def the_link_fails(self, trouble: Trouble) -> None:
+        async def fail() -> None:
+            reconnects = self.hand.statistics.reconnects
+            ongoing = await self.world.server.adversary.begin(trouble)
+            await asyncio.sleep(0.6)
+            await self.world.server.adversary.end(ongoing)
+            if self.hand.statistics.reconnects > reconnects:
+                writes = len(self.gripper.writes)
+                await asyncio.sleep(0.3)
+                assert len(self.gripper.writes) == writes, "something was written that nobody had asked for"
+
+        self.run(fail())
+
+    @rule(trouble=st.sampled_from(LASTING_TROUBLES), seconds=st.sampled_from([0.02, 0.7]))
+    def something_goes_wrong(self, trouble: Trouble, seconds: float) -> None:
+        async def go() -> None:
+            async with self.world.server.adversary.making(trouble):
+                await asyncio.sleep(seconds)
+            await asyncio.sleep(2.5)  # the longest pause before the next try is 2 s
+
+        self.run(go())
+
+    @rule(position=values)
+    def another_client_writes(self, position: int) -> None:
+        self.foreign += 1
+        self.may_move = ALL
+        self.run(self.world.server.adversary.begin(Trouble("foreign", position)))
+
+    # -- what must be so -------------------------------------------------------------------------------
+
+    @rule()
+    def everything_comes_to_rest(self) -> None:
+        async def rest() -> None:
+            async with asyncio.timeout(120):
+                while True:
+                    state = self.hand.state
+                    await asyncio.sleep(0.7)
+                    quiet = not self.gripper.is_moving and all(call.done() for call in self.calls)
+                    if quiet and self.hand.state is state and state is not State.DISCONNECTED:
+                        break
+
+            self.look_at_outcomes()
+            self.look_at_state()
+
+        self.run(rest())
+        self.at_rest()
+
+    def look_at_outcomes(self) -> None:
+        for call in self.calls:
+            if call.cancelled():
+                continue
+            error = call.exception()
+            assert error is None or isinstance(error, RobotiqError), repr(error)
+            if error is None and isinstance(result := call.result(), MoveResult):
+                assert ObjectStatus.IN_MOTION not in result.outcomes.values()
+        self.calls.clear()
+
+    def look_at_state(self) -> None:
+        """The hand knows what the gripper really is, and has no wrong idea of others."""
+        status = self.hand.status
+        assert self.world.loop.time() - status.timestamp < 0.1
+        for axis in AXES:
+            assert status.position(axis) == self.gripper.position(axis)
+        if self.hand.state is State.RUNNING_IDLE:
+            assert not self.hand.is_moving
+        assert self.hand.statistics.foreign_commands <= self.foreign
+
+    def at_rest(self) -> None:
+        self.may_move = NOBODY
+        self.travels = self.world.travels()
+
+    @invariant()
+    def only_axes_with_a_reason_have_moved(self) -> None:
+        if hasattr(self, "world"):
+            for axis in AXES:
+                if axis not in self.may_move:
+                    assert self.gripper.travel(axis) == self.travels[axis], f"{axis!r} moved"
+
+    @invariant()
+    def every_write_is_a_full_image_under_individual_control(self) -> None:
+        if hasattr(self, "world"):
+            for write in self.gripper.writes[-5:]:
+                image = Request.from_registers(write.registers)
+                assert image.individual_fingers
+                assert image.individual_scissor
+                assert image.registers == write.registers
+
+
+TestLiveUse = LiveUse.TestCase
+TestLiveUse.settings = settings(max_examples=settings().max_examples // 2, stateful_step_count=12)

@@ -1,0 +1,100 @@
+"""What the soak run keeps an eye on: the loop, the statuses, and the writes."""
+
+from __future__ import annotations
+
+import asyncio
+import selectors
+import time
+from collections.abc import Iterator
+
+from robotiq_async.enums import AXES
+from robotiq_async.request import AxisRequest, Request
+from tests.adversity.world import LONGEST_HOLD_S, World
+from tests.virtual import HoldWatch
+
+
+class _WatchedSelector(selectors.DefaultSelector):
+    """Tells a watch how long the loop was held between two waits."""
+
+    def __init__(self, hold: HoldWatch) -> None:
+        super().__init__()
+        self._hold = hold
+
+    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+        self._hold.end()
+        events = super().select(timeout)
+        self._hold.begin()
+        return events
+
+
+class LoopWatch:
+    """Makes the loop, and knows for how long it was held and by whom."""
+
+    def __init__(self) -> None:
+        self.hold = HoldWatch()
+        self._deliberate = 0.0
+
+    def make_loop(self) -> asyncio.AbstractEventLoop:
+        return asyncio.SelectorEventLoop(_WatchedSelector(self.hold))
+
+    def hold_up(self, seconds: float) -> None:
+        """Block the loop on purpose, as an application does."""
+        self.hold.end()
+        time.sleep(seconds)
+        self._deliberate += seconds
+        self.hold.begin()  # this one is not the library's
+
+    @property
+    def lost(self) -> float:
+        """Seconds that the application and other processes have taken so far."""
+        return self._deliberate + self.hold.waiting()
+
+
+class WriteWatch:
+    """Knows a replay when it sees one.
+
+    Every command of the soak carries speeds and forces of its own, so what an axis is asked (position,
+    speed, force) never comes back once it was followed by something else.
+    """
+
+    def __init__(self) -> None:
+        self._past: list[set[AxisRequest]] = []
+        self._number = 0
+        self.forget()
+
+    def next_settings(self) -> tuple[int, int]:
+        """A speed and a force that no recent command had."""
+        self._number += 1
+        return self._number % 256, self._number // 256 % 256
+
+    def forget(self) -> None:
+        """Somebody else has written, or everything is at rest: begin anew."""
+        self._past = [set() for _ in AXES]
+        self._last: list[AxisRequest | None] = [None] * len(AXES)
+
+    def check(self, world: World) -> Iterator[str]:
+        """What was wrong with the writes since the last look."""
+        images, world.gripper.images = world.gripper.images, []
+        for registers in images:
+            axes = Request.from_registers(registers).axes
+            for axis, request, past, at in zip(AXES, axes, self._past, range(4), strict=True):
+                if request != self._last[at]:
+                    if request in past:
+                        yield f"{axis!r} was asked again for what it had been asked before: {request}"
+                    past.add(request)
+                    self._last[at] = request
+
+
+def check(world: World, writes: WriteWatch, loop: LoopWatch) -> Iterator[str]:
+    """Everything that was wrong since the last look."""
+    yield from writes.check(world)
+    try:
+        world.check_no_stale_status()
+    except AssertionError as error:
+        yield str(error)
+    world.statuses.clear()
+    world.states.clear()
+    del world.gripper.stamps[:-300], world.server.heard[:-300]
+    if loop.hold.longest > LONGEST_HOLD_S:
+        yield f"the loop was held for {1000 * loop.hold.longest:.1f} ms"
+        loop.hold.longest = 0.0
