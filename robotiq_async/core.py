@@ -79,6 +79,7 @@ class Core:
         """Whether stop() interrupted an activation of ours."""
         self._desk = Desk()
         self._sent: Desk | None = None
+        """What is on the line: sent, and not acknowledged yet."""
         self._halting: list[tuple[int, Delivery]] = []
         self._moves: list[tuple[Move, int]] = []
         """Live moves, each with the number of the write that carried it (-1: not sent yet)."""
@@ -179,7 +180,7 @@ class Core:
         )
         self.machine.happen(Trigger.ASK_STOP)
         self._drop_all(lambda: NotStartedError("the hand was stopped"))
-        self._procedure = self._step = None
+        self._sent = self._procedure = self._step = None
 
     def shut_down(self) -> None:
         """Begin to stop the fingers, if there is anything to stop.
@@ -273,7 +274,7 @@ class Core:
         number = self._watch.last_number
         tell((*sent.going, *sent.setting))
         self._halting += [(number, delivery) for delivery in sent.halt or ()]
-        if self._procedure is not None or self._desk.is_empty:
+        if self._step is None and (self._procedure is not None or self._desk.is_empty):
             self._deliver()
 
     def see(self, status: RobotiqStatus) -> None:
@@ -306,7 +307,7 @@ class Core:
             return error
 
         self._drop_all(failure)
-        self._procedure = self._step = None
+        self._sent = self._procedure = self._step = None
         self._adoption = None
 
     def refuse_unless_running(self, trigger: Trigger) -> None:
@@ -458,7 +459,9 @@ class Core:
 
     def _drop_all(self, failure: Failure) -> None:
         """Nothing asked so far will happen: tell everybody."""
-        desks, self._desk, self._sent = (self._desk, self._sent or Desk()), Desk(), None
+        desks, self._desk = (self._desk, self._sent or Desk()), Desk()
+        if self._sent is not None:
+            self._sent = Desk()  # it may be on the line at this moment, but nobody waits for it any more
         halting, self._halting = self._halting, []
         for desk in desks:
             desk.fail(failure)

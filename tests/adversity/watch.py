@@ -87,6 +87,7 @@ class WriteWatch:
 
 def check(world: World, writes: WriteWatch, loop: LoopWatch) -> Iterator[str]:
     """Everything that was wrong since the last look."""
+    loop.hold.end()
     yield from writes.check(world)
     try:
         world.check_no_stale_status()
@@ -98,3 +99,4 @@ def check(world: World, writes: WriteWatch, loop: LoopWatch) -> Iterator[str]:
     if loop.hold.longest > LONGEST_HOLD_S:
         yield f"the loop was held for {1000 * loop.hold.longest:.1f} ms"
         loop.hold.longest = 0.0
+    loop.hold.begin()  # the time of this look is not the library's

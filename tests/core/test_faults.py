@@ -15,7 +15,7 @@ from robotiq_async import (
     State,
 )
 from robotiq_async.request import Request
-from tests.bench import Bench
+from tests.bench import POLL_S, Bench
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 
@@ -164,6 +164,26 @@ def test_an_activation_that_fails_ends_in_fault() -> None:
     bench.connect()
     bench.until(lambda: bench.state is State.FAULT)
     assert bench.latest.fault is Fault.ACTIVATION_FAULT
+
+
+@pytest.mark.parametrize("what", ["reset", "release"])
+def test_a_sequence_begun_while_a_write_is_on_the_line(bench: Bench, what: str) -> None:
+    if what == "release":
+        bench.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+        bench.run(0.1)
+        pending = bench.halt()
+    else:
+        pending = bench.command(A, position=200)
+    bench.now += POLL_S
+    request = bench.core.take_request(bench.now)
+    assert request is not None
+    (bench.core.reset if what == "reset" else bench.core.release)()
+    assert isinstance(pending.error, MoveSupersededError)
+    bench.gripper.write(0, request.registers)
+    bench.core.acknowledged(bench.now)
+    assert bench.state in (State.DO_RESET, State.DO_ATR), "its own request has not been sent yet"
+    bench.core.see(bench.status())
+    bench.until(lambda: bench.state in (State.RESET, State.ATR_DONE))
 
 
 def test_a_power_cycle_in_mid_activation_ends_in_reset() -> None:

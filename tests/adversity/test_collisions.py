@@ -1,0 +1,94 @@
+"""Two calls at once: the second comes in every turn of the loop while the first is under way."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+from itertools import count
+from typing import Any
+
+import pytest
+
+from robotiq_async import Finger, RobotiqError, State
+from tests.adversity.test_cancellation import check_nothing_is_left, in_fault, rest
+from tests.adversity.test_cancellation import reset as in_reset
+from tests.adversity.world import World, world
+from tests.virtual import run
+
+A, B = Finger.A, Finger.B
+FAST = 2000.0
+"""The gripper does everything within a poll or two: all there is to walk through is what the hand does."""
+MOST_TURNS = 60
+
+Call = Callable[[World], Awaitable[Any]]
+CALLS: dict[str, Call] = {
+    "set_position": lambda world: world.hand.set_position(120, A),
+    "set_force": lambda world: world.hand.set_force(9, A),
+    "move": lambda world: world.hand.move(100, A | B),
+    "halt": lambda world: world.hand.halt(),
+    "reset": lambda world: world.hand.reset(),
+    "activate": lambda world: world.hand.activate(),
+    "atr": lambda world: world.hand.atr(),
+    "recover": lambda world: world.hand.recover(),
+    "stop": lambda world: world.hand.stop(),
+}
+
+
+async def active(world: World) -> None:
+    await world.activate_beforehand()
+    await world.hand.start()
+
+
+READY: dict[str, tuple[Callable[[World], Awaitable[None]], tuple[str, ...]]] = {
+    "active": (active, ("set_position", "set_force", "move", "halt", "reset", "stop")),
+    "reset": (in_reset, ("activate", "recover", "reset", "stop")),
+    "fault": (in_fault, ("halt", "atr", "reset", "recover", "stop")),
+}
+
+
+@pytest.mark.parametrize("second", CALLS)
+@pytest.mark.parametrize(
+    ("ready", "first"), [(ready, call) for ready, (_, calls) in READY.items() for call in calls]
+)
+def test_a_second_call_in_every_turn(
+    ready: str, first: str, second: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.CRITICAL, logger="robotiq_async")
+    for turn in count(2):
+        if not run(lambda: collide(ready, first, second, turn)) or turn > MOST_TURNS:  # noqa: B023  # run at once
+            break
+    assert turn > 2, "the first call was over at once"
+    assert not caplog.records, "the task that owns the link failed"
+
+
+async def collide(ready: str, first: str, second: str, turn: int) -> bool:
+    """Make both calls and look at what is left; False if the first was over before the second came."""
+    async with world(speedup=FAST) as here:
+        await READY[ready][0](here)
+        one = asyncio.create_task(told(CALLS[first](here)))
+        other: asyncio.Future[asyncio.Task[str]] = here.loop.create_future()
+        was_under_way = True
+
+        def call() -> None:
+            nonlocal was_under_way
+            was_under_way = not one.done()
+            other.set_result(asyncio.create_task(told(CALLS[second](here))))
+
+        here.loop.after_turns(turn, call)
+        async with asyncio.timeout(10):
+            await one
+            await (await other)
+        await rest(here)
+        if here.hand.state is not State.DISCONNECTED:
+            await check_nothing_is_left(here)
+        return was_under_way
+
+
+async def told(call: Awaitable[Any]) -> str:
+    """How a call ended; anything but a result or an error of the contract fails the test."""
+    try:
+        await call
+    except RobotiqError as error:
+        return type(error).__name__
+    return "done"
