@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import math
-from collections.abc import Awaitable, Callable, Iterable, Sequence
-from contextlib import asynccontextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from robotiq_async.request import AxisRequest, Request
@@ -31,12 +31,12 @@ class Ongoing:
     Attributes:
         trouble: what it is.
         hits: requests and replies it has met so far.
-        undo: what ends it, beside forgetting it.
+        over: set when it has ended.
     """
 
     trouble: Trouble
     hits: int = 0
-    undo: Callable[[], Awaitable[None]] | None = None
+    over: asyncio.Event = field(default_factory=asyncio.Event)
 
 
 class Adversary:
@@ -49,6 +49,8 @@ class Adversary:
         """No trouble."""
         self._endpoint = endpoint
         self._ongoing: list[Ongoing] = []
+        self._device_cycle = endpoint.gripper.device_cycle
+        """What the gripper has when nothing makes it slow."""
 
     @property
     def ongoing(self) -> tuple[Ongoing, ...]:
@@ -73,21 +75,27 @@ class Adversary:
             RuntimeError: it is about connections, and the server is not running.
         """
         self.check([trouble])
-        ongoing = Ongoing(trouble)
-        ongoing.undo = self._do(trouble)
-        kind = KINDS[trouble.kind]
+        ongoing, kind = Ongoing(trouble), KINDS[trouble.kind]
+        self._do(trouble)
         if kind.damage is not None or kind.lasts == math.inf:
             self._ongoing.append(ongoing)
+        else:
+            ongoing.over.set()
         return ongoing
 
     async def end(self, ongoing: Ongoing) -> None:
-        """End a trouble; one that is over already stays over."""
-        if ongoing in self._ongoing:
-            self._ongoing.remove(ongoing)
-            if ongoing.undo is not None:
-                await ongoing.undo()
+        """End a trouble; one that is over already stays over. What it did is undone also when cancelled."""
+        if ongoing not in self._ongoing:
+            return
+        self._forget(ongoing)
+        undoing = asyncio.ensure_future(self._undo(ongoing.trouble))
+        try:
+            await asyncio.shield(undoing)
+        except asyncio.CancelledError:
+            await undoing
+            raise
 
-    @asynccontextmanager
+    @contextlib.asynccontextmanager
     async def making(self, trouble: Trouble) -> AsyncIterator[Ongoing]:
         """``async with``: a trouble that lasts as long as the block."""
         ongoing = await self.begin(trouble)
@@ -116,19 +124,22 @@ class Adversary:
             raise errors.exceptions[0] from None
 
     async def _play(self, trouble: Trouble, tell: Callable[[Trouble], object]) -> None:
+        """One trouble of a plan, from its beginning to its end, again and again if it comes again."""
+        loop, lasts = asyncio.get_running_loop(), trouble.duration or trouble.every
         await asyncio.sleep(trouble.at)
         while True:
+            began = loop.time()
             tell(trouble)
             ongoing = await self.begin(trouble)
-            if trouble.duration > 0:
-                try:
-                    await asyncio.sleep(min(trouble.duration, 1e9))
-                finally:
-                    await self.end(ongoing)
+            try:
+                with contextlib.suppress(TimeoutError):
+                    async with asyncio.timeout(None if lasts == math.inf else lasts):
+                        await ongoing.over.wait()
+            finally:
+                await self.end(ongoing)
             if trouble.every is None:
                 return
-            await asyncio.sleep(trouble.every - trouble.duration)
-            await self.end(ongoing)  # what was for once and has met nothing
+            await asyncio.sleep(began + trouble.every - loop.time())
 
     # What the endpoint asks.
 
@@ -137,8 +148,10 @@ class Adversary:
         return self._first(lambda each: each.kind in _DEAF) is None
 
     def damage(self, frame: bytes) -> Parts | None:
-        """What is sent in place of a reply; None if nothing is wrong with it."""
+        """What is sent in place of a reply; None if nothing is wrong with it. A refusal is left as it is."""
         reply = Reply(frame, self._endpoint.link == "rtu")
+        if reply.is_exception:
+            return None
         write = reply.is_to_a_write
         trouble = self._first(lambda each: KINDS[each.kind].damage is not None and each.is_about(write=write))
         damage = None if trouble is None else KINDS[trouble.kind].damage
@@ -150,14 +163,18 @@ class Adversary:
             if fits(ongoing.trouble):
                 ongoing.hits += 1
                 if ongoing.trouble.duration == 0:
-                    self._ongoing.remove(ongoing)
+                    self._forget(ongoing)
                 return ongoing.trouble
         return None
 
+    def _forget(self, ongoing: Ongoing) -> None:
+        self._ongoing.remove(ongoing)
+        ongoing.over.set()
+
     # What begins and ends.
 
-    def _do(self, trouble: Trouble) -> Callable[[], Awaitable[None]] | None:
-        """Carry out what happens at the beginning; returns what is to be done at the end."""
+    def _do(self, trouble: Trouble) -> None:
+        """What happens at the beginning."""
         endpoint, gripper, amount = self._endpoint, self._endpoint.gripper, trouble.amount
         match trouble.kind:
             case "close":
@@ -169,36 +186,40 @@ class Adversary:
                 endpoint.cut(reset=True)
                 if trouble.kind == "power-cut":
                     gripper.power_off()
-                return self._let_in
             case "foreign":
                 image = Request.from_registers(gripper.request_registers)
                 axes = tuple(AxisRequest(int(amount), axis.speed, axis.force) for axis in image.axes)
                 image = replace(image, individual_fingers=True, individual_scissor=True)
                 gripper.write(0, replace(image, go=True, axes=axes).registers)
             case "slow-device":
-                cycle, gripper.device_cycle = gripper.device_cycle, amount * gripper.speedup
-                return self._later(lambda: setattr(gripper, "device_cycle", cycle))
+                if "slow-device" not in self._kinds:
+                    self._device_cycle = gripper.device_cycle
+                gripper.device_cycle = amount * gripper.speedup
             case "interference":
                 gripper.interfere()
-                return self._later(gripper.clear_faults)
             case "fault":
                 gripper.inject_fault(int(amount))
-                return self._later(gripper.clear_faults)
             case "release":
                 gripper.emergency_release()
-        return None
 
-    @staticmethod
-    def _later(call: Callable[[], object]) -> Callable[[], Awaitable[None]]:
-        async def undo() -> None:
-            call()
+    async def _undo(self, trouble: Trouble) -> None:
+        """What happens at the end; the troubles that go on keep their effect."""
+        endpoint, gripper = self._endpoint, self._endpoint.gripper
+        match trouble.kind:
+            case "refuse" | "power-cut":
+                if "power-cut" not in self._kinds:
+                    gripper.power_on()
+                if not any(kind in _SHUT for kind in self._kinds) and endpoint.is_running:
+                    await endpoint.accept()
+            case "slow-device":
+                slow = [each.trouble.amount for each in self._ongoing if each.trouble.kind == "slow-device"]
+                gripper.device_cycle = slow[-1] * gripper.speedup if slow else self._device_cycle
+            case "interference" | "fault":
+                gripper.clear_faults()
+                for each in self._ongoing:
+                    if each.trouble.kind in ("interference", "fault"):
+                        self._do(each.trouble)
 
-        return undo
-
-    async def _let_in(self) -> None:
-        """The power is back, connections are accepted again, unless another trouble forbids it."""
-        kinds = [each.trouble.kind for each in self._ongoing]
-        if "power-cut" not in kinds:
-            self._endpoint.gripper.power_on()
-        if not any(kind in _SHUT for kind in kinds) and self._endpoint.is_running:
-            await self._endpoint.accept()
+    @property
+    def _kinds(self) -> list[str]:
+        return [each.trouble.kind for each in self._ongoing]

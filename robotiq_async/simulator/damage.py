@@ -51,6 +51,11 @@ class Reply:
         """Whether it answers a write."""
         return self.pdu[0] & 0x7F in (WRITE_SINGLE, WRITE_MULTIPLE)
 
+    @property
+    def is_exception(self) -> bool:
+        """Whether the simulator refuses the request."""
+        return bool(self.pdu[0] & 0x80)
+
     def changed(self, *, unit: int | None = None, pdu: bytes | None = None) -> Parts:
         """The reply with another unit or PDU, in an orderly frame."""
         body = bytes((self.unit if unit is None else unit,)) + (self.pdu if pdu is None else pdu)

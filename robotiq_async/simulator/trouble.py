@@ -1,7 +1,8 @@
 """What can go wrong, as data: one table of kinds, and troubles written as words or as values.
 
 A trouble is an event (a reply is lost, another client writes) or a condition that lasts (nobody answers,
-the device is slow). In words it is ``KIND [VALUE] [on read|write] [at S] [for S|once] [every S]``::
+the device is slow). In words it is
+``KIND [VALUE] [on read|write] [at S] [for S|for ever|once] [every S]``::
 
     drop at 5                      one reply is lost, 5 s after the beginning
     delay 0.05                     every reply comes 50 ms later
@@ -169,13 +170,20 @@ class Trouble:
     def __str__(self) -> str:
         """The trouble in words; :func:`parse_troubles` reads them."""
         words = [self.kind]
-        words += [] if self.value is None else [f"{self.value:g}"]
+        words += [] if self.value is None else [_digits(self.value)]
         words += [] if self.on == "any" else [f"on {self.on}"]
-        words += [f"at {self.at:g}"] if self.at else []
+        words += [f"at {_digits(self.at)}"] if self.at else []
         if self.lasts is not None:
-            words += [{0.0: "once", math.inf: "for ever"}.get(self.lasts, f"for {self.lasts:g}")]
-        words += [] if self.every is None else [f"every {self.every:g}"]
+            words += ["once" if self.lasts == 0 else f"for {_digits(self.lasts)}"]
+        words += [] if self.every is None else [f"every {_digits(self.every)}"]
         return " ".join(words)
+
+
+def _digits(number: float) -> str:
+    """A number with all its digits, and no more."""
+    if number == math.inf:
+        return "ever"
+    return repr(int(number) if number == int(number) else number)
 
 
 def _check_value(name: str, kind: Kind, value: object) -> None:
@@ -196,14 +204,18 @@ def parse_troubles(text: str) -> list[Trouble]:
     Raises:
         ValueError: a line that is none; named with the reason.
     """
-    lines = (part.partition("#")[0] for line in text.splitlines() for part in line.split(";"))
+    lines = (part for line in text.splitlines() for part in line.partition("#")[0].split(";"))
     return [_parse_one(line) for line in lines if line.strip()]
 
 
 def _parse_one(line: str) -> Trouble:
     words = line.split()
     kind = words.pop(0)
-    value = _number(kind, words.pop(0)) if words and words[0] not in _WORDS else None
+    value = None
+    if kind not in KINDS:
+        Trouble(kind)  # says so
+    if words and words[0] not in _WORDS:
+        value = _number(kind, words.pop(0))
     options: dict[str, str] = {}
     while words:
         word = words.pop(0)

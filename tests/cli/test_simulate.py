@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import signal
 import socket
@@ -9,8 +10,21 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from robotiq_async import Fault, RobotiqHand, State
+from robotiq_async.enums import AXES
+from robotiq_async.simulator.trouble import KINDS
+
 if TYPE_CHECKING:
+    from asyncio.subprocess import Process
+
     from tests.cli.conftest import Shell
+
+
+async def told(process: Process) -> str:
+    """The next line on its standard error."""
+    assert process.stderr is not None
+    async with asyncio.timeout(30):
+        return (await process.stderr.readline()).decode().rstrip("\n")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -50,3 +64,99 @@ async def test_other_than_loopback_is_warned_about(shell: Shell) -> None:
     warning, failure = outcome.err.splitlines()
     assert "anyone who reaches 192.0.2.1 can command this gripper" in warning
     assert "cannot listen on 192.0.2.1:0" in failure
+
+
+# Troubles.
+
+
+async def test_a_hand_sees_the_trouble(shell: Shell) -> None:
+    process = await shell.start("simulate", "--port", "0", "--trouble", "fault 14")
+    address = await shell.read_line(process)
+    assert await told(process) == "robotiq-async: trouble: fault 14"
+    hand = RobotiqHand(address)
+    await hand.start(activate=False)
+    try:
+        assert hand.state is State.FAULT
+        assert hand.status.fault is Fault.SCISSOR_BLOCKED
+    finally:
+        await hand.stop()
+
+
+async def test_troubles_of_several_options(shell: Shell) -> None:
+    words = ("--trouble", "delay 0.01; release", "--trouble", "foreign 200")
+    process = await shell.start("simulate", "--port", "0", *words)
+    address = await shell.read_line(process)
+    lines = [await told(process) for _ in range(3)]
+    assert lines == [f"robotiq-async: trouble: {each}" for each in ("delay 0.01", "release", "foreign 200")]
+    hand = RobotiqHand(address)
+    await hand.start(activate=False)
+    try:
+        async with asyncio.timeout(30):
+            async for status in hand.statuses():
+                if [status.requested_position(axis) for axis in AXES] == [200] * 4:
+                    break
+    finally:
+        await hand.stop()
+
+
+async def test_a_trouble_is_told_when_it_begins(shell: Shell) -> None:
+    process = await shell.start(
+        "simulate", "--port", "0", "--trouble", "drop at 1000; fault 14 at 0.1 for 0.1"
+    )
+    await shell.read_line(process)
+    assert await told(process) == "robotiq-async: trouble: fault 14 at 0.1 for 0.1"
+    process.send_signal(signal.SIGINT)
+    outcome = await shell.finish(process)
+    assert (outcome.code, outcome.out, outcome.err) == (0, "", "")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "words", ["power-cut", "refuse for 1000", "silence for 1000 every 2000", "drop", "close every 1000"]
+)
+async def test_it_ends_cleanly_while_a_plan_runs(shell: Shell, words: str, number: signal.Signals) -> None:
+    process = await shell.start("simulate", "--port", "0", "--trouble", words)
+    await shell.read_line(process)
+    assert await told(process) == f"robotiq-async: trouble: {words}"
+    process.send_signal(number)
+    outcome = await shell.finish(process)
+    assert (outcome.code, outcome.out, outcome.err) == (0, "", "")
+
+
+async def test_it_serves_on_when_the_plan_is_over(shell: Shell) -> None:
+    process = await shell.start("simulate", "--port", "0", "--trouble", "close")
+    address = await shell.read_line(process)
+    assert await told(process) == "robotiq-async: trouble: close"
+    (await shell.run("status", address)).assert_succeeded()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("dorp at 5", "no trouble is called 'dorp'; known are: delay, late, drop"),
+        ("drop at noon", "at must be followed by a number, got 'noon'"),
+        ("drop; foreign 256", "the value of foreign must be a whole number in 0..255, got 256"),
+        ("wrong-checksum", "wrong-checksum does not fit a simulator on tcp"),
+    ],
+)
+async def test_wrong_words(shell: Shell, words: str, message: str) -> None:
+    outcome = await shell.run("simulate", "--port", "0", "--trouble", "drop", "--trouble", words)
+    outcome.assert_failed(2, message)
+    assert outcome.out == "", "it never listened"
+
+
+async def test_a_trouble_that_does_not_fit_a_serial_line(shell: Shell) -> None:
+    outcome = await shell.run("simulate", "--serial", "/dev/no-such-port", "--trouble", "refuse")
+    outcome.assert_failed(2, "refuse does not fit a simulator on rtu")
+
+
+async def test_the_list_of_troubles(shell: Shell) -> None:
+    outcome = await shell.run("simulate", "--troubles")
+    assert (outcome.code, outcome.err) == (0, "")
+    lines = outcome.out.splitlines()
+    assert [line.split()[0] for line in lines] == list(KINDS)
+    for line, kind in zip(lines, KINDS.values(), strict=True):
+        assert kind.meaning in line
+        assert ("VALUE: " in line) == (kind.value is not None)
+        assert line.endswith(f"; {kind.link} only") == (kind.link is not None)
+        assert ("goes on" in line) == (kind.lasts > 0)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import csv
+import math
 from pathlib import Path
 from statistics import mean
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from robotiq_async.closing_time import CLOSED_READING, OPEN_READING, STROKE_COUNTS, closing_time
 from robotiq_async.enums import AXES, Finger, ObjectStatus
+from tests.simulator.conftest import CYCLE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -199,6 +201,49 @@ def test_speedup(make_bench: Callable[..., Bench]) -> None:
     while bench.gripper.is_moving:
         bench.wait(0.001)
     assert bench.now - began == pytest.approx(closing_time(128) / 10, abs=0.002)
+
+
+def test_a_longer_device_cycle_holds_for_the_writes_after_it(individual: Bench) -> None:
+    individual.gripper.write(0, individual.request.registers)
+    individual.gripper.device_cycle = 0.5
+    individual.wait(CYCLE * 1.001)
+    individual.go({Finger.A: 200})
+    individual.wait(0.49)
+    assert not individual.gripper.is_moving
+    individual.wait(0.01)
+    assert individual.gripper.is_moving
+
+
+def test_a_shorter_device_cycle_keeps_the_order_of_writes(make_bench: Callable[..., Bench]) -> None:
+    changed, patient = make_bench(), make_bench()
+    for bench in (changed, patient):
+        bench.activate_individually()
+        bench.gripper.device_cycle = 1.0
+    travelled = changed.gripper.travel(Finger.A)
+    changed.go({Finger.A: 200})
+    changed.gripper.device_cycle = 0
+    changed.go({Finger.A: 100})
+    patient.go({Finger.A: 200})
+    patient.go({Finger.A: 100})
+    for bench in (changed, patient):
+        assert not bench.gripper.is_moving
+        bench.wait(1)
+    assert changed.gripper.target(Finger.A) == 100
+    assert changed.gripper.position(Finger.A) == patient.gripper.position(Finger.A) < 20
+    changed.settle()
+    assert changed.gripper.position(Finger.A) == 100
+    assert changed.gripper.travel(Finger.A) - travelled == 94, "the first of the two was never ahead"
+    changed.go({Finger.A: 50})
+    assert changed.gripper.is_moving, "from then on writes take effect at once"
+
+
+@pytest.mark.parametrize(("value", "error"), [(-0.1, ValueError), (math.nan, ValueError), ("1", TypeError)])
+def test_a_device_cycle_that_is_none_changes_nothing(
+    bench: Bench, value: Any, error: type[Exception]
+) -> None:
+    with pytest.raises(error, match="device_cycle must be seconds"):
+        bench.gripper.device_cycle = value
+    assert bench.gripper.device_cycle == CYCLE
 
 
 def test_a_clock_that_stands_still_stops_everything(active: Bench) -> None:

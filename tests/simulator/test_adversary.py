@@ -1,0 +1,680 @@
+"""Troubles that happen: each kind on the wire, plans in virtual time, and how all of it ends."""
+
+from __future__ import annotations
+
+import asyncio
+import functools
+import struct
+from collections.abc import AsyncIterator, Callable, Coroutine
+from contextlib import asynccontextmanager, suppress
+from dataclasses import replace
+from typing import Any
+
+import pytest
+import serial
+
+from robotiq_async.enums import AXES, Fault, Mode
+from robotiq_async.request import AxisRequest, Request
+from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, Trouble
+from robotiq_async.simulator import parse_troubles as plan_of
+from robotiq_async.simulator.endpoint import SimulatorEndpoint
+from robotiq_async.simulator.trouble import KINDS
+from robotiq_async.status import RobotiqStatus
+from tests.simulator.test_server import RawClient, raw_client
+from tests.virtual import run
+from tests.virtual_line import VirtualLine
+
+READ = bytes.fromhex("04 0000 0001")
+AXES_ASKED = tuple(AxisRequest(10 * n, 100 + n, 200 + n) for n in range(1, 5))
+ACTIVE = Request(activate=True, axes=AXES_ASKED, individual_fingers=False, individual_scissor=False)
+ONLY_ON = dict.fromkeys(
+    ("wrong-transaction", "wrong-protocol", "exception", "reset", "close", "accept-silence", "refuse"), "tcp"
+) | {"wrong-checksum": "rtu"}
+
+Body = Callable[..., Coroutine[Any, Any, None]]
+
+
+def virtual(test: Body) -> Callable[..., None]:
+    """Run a test in a loop whose time is not real."""
+
+    @functools.wraps(test)
+    def in_virtual_time(**arguments: Any) -> None:
+        run(lambda: test(**arguments))
+
+    return in_virtual_time
+
+
+@asynccontextmanager
+async def simulator(**options: Any) -> AsyncIterator[SimulatorServer]:
+    """A simulator whose gripper goes by the clock of the loop."""
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, **options)
+    async with SimulatorServer(gripper) as server:
+        yield server
+
+
+@asynccontextmanager
+async def carried_out(
+    server: SimulatorServer, words: str, told: list[str]
+) -> AsyncIterator[asyncio.Task[None]]:
+    """A plan that is under way, with what it has told."""
+    plan = asyncio.create_task(
+        server.adversary.run(plan_of(words), lambda trouble: told.append(str(trouble)))
+    )
+    try:
+        yield plan
+    finally:
+        await cancelled(plan)
+
+
+async def cancelled(task: asyncio.Task[None]) -> None:
+    task.cancel()
+    with suppress(asyncio.CancelledError):
+        await task
+
+
+def write(value: int) -> bytes:
+    """A request that writes register 1."""
+    return struct.pack(">BHH", 6, 1, value)
+
+
+def status(server: SimulatorEndpoint) -> RobotiqStatus:
+    return RobotiqStatus.from_registers(server.gripper.status_registers())
+
+
+async def is_answered(client: RawClient, pdu: bytes = READ) -> bool:
+    """Whether a request is answered within half a second."""
+    client.writer.write(client.frame(pdu))
+    try:
+        async with asyncio.timeout(0.5):
+            transaction, _, answer = await client.reply()
+    except TimeoutError:
+        return False
+    assert (transaction, answer[0]) == (client.transaction, pdu[0])
+    return True
+
+
+async def is_let_in(server: SimulatorServer) -> bool:
+    """Whether a new client is let in and answered."""
+    try:
+        async with raw_client(server) as client:
+            return await is_answered(client)
+    except ConnectionRefusedError:
+        return False
+
+
+async def activate(server: SimulatorServer) -> None:
+    """In the basic mode: B and C follow A, the scissor follows the mode."""
+    server.gripper.write(0, ACTIVE.registers)
+    await asyncio.sleep(10)
+    assert status(server).is_activated
+
+
+# Replies.
+
+
+@virtual
+async def test_the_lost_reply_to_a_write() -> None:
+    async with simulator() as server, raw_client(server) as client:
+        lost = await server.adversary.begin(Trouble("drop", on="write"))
+        assert await is_answered(client)
+        assert not await is_answered(client, write(5))
+        assert server.gripper.request_registers[1] == 5, "it was carried out"
+        assert await is_answered(client, write(6))
+        assert lost.hits == 1
+        assert server.adversary.ongoing == ()
+
+
+@virtual
+async def test_the_lost_reply_to_a_read() -> None:
+    async with simulator() as server, raw_client(server) as client:
+        await server.adversary.begin(Trouble("drop", on="read"))
+        assert await is_answered(client, write(5))
+        assert not await is_answered(client)
+        assert await is_answered(client)
+
+
+@virtual
+async def test_all_replies_are_lost_as_long_as_it_lasts() -> None:
+    async with simulator() as server, raw_client(server) as client:
+        async with server.adversary.making(Trouble("drop", lasts=60)) as losing:
+            assert [await is_answered(client) for _ in range(3)] == [False] * 3
+            assert server.adversary.ongoing == (losing,)
+            assert losing.hits == 3
+        assert server.adversary.ongoing == ()
+        assert await is_answered(client)
+
+
+@virtual
+async def test_the_oldest_trouble_acts() -> None:
+    async with simulator() as server, raw_client(server) as client:
+        loop = asyncio.get_running_loop()
+        older = await server.adversary.begin(Trouble("delay", 0.3, on="read"))
+        newer = await server.adversary.begin(Trouble("drop"))
+        began = loop.time()
+        assert await is_answered(client)
+        assert loop.time() - began == pytest.approx(0.3, abs=0.01)
+        assert (older.hits, newer.hits) == (1, 0)
+        assert not await is_answered(client, write(5)), "the older one is not about writes"
+        assert server.adversary.ongoing == (older,)
+
+
+@virtual
+async def test_the_policy_decides_on_replies_that_no_trouble_is_about() -> None:
+    async with simulator() as server, raw_client(server) as client:
+        seen: list[bytes] = []
+
+        def policy(reply: bytes) -> list[tuple[float, bytes]]:
+            seen.append(reply)
+            return [(0.0, reply)]
+
+        server.policy = policy
+        async with server.adversary.making(Trouble("delay", 0.1, on="read")):
+            assert await is_answered(client)
+            assert seen == []
+            assert await is_answered(client, write(5))
+        assert await is_answered(client)
+    assert [reply[7] for reply in seen] == [6, 4]
+
+
+@virtual
+async def test_a_refused_request_was_carried_out() -> None:
+    async with simulator() as server, raw_client(server) as client:
+        await server.adversary.begin(Trouble("exception", 6, on="write"))
+        assert await client.ask(write(5)) == b"\x86\x06"
+        assert server.gripper.request_registers[1] == 5
+
+
+# Requests and connections.
+
+
+@virtual
+async def test_in_silence_nothing_is_heard_and_connections_stay() -> None:
+    async with simulator() as server, raw_client(server) as client:
+        async with server.adversary.making(Trouble("silence")) as silence:
+            assert not await is_answered(client, write(5))
+            assert not await is_answered(client)
+            assert not await is_let_in(server), "new connections are accepted and not answered"
+            assert silence.hits == 3
+        assert await is_answered(client)
+        assert server.gripper.writes == ()
+
+
+@virtual
+async def test_silence_for_once_is_one_request_that_is_not_heard() -> None:
+    async with simulator() as server, raw_client(server) as client:
+        await server.adversary.begin(Trouble("silence", lasts=0))
+        assert not await is_answered(client, write(5))
+        assert await is_answered(client, write(6))
+        assert [each.registers[1] for each in server.gripper.writes] == [6]
+
+
+@pytest.mark.parametrize("kind", ["reset", "accept-silence", "refuse", "power-cut"])
+async def test_connections_are_reset(kind: str) -> None:
+    async with SimulatorServer() as server, raw_client(server) as one, raw_client(server) as other:
+        await one.read_status()
+        await other.read_status()
+        async with server.adversary.making(Trouble(kind)), asyncio.timeout(5):
+            for client in (one, other):
+                with pytest.raises(ConnectionResetError):
+                    await client.reader.read()
+
+
+async def test_connections_are_closed_in_order() -> None:
+    async with SimulatorServer() as server, raw_client(server) as one, raw_client(server) as other:
+        await one.read_status()
+        await other.read_status()
+        await server.adversary.begin(Trouble("close"))
+        async with asyncio.timeout(5):
+            assert [await client.reader.read() for client in (one, other)] == [b"", b""]
+
+
+@pytest.mark.parametrize("kind", ["refuse", "power-cut"])
+async def test_nobody_is_let_in_on_a_real_port_either(kind: str) -> None:
+    async with SimulatorServer() as server:
+        port = server.port
+        async with server.adversary.making(Trouble(kind)):
+            with pytest.raises(ConnectionRefusedError):
+                await asyncio.open_connection("127.0.0.1", port)
+        assert server.port == port
+        async with raw_client(server) as client:
+            assert (await client.read_status()).is_reset
+
+
+@virtual
+@pytest.mark.parametrize("kind", ["reset", "close"])
+async def test_after_a_cut_new_connections_are_welcome(kind: str) -> None:
+    async with simulator() as server, raw_client(server) as client:
+        await server.adversary.begin(Trouble(kind))
+        assert server.adversary.ongoing == ()
+        assert await is_let_in(server)
+        with suppress(ConnectionResetError):
+            assert await client.reader.read() == b""
+
+
+@virtual
+async def test_accepted_in_silence_and_answered_after_it() -> None:
+    async with simulator() as server, raw_client(server) as before:
+        async with server.adversary.making(Trouble("accept-silence")):
+            with pytest.raises(ConnectionResetError):
+                await before.reader.read()
+            async with raw_client(server) as client:
+                assert not await is_answered(client, write(5))
+                assert server.gripper.writes == ()
+        assert await is_let_in(server)
+
+
+@virtual
+async def test_a_connection_made_in_silence_is_answered_when_it_is_over() -> None:
+    async with simulator() as server:
+        silence = await server.adversary.begin(Trouble("accept-silence"))
+        async with raw_client(server) as client:
+            assert not await is_answered(client)
+            await server.adversary.end(silence)
+            assert await is_answered(client)
+
+
+@virtual
+async def test_refused_until_it_ends() -> None:
+    async with simulator() as server:
+        await activate(server)
+        async with server.adversary.making(Trouble("refuse")):
+            assert not await is_let_in(server)
+            assert status(server).is_activated, "the gripper has its power"
+        assert await is_let_in(server)
+
+
+@virtual
+async def test_without_power_the_gripper_forgets_everything() -> None:
+    async with simulator() as server:
+        await activate(server)
+        async with server.adversary.making(Trouble("power-cut")):
+            assert not server.gripper.is_powered
+            assert not await is_let_in(server)
+        assert server.gripper.is_powered
+        assert await is_let_in(server)
+        assert status(server).is_reset
+        assert server.gripper.request_registers == (0,) * 8
+
+
+@virtual
+@pytest.mark.parametrize("first", ["refuse", "power-cut"])
+@pytest.mark.parametrize("second", ["refuse", "power-cut"])
+@pytest.mark.parametrize("in_order", [True, False])
+async def test_refused_until_the_last_of_two_ends(first: str, second: str, in_order: bool) -> None:
+    async with simulator() as server:
+        begun = [await server.adversary.begin(Trouble(kind)) for kind in (first, second)]
+        ending, lasting = begun if in_order else begun[::-1]
+        await server.adversary.end(ending)
+        assert not await is_let_in(server)
+        assert server.gripper.is_powered == (lasting.trouble.kind == "refuse")
+        await server.adversary.end(lasting)
+        assert await is_let_in(server)
+        assert server.gripper.is_powered
+
+
+@virtual
+async def test_silence_goes_on_after_refusal() -> None:
+    async with simulator() as server:
+        async with server.adversary.making(Trouble("silence")):
+            async with server.adversary.making(Trouble("refuse")):
+                pass
+            assert not await is_let_in(server)
+        assert await is_let_in(server)
+
+
+@virtual
+@pytest.mark.parametrize("kind", ["refuse", "power-cut"])
+async def test_ending_it_does_not_start_a_server_that_was_stopped(kind: str) -> None:
+    async with simulator() as server:
+        begun = await server.adversary.begin(Trouble(kind))
+        await server.stop()
+        await server.adversary.end(begun)
+        assert not server.is_running
+        assert server.gripper.is_powered
+        assert not await is_let_in(server)
+
+
+# The gripper.
+
+
+@virtual
+@pytest.mark.parametrize(("value", "position"), [(None, 128), (0, 0), (200, 200)])
+async def test_another_client_sends_all_axes_somewhere(value: int | None, position: int) -> None:
+    async with simulator() as server:
+        await activate(server)
+        assert ACTIVE.mode is Mode.BASIC
+        await server.adversary.begin(Trouble("foreign", value))
+        assert server.adversary.ongoing == ()
+        image = Request.from_registers(server.gripper.request_registers)
+        assert image.activate
+        assert image.go
+        assert image.axes == tuple(replace(axis, position=position) for axis in AXES_ASKED)
+        await asyncio.sleep(60)
+        reached = [server.gripper.position(axis) for axis in AXES]
+        assert reached == [max(position, 6)] * 3 + [max(position, 24)]
+
+
+@virtual
+@pytest.mark.parametrize(("value", "seconds"), [(None, 0.2), (1.5, 1.5)])
+async def test_requests_to_a_slow_device_take_effect_later(value: float | None, seconds: float) -> None:
+    async with simulator(speedup=5, device_cycle=0.02) as server:
+        async with server.adversary.making(Trouble("slow-device", value)):
+            server.gripper.write(0, Request(activate=True).registers)
+            await asyncio.sleep(seconds - 0.01)
+            assert not status(server).activation_echo
+            await asyncio.sleep(0.02)
+            assert status(server).activation_echo
+        assert server.gripper.device_cycle == 0.02
+
+
+@virtual
+async def test_the_scissor_is_blocked() -> None:
+    async with simulator() as server:
+        await activate(server)
+        async with server.adversary.making(Trouble("interference")):
+            assert status(server).fault is Fault.SCISSOR_INTERFERENCE
+            await asyncio.sleep(19.9)
+            assert status(server).fault is Fault.SCISSOR_INTERFERENCE
+            await asyncio.sleep(0.2)
+            assert status(server).fault is Fault.SCISSOR_BLOCKED
+        assert status(server).fault is Fault.NONE
+
+
+@virtual
+@pytest.mark.parametrize(
+    ("value", "fault"),
+    [(None, Fault.COMMUNICATION_NOT_READY), (1, Fault(1)), (14, Fault.SCISSOR_BLOCKED), (15, Fault(15))],
+)
+async def test_a_fault_is_reported(value: int | None, fault: Fault) -> None:
+    async with simulator() as server:
+        await activate(server)
+        async with server.adversary.making(Trouble("fault", value)):
+            await asyncio.sleep(60)
+            assert status(server).fault is fault
+        assert status(server).fault is Fault.NONE
+
+
+@virtual
+async def test_the_gripper_releases() -> None:
+    async with simulator() as server:
+        await activate(server)
+        await server.adversary.begin(Trouble("release"))
+        assert server.adversary.ongoing == ()
+        assert status(server).fault is Fault.AUTOMATIC_RELEASE
+        await asyncio.sleep(60)
+        assert status(server).fault is Fault.AUTOMATIC_RELEASE_DONE
+
+
+# Beginning and ending.
+
+
+@virtual
+async def test_what_is_over_stays_over() -> None:
+    async with simulator() as server:
+        begun = await server.adversary.begin(Trouble("fault", 9))
+        await server.adversary.end(begun)
+        server.gripper.inject_fault(14)
+        await server.adversary.end(begun)
+        assert status(server).fault is Fault.SCISSOR_BLOCKED
+
+
+@virtual
+async def test_only_the_one_that_is_ended_ends() -> None:
+    async with simulator() as server, raw_client(server) as client:
+        one, other = [await server.adversary.begin(Trouble("drop", lasts=60)) for _ in range(2)]
+        assert server.adversary.ongoing == (one, other)
+        await server.adversary.end(one)
+        assert server.adversary.ongoing == (other,)
+        assert not await is_answered(client)
+
+
+@virtual
+async def test_a_block_that_fails_ends_its_trouble() -> None:
+    async with simulator() as server:
+        with pytest.raises(ZeroDivisionError):
+            async with server.adversary.making(Trouble("refuse")):
+                raise ZeroDivisionError
+        assert server.adversary.ongoing == ()
+        assert await is_let_in(server)
+
+
+@pytest.mark.parametrize("kind", ["reset", "close", "accept-silence", "refuse", "power-cut"])
+async def test_without_connections_there_is_nothing_to_cut(kind: str) -> None:
+    server = SimulatorServer()
+    with pytest.raises(RuntimeError, match="not running"):
+        await server.adversary.begin(Trouble(kind))
+    assert server.adversary.ongoing == ()
+    assert server.gripper.is_powered
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_fits_which_link(kind: str) -> None:
+    fits = ONLY_ON.get(kind)
+    for server in (SimulatorServer(), SerialSimulatorServer("/dev/ttyFAR")):
+        if fits in (None, server.link):
+            server.adversary.check([Trouble(kind)])
+        else:
+            with pytest.raises(ValueError, match=f"^{kind} does not fit a simulator on {server.link}$"):
+                server.adversary.check([Trouble("silence"), Trouble(kind)])
+
+
+async def test_what_does_not_fit_the_link_does_not_begin() -> None:
+    server = SimulatorServer()
+    with pytest.raises(ValueError, match="wrong-checksum does not fit a simulator on tcp"):
+        await server.adversary.begin(Trouble("wrong-checksum"))
+    assert server.adversary.ongoing == ()
+
+
+async def test_of_a_plan_that_does_not_fit_nothing_begins() -> None:
+    server = SerialSimulatorServer("/dev/ttyFAR")
+    told: list[Trouble] = []
+    with pytest.raises(ValueError, match="refuse does not fit a simulator on rtu"):
+        await server.adversary.run(plan_of("fault 9; refuse at 10"), told.append)
+    assert told == []
+    assert server.adversary.ongoing == ()
+    assert status(server).fault is Fault.NONE
+
+
+# Plans.
+
+
+@virtual
+async def test_each_at_its_time_and_for_as_long_as_it_says() -> None:
+    async with simulator() as server, raw_client(server) as client:
+        loop = asyncio.get_running_loop()
+        began = loop.time()
+        told: list[tuple[float, Trouble]] = []
+        plan = plan_of("silence at 5 for 2; fault at 6 for 9; drop for 1")
+        carrying_out = asyncio.create_task(
+            server.adversary.run(plan, lambda trouble: told.append((loop.time() - began, trouble)))
+        )
+        seen = []
+        for _ in range(17):
+            seen.append((await is_answered(client), status(server).fault))
+            await asyncio.sleep(began + len(seen) - loop.time())
+        none, fault = Fault.NONE, Fault.COMMUNICATION_NOT_READY
+        # A second each: the drop, four quiet ones, two of silence, and the fault.
+        expected = [(False, none)] + [(True, none)] * 4 + [(False, none), (False, fault)]
+        assert seen == expected + [(True, fault)] * 8 + [(True, none)] * 2
+        assert told == [(0, plan[2]), (5, plan[0]), (6, plan[1])]
+        assert server.adversary.ongoing == ()
+        await carrying_out
+
+
+@virtual
+async def test_a_plan_is_over_when_its_last_trouble_is() -> None:
+    async with simulator() as server:
+        loop = asyncio.get_running_loop()
+        began = loop.time()
+        await server.adversary.run(plan_of("fault at 1 for 6; close at 4"))
+        assert loop.time() - began == pytest.approx(7)
+        assert server.adversary.ongoing == ()
+
+
+@virtual
+async def test_an_empty_plan_is_over_at_once() -> None:
+    async with simulator() as server:
+        await server.adversary.run([])
+
+
+@virtual
+async def test_a_plan_that_is_for_ever() -> None:
+    async with simulator() as server:
+        async with carried_out(server, "fault 9", []) as plan:
+            await asyncio.sleep(1e7)
+            assert not plan.done()
+            assert status(server).fault is Fault.COMMUNICATION_NOT_READY
+        assert status(server).fault is Fault.NONE
+
+
+@virtual
+async def test_again_and_again() -> None:
+    async with simulator() as server:
+        loop = asyncio.get_running_loop()
+        began = loop.time()
+        told: list[float] = []
+        carrying_out = asyncio.create_task(
+            server.adversary.run(
+                plan_of("power-cut at 1 for 2 every 10"), lambda _: told.append(loop.time() - began)
+            )
+        )
+        powered = []
+        for second in range(35):
+            await asyncio.sleep(began + second + 0.5 - loop.time())
+            powered.append(server.gripper.is_powered)
+        assert [second for second, is_on in enumerate(powered) if not is_on] == [1, 2, 11, 12, 21, 22, 31, 32]
+        assert told == pytest.approx([1, 11, 21, 31])
+        await cancelled(carrying_out)
+
+
+@virtual
+async def test_once_and_again() -> None:
+    async with simulator() as server, raw_client(server) as client:
+        async with carried_out(server, "drop every 10", []):
+            answered = []
+            for _ in range(3):
+                await asyncio.sleep(5)
+                answered += [await is_answered(client) for _ in range(3)]
+                await asyncio.sleep(5)
+        assert answered == [False, True, True] * 3
+
+
+@virtual
+async def test_what_has_met_nothing_does_not_pile_up() -> None:
+    async with simulator() as server, raw_client(server) as client:
+        told: list[str] = []
+        async with carried_out(server, "drop every 10", told):
+            await asyncio.sleep(95)
+            assert told == ["drop every 10"] * 10
+            assert [await is_answered(client) for _ in range(3)] == [False, True, True]
+
+
+@virtual
+async def test_it_is_told_before_it_begins() -> None:
+    async with simulator() as server:
+        seen = []
+        await server.adversary.run(plan_of("fault 9 for 1"), lambda _: seen.append(status(server).fault))
+        assert seen == [Fault.NONE]
+
+
+@virtual
+@pytest.mark.parametrize(
+    "words",
+    [
+        *("refuse", "power-cut", "silence", "accept-silence", "drop for ever", "fault 9", "interference"),
+        *("slow-device 5", "refuse; power-cut; silence; fault 9; slow-device 3"),
+        *("power-cut for 60", "refuse for 60 every 61"),
+    ],
+)
+async def test_a_plan_that_is_cancelled_ends_its_troubles(words: str) -> None:
+    async with simulator(device_cycle=0.02) as server:
+        async with carried_out(server, words, []) as plan:
+            await asyncio.sleep(30)
+            assert len(server.adversary.ongoing) == len(words.split(";"))
+        assert plan.cancelled()
+        assert server.adversary.ongoing == ()
+        assert server.gripper.is_powered
+        assert server.gripper.device_cycle == 0.02
+        assert status(server).fault is Fault.NONE
+        assert await is_let_in(server)
+
+
+@virtual
+@pytest.mark.parametrize("words", ["refuse at 60", "refuse for 1 every 60", "refuse for 1 at 1 every 60"])
+async def test_what_has_not_begun_when_the_plan_is_cancelled_never_begins(words: str) -> None:
+    async with simulator() as server:
+        told: list[str] = []
+        async with carried_out(server, words, told):
+            await asyncio.sleep(30)
+        begun = len(told)
+        await asyncio.sleep(100)
+        assert len(told) == begun
+        assert await is_let_in(server)
+
+
+@virtual
+async def test_a_port_that_somebody_took_meanwhile() -> None:
+    async with simulator() as server:
+        plan = asyncio.create_task(server.adversary.run(plan_of("refuse for 10; fault 9; slow-device 3")))
+        await asyncio.sleep(5)
+        other = await asyncio.get_running_loop().create_server(asyncio.Protocol, "127.0.0.1", server.port)
+        with pytest.raises(OSError, match="address in use"):
+            await plan
+        other.close()
+        assert server.adversary.ongoing == ()
+        assert status(server).fault is Fault.NONE
+        assert server.gripper.device_cycle == 0.005
+
+
+# On a serial line.
+
+
+class SerialClient:
+    """The near end of a line, with a simulator at the other end."""
+
+    def __init__(self, port: serial.Serial) -> None:
+        self._port = port
+
+    async def ask(self) -> bytes:
+        """Read the first status register; the answer is empty when none comes."""
+        self._port.write(bytes.fromhex("09 04 07d0 0001 300f"))
+        answer = b""
+        for _ in range(10):
+            await asyncio.sleep(0.05)
+            answer += self._port.read(100)
+        return answer
+
+
+@asynccontextmanager
+async def serial_simulator(
+    patch: pytest.MonkeyPatch,
+) -> AsyncIterator[tuple[SerialSimulatorServer, SerialClient]]:
+    line = VirtualLine(patch)
+    gripper = SimulatedGripper(asyncio.get_running_loop().time)
+    async with SerialSimulatorServer(line.FAR, gripper) as server:
+        port = serial.serial_for_url(line.NEAR)
+        try:
+            yield server, SerialClient(port)
+        finally:
+            port.close()
+
+
+RESET_READING = bytes.fromhex("09 04 02 0000 58f1")
+
+
+@virtual
+@pytest.mark.parametrize("kind", ["silence", "power-cut", "drop"])
+async def test_no_answer_on_a_serial_line(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    async with serial_simulator(monkeypatch) as (server, client):
+        assert await client.ask() == RESET_READING
+        async with server.adversary.making(Trouble(kind, lasts=60)):
+            assert [await client.ask() for _ in range(2)] == [b"", b""]
+        assert await client.ask() == RESET_READING
+
+
+@virtual
+async def test_a_wrong_checksum_on_a_serial_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with serial_simulator(monkeypatch) as (server, client):
+        await server.adversary.begin(Trouble("wrong-checksum"))
+        assert await client.ask() == bytes.fromhex("09 04 02 0000 58f0")
+        assert await client.ask() == RESET_READING

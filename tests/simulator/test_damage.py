@@ -1,0 +1,176 @@
+"""What is done to the bytes of a reply: the frames are made by hand, on both kinds of link."""
+
+from __future__ import annotations
+
+import pytest
+
+from robotiq_async.simulator import Trouble
+from robotiq_async.simulator.damage import Parts, Reply
+from robotiq_async.simulator.trouble import KINDS
+
+READ = "04 04 1234 5678"
+"""Two registers, as an answer to FC04."""
+WRITE = "10 03e8 0002"
+"""Two registers from 1000 on are written, by FC16."""
+WRITE_ONE = "06 03e9 1234"
+
+
+def tcp(pdu: str, *, transaction: str = "0a0b", protocol: str = "0000", unit: str = "09") -> bytes:
+    """A Modbus TCP frame."""
+    body = bytes.fromhex(unit + pdu)
+    return bytes.fromhex(transaction + protocol) + bytes((0, len(body))) + body
+
+
+def rtu(pdu: str, *, unit: str = "09") -> bytes:
+    """A Modbus RTU frame with its CRC-16/MODBUS, low byte first."""
+    body = bytes.fromhex(unit + pdu)
+    crc = 0xFFFF
+    for byte in body:
+        crc ^= byte
+        for _ in range(8):
+            crc = crc >> 1 ^ (0xA001 if crc & 1 else 0)
+    return body + crc.to_bytes(2, "little")
+
+
+def damaged(kind: str, frame: bytes, *, serial: bool = False, value: float | None = None) -> Parts:
+    """What a kind of trouble makes of a frame."""
+    damage = KINDS[kind].damage
+    assert damage is not None
+    return damage(Reply(frame, serial), Trouble(kind, value).amount)
+
+
+def at_once(frame: bytes) -> list[tuple[float, bytes]]:
+    return [(0.0, frame)]
+
+
+def test_the_frames_themselves() -> None:
+    assert rtu("32 3334 3536 3738 39", unit="31")[-2:] == (0x4B37).to_bytes(2, "little"), "CRC of 123456789"
+    assert tcp(READ) == bytes.fromhex("0a0b 0000 0007 09 04 04 1234 5678")
+    assert rtu(READ)[:-2] == bytes.fromhex("09 04 04 1234 5678")
+
+
+# What is known of a reply.
+
+
+@pytest.mark.parametrize(
+    ("pdu", "is_to_a_write"),
+    [
+        *((READ, False), ("03 02 1234", False), ("83 02", False), ("84 02", False)),
+        *((WRITE, True), (WRITE_ONE, True), ("86 02", True), ("90 02", True)),
+    ],
+)
+def test_a_reply(pdu: str, is_to_a_write: bool) -> None:
+    for reply in (Reply(tcp(pdu), serial=False), Reply(rtu(pdu), serial=True)):
+        assert reply.unit == 9
+        assert reply.pdu == bytes.fromhex(pdu)
+        assert reply.is_to_a_write is is_to_a_write
+
+
+# The PDU or the unit is wrong; length and check sum fit it.
+
+
+@pytest.mark.parametrize(
+    ("kind", "pdu", "wrong"),
+    [
+        ("wrong-function", READ, "03 04 1234 5678"),
+        ("wrong-function", "03 02 1234", "04 02 1234"),
+        ("wrong-function", WRITE, "06 03e8 0002"),
+        ("wrong-function", WRITE_ONE, "10 03e9 1234"),
+        ("wrong-length", READ, "04 02 1234"),
+        ("wrong-length", "03 02 1234", "03 00"),
+        ("wrong-length", WRITE, "10 03e8 00"),
+        ("wrong-length", WRITE_ONE, "06 03e9 12"),
+        ("wrong-count", READ, "04 06 1234 5678"),
+        ("wrong-count", WRITE, "10 03e8 0003"),
+        ("wrong-count", WRITE_ONE, "06 03e9 1235"),
+        ("wrong-echo", WRITE, "10 03e9 0002"),
+        ("wrong-echo", WRITE_ONE, "06 03e8 1234"),
+    ],
+)
+def test_only_the_pdu_is_wrong(kind: str, pdu: str, wrong: str) -> None:
+    assert list(damaged(kind, tcp(pdu))) == at_once(tcp(wrong))
+    assert list(damaged(kind, rtu(pdu), serial=True)) == at_once(rtu(wrong))
+
+
+@pytest.mark.parametrize("pdu", [READ, WRITE])
+@pytest.mark.parametrize(("unit", "wrong"), [("09", "0a"), ("00", "01"), ("ff", "00")])
+def test_only_the_unit_is_wrong(pdu: str, unit: str, wrong: str) -> None:
+    assert list(damaged("wrong-unit", tcp(pdu, unit=unit))) == at_once(tcp(pdu, unit=wrong))
+    assert list(damaged("wrong-unit", rtu(pdu, unit=unit), serial=True)) == at_once(rtu(pdu, unit=wrong))
+
+
+@pytest.mark.parametrize(
+    ("pdu", "value", "refused"),
+    [(READ, None, "84 04"), (WRITE, None, "90 04"), (WRITE_ONE, 2, "86 02"), (READ, 255, "84 ff")],
+)
+def test_a_refusal_in_place_of_the_reply(pdu: str, value: int | None, refused: str) -> None:
+    assert list(damaged("exception", tcp(pdu), value=value)) == at_once(tcp(refused))
+
+
+# The frame around it is wrong.
+
+
+@pytest.mark.parametrize("pdu", [READ, WRITE])
+@pytest.mark.parametrize(
+    ("transaction", "wrong"), [("0a0b", "0a0a"), ("0100", "00ff"), ("0001", "0000"), ("0000", "ffff")]
+)
+def test_only_the_transaction_is_wrong(pdu: str, transaction: str, wrong: str) -> None:
+    frame, expected = tcp(pdu, transaction=transaction), tcp(pdu, transaction=wrong)
+    assert list(damaged("wrong-transaction", frame)) == at_once(expected)
+
+
+@pytest.mark.parametrize("pdu", [READ, WRITE])
+def test_only_the_protocol_is_wrong(pdu: str) -> None:
+    assert list(damaged("wrong-protocol", tcp(pdu))) == at_once(tcp(pdu, protocol="0001"))
+
+
+@pytest.mark.parametrize("pdu", [READ, WRITE])
+def test_only_the_checksum_is_wrong(pdu: str) -> None:
+    frame = rtu(pdu)
+    ((delay, wrong),) = damaged("wrong-checksum", frame, serial=True)
+    assert delay == 0
+    assert wrong[:-2] == frame[:-2]
+    assert (int.from_bytes(wrong[-2:], "big") ^ int.from_bytes(frame[-2:], "big")).bit_count() == 1
+
+
+# The frame is in order, but not how it comes.
+
+FRAMES = [(tcp(READ), False), (tcp(WRITE), False), (rtu(READ), True), (rtu(WRITE), True)]
+FRAME_NAMES = ["tcp read", "tcp write", "rtu read", "rtu write"]
+on_every_frame = pytest.mark.parametrize(("frame", "serial"), FRAMES, ids=FRAME_NAMES)
+
+
+@on_every_frame
+@pytest.mark.parametrize(
+    ("kind", "value", "delay"),
+    [("delay", None, 0.05), ("delay", 0.3, 0.3), ("late", None, 0.7), ("late", 2, 2)],
+)
+def test_it_comes_later(frame: bytes, serial: bool, kind: str, value: float | None, delay: float) -> None:
+    assert list(damaged(kind, frame, serial=serial, value=value)) == [(delay, frame)]
+
+
+@on_every_frame
+def test_it_does_not_come(frame: bytes, serial: bool) -> None:
+    assert list(damaged("drop", frame, serial=serial)) == []
+
+
+@on_every_frame
+def test_it_comes_by_half(frame: bytes, serial: bool) -> None:
+    ((delay, part),) = damaged("half", frame, serial=serial)
+    assert delay == 0
+    assert frame.startswith(part)
+    assert len(part) == len(frame) // 2
+
+
+@on_every_frame
+@pytest.mark.parametrize(("value", "apart"), [(None, 0.002), (0.3, 0.3), (0, 0)])
+def test_it_comes_in_three_pieces(frame: bytes, serial: bool, value: float | None, apart: float) -> None:
+    parts = damaged("pieces", frame, serial=serial, value=value)
+    assert [delay for delay, _ in parts] == [0, apart, 2 * apart]
+    assert all(len(part) >= 2 for _, part in parts)
+    assert b"".join(part for _, part in parts) == frame
+
+
+@on_every_frame
+def test_it_comes_twice_in_one_segment(frame: bytes, serial: bool) -> None:
+    assert list(damaged("twice", frame, serial=serial)) == at_once(frame + frame)

@@ -1,0 +1,312 @@
+"""Troubles as data: the words, the values, and what is refused."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robotiq_async.simulator import Trouble, parse_troubles
+from robotiq_async.simulator.trouble import KINDS
+
+INF = math.inf
+CONDITIONS = ["accept-silence", "refuse", "power-cut", "slow-device", "interference", "fault"]
+"""Kinds that cannot be for a single reply or moment."""
+REPLIES = [
+    *("delay", "late", "drop", "half", "pieces", "twice", "exception"),
+    *("wrong-function", "wrong-length", "wrong-count", "wrong-transaction"),
+    *("wrong-unit", "wrong-protocol", "wrong-checksum"),
+]
+"""Kinds that can be about replies to reads and to writes."""
+
+
+def seconds(low: int, high: int) -> st.SearchStrategy[float]:
+    """Tenths of seconds, which words carry exactly."""
+    return st.integers(10 * low, 10 * high).map(lambda tenths: tenths / 10)
+
+
+@st.composite
+def troubles(draw: st.DrawFn) -> Trouble:
+    """Any trouble there can be."""
+    name = draw(st.sampled_from(list(KINDS)))
+    kind = KINDS[name]
+    value: float | None = None
+    if isinstance(kind.value, int):
+        value = draw(st.none() | st.integers(int(kind.low), int(kind.high)))
+    elif kind.value is not None:
+        value = draw(
+            st.none() | st.integers(0, int(1000 * kind.high)).map(lambda thousandths: thousandths / 1000)
+        )
+    lasts = st.just(INF) | seconds(1, 86000)
+    if kind.lasts == 0 or name not in CONDITIONS:
+        lasts |= st.just(0.0)
+    trouble = Trouble(
+        name,
+        value,
+        on=draw(st.sampled_from(["any", "read", "write"] if name in REPLIES else ["any"])),
+        at=draw(st.just(0.0) | seconds(0, 86400)),
+        lasts=draw(st.none() | lasts),
+    )
+    if trouble.duration == INF or draw(st.booleans()):
+        return trouble
+    every = draw(seconds(int(trouble.duration) + 1, 86400))
+    return Trouble(name, value, on=trouble.on, at=trouble.at, lasts=trouble.lasts, every=every)
+
+
+def test_the_kinds_that_are_about_replies() -> None:
+    """The lists above are all there are."""
+    damaging = {name for name, kind in KINDS.items() if kind.damage is not None}
+    assert damaging == {*REPLIES, "wrong-echo"}
+    assert {name for name, kind in KINDS.items() if kind.lasts == INF} == {
+        *CONDITIONS,
+        *("delay", "pieces", "silence"),
+    }
+
+
+# Words.
+
+
+@pytest.mark.parametrize(
+    ("words", "trouble"),
+    [
+        ("drop", Trouble("drop")),
+        ("drop at 5", Trouble("drop", at=5)),
+        ("delay 0.05", Trouble("delay", 0.05)),
+        ("delay 0", Trouble("delay", 0)),
+        ("delay 10", Trouble("delay", 10)),
+        ("pieces 1", Trouble("pieces", 1)),
+        ("delay once", Trouble("delay", lasts=0)),
+        ("silence once", Trouble("silence", lasts=0)),
+        ("drop for ever", Trouble("drop", lasts=INF)),
+        ("drop for 2.5", Trouble("drop", lasts=2.5)),
+        ("refuse for 86400 at 86400", Trouble("refuse", at=86400, lasts=86400)),
+        ("drop every 0.001", Trouble("drop", every=0.001)),
+        ("drop every 86400", Trouble("drop", every=86400)),
+        ("refuse for 1 every 1.001", Trouble("refuse", lasts=1, every=1.001)),
+        ("wrong-unit on write once", Trouble("wrong-unit", on="write", lasts=0)),
+        ("wrong-unit on read", Trouble("wrong-unit", on="read")),
+        ("wrong-echo on write", Trouble("wrong-echo", on="write")),
+        ("power-cut at 10 for 2 every 60", Trouble("power-cut", at=10, lasts=2, every=60)),
+        ("late 0.9 every 60 once at 10 on read", Trouble("late", 0.9, on="read", at=10, lasts=0, every=60)),
+        ("foreign 0", Trouble("foreign", 0)),
+        ("foreign 255", Trouble("foreign", 255)),
+        ("fault 1", Trouble("fault", 1)),
+        ("fault 15", Trouble("fault", 15)),
+        ("exception 255", Trouble("exception", 255)),
+        ("exception 1e0", Trouble("exception", 1)),
+        ("  drop   at\t5 ", Trouble("drop", at=5)),
+    ],
+)
+def test_words_are_read(words: str, trouble: Trouble) -> None:
+    assert parse_troubles(words) == [trouble]
+
+
+def test_several_on_lines_and_between_semicolons_in_their_order() -> None:
+    text = """
+    # what goes wrong on Mondays
+    power-cut at 20 for 2; foreign 0 at 30   # the other cell
+
+    drop every 10;
+    """
+    assert parse_troubles(text) == [
+        Trouble("power-cut", at=20, lasts=2),
+        Trouble("foreign", 0, at=30),
+        Trouble("drop", every=10),
+    ]
+
+
+@pytest.mark.parametrize("text", ["", " \n;; \n", "# nothing"])
+def test_no_words_are_no_trouble(text: str) -> None:
+    assert parse_troubles(text) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("dorp at 5", "no trouble is called 'dorp'; known are: delay, late, drop, "),
+        ("Drop", "no trouble is called 'Drop'"),
+        ("drop 1", "drop takes no value, got 1.0"),
+        ("silence 3", "silence takes no value, got 3.0"),
+        ("drop 0", "drop takes no value, got 0.0"),
+        ("delay much", "delay must be followed by a number, got 'much'"),
+        ("delay 10.5", "the value of delay must be seconds in 0..10, got 10.5"),
+        ("delay -0.1", "the value of delay must be seconds in 0..10, got -0.1"),
+        ("delay nan", "the value of delay must be seconds in 0..10, got nan"),
+        ("delay inf", "the value of delay must be seconds in 0..10, got inf"),
+        ("late 11", "the value of late must be seconds in 0..10, got 11.0"),
+        ("pieces 1.1", "the value of pieces must be seconds in 0..1, got 1.1"),
+        ("slow-device 11", "the value of slow-device must be seconds in 0..10, got 11.0"),
+        ("foreign 256", "the value of foreign must be a whole number in 0..255, got 256.0"),
+        ("foreign -1", "the value of foreign must be a whole number in 0..255, got -1.0"),
+        ("foreign 1.5", "the value of foreign must be a whole number in 0..255, got 1.5"),
+        ("foreign nan", "the value of foreign must be a whole number in 0..255, got nan"),
+        ("foreign inf", "the value of foreign must be a whole number in 0..255, got inf"),
+        ("fault 0", "the value of fault must be a whole number in 1..15, got 0.0"),
+        ("fault 16", "the value of fault must be a whole number in 1..15, got 16.0"),
+        ("exception 0", "the value of exception must be a whole number in 1..255, got 0.0"),
+        ("exception 256", "the value of exception must be a whole number in 1..255, got 256.0"),
+        ("drop on both", "on must be read, write or any, got 'both'"),
+        ("wrong-echo on read", "'on read' means nothing for wrong-echo"),
+        ("drop at noon", "at must be followed by a number, got 'noon'"),
+        ("drop at -1", "at must be seconds in 0..86400.0, got -1.0"),
+        ("drop at 86401", "at must be seconds in 0..86400.0, got 86401.0"),
+        ("drop at nan", "at must be seconds in 0..86400.0, got nan"),
+        ("drop at inf", "at must be seconds in 0..86400.0, got inf"),
+        ("drop for long", "for must be followed by a number, got 'long'"),
+        ("drop for -1", "for must be seconds in 0..86400.0, got -1.0"),
+        ("drop for 86401", "for must be seconds in 0..86400.0, got 86401.0"),
+        ("drop for nan", "for must be seconds in 0..86400.0, got nan"),
+        ("drop for -inf", "for must be seconds in 0..86400.0, got -inf"),
+        ("drop every day", "every must be followed by a number, got 'day'"),
+        ("drop every 0", "every must be seconds in 0.001..86400.0, got 0.0"),
+        ("drop every 86401", "every must be seconds in 0.001..86400.0, got 86401.0"),
+        ("drop every nan", "every must be seconds in 0.001..86400.0, got nan"),
+        ("drop every inf", "every must be seconds in 0.001..86400.0, got inf"),
+        ("power-cut for 2 every 2", "power-cut cannot come again after 2 s: it lasts as long"),
+        ("drop for 2 every 1.5", "drop cannot come again after 1.5 s: it lasts as long"),
+        ("silence every 60", "silence cannot come again after 60 s: it lasts as long"),
+        ("drop once for 3", "cannot read 'drop once for 3': 'once' and 'for' contradict each other"),
+        ("drop for ever once", "cannot read 'drop for ever once': 'once' and 'for' contradict each other"),
+        ("drop at", "cannot read 'drop at' at 'at'; the form is: KIND [VALUE] [on read|write] [at S] "),
+        ("drop at 5 at 6", "cannot read 'drop at 5 at 6' at 'at'"),
+        ("drop once once", "cannot read 'drop once once' at 'once'"),
+        ("drop at 5 sharp", "cannot read 'drop at 5 sharp' at 'sharp'"),
+        ("delay 1 2", "cannot read 'delay 1 2' at '2'"),
+        ("drop; silence; dorp", "no trouble is called 'dorp'"),
+    ],
+)
+def test_words_that_are_refused_say_why(words: str, message: str) -> None:
+    with pytest.raises(ValueError, match=f"^{re.escape(message)}"):
+        parse_troubles(words)
+
+
+@pytest.mark.parametrize("direction", ["read", "write"])
+@pytest.mark.parametrize("kind", sorted(set(KINDS) - {*REPLIES, "wrong-echo"}))
+def test_on_means_nothing_where_no_reply_is_meant(kind: str, direction: str) -> None:
+    with pytest.raises(ValueError, match=f"^'on {direction}' means nothing for {kind}$"):
+        parse_troubles(f"{kind} on {direction}")
+
+
+@pytest.mark.parametrize("kind", CONDITIONS)
+@pytest.mark.parametrize("words", ["once", "for 0"])
+def test_a_condition_is_not_for_once(kind: str, words: str) -> None:
+    with pytest.raises(ValueError, match=f"^{kind} is a condition: say for how long"):
+        parse_troubles(f"{kind} {words}")
+
+
+# Values.
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"value": "0.1"}, "the value of delay must be seconds in 0..10, got '0.1'"),
+        ({"value": True}, "the value of delay must be seconds in 0..10, got True"),
+        ({"at": "5"}, "at must be seconds in 0..86400.0, got '5'"),
+        ({"at": False}, "at must be seconds in 0..86400.0, got False"),
+        ({"lasts": "5"}, "for must be seconds in 0..86400.0, got '5'"),
+        ({"lasts": True}, "for must be seconds in 0..86400.0, got True"),
+        ({"lasts": 1, "every": "5"}, "every must be seconds in 0.001..86400.0, got '5'"),
+        ({"lasts": 0, "every": True}, "every must be seconds in 0.001..86400.0, got True"),
+    ],
+)
+def test_what_is_no_number_is_refused(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(TypeError, match=f"^{re.escape(message)}$"):
+        Trouble("delay", **options)
+
+
+def test_whole_numbers_may_be_written_as_floats() -> None:
+    assert Trouble("fault", 9.0) == Trouble("fault", 9)
+
+
+@pytest.mark.parametrize("on", ["", "READ", None])
+def test_a_direction_that_is_none_is_refused(on: Any) -> None:
+    with pytest.raises(ValueError, match=f"^on must be read, write or any, got {on!r}$"):
+        Trouble("drop", on=on)
+
+
+# What is meant when nothing is said.
+
+
+def test_nothing_said() -> None:
+    trouble = Trouble("drop")
+    assert (trouble.value, trouble.on, trouble.at, trouble.lasts, trouble.every) == (
+        None,
+        "any",
+        0,
+        None,
+        None,
+    )
+
+
+@pytest.mark.parametrize(
+    ("kind", "amount"),
+    [
+        *(("delay", 0.05), ("late", 0.7), ("pieces", 0.002), ("exception", 4), ("foreign", 128)),
+        *(("slow-device", 0.2), ("fault", 9), ("drop", 0), ("silence", 0)),
+    ],
+)
+def test_the_usual_value(kind: str, amount: float) -> None:
+    assert Trouble(kind).amount == amount
+
+
+@pytest.mark.parametrize("value", [0, 0.03, 10])
+def test_a_value_replaces_the_usual_one(value: float) -> None:
+    assert Trouble("delay", value).amount == value
+
+
+@pytest.mark.parametrize("kind", [*CONDITIONS, "delay", "pieces", "silence"])
+def test_conditions_last_for_ever(kind: str) -> None:
+    assert Trouble(kind).duration == INF
+    assert Trouble(kind, lasts=2).duration == 2
+
+
+@pytest.mark.parametrize("kind", ["late", "drop", "wrong-echo", "reset", "close", "foreign", "release"])
+def test_events_happen_once(kind: str) -> None:
+    assert Trouble(kind).duration == 0
+    assert Trouble(kind, lasts=2).duration == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "read", "write"),
+    [
+        *(("drop", True, True), ("drop on read", True, False), ("drop on write", False, True)),
+        *(("wrong-echo", False, True), ("wrong-echo on write", False, True)),
+    ],
+)
+def test_what_replies_it_is_about(words: str, read: bool, write: bool) -> None:
+    (trouble,) = parse_troubles(words)
+    assert (trouble.is_about(write=False), trouble.is_about(write=True)) == (read, write)
+
+
+# And back into words.
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "drop",
+        "delay 0.05 on read at 2.5 for 3 every 10",
+        "silence once",
+        "drop for ever",
+        "foreign 0 at 30",
+        "late once every 60",
+    ],
+)
+def test_a_trouble_in_words(words: str) -> None:
+    (trouble,) = parse_troubles(words)
+    assert str(trouble) == words
+
+
+@given(trouble=troubles())
+def test_its_words_give_an_equal_trouble(trouble: Trouble) -> None:
+    assert parse_troubles(str(trouble)) == [trouble]
+
+
+@given(plan=st.lists(troubles()), separator=st.sampled_from(["\n", ";", "; ", " # again\n"]))
+def test_the_words_of_a_plan_give_an_equal_plan(plan: list[Trouble], separator: str) -> None:
+    assert parse_troubles(separator.join(map(str, plan))) == plan
