@@ -8,11 +8,13 @@ The map; each module imports only what stands above it::
     registers    the bit fields, as data
     status       RobotiqStatus, decoded from eight registers
     request      Request, encoded into eight registers
+    log          the logger, which never fails
     closing_time the thesis's closing times
     machine      states, triggers and the table of both
     procedures   activation, reset, release, shutdown as generators
     echo         what was written and what the gripper shows of it
     adoption     what an axis was asked to do by somebody else
+    ledger       what the gripper has been asked, as far as is known
     desk         what callers have asked for
     compose      the next image, from what callers have asked
     motion       moves and their results
@@ -21,6 +23,7 @@ The map; each module imports only what stands above it::
     address      which gripper                                 asyncio from here on
     reply        every byte of a reply, checked
     link         transports; the only module that uses pymodbus
+    guard        transports of somebody else's, held to what a hand relies on
     simulated    the transport of sim://
     statistics   figures about the polling
     streams      async iterators

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import socket
 from dataclasses import dataclass
 from ipaddress import IPv6Address
 from typing import Final, Literal
@@ -28,6 +31,21 @@ class Address:
     kind: Literal["tcp", "rtu", "sim"]
     host: str = ""
     port: int = 0
+
+    @property
+    def key(self) -> str:
+        """What all addresses of one gripper have in common, as far as that is known without asking anybody.
+
+        127.1 and localhost are 127.0.0.1, and the links to a serial port are that port.
+        """
+        host = self.host
+        if self.kind == "rtu":
+            host = os.path.realpath(host)
+        elif self.kind == "tcp":
+            host = "127.0.0.1" if host == "localhost" else host.removesuffix(".")
+            with contextlib.suppress(OSError):
+                host = socket.inet_ntoa(socket.inet_aton(host))
+        return f"{self.kind}://{host}:{self.port}"
 
     def __str__(self) -> str:
         """The address in its full form."""

@@ -29,19 +29,29 @@ DIRECTION_WAIT_S: Final = 0.1
 class Adoption:
     """Watches an adopted gripper until the hand writes its own first image."""
 
-    def __init__(self, first: RobotiqStatus) -> None:
-        """Begin with the first status after the adoption."""
+    def __init__(self, first: RobotiqStatus, asked: float | None = None, since: float | None = None) -> None:
+        """Begin with the first status after the adoption.
+
+        Args:
+            first: the status.
+            asked: when it was asked for, in monotonic seconds; None for the time of the reply.
+            since: from when the time counts that a moving axis is given to show its direction; None for
+                the same time.
+        """
         self._first = first
         self._latest = first
+        self._asked = first.timestamp if asked is None else asked
+        self.since = self._asked if since is None else since
 
-    def watch(self, status: RobotiqStatus) -> None:
-        """Take in the next status."""
+    def watch(self, status: RobotiqStatus, asked: float | None = None) -> None:
+        """Take in the next status, and when it was asked for."""
         self._latest = status
+        self._asked = status.timestamp if asked is None else asked
 
     @property
     def is_certain(self) -> bool:
         """Whether every moving axis has shown its direction, or has had the time to."""
-        if self._latest.timestamp - self._first.timestamp >= DIRECTION_WAIT_S:
+        if self._asked - self.since >= DIRECTION_WAIT_S:
             return True
         return all(self._direction(axis) for axis in AXES if axis in self._latest.moving)
 

@@ -20,6 +20,9 @@ def compose(base: Request, desk: Desk, status: RobotiqStatus, gripping: Finger) 
         status: the newest status.
         gripping: the axes that were in contact when rGTO was last set.
     """
+    # rACT is for the sequences: raised here it would activate a gripper that has lost its activation. And
+    # rATR would let go.
+    base = replace(base, activate=base.activate and status.activation_echo, release=False)
     if desk.halt is not None:
         return replace(base, go=False)
     if desk.positions and not base.go:

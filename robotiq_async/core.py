@@ -11,16 +11,13 @@ Everything a caller waits for is a callback, told exactly once.
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from .adoption import Adoption
 from .compose import compose
 from .desk import Delivery, Desk, Failure, tell
-from .echo import WINDOW_S, EchoWatch
-from .enums import AXES, Finger, State
+from .enums import AXES, Finger, Severity, State
 from .errors import (
     ConnectionLostError,
     GripperFaultError,
@@ -29,6 +26,8 @@ from .errors import (
     NotStartedError,
     RobotiqError,
 )
+from .ledger import NOBODY, Ledger
+from .log import log
 from .machine import RUNNING, Machine, Trigger, look, refusal
 from .motion import Move, default_timeout
 from .procedures import (
@@ -37,14 +36,12 @@ from .procedures import (
     automatic_release,
     reset,
     shutdown,
-    signature_of_status,
 )
-from .request import AxisRequest, Request
+from .request import Request
 from .status import RobotiqStatus
 
-log = logging.getLogger("robotiq_async")
-
-
+FOREIGN_WARNING_S: Final = 1.0
+"""At most one warning about another client in this time."""
 _COMMANDED: Final = RUNNING | {State.FAULT}
 """The states in which the gripper follows requests, ours or another client's."""
 
@@ -63,20 +60,16 @@ class Core:
         self.machine = machine
         self.status: RobotiqStatus | None = None
         self.foreign_commands = 0
-        self._image = Request(axes=(AxisRequest(0, speed, force),) * len(AXES))
-        """The last image written, or the one the gripper shows after a reconnect."""
-        self._adoption: Adoption | None = None
-        """Set from an adoption until the first write: what the base of that write is made from."""
-        self._adopted = self._image
-        self._watch = EchoWatch()
-        self._unsure_until = 0.0
-        """Until then a write that was not acknowledged before a reconnect may still show."""
-        self._gripping = Finger(0)
-        """The axes in contact when the go bit was last seen set: gDT is not worth reading without it."""
+        self._ledger = Ledger(speed, force)
         self._procedure: Procedure | None = None
         self._step: Request | None = None
+        self._step_number = 0
+        """The write that carried the last step: a procedure sees only what came of it."""
         self._activating = False
-        """Whether stop() interrupted an activation of ours."""
+        """Whether an activation of ours may still be under way: to be taken back if the hand is stopped."""
+        self._hold_on_return = NOBODY
+        """Axes whose hold was not delivered before the link went down."""
+        self._warned = 0.0
         self._desk = Desk()
         self._sent: Desk | None = None
         """What is on the line: sent, and not acknowledged yet."""
@@ -122,7 +115,7 @@ class Core:
         if all(each is not move for each, _ in self._moves):
             return
         self._moves = [(each, number) for each, number in self._moves if each is not move]
-        self._desk.put_hold(move.axes)
+        self._desk.put_hold(move.axes, lambda: MoveSupersededError("a move took over and was given up"))
         self.machine.happen(Trigger.ASK_COMMAND)
 
     def halt(self, delivery: Delivery) -> None:
@@ -147,6 +140,7 @@ class Core:
             InvalidStateError: not in RESET.
         """
         self.machine.happen(Trigger.ASK_ACTIVATE)
+        self._activating = True
         self._begin(activation(self._at_rest()))
 
     def reset(self) -> None:
@@ -174,10 +168,6 @@ class Core:
 
     def stop(self) -> None:
         """The hand is being stopped: nothing more is taken, and whoever waits is told."""
-        self._activating = self._procedure is not None and self.machine.state in (
-            State.DO_ACTIVATION,
-            State.WF_ACTIVATION,
-        )
         self.machine.happen(Trigger.ASK_STOP)
         self._drop_all(lambda: NotStartedError("the hand was stopped"))
         self._sent = self._procedure = self._step = None
@@ -192,9 +182,11 @@ class Core:
             return
         if self._activating:
             self._begin(reset(self._at_rest()))
-        elif status.go_echo or not self._watch.is_settled(status.timestamp):
-            # A gripper that lost its activation unnoticed must not be activated by our shutdown.
-            self._begin(shutdown(replace(self._base(), activate=status.activation_echo)))
+        elif status.go_echo or not self._ledger.is_settled:
+            # A gripper that lost its activation unnoticed must not be activated by our shutdown, nor one
+            # that a reset of ours is just about to reach.
+            base = self._ledger.base
+            self._begin(shutdown(replace(base, activate=base.activate and status.activation_echo)))
 
     # -- the cycle -------------------------------------------------------------------------------------
 
@@ -202,6 +194,11 @@ class Core:
     def is_busy(self) -> bool:
         """Whether a procedure is under way."""
         return self._procedure is not None
+
+    @property
+    def has_request(self) -> bool:
+        """Whether there may be something to write."""
+        return self._step is not None or not self._desk.is_empty
 
     @property
     def is_moving(self) -> bool:
@@ -213,14 +210,14 @@ class Core:
             status.is_moving
             or bool(self._desk.positions)
             or self._sent is not None
-            or not self._watch.is_settled(status.timestamp)
+            or not self._ledger.is_settled
         )
 
     def speeds(self) -> dict[Finger, int]:
         """The speed each axis has or is about to get."""
         return {
             axis: self._desk.speeds.get(axis, request.speed)
-            for axis, request in zip(AXES, self._image.axes, strict=True)
+            for axis, request in zip(AXES, self._ledger.settings, strict=True)
         }
 
     def move_timeout(self, position: int, axes: Finger, speed: int | None) -> float:
@@ -229,29 +226,30 @@ class Core:
         speeds = self.speeds() if speed is None else dict.fromkeys(AXES, speed)
         return default_timeout(position, axes, self.status, speeds)
 
-    def found(self, status: RobotiqStatus, *, activate: bool) -> None:
+    def found(self, status: RobotiqStatus, *, activate: bool, asked: float | None = None) -> None:
         """Take in the first status after the link was opened; the policy says whether to activate."""
-        self.status = status
         if activate and look(status) is Trigger.SEEN_RESET:
+            self.status = status
+            self._ledger.read(status, status.timestamp if asked is None else asked)
             self.activate()
         else:
-            self.see(status)
+            self.see(status, asked)
 
     def take_request(self, now: float) -> Request | None:
         """The image to write in this cycle, or None. It counts as sent from here on."""
         if self._step is not None:
             image, self._step = self._step, None
             self._sent = Desk()
-            self._send(image, now)
+            self._step_number = self._ledger.writing(image, NOBODY, now)
             return image
         if self._procedure is not None or self._desk.is_empty or self.machine.state not in _COMMANDED:
             return None
-        composed = self._compose(now)
+        composed = self._compose()
         if composed is None:
             return None
-        if self._desk.only_holds and composed == self._base():
+        if self._desk.only_holds and composed == self._ledger.base:
             # Nothing drifts; but what was written before may not act yet, and then something might.
-            if self._watch.is_settled(now):
+            if self._ledger.is_settled:
                 self._desk = Desk()
                 self._deliver()
             return None
@@ -261,7 +259,7 @@ class Core:
             self._desk.halt = None
         else:
             self._sent, self._desk = self._desk, Desk()
-        number = self._send(composed, now)
+        number = self._ledger.writing(composed, self._sent.moved, now)
         if self._sent.positions:
             self._moves = [(move, number if at < 0 else at) for move, at in self._moves]
         return composed
@@ -270,18 +268,24 @@ class Core:
         """The image was acknowledged."""
         sent, self._sent = self._sent, None
         assert sent is not None, "nothing was sent"
-        self._watch.acknowledged(now)
-        number = self._watch.last_number
-        tell((*sent.going, *sent.setting))
+        number = self._ledger.acknowledged(now)
+        tell(sent.senders)
         self._halting += [(number, delivery) for delivery in sent.halt or ()]
         if self._step is None and (self._procedure is not None or self._desk.is_empty):
             self._deliver()
 
-    def see(self, status: RobotiqStatus) -> None:
-        """Take in a status, read after everything that was acknowledged so far."""
+    def see(self, status: RobotiqStatus, asked: float | None = None) -> None:
+        """Take in a status, read after everything that was acknowledged so far.
+
+        Args:
+            status: the status.
+            asked: when its request was sent, in monotonic seconds; None for the time of the reply. After
+                the loop was held up that is long before the reply was looked at.
+        """
         self.status = status
+        self._ledger.read(status, status.timestamp if asked is None else asked)
         if self._procedure is not None:
-            if self._step is None and self._sent is None:
+            if self._step is None and self._sent is None and self._ledger.acts(self._step_number):
                 self._advance(self._procedure, status)
             return
         before = self.machine.state
@@ -289,10 +293,10 @@ class Core:
         if before in _COMMANDED and after not in (before, *RUNNING):
             self._leave(after, status)
         elif after in _COMMANDED:
-            if before in _COMMANDED:
-                self._compare(status)
-            else:
-                self._enter(before, status)
+            self._go_on(before, status)
+        else:
+            self._hold_on_return = NOBODY
+        self._note_activation(status)
         self._tell_halted(status)
         if after in RUNNING:
             self._follow(status)
@@ -306,9 +310,11 @@ class Core:
             error.__cause__ = why
             return error
 
+        # A hold is a stop and not a motion: it is not dropped.
+        self._hold_on_return |= self._desk.hold | (NOBODY if self._sent is None else self._sent.hold)
         self._drop_all(failure)
         self._sent = self._procedure = self._step = None
-        self._adoption = None
+        self._ledger.lost()
 
     def refuse_unless_running(self, trigger: Trigger) -> None:
         """Refuse what is not possible now, with the error that tells why.
@@ -333,38 +339,30 @@ class Core:
 
     # -- inside ----------------------------------------------------------------------------------------
 
-    def _send(self, image: Request, now: float) -> int:
-        self._image = image
-        self._adoption = None
-        self._unsure_until = 0.0
-        return self._watch.writing(image, now)
-
-    def _compose(self, now: float) -> Request | None:
+    def _compose(self) -> Request | None:
         """The image with everything asked, or None while it is too early to tell. A halt is never early."""
-        status, desk = self.status, self._desk
+        status, desk, ledger = self.status, self._desk, self._ledger
         assert status is not None, "a hand that takes commands has read a status"
         if desk.halt is None:
-            if self._adoption is not None and not self._adoption.is_certain:
+            if not ledger.is_certain:
                 return None
-            if desk.positions and not self._base().go and status.go_echo and not self._watch.is_settled(now):
+            if desk.positions and not ledger.base.go and status.go_echo and not ledger.is_settled:
                 # Where the fingers stop is known once the halt has acted.
                 return None
-        return compose(self._base(), desk, status, self._gripping)
-
-    def _base(self) -> Request:
-        """The image that the next one is made from."""
-        return self._image if self._adoption is None else self._adoption.request(self._image.axes)
+        return compose(ledger.base, desk, status, ledger.gripping)
 
     def _at_rest(self) -> Request:
         """The image with every axis asked to be where it is: nothing a raised rGTO could wake."""
         assert self.status is not None, "procedures begin after the first status"
         status = self.status
-        return replace(self._base(), go=False).with_positions({axis: status.position(axis) for axis in AXES})
+        return replace(self._ledger.base, go=False).with_positions(
+            {axis: status.position(axis) for axis in AXES}
+        )
 
     def _begin(self, procedure: Procedure) -> None:
         self._procedure = procedure
         self._step = next(procedure)
-        self._gripping = Finger(0)
+        self._ledger.gripping = NOBODY
 
     def _advance(self, procedure: Procedure, status: RobotiqStatus) -> None:
         """Hand the status to the procedure; at its end, see where that leaves the hand."""
@@ -376,71 +374,71 @@ class Core:
         except RobotiqError as error:
             log.warning("%s", error)
         self._procedure = None
-        self._watch.restart(self._image, signature_of_status(status), status.timestamp)
+        self._ledger.restart(status)
         self.machine.happen(look(status))
+        self._note_activation(status)
 
     def _deliver(self) -> None:
         """A request was acknowledged: a DO_ state, or RUNNING_CC, is over."""
         if self.machine.state in (State.DO_ACTIVATION, State.DO_ATR, State.DO_RESET, State.RUNNING_CC):
             self.machine.happen(Trigger.DELIVERED)
 
-    def _enter(self, before: State, status: RobotiqStatus) -> None:
-        """The gripper turned out to follow requests: go on from the image it shows, or adopt it."""
-        shown = self._watch.observe(status)
+    def _go_on(self, before: State, status: RobotiqStatus) -> None:
+        """The gripper follows requests: see whose."""
         if before is State.DISCONNECTED:
-            self._unsure_until = status.timestamp + WINDOW_S
-        if shown is None:
-            self._adopt(status)
-        elif before is State.DISCONNECTED:
-            self._image = shown
-            self._watch.adopt(shown, signature_of_status(status), status.timestamp)
-
-    def _adopt(self, status: RobotiqStatus) -> None:
-        """Take the gripper as it is, without writing."""
-        self._gripping = Finger(0)
-        self._adoption = Adoption(status)
-        self._adopted = self._base()
-        self._watch.adopt(self._adopted, signature_of_status(status), status.timestamp)
-
-    def _compare(self, status: RobotiqStatus) -> None:
-        """Notice another client."""
-        shown = self._watch.observe(status)
-        if shown is None:
+            self._return(status)
+        elif before not in _COMMANDED:
+            self._ledger.adopt(status)
+        elif not self._ledger.compare(status):
             self._take_over(status)
-        elif self._adoption is not None and shown is self._adopted:
-            self._adoption.watch(status)
-        elif self._adoption is not None or status.timestamp < self._unsure_until:
-            # Nothing was written since the link came back, or since another client wrote, and now an older
-            # write of ours shows: go on from it.
-            self._image, self._adoption = shown, None
+
+    def _return(self, status: RobotiqStatus) -> None:
+        """The link is back: go on from the image that the gripper shows, or adopt it."""
+        self._ledger.found(status)
+        axes, self._hold_on_return = self._hold_on_return & self._ledger.ours, NOBODY
+        if axes:
+            self._hold(axes)
+            if self.machine.state in RUNNING:
+                self.machine.happen(Trigger.ASK_COMMAND)
 
     def _take_over(self, status: RobotiqStatus) -> None:
         """Another client commands the gripper: take over its requests, or our next write undoes them."""
         self.foreign_commands += 1
-        log.warning("another client commands the gripper: %r", status)
-        self._adopt(status)
+        if status.timestamp - self._warned >= FOREIGN_WARNING_S:
+            self._warned = status.timestamp
+            log.warning("another client commands the gripper: %r", status)
+        self._ledger.adopt(status)
         self._end_moves(
             lambda: MoveSupersededError("another client commands the gripper"),
             lambda move: not move.is_under(status),
             sent_only=True,
         )
 
+    def _note_activation(self, status: RobotiqStatus) -> None:
+        """See whether an activation of ours has come to its end."""
+        sight = look(status)
+        self._activating = self._activating and not (
+            sight is Trigger.SEEN_READY
+            or status.fault.severity is Severity.MAJOR
+            or (sight is Trigger.SEEN_RESET and self._ledger.is_settled)
+        )
+
+    def _hold(self, axes: Finger) -> None:
+        self._desk.put_hold(axes, lambda: MoveSupersededError("the fingers are held"))
+
     def _follow(self, status: RobotiqStatus) -> None:
         """Tell callers what has come true with this status."""
-        if status.go_echo:
-            self._gripping = status.contacts
+        self._ledger.note_contacts(status)
         for move, number in self._moves[:]:
             if number < 0:
                 continue
             move.observe(status)
-            if self._watch.acts(number, status.timestamp) and move.has_arrived(status):
+            if self._ledger.acts(number) and move.has_arrived(status):
                 self._moves = [(each, at) for each, at in self._moves if each is not move]
                 move.end(move.result(status))
 
     def _tell_halted(self, status: RobotiqStatus) -> None:
-        now = [
-            (n, d) for n, d in self._halting if not status.go_echo or self._watch.acts(n, status.timestamp)
-        ]
+        now = [(n, d) for n, d in self._halting if not status.go_echo or self._ledger.acts(n)]
         self._halting = [each for each in self._halting if each not in now]
         tell(delivery for _, delivery in now)
 
@@ -452,10 +450,10 @@ class Core:
         else:
             failure = lambda: NotActivatedError("the gripper lost its activation")  # noqa: E731
         self._drop_all(failure)
-        if after is State.FAULT and self._adoption is None:
+        if after is State.FAULT and status.activation_echo:
             # Which axes drift is decided when the hold is written: a command that was sent just before
             # may not act yet, and its motion would begin when the fault clears.
-            self._desk.put_hold(Finger.ALL)
+            self._hold(self._ledger.ours)
 
     def _drop_all(self, failure: Failure) -> None:
         """Nothing asked so far will happen: tell everybody."""

@@ -33,7 +33,7 @@ class Desk:
         forces: new force by axis.
         hold: axes to be held where they are, if they move.
         halt: callers of halt(); None when nobody asked to halt.
-        going: callers that wait for a position to be sent.
+        going: callers that wait for a position to be sent, with their axes.
         setting: callers that wait for nothing but a speed or a force.
     """
 
@@ -42,7 +42,7 @@ class Desk:
     forces: dict[Finger, int] = field(default_factory=dict)
     hold: Finger = NONE
     halt: list[Delivery] | None = None
-    going: list[Delivery] = field(default_factory=list)
+    going: list[tuple[Finger, Delivery]] = field(default_factory=list)
     setting: list[Delivery] = field(default_factory=list)
 
     @property
@@ -69,27 +69,48 @@ class Desk:
                 changes.update(dict.fromkeys((axis for axis in AXES if axis in axes), value))
         if position is not None:
             self.hold &= ~axes
-        if delivery is not None:
-            (self.setting if position is None else self.going).append(delivery)
+        if delivery is not None and position is None:
+            self.setting.append(delivery)
+        elif delivery is not None:
+            self.going.append((axes, delivery))
 
-    def put_hold(self, axes: Finger) -> None:
-        """Hold axes; a position that was not sent yet is dropped."""
+    def put_hold(self, axes: Finger, superseded: Failure) -> None:
+        """Hold axes; a position that was not sent yet is dropped, and who waits for it is told."""
         for axis in AXES:
             if axis in axes:
                 self.positions.pop(axis, None)
+        going, self.going = self.going, []
+        for mask, delivery in going:
+            if mask & axes:
+                delivery(superseded())
+            else:
+                self.going.append((mask, delivery))
         self.hold |= axes
 
     def put_halt(self, delivery: Delivery, superseded: Failure) -> None:
         """Stop everything; a position that was asked before and not sent yet is dropped."""
         self.positions.clear()
         going, self.going = self.going, []
-        tell(going, superseded)
+        tell((delivery for _, delivery in going), superseded)
         self.hold = NONE
         self.halt = [*(self.halt or ()), delivery]
 
     def fail(self, failure: Failure) -> None:
         """Tell everybody who waits that it will not happen."""
-        tell((*self.going, *self.setting, *(self.halt or ())), failure)
+        tell((*self.senders, *(self.halt or ())), failure)
+
+    @property
+    def moved(self) -> Finger:
+        """The axes that get a new position."""
+        mask = NONE
+        for axis in self.positions:
+            mask |= axis
+        return mask
+
+    @property
+    def senders(self) -> list[Delivery]:
+        """Callers that wait for nothing but the acknowledgement."""
+        return [*(delivery for _, delivery in self.going), *self.setting]
 
 
 def tell(deliveries: Iterable[Delivery], failure: Failure | None = None) -> None:

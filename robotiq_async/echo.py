@@ -79,13 +79,14 @@ class EchoWatch:
         self._written[-1].acknowledged = True
         self._written[-1].time = now
 
-    def observe(self, status: RobotiqStatus) -> Request | None:
+    def observe(self, status: RobotiqStatus, asked: float | None = None) -> Request | None:
         """The image that a status shows, or None if it shows none of ours.
 
         The gripper takes images in order, so the first one that fits, counted from the one shown last,
         is the one shown. An older one may come back for as long as it is remembered.
         """
-        self._forget(status.timestamp)
+        # What it shows may be as old as its request, however late the reply was looked at.
+        self._forget(status.timestamp if asked is None else asked)
         signature = signature_of_status(status)
         # The usual case first: nothing has changed since the last poll.
         shown = self._shown

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections.abc import Callable, Collection, Mapping
 from types import TracebackType
 from typing import ClassVar, Final, Self
@@ -27,6 +26,7 @@ from .errors import (
     StateTimeoutError,
 )
 from .link import Transport
+from .log import log
 from .machine import RUNNING, Machine, Trigger
 from .motion import Move, MoveResult
 from .options import (
@@ -41,8 +41,6 @@ from .statistics import Counters, Statistics
 from .status import RobotiqStatus
 from .streams import Channel, Stream, Transition
 from .waiting import StateWaiters
-
-log = logging.getLogger("robotiq_async")
 
 RESET_TIMEOUT_S: Final = 5.0
 """A reset takes a device cycle or two; this leaves room for a slow one."""
@@ -612,18 +610,13 @@ class RobotiqHand:
 
     # -- inside ----------------------------------------------------------------------------------------
 
-    @property
-    def _key(self) -> str:
-        """What two hands on one gripper have in common."""
-        return self._options.address.replace("//localhost:", "//127.0.0.1:")
-
     def _claim(self) -> None:
         """Own the address in this process.
 
         Raises:
             InvalidStateError: it is owned already.
         """
-        key = self._key
+        key = self._options.key
         owner = self._running.get(key)
         if owner is not None and owner._task is not None and not owner._task.get_loop().is_closed():  # noqa: SLF001
             who = "this hand" if owner is self else "another hand"
@@ -638,8 +631,8 @@ class RobotiqHand:
         """The owner task has ended: nobody may wait for it any longer. Called by whoever sees it first."""
         if self._task is not task:
             return
-        if self._running.get(self._key) is self:
-            del self._running[self._key]
+        if self._running.get(self._options.key) is self:
+            del self._running[self._options.key]
         self._task = None
         failure: Callable[[], RobotiqError] | None = None
         if not task.cancelled() and (bug := task.exception()) is not None:

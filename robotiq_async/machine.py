@@ -25,9 +25,8 @@ from typing import Final
 
 from .enums import Fault, Initialization, State
 from .errors import InvalidStateError
+from .log import log
 from .status import RobotiqStatus
-
-log = logging.getLogger("robotiq_async")
 
 
 class Trigger(Enum):

@@ -7,6 +7,7 @@ from typing import Final
 
 from .address import parse_address
 from .checks import check_byte, check_int, check_seconds
+from .guard import GuardedTransport
 from .link import ModbusTransport, Transport
 from .owner import ReconnectPolicy
 from .registers import REGISTER_COUNT, RTU_REGISTERS, TCP_REGISTERS
@@ -27,6 +28,8 @@ class Options:
 
     transport: Transport
     address: str
+    key: str
+    """The same for every address of this gripper."""
     poll_interval: float
     activation_timeout: float
     policy: ReconnectPolicy | None
@@ -69,19 +72,21 @@ def check_options(
         transport: Transport
         if parsed.kind == "sim":
             transport = SimulatedTransport(registers, connect_timeout=connect_s, response_timeout=response_s)
-            name = f"sim://#{id(transport):x}"  # every sim:// is a gripper of its own
+            name = key = f"sim://#{id(transport):x}"  # every sim:// is a gripper of its own
         else:
             transport = ModbusTransport(
                 parsed, registers, connect_timeout=connect_s, response_timeout=response_s
             )
-            name = str(parsed)
+            name, key = str(parsed), parsed.key
     elif isinstance(address, Transport):
-        transport, name = address, f"<{type(address).__name__} at {id(address):#x}>"
+        name = key = f"<{type(address).__name__} at {id(address):#x}>"
+        transport = GuardedTransport(address, name, connect_timeout=connect_s, response_timeout=response_s)
     else:
         raise TypeError(f"address must be a string or a Transport, got {address!r}")
     return Options(
         transport=transport,
         address=name,
+        key=key,
         poll_interval=check_seconds("poll_interval", poll_interval, 0.001, 0.1),
         activation_timeout=check_seconds("activation_timeout", activation_timeout, 0.01, 120.0),
         policy=_check_reconnect(reconnect),

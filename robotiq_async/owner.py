@@ -10,7 +10,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import importlib
-import logging
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,11 +28,10 @@ from .errors import (
     RobotiqError,
 )
 from .link import Transport
+from .log import log
 from .machine import Trigger
 from .statistics import Counters
 from .status import RobotiqStatus
-
-log = logging.getLogger("robotiq_async")
 
 # anyio loads its backend when it is first used: some 20 ms that would hold up the loop in which a hand
 # starts. Where it keeps it is not documented; a name that has changed costs those 20 ms and nothing else.
@@ -134,6 +132,8 @@ class Owner:
         self._interruptible: anyio.CancelScope | None = None
         self._deadline = 0.0
         self._last_poll = 0.0
+        self._read_at = 0.0
+        """When the newest status was asked for."""
         self._stall = 0.0
         """By how much the last tick came late."""
         self._warned = 0.0
@@ -159,7 +159,7 @@ class Owner:
 
     async def _first_contact(self) -> bool:
         try:
-            status = await self._contact()
+            found = await self._contact()
         except (ResponseTimeoutError, ConnectionLostError) as error:
             failed = ConnectFailedError(self._address, f"connected, but nobody answers: {error}")
             failed.__cause__ = error
@@ -168,9 +168,9 @@ class Owner:
         except RobotiqConnectionError as error:
             self._tell_connected(error)
             return False
-        if status is None:
+        if found is None:
             return False
-        self._take_in(status, self._activate)
+        self._take_in(*found, self._activate)
         self._tell_connected(None)
         return True
 
@@ -183,16 +183,16 @@ class Owner:
         else:
             self.connected.set_exception(failure)
 
-    async def _contact(self) -> RobotiqStatus | None:
-        """Open the link and read once; None when asked to stop meanwhile."""
+    async def _contact(self) -> tuple[RobotiqStatus, float] | None:
+        """Open the link and read once, see :meth:`_read`; None when asked to stop meanwhile."""
         with anyio.CancelScope() as self._interruptible:
             if not self._stopping:
                 await self._transport.open()
-                return self._status(await self._transport.read())
+                return await self._read()
         return None
 
-    def _take_in(self, status: RobotiqStatus, activate: bool) -> None:
-        self._core.found(status, activate=activate)
+    def _take_in(self, status: RobotiqStatus, asked: float, activate: bool) -> None:
+        self._core.found(status, activate=activate, asked=asked)
         self._publish(status)
         self._last_poll = 0.0
         self._deadline = self._loop.time()
@@ -210,7 +210,7 @@ class Owner:
             with anyio.CancelScope() as self._interruptible:
                 await asyncio.sleep(delay)
             try:
-                status = await self._contact()
+                found = await self._contact()
             except RobotiqConnectionError as error:
                 log.debug("still no link: %s", error)
                 if policy.give_up_after is not None and self._loop.time() - lost_at >= policy.give_up_after:
@@ -218,10 +218,10 @@ class Owner:
                     return False
                 delay = min(max(2 * delay, 0.01), policy.max_delay)
                 continue
-            if status is not None:
+            if found is not None:
                 self._counters.reconnects += 1
                 log.warning("link back after %.2f s", self._loop.time() - lost_at)
-                self._take_in(status, policy.activate)
+                self._take_in(*found, policy.activate)
                 return True
         return False
 
@@ -241,25 +241,43 @@ class Owner:
     async def _cycle(self) -> None:
         """Write what has changed, then read."""
         counters, loop = self._counters, self._loop
+        if self._core.has_request and self._is_stale():
+            await self._look()
         request = self._core.take_request(loop.time())
         if request is not None:
             await self._transport.write(request.registers)
             counters.writes += 1
             self._core.acknowledged(loop.time())
-        sent = loop.time()
-        status = self._status(await self._transport.read())
-        counters.round_trips.append(status.timestamp - sent)
+        await self._look()
+
+    async def _look(self) -> None:
+        """Read, and tell everybody."""
+        counters = self._counters
+        status, asked = await self._read()
+        counters.round_trips.append(status.timestamp - asked)
         if self._last_poll:
-            counters.periods.append(sent - self._last_poll)
-        self._last_poll = sent
-        self._core.see(status)
+            counters.periods.append(asked - self._last_poll)
+        self._last_poll = asked
+        self._core.see(status, asked)
         self._publish(status)
 
-    def _status(self, registers: tuple[int, ...]) -> RobotiqStatus:
+    async def _read(self) -> tuple[RobotiqStatus, float]:
+        """The status, and when it was asked for."""
+        asked = self._loop.time()
+        registers = await self._transport.read()
         status = RobotiqStatus(registers, self._loop.time(), self.sequence)
         self.sequence += 1
         self._counters.polls += 1
-        return status
+        self._read_at = asked
+        return status, asked
+
+    def _is_stale(self) -> bool:
+        """Whether the newest status is old, because the loop was held up or the reply was slow.
+
+        Nothing is decided on it then: what another client has done, or where an axis is by now, must be
+        seen before the next write. One more look is enough; a slow link does not get faster by it.
+        """
+        return self._loop.time() - self._read_at > self._interval + LATE_S
 
     async def _tick(self) -> None:
         """Wait for the next tick. Deadlines are absolute; a missed one is counted and skipped."""
@@ -292,9 +310,9 @@ class Owner:
     async def _finish(self) -> None:
         """Stop the fingers if that is possible in time, then disconnect."""
         self._stopping = True
-        self._core.stop()
         deadline = min(self._end_by, self._loop.time() + SHUTDOWN_S)
         try:
+            self._core.stop()
             with anyio.CancelScope(deadline=deadline, shield=True) as scope:
                 if self._halt_at_stop and self._core.status is not None:
                     await self._stop_fingers()
@@ -319,10 +337,12 @@ class Owner:
             await asyncio.sleep(SHUTDOWN_PAUSE_S)
 
     async def _stop_fingers_once(self) -> None:
-        if not self._transport.is_open:
+        is_new = not self._transport.is_open
+        if is_new:
             # A gripper that lost its client goes on moving.
             await self._transport.open()
-            self._core.status = self._status(await self._transport.read())
+        if is_new or self._is_stale():
+            self._core.status, _ = await self._read()
         self._core.shut_down()
         while self._core.is_busy:
             await self._cycle()

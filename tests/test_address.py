@@ -265,3 +265,27 @@ def test_a_link_local_address_names_its_interface_as_it_is_spelled(zone: str) ->
 def test_a_port_of_any_length_is_a_value_error_that_shows_the_forms() -> None:
     with pytest.raises(ValueError, match="malformed address"):
         parse_address("host:" + "9" * 5000)
+
+
+@pytest.mark.parametrize(
+    ("one", "another"),
+    [
+        ("127.1:5020", "tcp://127.0.0.1:5020"),
+        ("localhost", "127.0.0.1:502"),
+        ("gripper.local.", "tcp://gripper.local:502"),
+        ("[::1]:502", "tcp://[::1]"),
+    ],
+)
+def test_one_gripper_has_one_key(one: str, another: str) -> None:
+    assert parse_address(one).key == parse_address(another).key
+
+
+def test_the_links_to_a_serial_port_are_that_port(tmp_path: Path) -> None:
+    (tmp_path / "port").touch()
+    (tmp_path / "by-id").symlink_to(tmp_path / "port")
+    assert parse_address(f"rtu://{tmp_path}/by-id").key == parse_address(f"rtu://{tmp_path}/port").key
+    assert parse_address(f"rtu://{tmp_path}/by-id").key != parse_address(f"rtu://{tmp_path}/other").key
+
+
+def test_other_grippers_have_other_keys() -> None:
+    assert len({parse_address(each).key for each in ("a:1", "a:2", "b:1", "rtu://a", "sim://")}) == 5

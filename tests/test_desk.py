@@ -110,7 +110,7 @@ def test_any_commands_leave_the_last_value_of_each_axis_and_field(
 def test_holding_an_axis_drops_its_unsent_position_and_no_other() -> None:
     desk = Desk()
     desk.put(ABC, 100, 50, 60)
-    desk.put_hold(A | B)
+    desk.put_hold(A | B, superseded)
     assert desk.positions == {C: 100}
     assert desk.speeds == {A: 50, B: 50, C: 50}
     assert desk.forces == {A: 60, B: 60, C: 60}
@@ -119,22 +119,22 @@ def test_holding_an_axis_drops_its_unsent_position_and_no_other() -> None:
 
 def test_a_new_position_lifts_the_hold_of_its_axes_and_no_other() -> None:
     desk = Desk()
-    desk.put_hold(ALL)
+    desk.put_hold(ALL, superseded)
     desk.put(A, 100, None, None)
     assert desk.hold == B | C | S
 
 
 def test_a_new_speed_does_not_lift_a_hold() -> None:
     desk = Desk()
-    desk.put_hold(A)
+    desk.put_hold(A, superseded)
     desk.put(A, None, 50, 60)
     assert desk.hold == A
 
 
 def test_holds_add_up() -> None:
     desk = Desk()
-    desk.put_hold(A)
-    desk.put_hold(B)
+    desk.put_hold(A, superseded)
+    desk.put_hold(B, superseded)
     assert desk.hold == A | B
 
 
@@ -142,7 +142,7 @@ def test_holds_add_up() -> None:
     ("fill", "empty", "only_holds"),
     [
         (lambda _: None, True, True),
-        (lambda desk: desk.put_hold(A), False, True),
+        (lambda desk: desk.put_hold(A, superseded), False, True),
         (lambda desk: desk.put(A, 1, None, None), False, False),
         (lambda desk: desk.put(A, None, 1, None), False, False),
         (lambda desk: desk.put(A, None, None, 1), False, False),
@@ -165,7 +165,7 @@ def test_a_desk_knows_whether_there_is_something_to_write(
 def test_a_halt_drops_unsent_positions_and_holds_and_keeps_speeds_and_forces() -> None:
     desk, halter = Desk(), Caller()
     desk.put(ABC, 100, 50, 60)
-    desk.put_hold(S)
+    desk.put_hold(S, superseded)
     desk.put_halt(halter, superseded)
     assert not desk.positions
     assert desk.hold == Finger(0)

@@ -113,6 +113,10 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         """Call something after so many more turns of the loop: between any two callbacks, if need be."""
         self._virtual.at_turn = (self._virtual.turns + count, call)
 
+    def hold_up(self, seconds: float) -> None:
+        """Let time pass in which nothing else can happen in this loop, as a blocking call does."""
+        self._virtual.now += seconds
+
     # The signatures are asyncio's; what pymodbus and the simulator pass is all that is looked at.
 
     async def create_server(self, factory: Any, _host: Any = None, port: Any = None, **_: Any) -> Any:  # type: ignore[override]

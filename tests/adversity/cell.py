@@ -52,7 +52,7 @@ async def outcome(world: World, phase: Phase, words: str) -> str:
         state = world.hand.state
         if phase.name == "stopping" and abs(world.gripper.position(Finger.A) - TARGET) <= 2:
             told += ", fingers went on"
-        _check_motions(world, before, phase, words.split()[0])
+        _check_motions(world, before, phase, words.split()[0], told)
         await _works(world)
         world.check_no_stale_status()
         world.check_loop()
@@ -142,7 +142,7 @@ async def _rest(world: World) -> None:
                 return
 
 
-def _check_motions(world: World, before: Before, phase: Phase, kind: str) -> None:
+def _check_motions(world: World, before: Before, phase: Phase, kind: str, told: str) -> None:
     """No command was sent twice, neither in a row nor the one of the phase; only addressed axes moved."""
     motions = world.motions(before.writes)
     assert all(one != another for one, another in pairwise(motions)), motions
@@ -150,6 +150,8 @@ def _check_motions(world: World, before: Before, phase: Phase, kind: str) -> Non
     if kind in MOVES_EVERYTHING:
         return
     _check_travel(world, before.travels, phase.addressed)
+    if phase.name == "moving" and told in ("GripperFault", "NotActivated"):
+        assert world.gripper.position(Finger.A) < TARGET - 2, "a motion resumed after a fault"
     if phase.name == "holding" and kind != "power-cut":
         assert world.gripper.request_registers == before.requests, "the grip was relaxed"
 

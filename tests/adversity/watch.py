@@ -12,6 +12,9 @@ from robotiq_async.request import AxisRequest, Request
 from tests.adversity.world import LONGEST_HOLD_S, World
 from tests.virtual import HoldWatch
 
+STAYS_WITHIN = 2
+"""Counts between a request and a position that is reached."""
+
 
 class _WatchedSelector(selectors.DefaultSelector):
     """Tells a watch how long the loop was held between two waits."""
@@ -75,14 +78,16 @@ class WriteWatch:
     def check(self, world: World) -> Iterator[str]:
         """What was wrong with the writes since the last look."""
         images, world.gripper.images = world.gripper.images, []
-        for registers in images:
+        for registers, positions in images:
             axes = Request.from_registers(registers).axes
-            for axis, request, past, at in zip(AXES, axes, self._past, range(4), strict=True):
-                if request != self._last[at]:
-                    if request in past:
-                        yield f"{axis!r} was asked again for what it had been asked before: {request}"
-                    past.add(request)
-                    self._last[at] = request
+            for at, (request, position) in enumerate(zip(axes, positions, strict=True)):
+                if request == self._last[at]:
+                    continue
+                # To be asked to stay is no motion, however often.
+                if request in self._past[at] and abs(request.position - position) > STAYS_WITHIN:
+                    yield f"{AXES[at]!r}, at {position}, was asked again for what it was before: {request}"
+                self._past[at].add(request)
+                self._last[at] = request
 
 
 def check(world: World, writes: WriteWatch, loop: LoopWatch) -> Iterator[str]:

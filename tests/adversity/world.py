@@ -30,13 +30,13 @@ class StampedGripper(SimulatedGripper):
 
     Attributes:
         stamps: when each status was given out, and its number.
-        images: every image that was written.
+        images: every image that was written, with where the axes were.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.stamps: list[tuple[float, int]] = []
-        self.images: list[Registers] = []
+        self.images: list[tuple[Registers, tuple[int, ...]]] = []
         self._number = 0
 
     def status_registers(self) -> Registers:
@@ -47,7 +47,7 @@ class StampedGripper(SimulatedGripper):
 
     def write(self, address_offset: int, registers: Sequence[int]) -> None:
         super().write(address_offset, registers)
-        self.images.append(self.request_registers)
+        self.images.append((self.request_registers, tuple(self.position(axis) for axis in AXES)))
 
 
 class Heard:

@@ -65,7 +65,7 @@ def test_the_first_command_leaves_the_other_axes_what_they_do(
     bench.connect()
     # The scissor, so that A, B and C are all un-addressed. The hand's own speed is that of the client:
     # speeds have no echo.
-    bench.core._image = Request(axes=(AxisRequest(0, speed, 100),) * 4)
+    bench.core._ledger._image = Request(axes=(AxisRequest(0, speed, 100),) * 4)
     bench.command(S, position=180)
     bench.run(20)
     undisturbed.now = bench.now

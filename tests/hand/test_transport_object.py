@@ -11,6 +11,7 @@ from robotiq_async import (
     ConnectFailedError,
     ConnectionLostError,
     Finger,
+    ProtocolError,
     ReconnectPolicy,
     RobotiqHand,
     State,
@@ -122,3 +123,87 @@ async def test_missed_ticks_are_skipped_and_not_caught_up() -> None:
         assert hand.statistics.overruns >= 8
         assert statuses.missed == 0
         assert timestamps[-1] - timestamps[0] > 0.03, "a burst of polls"
+
+
+# -- a transport that does not keep to the rules ----------------------------------------------------------
+
+
+class Rogue(Wire):
+    """Does something that a transport must not do, in the call that it is told."""
+
+    def __init__(self, call: str, what: str) -> None:
+        super().__init__()
+        self.call, self.what = call, what
+        self.is_rogue = False
+
+    async def open(self) -> None:
+        await self._misbehave("open")
+        await super().open()
+
+    async def read(self) -> Registers:
+        await self._misbehave("read")
+        registers = await super().read()
+        if self.is_rogue and self.what == "seven":
+            return registers[:7]
+        if self.is_rogue and self.what == "range":
+            return (0x10000, *registers[1:])
+        return registers
+
+    async def write(self, registers: Sequence[int]) -> None:
+        await self._misbehave("write")
+        await super().write(registers)
+
+    async def _misbehave(self, call: str) -> None:
+        if not self.is_rogue or call != self.call:
+            return
+        if self.what == "never":
+            await asyncio.Event().wait()
+        if self.what == "raise":
+            raise OSError(5, "input/output error")
+
+
+WAYS = [
+    ("open", "never"),
+    ("open", "raise"),
+    ("read", "never"),
+    ("read", "raise"),
+    ("read", "seven"),
+    ("read", "range"),
+]
+
+
+@pytest.mark.parametrize(("call", "what"), WAYS)
+async def test_a_rogue_transport_fails_the_start(call: str, what: str) -> None:
+    wire = Rogue(call, what)
+    wire.is_rogue = True
+    hand = RobotiqHand(wire, connect_timeout=0.2, response_timeout=0.1)
+    async with asyncio.timeout(5):
+        with pytest.raises((ConnectFailedError, ProtocolError)):
+            await hand.start()
+    assert hand.state is State.SHUTDOWN
+    wire.is_rogue = False
+    async with hand:
+        await hand.move(30, Finger.A)
+
+
+@pytest.mark.parametrize(("call", "what"), [*WAYS[2:], ("write", "never"), ("write", "raise")])
+async def test_a_rogue_transport_is_a_lost_link(call: str, what: str) -> None:
+    wire = Rogue(call, what)
+    async with RobotiqHand(wire, connect_timeout=0.2, response_timeout=0.1) as hand:
+        wire.is_rogue = True
+        hand.command(Finger.A, position=100)
+        await hand.wait_for_state(State.DISCONNECTED, timeout=5)
+        wire.is_rogue = False
+        await hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
+        await hand.move(30, Finger.B)
+
+
+@pytest.mark.parametrize("what", ["never", "raise"])
+async def test_stop_ends_on_a_rogue_transport(what: str) -> None:
+    wire = Rogue("read", what)
+    hand = RobotiqHand(wire, connect_timeout=0.2)
+    await hand.start()
+    wire.is_rogue = True
+    async with asyncio.timeout(3):
+        await hand.stop()
+    assert hand.state is State.SHUTDOWN
