@@ -25,7 +25,7 @@ demo: $(STAMP)  ## Run the demo on a simulated gripper (ADDRESS=... for a real o
 	@$(BIN)/python -m robotiq_async demo $(ADDRESS)
 
 test: $(STAMP)  ## Run all tests
-	@$(BIN)/python -m pytest
+	@$(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
 soak: $(STAMP)  ## Move under random faults for MINUTES=30 over LINK=tcp (or rtu), and print figures
 	@$(BIN)/python -m tests.adversity.soak --minutes $(MINUTES) --link $(LINK)

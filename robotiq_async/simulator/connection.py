@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import struct
+from collections import deque
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from pymodbus.pdu import ExceptionResponse
@@ -50,6 +51,8 @@ class Connection(ServerRequestHandler):
         self._endpoint = endpoint
         self._inbox = bytearray()
         self._answering = False
+        self._outbox: deque[tuple[float, bytes]] = deque()
+        """What is sent later, and when, in order: no reply overtakes an older one."""
 
     def data_received(self, data: bytes) -> None:
         """Take bytes from the client; a gripper without power does not even hear them."""
@@ -64,11 +67,14 @@ class Connection(ServerRequestHandler):
         if parts is None:
             self.hang_up()
             return
+        now = self.loop.time()
         for delay, part in parts:
-            if delay > 0:
-                self.loop.call_later(delay, self._write, part)
-            else:
+            if delay <= 0 and not self._outbox:
                 self._write(part)
+                continue
+            last = self._outbox[-1][0] if self._outbox else now
+            self._outbox.append((max(last, now + delay), part))
+            self.loop.call_at(self._outbox[-1][0], self._write_next)
         if self._inbox:
             self.loop.call_soon(self._answer_next)
 
@@ -104,6 +110,9 @@ class Connection(ServerRequestHandler):
         if self.last_pdu is None:  # a wrong checksum: no answer, and what follows is suspect too
             self._answering = False
             self._inbox.clear()
+
+    def _write_next(self) -> None:
+        self._write(self._outbox.popleft()[1])
 
     def _write(self, part: bytes) -> None:
         if self.is_active() and part:

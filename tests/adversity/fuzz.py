@@ -96,7 +96,11 @@ def answers(request: bytes, reply: bytes, serial: bool) -> bool:
 
 
 def payload(reply: bytes, serial: bool) -> bytes | None:
-    """The registers of a reply to the reading of a status, if it is right in all that can be checked."""
+    """The registers of a reply to the reading of a status, if it is right in all that can be checked.
+
+    What follows it may arrive later, when the reply has been taken already.
+    """
+    reply = reply[: 21 if serial else 25]
     request = bytes((9, 3, 0x07, 0xD0, 0, 8)) if serial else reply[:4] + bytes((0, 6, 2, READ, 0, 0, 0, 8))
     right = len(reply) == (21 if serial else 25) and answers(request, reply, serial)
     return (reply[3:19] if serial else reply[9:25]) if right else None
@@ -253,8 +257,8 @@ async def _live_over_tcp(count: int, seed: int) -> dict[str, float]:
     async with SimulatorServer(SimulatedGripper(speedup=50)) as server:
         line = Line(random.Random(seed), serial=False, share=0.25)
         figures: dict[str, float] = {}
-        # The first tenth fills what grows once: caches, samples, buffers.
-        await live(server, server.address, line, count // 10)
+        # This fills what grows once: caches, samples, the history of writes (the last 10,000).
+        await live(server, server.address, line, count // 2)
         with memory_growth(figures):
             figures |= await live(server, server.address, line, count)
         return figures

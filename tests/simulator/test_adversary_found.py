@@ -121,3 +121,15 @@ async def test_cancelled_while_it_ends_clients_are_let_in_and_the_server_can_sto
         await server.adversary.end(begun)
         assert await is_let_in(server)
     assert not await is_let_in(server)
+
+
+@virtual
+async def test_a_reply_that_comes_later_is_not_overtaken() -> None:
+    async with simulator() as server, raw_client(server) as client:
+        await server.adversary.begin(Trouble("late"))
+        requests = [client.frame(bytes.fromhex("04 0000 0008")), client.frame(bytes.fromhex("04 0000 0002"))]
+        for request in requests:
+            client.writer.write(request)
+            await asyncio.sleep(0.1)
+        replies = [await client.reader.readexactly(size) for size in (25, 13)]
+        assert [reply[:2] for reply in replies] == [request[:2] for request in requests]
