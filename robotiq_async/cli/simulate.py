@@ -31,9 +31,12 @@ async def simulate(
     Its address is the only line on standard output, printed once it listens:
     other programs connect to it as to a real gripper.
 
-    A trouble is KIND [VALUE] [on read|write] [at S] [for S|for ever|once] [every S],
-    in seconds of the clock from the start. Each is told on standard error as it
-    begins. --troubles lists the kinds.
+    A trouble is
+
+        KIND [VALUE] [on read|write] [at S] [for S|for ever|once] [every S]
+
+    in seconds of the clock, counted from the start. Each is told on standard error
+    as it begins. --troubles lists the kinds.
 
     For example:
 

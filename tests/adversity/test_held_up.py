@@ -1,0 +1,84 @@
+"""The application holds up the event loop: it is noticed, and nothing is caught up on."""
+
+from __future__ import annotations
+
+import asyncio
+from itertools import pairwise
+
+import pytest
+
+from robotiq_async import Finger
+from tests.adversity.world import world
+from tests.virtual import run
+
+POLL_S = 0.01
+
+
+def test_what_was_missed_is_counted_and_skipped() -> None:
+    async def main() -> None:
+        async with world() as here:
+            await here.activate_beforehand()
+            await here.hand.start()
+            await anext(here.hand.statuses())
+            before, given = here.hand.statistics, len(here.gripper.stamps)
+            here.loop.hold_up(1.0)
+            await asyncio.sleep(0.5)
+            after = here.hand.statistics
+            assert after.overruns - before.overruns == pytest.approx(1.0 / POLL_S, abs=2)
+            assert after.longest_stall == pytest.approx(1.0, abs=0.02)
+            assert after.reconnects == 0
+            # Nothing is caught up on: half a second has its fifty polls, at their distance.
+            times = [at for at, _ in here.gripper.stamps[given + 1 :]]
+            assert len(times) == pytest.approx(0.5 / POLL_S, abs=2)
+            assert min(later - earlier for earlier, later in pairwise(times)) > POLL_S / 2
+
+    run(main)
+
+
+def test_one_warning_a_second_at_most(caplog: pytest.LogCaptureFixture) -> None:
+    async def main() -> None:
+        async with world() as here:
+            await here.activate_beforehand()
+            await here.hand.start()
+            began = here.loop.time()
+            while here.loop.time() - began < 10.0:
+                here.loop.hold_up(0.2)
+                await asyncio.sleep(0.025)
+
+    run(main)
+    warnings = [each.message for each in caplog.records if "holds up the event loop" in each.message]
+    assert 5 <= len(warnings) <= 11
+
+
+def test_slow_replies_are_not_blamed_on_the_loop_alone(caplog: pytest.LogCaptureFixture) -> None:
+    async def main() -> None:
+        async with world() as here:
+            here.server.replies.delay(0.1)
+            await here.activate_beforehand()
+            await here.hand.start()
+            await asyncio.sleep(1.0)
+            assert here.hand.statistics.longest_stall < 0.01
+
+    run(main)
+    (warning,) = [each.message for each in caplog.records if "polling is" in each.message]
+    assert "the gripper answers slowly" in warning
+
+
+@pytest.mark.parametrize("held_s", [0.05, 0.3, 0.6, 3.0])
+def test_a_move_survives(held_s: float) -> None:
+    async def main() -> None:
+        async with world() as here:
+            await here.activate_beforehand()
+            await here.hand.start()
+            moving = asyncio.create_task(here.hand.move(200, Finger.A, speed=0))
+            for _ in range(3):
+                # Between two exchanges: the simulator shares the loop, and would be held up with a request
+                # that a real gripper answers meanwhile.
+                await anext(here.hand.statuses())
+                here.loop.hold_up(held_s)
+            result = await moving
+            assert abs(result.positions[Finger.A] - 200) <= 2
+            assert here.hand.statistics.reconnects == 0
+            assert here.hand.statistics.foreign_commands == 0
+
+    run(main)
