@@ -182,11 +182,30 @@ class LiveUse(RuleBasedStateMachine):
     def wait(self, seconds: float) -> None:
         self.run(asyncio.sleep(seconds))
 
+    @rule(turns=st.integers(1, 30))
+    def a_few_turns_of_the_loop(self, turns: int) -> None:
+        """Into the middle of an exchange."""
+
+        async def wait() -> None:
+            loop = self.world.loop
+            over = loop.create_future()
+            loop.after_turns(turns, lambda: over.set_result(None))
+            await over
+
+        self.run(wait())
+
     # -- what goes wrong -------------------------------------------------------------------------------
 
     @rule(axes=masks, position=st.integers(20, 230))
     def something_is_in_the_way(self, axes: Finger, position: int) -> None:
         self.gripper.place_object(axes, position)
+
+    @rule(seconds=st.sampled_from([0.05, 0.3, 1.0]))
+    def the_loop_is_held_up(self, seconds: float) -> None:
+        async def hold() -> None:
+            self.world.loop.hold_up(seconds)
+
+        self.run(hold())
 
     @rule(trouble=st.sampled_from(LINK_TROUBLES))
     def the_link_fails(self, trouble: Trouble) -> None:
