@@ -60,16 +60,6 @@ async def test_two_slow_devices_are_both_undone() -> None:
 
 
 @virtual
-async def test_two_slow_devices_are_both_undone_in_the_end() -> None:
-    async with simulator() as server:
-        one = await server.adversary.begin(Trouble("slow-device", 0.2))
-        other = await server.adversary.begin(Trouble("slow-device", 0.5))
-        await server.adversary.end(one)
-        await server.adversary.end(other)
-        assert server.gripper.device_cycle == 0.005
-
-
-@virtual
 @pytest.mark.parametrize(
     ("first", "second", "left"),
     [
