@@ -63,6 +63,7 @@ class Core:
         self._ledger = Ledger(speed, force)
         self._procedure: Procedure | None = None
         self._step: Request | None = None
+        self._may_begin: Callable[[RobotiqStatus], bool] = lambda _: True
         self._step_number = 0
         """The write that carried the last step: a procedure sees only what came of it."""
         self._activating = False
@@ -110,9 +111,17 @@ class Core:
         self.command(move.axes, move.position, speed, force)
         self._moves.append((move, -1))
 
-    def abandon(self, move: Move) -> None:
-        """Nobody waits for this move any more: hold those of its axes that still move."""
+    def abandon(self, move: Move, *, unseen: bool = False) -> None:
+        """Nobody waits for this move any more: hold those of its axes that still move.
+
+        Args:
+            move: the move.
+            unseen: it was cancelled: if it has ended meanwhile, nobody knows of that.
+        """
         if all(each is not move for each, _ in self._moves):
+            if unseen and move.was_lost:
+                self._hold_on_return |= move.axes
+                self._hold_what_was_lost()
             return
         self._moves = [(each, number) for each, number in self._moves if each is not move]
         self._desk.put_hold(move.axes, lambda: MoveSupersededError("a move took over and was given up"))
@@ -141,7 +150,7 @@ class Core:
         """
         self.machine.happen(Trigger.ASK_ACTIVATE)
         self._activating = True
-        self._begin(activation(self._at_rest()))
+        self._begin(activation(self._at_rest()), lambda status: look(status) is Trigger.SEEN_RESET)
 
     def reset(self) -> None:
         """Begin a reset.
@@ -164,7 +173,8 @@ class Core:
             raise NotActivatedError("the gripper is reset: there is nothing to release")
         self.machine.happen(Trigger.ASK_RELEASE)
         self._drop_all(lambda: MoveSupersededError("atr() took over"))
-        self._begin(automatic_release(self._at_rest()))
+        # Raised rACT would activate a gripper that has been reset meanwhile.
+        self._begin(automatic_release(self._at_rest()), lambda status: status.activation_echo)
 
     def stop(self) -> None:
         """The hand is being stopped: nothing more is taken, and whoever waits is told."""
@@ -184,9 +194,10 @@ class Core:
             self._begin(reset(self._at_rest()))
         elif status.go_echo or not self._ledger.is_settled:
             # A gripper that lost its activation unnoticed must not be activated by our shutdown, nor one
-            # that a reset of ours is just about to reach.
+            # that a reset of ours is just about to reach; and one that others have activated not be reset.
             base = self._ledger.base
-            self._begin(shutdown(replace(base, activate=base.activate and status.activation_echo)))
+            active = status.activation_echo and (base.activate or self._ledger.is_settled)
+            self._begin(shutdown(replace(base, activate=active)))
 
     # -- the cycle -------------------------------------------------------------------------------------
 
@@ -274,6 +285,13 @@ class Core:
         if self._step is None and (self._procedure is not None or self._desk.is_empty):
             self._deliver()
 
+    def look_again(self, status: RobotiqStatus, asked: float) -> None:
+        """Take in a status before a shutdown: what is known must be known now."""
+        self.status = status
+        self._ledger.read(status, asked)
+        if look(status) is Trigger.SEEN_READY and not self._ledger.compare(status):
+            self._ledger.adopt(status)
+
     def see(self, status: RobotiqStatus, asked: float | None = None) -> None:
         """Take in a status, read after everything that was acknowledged so far.
 
@@ -285,7 +303,9 @@ class Core:
         self.status = status
         self._ledger.read(status, status.timestamp if asked is None else asked)
         if self._procedure is not None:
-            if self._step is None and self._sent is None and self._ledger.acts(self._step_number):
+            if self._step is not None and not self._may_begin(status):
+                self._call_off(status)
+            elif self._step is None and self._sent is None and self._ledger.acts(self._step_number):
                 self._advance(self._procedure, status)
             return
         before = self.machine.state
@@ -311,7 +331,8 @@ class Core:
             return error
 
         # A hold is a stop and not a motion: it is not dropped.
-        self._hold_on_return |= self._desk.hold | (NOBODY if self._sent is None else self._sent.hold)
+        for desk in (self._desk, self._sent or Desk()):
+            self._hold_on_return |= desk.hold | desk.replaced
         self._drop_all(failure)
         self._sent = self._procedure = self._step = None
         self._ledger.lost()
@@ -349,7 +370,7 @@ class Core:
             if desk.positions and not ledger.base.go and status.go_echo and not ledger.is_settled:
                 # Where the fingers stop is known once the halt has acted.
                 return None
-        return compose(ledger.base, desk, status, ledger.gripping)
+        return compose(ledger.base, desk, status, ledger.gripping(status))
 
     def _at_rest(self) -> Request:
         """The image with every axis asked to be where it is: nothing a raised rGTO could wake."""
@@ -359,10 +380,22 @@ class Core:
             {axis: status.position(axis) for axis in AXES}
         )
 
-    def _begin(self, procedure: Procedure) -> None:
+    def _begin(
+        self, procedure: Procedure, may_begin: Callable[[RobotiqStatus], bool] = lambda _: True
+    ) -> None:
+        """Begin a procedure; until its first request is sent, every status must allow it to begin."""
         self._procedure = procedure
         self._step = next(procedure)
-        self._ledger.gripping = NOBODY
+        self._may_begin = may_begin
+        self._hold_on_return = NOBODY
+        self._ledger.forget_contacts()
+
+    def _call_off(self, status: RobotiqStatus) -> None:
+        """What a procedure was to begin from is gone: send nothing, and see where the hand is instead."""
+        self._procedure = self._step = None
+        self._activating = False
+        self._deliver()
+        self.machine.happen(look(status))
 
     def _advance(self, procedure: Procedure, status: RobotiqStatus) -> None:
         """Hand the status to the procedure; at its end, see where that leaves the hand."""
@@ -374,8 +407,10 @@ class Core:
         except RobotiqError as error:
             log.warning("%s", error)
         self._procedure = None
+        ours = self._ledger.is_echoed_by(status)
         self._ledger.restart(status)
-        self.machine.happen(look(status))
+        if self.machine.happen(look(status)) in _COMMANDED and not ours:
+            self._take_over(status)
         self._note_activation(status)
 
     def _deliver(self) -> None:
@@ -395,6 +430,15 @@ class Core:
     def _return(self, status: RobotiqStatus) -> None:
         """The link is back: go on from the image that the gripper shows, or adopt it."""
         self._ledger.found(status)
+        if self.machine.state is State.FAULT and status.activation_echo:
+            # As when a fault is seen to begin: nothing resumes by itself when it clears.
+            self._hold_on_return = Finger.ALL
+        self._hold_what_was_lost()
+
+    def _hold_what_was_lost(self) -> None:
+        """Hold what a lost link kept from being held, unless somebody else moves it by now."""
+        if self.machine.state not in _COMMANDED:
+            return  # the link is still down
         axes, self._hold_on_return = self._hold_on_return & self._ledger.ours, NOBODY
         if axes:
             self._hold(axes)
@@ -408,6 +452,7 @@ class Core:
             self._warned = status.timestamp
             log.warning("another client commands the gripper: %r", status)
         self._ledger.adopt(status)
+        self._desk.hold &= self._ledger.ours
         self._end_moves(
             lambda: MoveSupersededError("another client commands the gripper"),
             lambda move: not move.is_under(status),
@@ -449,7 +494,13 @@ class Core:
             failure: Failure = lambda: GripperFaultError(fault)  # noqa: E731
         else:
             failure = lambda: NotActivatedError("the gripper lost its activation")  # noqa: E731
+        halt, halting = self._desk.halt, self._halting
+        if after is State.FAULT:
+            self._desk.halt, self._halting = None, []
         self._drop_all(failure)
+        if after is State.FAULT:
+            # A halt is good in a fault, too.
+            self._desk.halt, self._halting = halt, halting
         if after is State.FAULT and status.activation_echo:
             # Which axes drift is decided when the hold is written: a command that was sent just before
             # may not act yet, and its motion would begin when the fault clears.

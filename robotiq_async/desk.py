@@ -32,6 +32,7 @@ class Desk:
         speeds: new speed by axis.
         forces: new force by axis.
         hold: axes to be held where they are, if they move.
+        replaced: axes whose hold was replaced by a command: if that is lost, the hold is not.
         halt: callers of halt(); None when nobody asked to halt.
         going: callers that wait for a position to be sent, with their axes.
         setting: callers that wait for nothing but a speed or a force.
@@ -41,6 +42,7 @@ class Desk:
     speeds: dict[Finger, int] = field(default_factory=dict)
     forces: dict[Finger, int] = field(default_factory=dict)
     hold: Finger = NONE
+    replaced: Finger = NONE
     halt: list[Delivery] | None = None
     going: list[tuple[Finger, Delivery]] = field(default_factory=list)
     setting: list[Delivery] = field(default_factory=list)
@@ -68,6 +70,7 @@ class Desk:
             if value is not None:
                 changes.update(dict.fromkeys((axis for axis in AXES if axis in axes), value))
         if position is not None:
+            self.replaced |= self.hold & axes
             self.hold &= ~axes
         if delivery is not None and position is None:
             self.setting.append(delivery)
@@ -92,6 +95,7 @@ class Desk:
         self.positions.clear()
         going, self.going = self.going, []
         tell((delivery for _, delivery in going), superseded)
+        self.replaced |= self.hold
         self.hold = NONE
         self.halt = [*(self.halt or ()), delivery]
 

@@ -18,8 +18,8 @@ from .status import RobotiqStatus
 WINDOW_S: Final = 0.5
 """How long after its acknowledgement a write may still be about to show; the slowest device cycle that is
 reckoned with is 0.2 s."""
-SILENT_S: Final = 0.05
-"""How long a change without an echo (speed, force) is given to act: five cycles of a 100 Hz device."""
+SILENT_S: Final = 0.25
+"""How long a change without an echo (speed, force) is given to act: the slowest device cycle and more."""
 
 
 @dataclass(slots=True)
@@ -78,6 +78,12 @@ class EchoWatch:
         """The last image was acknowledged."""
         self._written[-1].acknowledged = True
         self._written[-1].time = now
+
+    def lost(self) -> None:
+        """The link is down: what was not acknowledged may have arrived, or not."""
+        last = self._written[-1] if self._written else None
+        if last is not None and not last.acknowledged:
+            last.acknowledged = last.doubtful = True
 
     def observe(self, status: RobotiqStatus, asked: float | None = None) -> Request | None:
         """The image that a status shows, or None if it shows none of ours.

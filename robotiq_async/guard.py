@@ -6,6 +6,8 @@ import asyncio
 from collections.abc import Awaitable, Sequence
 from typing import TypeVar
 
+import anyio
+
 from .errors import (
     ConnectFailedError,
     ConnectionLostError,
@@ -35,6 +37,7 @@ class GuardedTransport:
             response_timeout: seconds for a read or a write.
         """
         self._inner = inner
+        self._is_open = False
         self._name = name
         self._connect_timeout = connect_timeout
         self._response_timeout = response_timeout
@@ -42,7 +45,7 @@ class GuardedTransport:
     @property
     def is_open(self) -> bool:
         """Whether requests can be sent."""
-        return self._inner.is_open
+        return self._is_open and self._inner.is_open
 
     async def open(self) -> None:
         """Connect.
@@ -54,6 +57,7 @@ class GuardedTransport:
             await self._bounded(self._inner.open(), self._connect_timeout)
         except (ResponseTimeoutError, ConnectionLostError) as error:
             raise ConnectFailedError(self._name, str(error)) from error
+        self._is_open = True
 
     async def read(self) -> Registers:
         """The eight status registers.
@@ -78,9 +82,12 @@ class GuardedTransport:
 
     async def close(self) -> None:
         """Disconnect; never fails."""
+        # Whatever becomes of this, what comes later from the old connection is no answer to a new request.
+        self._is_open = False
         try:
-            async with asyncio.timeout(self._response_timeout):
-                await self._inner.close()
+            with anyio.CancelScope(shield=True):
+                async with asyncio.timeout(self._response_timeout):
+                    await self._inner.close()
         except Exception as error:  # noqa: BLE001  # there is nothing left to do about it
             log.warning("%s did not close: %r", self._name, error)
 

@@ -354,6 +354,11 @@ class RobotiqHand:
         try:
             with anyio.move_on_after(limit):
                 return await ended
+        except asyncio.CancelledError:
+            core.abandon(move, unseen=True)
+            if ended.done() and not ended.cancelled():
+                ended.exception()  # nobody else will look at it
+            raise
         finally:
             core.abandon(move)
         raise MoveTimeoutError(

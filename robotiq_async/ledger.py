@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from typing import Final
 
-from .adoption import Adoption
+from .adoption import TOLERANCE, Adoption, agrees
 from .echo import WINDOW_S, EchoWatch
-from .enums import AXES, Finger
-from .procedures import signature_of_status
+from .enums import AXES, Finger, ObjectStatus
+from .procedures import signature_of, signature_of_status
 from .request import AxisRequest, Request
 from .status import RobotiqStatus
 
@@ -39,8 +39,8 @@ class Ledger:
         """Until then a write that was not acknowledged before a reconnect may still show."""
         self._moved = NOBODY
         """Axes that we have given a position since the gripper was found."""
-        self.gripping = NOBODY
-        """The axes in contact when the go bit was last seen set: gDT is not worth reading without it."""
+        self._contacts: dict[Finger, tuple[ObjectStatus, int]] = {}
+        """The contacts, and where, when the go bit was last seen set: gDT is not worth reading without it."""
         self._shown: Request | None = None
         """The image of ours that the newest status shows, if it shows one."""
         self._asked = 0.0
@@ -92,6 +92,9 @@ class Ledger:
         self._adoption = None
         self._unsure_until = 0.0
         self._moved |= moved
+        for axis in AXES:
+            if axis in moved:
+                self._contacts.pop(axis, None)
         return self._watch.writing(image, now)
 
     def acknowledged(self, now: float) -> int:
@@ -102,7 +105,7 @@ class Ledger:
     def lost(self) -> None:
         """The link is down: what others do meanwhile is not seen."""
         self._adoption = None
-        self.gripping = NOBODY
+        self._watch.lost()
 
     # -- what is read ----------------------------------------------------------------------------------
 
@@ -118,7 +121,7 @@ class Ledger:
     def found(self, status: RobotiqStatus) -> None:
         """The link was lost and is back, and the gripper follows requests: ours, or it is adopted."""
         self._unsure_until = self._asked + WINDOW_S
-        if self._shown is None:
+        if self._shown is None or self._shown is self._adopted:
             self._moved = NOBODY
             self.adopt(status)
         else:
@@ -127,7 +130,7 @@ class Ledger:
 
     def adopt(self, status: RobotiqStatus) -> None:
         """Take the gripper as it is, without writing."""
-        self.gripping = NOBODY
+        self._contacts.clear()
         # Who writes again and again must not make us wait again and again.
         since = self._asked if self._adoption is None else self._adoption.since
         self._adoption = Adoption(status, self._asked, since)
@@ -141,6 +144,8 @@ class Ledger:
             return False
         if self._adoption is not None and shown is self._adopted:
             self._adoption.watch(status, self._asked)
+        elif self._asked < self._unsure_until and shown is self._adopted:
+            self.adopt(status)
         elif self._adoption is not None or self._asked < self._unsure_until:
             # Nothing was written since the link came back, or since another client wrote, and now an older
             # write of ours shows: go on from it.
@@ -150,8 +155,32 @@ class Ledger:
     def note_contacts(self, status: RobotiqStatus) -> None:
         """Remember which axes grip, as long as that can be seen."""
         if status.go_echo:
-            self.gripping = status.contacts
+            self._contacts = {
+                axis: (status.finger_status(axis), status.position(axis))
+                for axis in AXES
+                if axis in status.contacts
+            }
+
+    def gripping(self, status: RobotiqStatus) -> Finger:
+        """The axes that gripped when rGTO was last set, are there still, and by the request they have."""
+        mask, base = NOBODY, self.base
+        for axis, (what, at) in self._contacts.items():
+            is_there = abs(status.position(axis) - at) <= TOLERANCE
+            if is_there and agrees(base.position(axis), what, at, direction=0):
+                mask |= axis
+        return mask
+
+    def forget_contacts(self) -> None:
+        """A sequence begins: it lets go."""
+        self._contacts.clear()
+
+    def is_echoed_by(self, status: RobotiqStatus) -> bool:
+        """Whether a status shows the last image."""
+        return signature_of_status(status) == signature_of(self._image)
 
     def restart(self, status: RobotiqStatus) -> None:
-        """A sequence is over: what it wrote last is what the gripper has, and nothing else is on its way."""
+        """A sequence is over: what it wrote last is what the gripper has, and nothing else is on its way.
+
+        If the status shows something else, another client has written meanwhile.
+        """
         self._watch.restart(self._image, signature_of_status(status), self._asked)

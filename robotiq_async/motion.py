@@ -9,7 +9,7 @@ from typing import Final
 
 from .closing_time import STROKE_COUNTS, closing_time
 from .enums import AXES, Finger, ObjectStatus
-from .errors import RobotiqError
+from .errors import ConnectionLostError, RobotiqError
 from .status import RobotiqStatus
 
 MARGIN_S: Final = 2.0
@@ -62,7 +62,8 @@ class Move:
         """
         self.position = position
         self.axes = axes
-        self.is_sent = False
+        self.was_lost = False
+        """Whether the link went down under it."""
         self._started = now
         self._peak = dict.fromkeys((axis for axis in AXES if axis in axes), 0)
         self._done: Callable[[MoveResult | RobotiqError], None] | None = done
@@ -76,6 +77,7 @@ class Move:
         """Hand over the outcome, the first time."""
         done, self._done = self._done, None
         if done is not None:
+            self.was_lost = isinstance(outcome, ConnectionLostError)
             done(outcome)
 
     def observe(self, status: RobotiqStatus) -> None:

@@ -38,14 +38,19 @@ from .status import RobotiqStatus
 with contextlib.suppress(ImportError):
     importlib.import_module("anyio._backends._asyncio")
 
-STOP_S: Final = 1.8
-"""From stop() to its end at the latest, whatever is in flight; promised are 2 s."""
+STOP_S: Final = 1.4
+"""From stop() until disconnecting at the latest, whatever is in flight. Promised are 2 s; a transport object
+may take the last half second to close."""
 SHUTDOWN_S: Final = 1.2
 """Of that, time to reach the gripper and to see the fingers stop."""
 SHUTDOWN_PAUSE_S: Final = 0.05
 """Between two attempts at that."""
 LATE_S: Final = 0.05
 """Later than this a poll is worth a warning; on a busy machine a few milliseconds are usual."""
+HELD_S: Final = 0.01
+"""A timer that comes so late was kept from coming."""
+LOOKS: Final = 3
+"""At most so often a status that was asked for in a loop that was held up is asked for again."""
 LATE_WARNING_S: Final = 1.0
 """At most one warning about late polls in this time."""
 
@@ -133,7 +138,9 @@ class Owner:
         self._deadline = 0.0
         self._last_poll = 0.0
         self._read_at = 0.0
-        """When the newest status was asked for."""
+        """When the newest status came in."""
+        self._stall_in_read = 0.0
+        """By how much a timer came late while it was asked for."""
         self._stall = 0.0
         """By how much the last tick came late."""
         self._warned = 0.0
@@ -241,7 +248,9 @@ class Owner:
     async def _cycle(self) -> None:
         """Write what has changed, then read."""
         counters, loop = self._counters, self._loop
-        if self._core.has_request and self._is_stale():
+        for _ in range(LOOKS):
+            if not (self._core.has_request and self._is_stale()):
+                break
             await self._look()
         request = self._core.take_request(loop.time())
         if request is not None:
@@ -264,20 +273,31 @@ class Owner:
     async def _read(self) -> tuple[RobotiqStatus, float]:
         """The status, and when it was asked for."""
         asked = self._loop.time()
-        registers = await self._transport.read()
+        self._stall_in_read = 0.0
+        # A slow reply lets this timer come in time; a loop that is held up does not.
+        timer = self._loop.call_at(asked + LATE_S, self._note_stall, asked + LATE_S)
+        try:
+            registers = await self._transport.read()
+        finally:
+            timer.cancel()
         status = RobotiqStatus(registers, self._loop.time(), self.sequence)
         self.sequence += 1
         self._counters.polls += 1
-        self._read_at = asked
+        self._read_at = status.timestamp
         return status, asked
 
+    def _note_stall(self, due: float) -> None:
+        self._stall_in_read = self._loop.time() - due
+        self._counters.longest_stall = max(self._counters.longest_stall, self._stall_in_read)
+
     def _is_stale(self) -> bool:
-        """Whether the newest status is old, because the loop was held up or the reply was slow.
+        """Whether the loop was held up since the newest status was asked for.
 
         Nothing is decided on it then: what another client has done, or where an axis is by now, must be
-        seen before the next write. One more look is enough; a slow link does not get faster by it.
+        seen before the next write.
         """
-        return self._loop.time() - self._read_at > self._interval + LATE_S
+        age = self._loop.time() - self._read_at
+        return age > self._interval + LATE_S or self._stall_in_read > HELD_S
 
     async def _tick(self) -> None:
         """Wait for the next tick. Deadlines are absolute; a missed one is counted and skipped."""
@@ -299,9 +319,8 @@ class Owner:
         if now - self._warned < LATE_WARNING_S:
             return
         self._warned = now
-        # Late to wake up is the loop. A long exchange may be either: who was held up cannot tell.
-        held = "something holds up the event loop"
-        why = held if self._stall >= late / 2 else f"the gripper answers slowly, or {held}"
+        held = max(self._stall, self._stall_in_read) >= late / 2
+        why = "something holds up the event loop" if held else "the gripper answers slowly"
         missed = self._counters.overruns
         log.warning("polling is %.0f ms late: %s (%d polls missed so far)", 1000 * late, why, missed)
 
@@ -342,7 +361,7 @@ class Owner:
             # A gripper that lost its client goes on moving.
             await self._transport.open()
         if is_new or self._is_stale():
-            self._core.status, _ = await self._read()
+            self._core.look_again(*await self._read())
         self._core.shut_down()
         while self._core.is_busy:
             await self._cycle()

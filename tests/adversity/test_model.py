@@ -249,6 +249,7 @@ class LiveUse(RuleBasedStateMachine):
                     if quiet and self.hand.state is state and state is not State.DISCONNECTED:
                         break
 
+            await asyncio.sleep(0.05)  # the newest status may be from just before it came to rest
             self.look_at_outcomes()
             self.look_at_state()
 
