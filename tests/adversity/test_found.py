@@ -8,8 +8,16 @@ from dataclasses import replace
 
 import pytest
 
-from robotiq_async import Finger, NotStartedError, RobotiqError, State
-from robotiq_async.request import Request
+from robotiq_async import (
+    ConnectionLostError,
+    Fault,
+    Finger,
+    NotActivatedError,
+    NotStartedError,
+    RobotiqError,
+    State,
+)
+from robotiq_async.request import AxisRequest, Request
 from robotiq_async.simulator import Trouble
 from tests.adversity.world import World, world
 from tests.virtual import run
@@ -204,3 +212,104 @@ def test_a_log_handler_that_fails_does_not_keep_the_fingers_from_stopping(
     finally:
         logger.removeHandler(handler)
     assert "no space left" in capsys.readouterr().err
+
+
+# -- found by the second review ------------------------------------------------------------------------
+
+
+def test_stop_over_a_new_link_leaves_what_others_have_activated_active() -> None:
+    async def main() -> None:
+        async with world() as here:
+            await here.hand.start(activate=False)
+            here.gripper.place_object(Finger.ABC, 150)
+            async with here.server.adversary.making(Trouble("refuse")):
+                await asyncio.sleep(0.3)
+                here.gripper.write(0, [0x0100])
+                await asyncio.sleep(3)
+                axes = (AxisRequest(255, 128, 64),) * 4
+                here.gripper.write(0, Request(activate=True, go=True, axes=axes).registers)
+                await asyncio.sleep(3)
+            await here.hand.stop()
+            await asyncio.sleep(0.2)
+            asked = Request.from_registers(here.gripper.request_registers)
+            assert asked.activate
+            assert not asked.go
+
+    run(main)
+
+
+def test_a_release_is_called_off_when_the_gripper_was_reset_while_the_loop_was_held_up() -> None:
+    async def main() -> None:
+        async with world() as here:
+            await here.activate_beforehand()
+            await here.hand.start()
+            await here.hand.move(100)
+            here.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+            await here.until_state(State.FAULT)
+            await asyncio.sleep(0.3)
+            here.gripper.write(0, [0x0000])
+            here.loop.hold_up(1.0)
+            with pytest.raises(NotActivatedError):
+                await here.hand.atr()
+            await nothing_moves_for(here, 6)
+
+    run(main)
+
+
+@pytest.mark.parametrize("response_timeout", [0.4, 0.5])
+def test_a_write_fails_within_a_second_on_a_slow_link(response_timeout: float) -> None:
+    async def main() -> None:
+        async with world(response_timeout=response_timeout) as here:
+            await here.activate_beforehand()
+            await here.hand.start()
+            async with here.server.adversary.making(Trouble("delay", response_timeout - 0.01, on="read")):
+                await asyncio.sleep(1.0)
+                heard = len(here.server.heard)
+                await here.until(lambda: len(here.server.heard) > heard)
+                began = here.loop.time()
+                async with here.server.adversary.making(Trouble("drop", on="write")):
+                    with pytest.raises(ConnectionLostError):
+                        await here.hand.set_position(100)
+                assert here.loop.time() - began <= 1.0
+
+    run(main)
+
+
+@pytest.mark.parametrize("turns", range(1, 12))
+def test_a_move_cancelled_in_the_turn_in_which_the_link_is_lost_is_stopped_or_told(turns: int) -> None:
+    async def main() -> None:
+        async with world() as here:
+            await here.activate_beforehand()
+            await here.hand.start()
+            moving = asyncio.create_task(here.hand.move(255, A, speed=0))
+            await asyncio.sleep(0.3)
+            await here.server.adversary.begin(Trouble("close"))
+            here.loop.after_turns(turns, moving.cancel)
+            await asyncio.wait({moving})
+            await asyncio.sleep(4)
+            if moving.cancelled():
+                assert here.gripper.position(A) < 150
+            else:
+                assert isinstance(moving.exception(), ConnectionLostError)
+
+    run(main)
+
+
+def test_a_loop_that_is_held_up_again_during_the_second_look_is_looked_into_again() -> None:
+    async def main() -> None:
+        async with world() as here:
+            await here.activate_beforehand()
+            await here.hand.start()
+            await here.hand.move(50, A)
+            await anext(here.hand.statuses())
+            here.loop.hold_up(0.3)
+            here.hand.command(A, position=100)
+            heard = len(here.server.heard)
+            await here.until(lambda: len(here.server.heard) > heard)
+            await asyncio.sleep(0.0001)
+            here.loop.hold_up(0.1)
+            here.gripper.write(0, [0x0000])
+            here.loop.hold_up(0.2)
+            await nothing_moves_for(here, 6)
+
+    run(main)

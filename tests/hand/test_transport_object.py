@@ -207,3 +207,61 @@ async def test_stop_ends_on_a_rogue_transport(what: str) -> None:
     async with asyncio.timeout(3):
         await hand.stop()
     assert hand.state is State.SHUTDOWN
+
+
+class Slow(Wire):
+    """Its answers come in order, and closing it takes a moment, or for ever."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.answers: asyncio.Queue[Registers] = asyncio.Queue()
+        self.calls: list[str] = []
+        self.answers_after = 0.0
+        self.hangs = False
+
+    async def open(self) -> None:
+        self.calls.append("open")
+        self.answers = asyncio.Queue()
+        await super().open()
+
+    async def read(self) -> Registers:
+        self.calls.append("read")
+        if self.hangs:
+            await asyncio.Event().wait()
+        registers = await super().read()
+        asyncio.get_running_loop().call_later(self.answers_after, self.answers.put_nowait, registers)
+        return await self.answers.get()
+
+    async def close(self) -> None:
+        if self.hangs:
+            await asyncio.Event().wait()
+        await asyncio.sleep(0)
+        self.calls.append("close")
+        await super().close()
+
+
+async def test_a_read_that_stop_interrupts_leaves_no_answer_to_the_next() -> None:
+    wire = Slow()
+    hand = RobotiqHand(wire)
+    await hand.start()
+    await hand.set_position(255)
+    wire.broken = True
+    await hand.wait_for_state(State.DISCONNECTED)
+    wire.answers_after = 0.05
+    wire.calls.clear()
+    async with asyncio.timeout(5):
+        while "read" not in wire.calls:  # noqa: ASYNC110
+            await asyncio.sleep(0)
+    await hand.stop()
+    first = wire.calls.index("read")
+    assert wire.calls[first : first + 3] == ["read", "close", "open"]
+
+
+async def test_stop_is_bounded_when_a_transport_neither_answers_nor_closes() -> None:
+    wire = Slow()
+    hand = RobotiqHand(wire, response_timeout=0.5)
+    await hand.start()
+    wire.hangs = True
+    began = asyncio.get_running_loop().time()
+    await hand.stop()
+    assert asyncio.get_running_loop().time() - began < 2.0
