@@ -43,6 +43,11 @@ class EchoWatch:
         self._shown: _Written | None = None
 
     @property
+    def is_in_doubt(self) -> bool:
+        """Whether a write may or may not have arrived, and has not shown so far."""
+        return any(each.doubtful for each in self._written)
+
+    @property
     def last_number(self) -> int:
         """The number of the last image."""
         return self._number

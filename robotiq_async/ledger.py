@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Final
 
 from .adoption import TOLERANCE, Adoption, agrees
-from .echo import WINDOW_S, EchoWatch
+from .echo import SILENT_S, WINDOW_S, EchoWatch
 from .enums import AXES, Finger, ObjectStatus
 from .procedures import signature_of, signature_of_status
 from .request import AxisRequest, Request
@@ -43,6 +43,8 @@ class Ledger:
         """The contacts, and where, when the go bit was last seen set: gDT is not worth reading without it."""
         self._shown: Request | None = None
         """The image of ours that the newest status shows, if it shows one."""
+        self._sure_at = 0.0
+        """When no write was in doubt, the last time."""
         self._asked = 0.0
         """When the newest status was asked for. What it shows may be as old as that, however late its reply
         was looked at; so this is the time that the age of a write is measured by."""
@@ -61,7 +63,14 @@ class Ledger:
 
     @property
     def is_certain(self) -> bool:
-        """Whether the base can be relied on: an adopted axis takes a moment to show its direction."""
+        """Whether the base can be relied on.
+
+        An adopted axis takes a moment to show its direction. A write that was not acknowledged before the
+        link went down may have arrived, and shows within a device cycle: what is written before that would
+        take the axes back to what they were asked before it.
+        """
+        if self._watch.is_in_doubt and self._asked - self._sure_at < SILENT_S:
+            return False
         return self._adoption is None or self._adoption.is_certain
 
     @property
@@ -117,6 +126,8 @@ class Ledger:
         else:
             # The very first: not ours, but what any write of ours comes after.
             self._watch.restart(self._image, signature_of_status(status), asked)
+        if not self._watch.is_in_doubt:
+            self._sure_at = asked
 
     def found(self, status: RobotiqStatus) -> None:
         """The link was lost and is back, and the gripper follows requests: ours, or it is adopted."""

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
+from robotiq_async.enums import AXES
+from robotiq_async.request import Request
+from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.status import RobotiqStatus
 
 REQUEST_RESERVED = (0xE0, 0xF3, 0xFF, *(0,) * 12, 0xFF)
@@ -41,3 +45,14 @@ def status_of(
     axes = zip(four(echo), four(position), four(current), strict=True)
     content = [byte_0, byte_1, fault, *(byte for axis in axes for byte in axis), 0]
     return RobotiqStatus.from_registers(registers_of(content), timestamp=at, sequence=sequence)
+
+
+def only_holds(gripper: SimulatedGripper, since: int) -> bool:
+    """Whether all that was written after so many writes only asks axes to stay where they have stayed."""
+    images = [Request.from_registers(write.registers) for write in gripper.writes[max(since - 1, 0) :]]
+    for before, image in pairwise(images):
+        for axis in AXES:
+            is_asked_anew = image.position(axis) != before.position(axis)
+            if is_asked_anew and abs(image.position(axis) - gripper.position(axis)) > 2:
+                return False
+    return True

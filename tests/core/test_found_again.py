@@ -163,6 +163,34 @@ def test_a_pending_hold_does_not_stop_who_has_taken_over() -> None:
     assert bench.positions()[A] == 90
 
 
+@pytest.mark.parametrize("device_cycle", [0.005, 0.03, 0.1, 0.2])
+@pytest.mark.parametrize("arrived", [True, False])
+def test_a_command_after_a_lost_acknowledgement_waits_until_it_is_known_what_acts(
+    device_cycle: float, arrived: bool
+) -> None:
+    bench = started(device_cycle)
+    bench.command(S, position=32)
+    bench.run(0.6)
+    bench.command(S, position=200)
+    if arrived:
+        bench.step(answer=False)
+    else:
+        bench.now += POLL_S
+        assert bench.core.take_request(bench.now) is not None
+        bench.core.lost(None)
+    bench.now += 0.001
+    bench.connect(activate=False)  # before the gripper acts on it, if it got it
+    pending = bench.command(A, position=50)
+    began = bench.now
+    bench.until(lambda: pending.is_told)
+    assert bench.now - began < 0.5
+    bench.until(lambda: not bench.core.is_moving)
+    assert bench.positions()[S] == pytest.approx(200 if arrived else 32, abs=2)
+    assert bench.positions()[A] == pytest.approx(50, abs=2)
+    positions = [Request.from_registers(image).position(S) for image in bench.written]
+    assert positions[-1] == (200 if arrived else 32)
+
+
 # -- grips ---------------------------------------------------------------------------------------------
 
 
