@@ -30,7 +30,9 @@ class _Written:
     time: float
     acknowledged: bool = False
     doubtful: bool = False
-    """It may never have arrived: it counts while it may still act, and not as what the gripper has."""
+    """It counts while it may still act, and not as what the gripper has."""
+    received: bool = False
+    """It has arrived for certain."""
 
 
 class EchoWatch:
@@ -55,7 +57,7 @@ class EchoWatch:
     def restart(self, image: Request, signature: Signature, now: float) -> None:
         """Take an image for what the gripper has now, and a signature for how it shows; forget the rest."""
         self._number += 1
-        self._shown = _Written(self._number, image, signature, now, acknowledged=True)
+        self._shown = _Written(self._number, image, signature, now, acknowledged=True, received=True)
         self._written = deque([self._shown])
 
     def adopt(self, image: Request, signature: Signature, now: float) -> None:
@@ -69,9 +71,9 @@ class EchoWatch:
         self.restart(image, signature, now)
         for each in waiting:
             self._number += 1
-            self._written.append(
-                _Written(self._number, each.image, each.signature, now, acknowledged=True, doubtful=True)
-            )
+            again = _Written(self._number, each.image, each.signature, now, acknowledged=True, doubtful=True)
+            again.received = each.received
+            self._written.append(again)
 
     def writing(self, image: Request, now: float) -> int:
         """An image is about to be sent; returns the number it goes by."""
@@ -81,8 +83,9 @@ class EchoWatch:
 
     def acknowledged(self, now: float) -> None:
         """The last image was acknowledged."""
-        self._written[-1].acknowledged = True
-        self._written[-1].time = now
+        last = self._written[-1]
+        last.acknowledged = last.received = True
+        last.time = now
 
     def lost(self) -> None:
         """The link is down: what was not acknowledged may have arrived, or not."""
@@ -110,8 +113,17 @@ class EchoWatch:
         newer = [each for each in fitting if each.number > number]
         if newer:
             self._shown = newer[0]
-            self._shown.doubtful = False
+            self._shown.doubtful, self._shown.received = False, True
         return (newer or fitting)[0].image
+
+    def newest_that_shows_like(self, image: Request) -> Request:
+        """The newest image that has arrived for certain and cannot be told from this one by its echo.
+
+        That is what the gripper has, or will have in a moment: speed and force have no echo.
+        """
+        alike = {each.signature for each in self._written if each.image is image}
+        newest = [each.image for each in self._written if each.received and each.signature in alike]
+        return newest[-1] if newest else image
 
     def acts(self, number: int, now: float) -> bool:
         """Whether the image of this number, or a later one, acts by now.

@@ -136,8 +136,8 @@ class Ledger:
             self._moved = NOBODY
             self.adopt(status)
         else:
-            self._image = self._shown
-            self._watch.adopt(self._shown, signature_of_status(status), self._asked)
+            self._image = self._watch.newest_that_shows_like(self._shown)
+            self._watch.adopt(self._image, signature_of_status(status), self._asked)
 
     def adopt(self, status: RobotiqStatus) -> None:
         """Take the gripper as it is, without writing."""
@@ -160,7 +160,7 @@ class Ledger:
         elif self._adoption is not None or self._asked < self._unsure_until:
             # Nothing was written since the link came back, or since another client wrote, and now an older
             # write of ours shows: go on from it.
-            self._image, self._adoption = shown, None
+            self._image, self._adoption = self._watch.newest_that_shows_like(shown), None
         return True
 
     def note_contacts(self, status: RobotiqStatus) -> None:

@@ -8,14 +8,11 @@ import selectors
 import time
 from collections.abc import Iterator
 
-from robotiq_async.enums import AXES
+from robotiq_async.adoption import agrees
+from robotiq_async.enums import AXES, ObjectStatus
 from robotiq_async.request import AxisRequest, Request
 from tests.adversity.world import LONGEST_HOLD_S, World
 from tests.virtual import HoldWatch
-
-STAYS_WITHIN = 2
-"""Counts between a request and a position that is reached."""
-
 
 class _WatchedSelector(selectors.DefaultSelector):
     """Tells a watch how long the loop was held between two waits."""
@@ -80,12 +77,17 @@ class WriteWatch:
         """What was wrong with the writes since the last look."""
         images, world.gripper.images = world.gripper.images, []
         for registers, positions in images:
-            axes = Request.from_registers(registers).axes
-            for at, (request, position) in enumerate(zip(axes, positions, strict=True)):
+            image = Request.from_registers(registers)
+            if not image.go:
+                # Nobody is asked to move; and what comes after must not be what was halted.
+                self._last = [None] * len(AXES)
+                continue
+            for at, (request, position) in enumerate(zip(image.axes, positions, strict=True)):
                 if request == self._last[at]:
                     continue
                 # To be asked to stay is no motion, however often.
-                if request in self._past[at] and abs(request.position - position) > STAYS_WITHIN:
+                stays = agrees(request.position, ObjectStatus.AT_POSITION, position, direction=0)
+                if request in self._past[at] and not stays:
                     yield f"{AXES[at]!r}, at {position}, was asked again for what it was before: {request}"
                 self._past[at].add(request)
                 self._last[at] = request

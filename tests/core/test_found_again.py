@@ -308,3 +308,22 @@ def test_a_lost_hold_does_not_outlive_an_activation() -> None:
     blink(bench)
     bench.run(10)
     assert bench.positions()[A] >= 198
+
+
+# -- what has no echo ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("moved_before", [False, True])
+def test_an_acknowledged_speed_survives_a_blink_of_the_link(moved_before: bool) -> None:
+    bench = started(device_cycle=0.1)
+    if moved_before:
+        bench.command(B, position=120)
+        bench.step()
+    bench.command(B, speed=77, force=33)
+    bench.step()
+    blink(bench)
+    bench.run(0.3)
+    bench.command(A, position=60)
+    bench.run(0.6)
+    image = Request.from_registers(bench.written[-1])
+    assert (image.axes[1].speed, image.axes[1].force) == (77, 33)
