@@ -14,6 +14,7 @@ from robotiq_async.request import AxisRequest, Request
 from tests.adversity.world import LONGEST_HOLD_S, World
 from tests.virtual import HoldWatch
 
+
 class _WatchedSelector(selectors.DefaultSelector):
     """Tells a watch how long the loop was held between two waits."""
 
