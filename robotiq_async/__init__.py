@@ -22,11 +22,14 @@ The map; each module imports only what stands above it::
     ------------------------------------------------------------
     address      which gripper                                 asyncio from here on
     reply        every byte of a reply, checked
-    link         transports; the only module that uses pymodbus
+    messages     what is asked and answered, as pymodbus knows it
+    link         transports; the only module, messages aside, that uses pymodbus
     guard        transports of somebody else's, held to what a hand relies on
     simulated    the transport of sim://
     statistics   figures about the polling
     streams      async iterators
+    timerfd      Linux's timer that is watched like a socket
+    tick         the beat of the polling
     owner        the one task that owns the link
     options      checked options of a hand
     waiting      callers that wait for a state

@@ -7,18 +7,19 @@ pymodbus does the framing and the transport; what it leaves to its user is done 
 * Every byte that arrives is checked before pymodbus sees it (reply.py). Anything but the whole right
   answer, in time, ends the exchange *and* the connection: on a link that is out of step the next reply
   could be the answer to this request.
-* Time-outs are a watchdog of ours. pymodbus's own is ``asyncio.wait_for``, which on Python 3.11 swallows
-  a cancellation that lands together with the reply, and which a loop that was held up takes for silence
-  although the reply is waiting in the socket.
+* Time-outs are a watchdog of ours that looks once in a while. pymodbus's own is ``asyncio.wait_for``,
+  which on Python 3.11 swallows a cancellation that lands together with the reply, and which a loop that
+  was held up takes for silence although the reply is waiting in the socket.
 * Foreign exceptions stop here.
 """
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
-from collections.abc import Awaitable, Callable, Sequence
-from typing import Any, Protocol, runtime_checkable
+from collections.abc import Sequence
+from typing import Any, Final, Protocol, runtime_checkable
 
 import anyio
 from pymodbus import FramerType
@@ -34,6 +35,7 @@ from .errors import (
     ResponseTimeoutError,
     RobotiqConnectionError,
 )
+from .messages import ReadRequest, WriteRequest, register
 from .registers import REGISTER_COUNT, RegisterMap, Registers
 from .reply import Expected, expected_reply
 
@@ -42,6 +44,13 @@ from .reply import Expected, expected_reply
 _pymodbus_log = logging.getLogger("pymodbus.logging")
 if _pymodbus_log.level == logging.NOTSET:
     _pymodbus_log.setLevel(logging.CRITICAL + 1)
+
+LARGEST_READ: Final = 4096
+"""Bytes taken from the socket at a time; the longest Modbus frame has 260."""
+HELD_S: Final = 0.01
+"""A watchdog that comes so late was kept from coming: the loop was held up."""
+GRACE_S: Final = 0.02
+"""A peer in the same loop (the simulated gripper) was held up with it, and gets so much more time."""
 
 
 class _ExchangeEndedError(Exception):
@@ -117,6 +126,12 @@ class ModbusTransport:
         self._expected: Expected | None = None
         self._failure: RobotiqConnectionError | None = None
         self._probe = 0
+        self._poll = ReadRequest(registers)
+        self._loop: asyncio.AbstractEventLoop
+        self._due = 0.0
+        """When the exchange in flight must be over, in the loop's time."""
+        self._has_grace = False
+        self._watchdog: asyncio.TimerHandle | None = None
 
     @property
     def is_open(self) -> bool:
@@ -132,6 +147,7 @@ class ModbusTransport:
             ResponseTimeoutError: a serial port can be opened, but nobody answers.
         """
         await self.close()
+        self._loop = asyncio.get_running_loop()
         self._failure = self._expected = None
         client = self._make_client()
         try:
@@ -153,6 +169,10 @@ class ModbusTransport:
             what = "cannot open the serial port" if self._serial else "connection refused or host unreachable"
             raise ConnectFailedError(str(self._address), what)
         self._client = client
+        # asyncio asks the system for 256 KiB at a time, and taking and giving back that much memory costs
+        # several times what a reply does. Undocumented: where it is called otherwise, nothing is saved.
+        with contextlib.suppress(AttributeError):
+            client.ctx.transport.max_size = LARGEST_READ  # type: ignore[attr-defined]
         if self._serial:
             await self._resynchronise()
 
@@ -162,7 +182,7 @@ class ModbusTransport:
         Raises:
             RobotiqConnectionError: no clean answer in time; the transport is closed.
         """
-        return await self._read(REGISTER_COUNT)
+        return tuple((await self._exchange(self._poll)).registers)
 
     async def write(self, registers: Sequence[int]) -> None:
         """Write the eight request registers with one FC16, exactly once.
@@ -170,24 +190,13 @@ class ModbusTransport:
         Raises:
             RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
         """
-        client = self._connected()
-        await self._exchange(
-            lambda: client.write_registers(self._map.request, list(registers), device_id=self._map.device_id)
-        )
+        await self._exchange(WriteRequest(self._map, registers))
 
     async def close(self) -> None:
         """Disconnect; does nothing when closed."""
         self._drop()
 
     # -- one exchange ----------------------------------------------------------------------------------
-
-    async def _read(self, count: int) -> Registers:
-        client = self._connected()
-        read = client.read_input_registers if self._map.read_function == 4 else client.read_holding_registers
-        response = await self._exchange(
-            lambda: read(self._map.status, count=count, device_id=self._map.device_id)
-        )
-        return tuple(response.registers)
 
     def _connected(self) -> AsyncModbusTcpClient | AsyncModbusSerialClient:
         if self._failure is not None:
@@ -199,11 +208,12 @@ class ModbusTransport:
             raise ConnectionLostError(f"not connected to {self._address}")
         return self._client
 
-    async def _exchange(self, send: Callable[[], Awaitable[ModbusPDU]]) -> ModbusPDU:
+    async def _exchange(self, request: ModbusPDU) -> ModbusPDU:
         """Send one request and wait for its answer; on anything else the connection is given up."""
-        watchdog = self._watch()
+        client = self._connected()
+        self._watch()
         try:
-            response = await send()
+            response: ModbusPDU = await client.execute(False, request)
         except _ExchangeEndedError as ended:
             self._drop()
             raise ended.reason from None
@@ -218,22 +228,38 @@ class ModbusTransport:
             self._drop()
             raise
         finally:
-            watchdog.cancel()
             self._expected = None
         return response
 
-    def _watch(self) -> asyncio.TimerHandle:
-        """Fail the exchange when it takes too long; to be cancelled at its end.
+    def _watch(self) -> None:
+        """Fail the exchange that begins now when it takes too long.
+
+        Setting a timer for each exchange and cancelling it costs more than the exchange's own Python. So
+        one timer stands until it expires, and then looks when the exchange of that moment is due.
+        """
+        loop = self._loop
+        self._due = loop.time() + self._response_timeout
+        self._has_grace = False
+        if self._watchdog is None:
+            self._watchdog = loop.call_at(self._due, self._look, self._due)
+
+    def _look(self, when: float) -> None:
+        """The watchdog's timer has expired.
 
         A loop that was held up reads before it looks at its timers: a reply that was waiting is in time.
         """
-
-        def expire() -> None:
-            if self._client is not None and not self._client.ctx.response_future.done():
-                waited = f"{self._response_timeout:g} s"
-                self._fail(ResponseTimeoutError(f"{self._address} did not answer within {waited}"))
-
-        return asyncio.get_running_loop().call_later(self._response_timeout, expire)
+        self._watchdog = None
+        client = self._client
+        if client is None or self._expected is None or client.ctx.response_future.done():
+            return
+        now = self._loop.time()
+        if now >= self._due and now - when > HELD_S and not self._has_grace:
+            self._due, self._has_grace = now + GRACE_S, True
+        if now < self._due:
+            self._watchdog = self._loop.call_at(self._due, self._look, self._due)
+        else:
+            waited = f"{self._response_timeout:g} s"
+            self._fail(ResponseTimeoutError(f"{self._address} did not answer within {waited}"))
 
     def _fail(self, error: RobotiqConnectionError) -> None:
         """End the exchange in flight with an error; without one, keep the error for the next."""
@@ -248,6 +274,9 @@ class ModbusTransport:
 
     def _drop(self) -> None:
         client, self._client = self._client, None
+        watchdog, self._watchdog = self._watchdog, None
+        if watchdog is not None:
+            watchdog.cancel()
         if client is not None:
             client.close()
 
@@ -283,14 +312,16 @@ class ModbusTransport:
             "trace_connect": self._trace_connect,
         }
         if not self._serial:
-            return AsyncModbusTcpClient(self._address.host, port=self._address.port, **options)
+            tcp = AsyncModbusTcpClient(self._address.host, port=self._address.port, **options)
+            register(tcp)
+            return tcp
         try:
             import serial  # noqa: F401, PLC0415
         except ImportError:
             raise ConnectFailedError(
                 str(self._address), "serial ports need pyserial: pip install 'robotiq-async[serial]'"
             ) from None
-        return AsyncModbusSerialClient(
+        line = AsyncModbusSerialClient(
             self._address.host,
             framer=FramerType.RTU,
             baudrate=115200,
@@ -299,6 +330,8 @@ class ModbusTransport:
             stopbits=1,
             **options,
         )
+        register(line)
+        return line
 
     async def _resynchronise(self) -> None:
         """Make sure that no answer to an earlier request is still on its way.
@@ -308,4 +341,4 @@ class ModbusTransport:
         gripper answers in order, so that once the right length is back nothing older can follow.
         """
         self._probe = self._probe % (REGISTER_COUNT - 1) + 1
-        await self._read(self._probe)
+        await self._exchange(ReadRequest(self._map, self._probe))

@@ -32,6 +32,7 @@ from .log import log
 from .machine import Trigger
 from .statistics import Counters
 from .status import RobotiqStatus
+from .tick import Tick
 
 # anyio loads its backend when it is first used: some 20 ms that would hold up the loop in which a hand
 # starts. Where it keeps it is not documented; a name that has changed costs those 20 ms and nothing else.
@@ -48,7 +49,7 @@ SHUTDOWN_PAUSE_S: Final = 0.05
 LATE_S: Final = 0.05
 """Later than this a poll is worth a warning; on a busy machine a few milliseconds are usual."""
 HELD_S: Final = 0.01
-"""A timer that comes so late was kept from coming."""
+"""A tick that comes so late was kept from coming."""
 LOOKS: Final = 3
 """At most so often a status that was asked for in a loop that was held up is asked for again."""
 LATE_WARNING_S: Final = 1.0
@@ -135,14 +136,10 @@ class Owner:
         self._end_by = math.inf
         self._halt_at_stop = True
         self._interruptible: anyio.CancelScope | None = None
-        self._deadline = 0.0
+        self._tick = Tick(poll_interval)
         self._last_poll = 0.0
         self._read_at = 0.0
         """When the newest status came in."""
-        self._stall_in_read = 0.0
-        """By how much a timer came late while it was asked for."""
-        self._stall = 0.0
-        """By how much the last tick came late."""
         self._warned = 0.0
 
     def request_stop(self, *, halt: bool) -> None:
@@ -202,7 +199,8 @@ class Owner:
         self._core.found(status, activate=activate, asked=asked)
         self._publish(status)
         self._last_poll = 0.0
-        self._deadline = self._loop.time()
+        self._tick.start()
+        self._counters.tick = self._tick.source
 
     async def _reconnect(self, why: RobotiqConnectionError) -> bool:
         """Open the link again; False when that is given up, or when asked to stop."""
@@ -236,7 +234,7 @@ class Owner:
 
     async def _poll(self) -> None:
         while not self._stopping:
-            await self._tick()
+            await self._wait_for_tick()
             if self._stopping:
                 return
             try:
@@ -247,16 +245,16 @@ class Owner:
 
     async def _cycle(self) -> None:
         """Write what has changed, then read."""
-        counters, loop = self._counters, self._loop
+        core = self._core
         for _ in range(LOOKS):
-            if not (self._core.has_request and self._is_stale()):
+            if not (core.has_request and self._is_stale()):
                 break
             await self._look()
-        request = self._core.take_request(loop.time())
+        request = core.take_request(self._tick.time())
         if request is not None:
             await self._transport.write(request.registers)
-            counters.writes += 1
-            self._core.acknowledged(loop.time())
+            self._counters.writes += 1
+            core.acknowledged(self._tick.time())
         await self._look()
 
     async def _look(self) -> None:
@@ -272,54 +270,40 @@ class Owner:
 
     async def _read(self) -> tuple[RobotiqStatus, float]:
         """The status, and when it was asked for."""
-        asked = self._loop.time()
-        self._stall_in_read = 0.0
-        # A slow reply lets this timer come in time; a loop that is held up does not.
-        timer = self._loop.call_at(asked + LATE_S, self._note_stall, asked + LATE_S)
-        try:
-            registers = await self._transport.read()
-        finally:
-            timer.cancel()
-        status = RobotiqStatus(registers, self._loop.time(), self.sequence)
+        tick = self._tick
+        tick.late = 0.0
+        asked = tick.time()
+        registers = await self._transport.read()
+        status = RobotiqStatus(registers, tick.time(), self.sequence)
         self.sequence += 1
         self._counters.polls += 1
         self._read_at = status.timestamp
         return status, asked
 
-    def _note_stall(self, due: float) -> None:
-        self._stall_in_read = self._loop.time() - due
-        self._counters.longest_stall = max(self._counters.longest_stall, self._stall_in_read)
-
     def _is_stale(self) -> bool:
         """Whether the loop was held up since the newest status was asked for.
 
         Nothing is decided on it then: what another client has done, or where an axis is by now, must be
-        seen before the next write.
+        seen before the next write. While a slow gripper is waited for the ticks come in time; when the loop
+        is held up they do not. And the loop may be held up at this moment: no tick tells of that yet.
         """
-        age = self._loop.time() - self._read_at
-        return age > self._interval + LATE_S or self._stall_in_read > HELD_S
+        return self._tick.late > HELD_S or self._tick.time() - self._read_at > self._interval + LATE_S
 
-    async def _tick(self) -> None:
-        """Wait for the next tick. Deadlines are absolute; a missed one is counted and skipped."""
-        loop, interval = self._loop, self._interval
-        self._deadline += interval
-        late = loop.time() - self._deadline
-        if late >= interval:
-            missed = int(late / interval)
+    async def _wait_for_tick(self) -> None:
+        """Wait for the next tick; one that was missed is counted and skipped."""
+        missed = await self._tick.wait() - 1
+        self._counters.longest_stall = self._tick.longest_late
+        if missed:
             self._counters.overruns += missed
-            self._deadline += missed * interval
-            if late >= LATE_S:
-                self._warn_late(late)
-        await asyncio.sleep(max(0.0, self._deadline - loop.time()))
-        self._stall = loop.time() - self._deadline
-        self._counters.longest_stall = max(self._counters.longest_stall, self._stall)
+            if missed * self._interval >= LATE_S:
+                self._warn_late(missed * self._interval)
 
     def _warn_late(self, late: float) -> None:
         now = self._loop.time()
         if now - self._warned < LATE_WARNING_S:
             return
         self._warned = now
-        held = max(self._stall, self._stall_in_read) >= late / 2
+        held = self._tick.late >= late / 2
         why = "something holds up the event loop" if held else "the gripper answers slowly"
         missed = self._counters.overruns
         log.warning("polling is %.0f ms late: %s (%d polls missed so far)", 1000 * late, why, missed)
@@ -338,6 +322,7 @@ class Owner:
             if scope.cancelled_caught:
                 log.warning("the gripper did not confirm in time that the fingers were stopped")
         finally:
+            self._tick.close()
             await self._transport.close()
             self._core.machine.happen(Trigger.STOPPED)
 

@@ -7,7 +7,8 @@ at before pymodbus sees it. No I/O here: bytes in, a verdict out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 from .errors import ProtocolError
 
@@ -23,8 +24,7 @@ _EXCEPTIONS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Expected:
+class Expected(NamedTuple):
     """The one reply that answers a request.
 
     Attributes:
@@ -45,6 +45,8 @@ class Expected:
         Raises:
             ProtocolError: the bytes can not become the answer, or the device refuses the request.
         """
+        if len(frame) == self.size and frame.startswith(self.start):
+            return True  # the usual case, quickly
         if _agree(frame, self.start):
             if len(frame) > self.size:
                 raise ProtocolError(f"{len(frame) - self.size} bytes more than the answer: {_show(frame)}")
@@ -61,7 +63,24 @@ class Expected:
 
 def expected_reply(request: bytes, *, serial: bool) -> Expected:
     """The reply that answers a request frame of function 3, 4 or 16."""
-    at, checksum = (1, 2) if serial else (7, 0)
+    if serial:
+        return _expected(request, 2)
+    # Over TCP a header comes first: transaction and protocol, to be repeated, then the length.
+    start, size, refusal, refusal_size = _expected_over_tcp(request[6:])
+    header = request[:4]
+    return Expected(header + start, size, header + refusal, refusal_size)
+
+
+@lru_cache(maxsize=16)
+def _expected_over_tcp(request: bytes) -> Expected:
+    """The same from the unit on, with the length before it; that of a poll is always the same."""
+    start, size, refusal, refusal_size = _expected(request, 0)
+    return Expected(_length(size) + start, size + 6, _length(refusal_size) + refusal, refusal_size + 6)
+
+
+def _expected(request: bytes, checksum: int) -> Expected:
+    """The same for a frame that begins with the unit and ends with a check sum of so many bytes."""
+    at = 1
     function = request[at]
     if function == 16:
         # The echo of address and count.
@@ -70,19 +89,16 @@ def expected_reply(request: bytes, *, serial: bool) -> Expected:
         payload = 2 * int.from_bytes(request[at + 3 : at + 5], "big")
         pdu = bytes((function, payload))
     return Expected(
-        start=_header(request, len(pdu) + payload, serial=serial) + pdu,
+        start=request[:at] + pdu,
         size=at + len(pdu) + payload + checksum,
-        refusal=_header(request, 2, serial=serial) + bytes((function | 0x80,)),
+        refusal=request[:at] + bytes((function | 0x80,)),
         refusal_size=at + 2 + checksum,
     )
 
 
-def _header(request: bytes, pdu_size: int, *, serial: bool) -> bytes:
-    """What stands before the function code of a reply: the unit, over TCP after the rest of the MBAP header.
-
-    Transaction, protocol and unit are those of the request; the length counts from the unit on.
-    """
-    return request[:1] if serial else request[:4] + (pdu_size + 1).to_bytes(2, "big") + request[6:7]
+def _length(size: int) -> bytes:
+    """The length field: it counts from the unit on."""
+    return size.to_bytes(2, "big")
 
 
 def _show(frame: bytes) -> str:

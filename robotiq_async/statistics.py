@@ -26,6 +26,7 @@ class Statistics:
         longest_stall: longest time a tick came late, in seconds: the event loop was held up.
         reconnects: times the link was opened again.
         foreign_commands: times another client was seen to command the gripper.
+        tick: what the polls are timed by: "timerfd" (Linux), "loop timer", or nothing before the first.
     """
 
     polls: int
@@ -38,12 +39,22 @@ class Statistics:
     longest_stall: float
     reconnects: int
     foreign_commands: int
+    tick: str
 
 
 class Counters:
     """What the owner task counts."""
 
-    __slots__ = ("longest_stall", "overruns", "periods", "polls", "reconnects", "round_trips", "writes")
+    __slots__ = (
+        "longest_stall",
+        "overruns",
+        "periods",
+        "polls",
+        "reconnects",
+        "round_trips",
+        "tick",
+        "writes",
+    )
 
     def __init__(self) -> None:
         """Begin at zero."""
@@ -52,6 +63,7 @@ class Counters:
         self.overruns = 0
         self.reconnects = 0
         self.longest_stall = 0.0
+        self.tick = ""
         self.periods: deque[float] = deque(maxlen=SAMPLES)
         self.round_trips: deque[float] = deque(maxlen=SAMPLES)
 
@@ -69,6 +81,7 @@ class Counters:
             longest_stall=self.longest_stall,
             reconnects=self.reconnects,
             foreign_commands=foreign_commands,
+            tick=self.tick,
         )
 
 

@@ -23,6 +23,7 @@ def test_before_the_first_poll_every_figure_is_zero() -> None:
         longest_stall=0.0,
         reconnects=0,
         foreign_commands=0,
+        tick="",
     )
 
 
@@ -33,6 +34,7 @@ def test_a_snapshot_tells_each_counter_under_its_own_name() -> None:
     counters.overruns = 3
     counters.reconnects = 4
     counters.longest_stall = 0.5
+    counters.tick = "timerfd"
     counters.periods.append(0.006)
     counters.round_trips.append(0.007)
     assert dataclasses.asdict(counters.snapshot(8)) == {
@@ -46,6 +48,7 @@ def test_a_snapshot_tells_each_counter_under_its_own_name() -> None:
         "round_trip_p50": 0.007,
         "round_trip_p99": 0.007,
         "foreign_commands": 8,
+        "tick": "timerfd",
     }
 
 

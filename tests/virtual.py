@@ -65,7 +65,8 @@ class _Selector(selectors.DefaultSelector):
 
     def __init__(self) -> None:
         super().__init__()
-        self.now = 1000.0
+        # Far from the system's clock, however long the machine has run.
+        self.now = 1e6
         self.turns = 0
         self.at_turn: tuple[int, Callable[[], object]] | None = None
         self.hold = HoldWatch()

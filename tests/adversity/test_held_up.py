@@ -7,7 +7,8 @@ from itertools import pairwise
 
 import pytest
 
-from robotiq_async import Finger
+from robotiq_async import Finger, State
+from robotiq_async.simulator import Trouble
 from tests.adversity.world import world
 from tests.virtual import run
 
@@ -81,5 +82,35 @@ def test_a_move_survives(held_s: float) -> None:
             assert abs(result.positions[Finger.A] - 200) <= 2
             assert here.hand.statistics.reconnects == 0
             assert here.hand.statistics.foreign_commands == 0
+
+    run(main)
+
+
+@pytest.mark.parametrize("turns", range(1, 25))
+def test_the_link_survives_wherever_in_an_exchange_it_happens(turns: int) -> None:
+    async def main() -> None:
+        async with world() as here:
+            await here.activate_beforehand()
+            await here.hand.start()
+            await anext(here.hand.statuses())
+            here.loop.after_turns(turns, lambda: here.loop.hold_up(0.6))
+            await asyncio.sleep(2.0)
+            assert here.hand.statistics.longest_stall > 0.5
+            assert here.hand.statistics.reconnects == 0
+
+    run(main)
+
+
+def test_a_silent_gripper_is_given_up_on_also_in_a_loop_that_is_held_up_again_and_again() -> None:
+    async def main() -> None:
+        async with world() as here:
+            await here.activate_beforehand()
+            await here.hand.start()
+            async with here.server.adversary.making(Trouble("silence")):
+                began = here.loop.time()
+                while here.hand.state is not State.DISCONNECTED:
+                    here.loop.hold_up(0.05)
+                    await asyncio.sleep(0)
+                    assert here.loop.time() - began < 1.0
 
     run(main)

@@ -1,0 +1,230 @@
+"""The beat of the polling: deadlines that are kept, missed ones that are skipped, and what it beats by."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import sys
+from collections.abc import Callable, Coroutine
+from itertools import pairwise
+from typing import Any
+
+import pytest
+
+from robotiq_async.tick import Tick
+from tests.virtual import VirtualLoop, run
+
+INTERVAL = 0.005
+LINUX = sys.platform == "linux"
+
+
+def open_files() -> int:
+    return len(os.listdir("/proc/self/fd"))
+
+
+class DeafLoop(asyncio.SelectorEventLoop):
+    """Watches no descriptors but its own."""
+
+    why: type[Exception] = NotImplementedError
+
+    def add_reader(self, *_: Any) -> Any:  # type: ignore[override]
+        raise self.why("no readers")
+
+
+class FullLoop(DeafLoop):
+    why = OSError
+
+
+def in_loop(main: Callable[[], Coroutine[Any, Any, None]], factory: Any = asyncio.new_event_loop) -> None:
+    with asyncio.Runner(loop_factory=factory) as runner:
+        runner.run(main())
+
+
+def loop_of_this_test() -> VirtualLoop:
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualLoop)
+    return loop
+
+
+async def deadlines(tick: Tick, count: int) -> list[float]:
+    """When so many ticks came."""
+    times = []
+    for _ in range(count):
+        await tick.wait()
+        times.append(tick.time())
+    return times
+
+
+# -- in virtual time ---------------------------------------------------------------------------------------
+
+
+def test_the_deadlines_are_absolute() -> None:
+    async def main() -> None:
+        tick = Tick(INTERVAL)
+        tick.start()
+        times = []
+        for _ in range(200):
+            await tick.wait()
+            times.append(tick.time())
+            await asyncio.sleep(0.003)  # what is done in between does not shift the next
+        assert times[-1] - times[0] == pytest.approx(199 * INTERVAL, abs=1e-6)
+        tick.close()
+
+    run(main)
+
+
+def test_the_first_comes_within_an_interval() -> None:
+    async def main() -> None:
+        tick = Tick(INTERVAL)
+        for _ in range(10):
+            began = tick.time()
+            tick.start()
+            assert await tick.wait() == 1
+            assert 0 <= tick.time() - began <= INTERVAL + 1e-6
+            await asyncio.sleep(0.0123)
+        tick.close()
+
+    run(main)
+
+
+def test_what_was_missed_is_told_and_not_caught_up_with() -> None:
+    async def main() -> None:
+        tick = Tick(INTERVAL)
+        tick.start()
+        await tick.wait()
+        await asyncio.sleep(4.5 * INTERVAL)
+        assert await tick.wait() == 4
+        assert await tick.wait() == 1
+        tick.close()
+
+    run(main)
+
+
+def test_who_is_slow_is_not_late_and_a_loop_that_is_held_up_is() -> None:
+    async def main() -> None:
+        tick = Tick(INTERVAL)
+        tick.start()
+        await tick.wait()
+        await asyncio.sleep(0.2)
+        await tick.wait()
+        assert tick.late < 0.001
+        loop_of_this_test().hold_up(0.2)
+        assert await tick.wait() == 40
+        assert tick.late == pytest.approx(0.2, abs=INTERVAL)
+        tick.late = 0.0
+        await tick.wait()
+        assert tick.late < 0.001
+        assert tick.longest_late == pytest.approx(0.2, abs=INTERVAL)
+        tick.close()
+
+    run(main)
+
+
+def test_being_late_is_noticed_while_nobody_waits() -> None:
+    async def main() -> None:
+        tick = Tick(INTERVAL)
+        tick.start()
+        loop_of_this_test().hold_up(0.1)
+        await asyncio.sleep(0.001)
+        assert tick.late == pytest.approx(0.1, abs=INTERVAL)
+        tick.close()
+
+    run(main)
+
+
+@pytest.mark.parametrize("hands", [2, 7, 64])
+def test_the_hands_of_a_loop_are_spread_over_the_interval(hands: int) -> None:
+    async def main() -> None:
+        ticks = [Tick(INTERVAL) for _ in range(hands)]
+        for tick in ticks:
+            tick.start()
+        await asyncio.sleep(INTERVAL)
+        times = sorted(tick.due % INTERVAL for tick in ticks)
+        gaps = [later - earlier for earlier, later in pairwise([*times, times[0] + INTERVAL])]
+        assert min(gaps) > 0.3 * INTERVAL / hands
+        assert max(gaps) < 3 * INTERVAL / hands
+        for tick in ticks:
+            tick.close()
+
+    run(main)
+
+
+def test_each_hand_keeps_its_own_interval() -> None:
+    async def main() -> None:
+        fast, slow = Tick(0.002), Tick(0.1)
+        fast.start()
+        slow.start()
+        fast_times, slow_times = await asyncio.gather(deadlines(fast, 500), deadlines(slow, 10))
+        assert [b - a for a, b in pairwise(fast_times)] == pytest.approx([0.002] * 499, abs=1e-6)
+        assert [b - a for a, b in pairwise(slow_times)] == pytest.approx([0.1] * 9, abs=1e-6)
+        fast.close()
+        slow.close()
+
+    run(main)
+
+
+def test_a_loop_with_a_clock_of_its_own_is_woken_by_that_clock() -> None:
+    async def main() -> None:
+        tick = Tick(INTERVAL)
+        assert tick.source == ""
+        tick.start()
+        assert tick.source == "loop timer"
+        tick.close()
+        tick.close()
+        assert tick.source == ""
+
+    run(main)
+
+
+def test_one_that_is_closed_does_not_stop_the_others() -> None:
+    async def main() -> None:
+        first, second = Tick(INTERVAL), Tick(INTERVAL)
+        first.start()
+        second.start()
+        first.close()
+        assert len(await deadlines(second, 3)) == 3
+        first.start()
+        second.close()
+        assert len(await deadlines(first, 3)) == 3
+        first.close()
+
+    run(main)
+
+
+# -- in real time ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.skipif(not LINUX, reason="timerfd is Linux's")
+@pytest.mark.parametrize("kind", ["asyncio", "uvloop"])
+def test_linux_keeps_the_deadlines(kind: str) -> None:
+    async def main() -> None:
+        before = open_files()
+        tick = Tick(INTERVAL)
+        tick.start()
+        assert tick.source == "timerfd"
+        await tick.wait()
+        first, passed = tick.due, 0
+        while passed < 20:
+            passed += await tick.wait()
+            assert tick.time() >= tick.due - tick.interval
+        assert tick.due - first == pytest.approx(passed * INTERVAL, abs=1e-6)
+        tick.close()
+        assert open_files() == before
+
+    in_loop(main, pytest.importorskip(kind).new_event_loop)
+
+
+@pytest.mark.skipif(not LINUX, reason="timerfd is Linux's")
+@pytest.mark.parametrize("loop", [DeafLoop, FullLoop])
+def test_where_no_timerfd_is_to_be_had_the_loop_keeps_them(loop: type[DeafLoop]) -> None:
+    async def main() -> None:
+        before = open_files()
+        tick = Tick(INTERVAL)
+        tick.start()
+        assert tick.source == "loop timer"
+        assert open_files() == before
+        times = await deadlines(tick, 5)
+        assert times == sorted(times)
+        tick.close()
+
+    in_loop(main, loop)
