@@ -461,8 +461,10 @@ class Core:
 
     def _note_activation(self, status: RobotiqStatus) -> None:
         """See whether an activation of ours has come to its end."""
+        if not self._activating:
+            return
         sight = look(status)
-        self._activating = self._activating and not (
+        self._activating = not (
             sight is Trigger.SEEN_READY
             or status.fault.severity is Severity.MAJOR
             or (sight is Trigger.SEEN_RESET and self._ledger.is_settled)
@@ -483,6 +485,8 @@ class Core:
                 move.end(move.result(status))
 
     def _tell_halted(self, status: RobotiqStatus) -> None:
+        if not self._halting:
+            return
         now = [(n, d) for n, d in self._halting if not status.go_echo or self._ledger.acts(n)]
         self._halting = [each for each in self._halting if each not in now]
         tell(delivery for _, delivery in now)

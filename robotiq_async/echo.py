@@ -47,7 +47,8 @@ class EchoWatch:
     @property
     def is_in_doubt(self) -> bool:
         """Whether a write may or may not have arrived, and has not shown so far."""
-        return any(each.doubtful for each in self._written)
+        # One entry is the usual case, and this is asked at every poll.
+        return len(self._written) > 1 and any(each.doubtful for each in self._written)
 
     @property
     def last_number(self) -> int:

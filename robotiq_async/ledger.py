@@ -166,11 +166,16 @@ class Ledger:
     def note_contacts(self, status: RobotiqStatus) -> None:
         """Remember which axes grip, as long as that can be seen."""
         if status.go_echo:
-            self._contacts = {
-                axis: (status.finger_status(axis), status.position(axis))
-                for axis in AXES
-                if axis in status.contacts
-            }
+            contacts = status.contacts
+            self._contacts = (
+                {
+                    axis: (status.finger_status(axis), status.position(axis))
+                    for axis in AXES
+                    if axis in contacts
+                }
+                if contacts
+                else {}
+            )
 
     def gripping(self, status: RobotiqStatus) -> Finger:
         """The axes that gripped when rGTO was last set, are there still, and by the request they have."""

@@ -21,6 +21,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from enum import Enum
+from functools import cache
 from typing import Final
 
 from .enums import Fault, Initialization, State
@@ -59,6 +60,15 @@ def look(status: RobotiqStatus) -> Trigger:
 
     A serious fault comes first, because gIMC = 0 with a fault is an automatic release and not a reset.
     """
+    # gACT, gIMC and gFLT decide; they rarely change, and this runs at every poll.
+    first, second = status.registers[:2]
+    return _look(first >> 8, second >> 8 & 0x0F)
+
+
+@cache
+def _look(activation: int, fault: int) -> Trigger:
+    """The same, from the byte that holds gACT and gIMC, and from gFLT."""
+    status = RobotiqStatus((activation << 8, fault << 8, 0, 0, 0, 0, 0, 0))
     if status.fault is Fault.AUTOMATIC_RELEASE_DONE:
         return Trigger.SEEN_RELEASED
     if status.fault.is_serious:

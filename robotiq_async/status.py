@@ -2,13 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from . import registers as reg
 from .checks import check_axis
 from .enums import AXES, Fault, Finger, Initialization, Mode, ObjectStatus
 
+_set = object.__setattr__
 _INDEX = {axis: index for index, axis in enumerate(AXES)}
+
+
+def _masks(wanted: Callable[[ObjectStatus], bool]) -> tuple[Finger, ...]:
+    """For each value of the byte that holds the four gDT: the axes that read what is wanted."""
+    return tuple(
+        Finger(
+            sum(
+                axis
+                for axis, field in zip(AXES, reg.gDT, strict=True)
+                if wanted(ObjectStatus(field.read([byte])))
+            )
+        )
+        for byte in range(256)
+    )
+
+
+_MOVING = _masks(lambda what: what is ObjectStatus.IN_MOTION)
+_CONTACTS = _masks(lambda what: what.is_contact)
 
 
 class RobotiqStatus:
@@ -23,13 +42,18 @@ class RobotiqStatus:
     """
 
     __slots__ = ("_registers", "_sequence", "_timestamp")
+    _registers: reg.Registers
+    _timestamp: float
+    _sequence: int
 
     # The hand makes one of these 200 times a second: it keeps the registers and nothing else.
     def __init__(self, registers: reg.Registers, timestamp: float = 0.0, sequence: int = 0) -> None:
         """Keep eight checked registers; :meth:`from_registers` checks them."""
-        self._registers = registers
-        self._timestamp = timestamp
-        self._sequence = sequence
+        if hasattr(self, "_sequence"):
+            raise AttributeError("RobotiqStatus is immutable: it is made once")
+        _set(self, "_registers", registers)
+        _set(self, "_timestamp", timestamp)
+        _set(self, "_sequence", sequence)
 
     @classmethod
     def from_registers(
@@ -139,21 +163,12 @@ class RobotiqStatus:
     @property
     def moving(self) -> Finger:
         """The axes that move (empty when none does)."""
-        moving = Finger(0)
-        if self.go_echo and self.is_activated:
-            for axis, field in zip(AXES, reg.gDT, strict=True):
-                if field.read(self._registers) == ObjectStatus.IN_MOTION:
-                    moving |= axis
-        return moving
+        return _MOVING[self._registers[0] & 0xFF] if self.go_echo and self.is_activated else Finger(0)
 
     @property
     def contacts(self) -> Finger:
         """The axes stopped by a contact (empty when none is)."""
-        contacts = Finger(0)
-        for axis, field in zip(AXES, reg.gDT, strict=True):
-            if ObjectStatus(field.read(self._registers)).is_contact:
-                contacts |= axis
-        return contacts
+        return _CONTACTS[self._registers[0] & 0xFF]
 
     def __eq__(self, other: object) -> bool:
         """Equal registers, timestamp and sequence."""
@@ -171,9 +186,7 @@ class RobotiqStatus:
 
     def __setattr__(self, name: str, value: object) -> None:
         """Refuse changes after construction."""
-        if hasattr(self, "_sequence"):
-            raise AttributeError(f"RobotiqStatus is immutable: cannot set {name!r}")
-        object.__setattr__(self, name, value)
+        raise AttributeError(f"RobotiqStatus is immutable: cannot set {name!r}")
 
     def __repr__(self) -> str:
         """The words a person looks for first."""

@@ -114,7 +114,8 @@ class Channel(Generic[T]):
 
     def __init__(self) -> None:
         """Begin without readers."""
-        self._streams: weakref.WeakSet[Stream[T]] = weakref.WeakSet()
+        # Plain references: going through a WeakSet takes several times as long, at every poll.
+        self._streams: list[weakref.ref[Stream[T]]] = []
         self._waited_for: set[Stream[T]] = set()
         self._failure: Callable[[], RobotiqError] | None = None
 
@@ -124,7 +125,7 @@ class Channel(Generic[T]):
         if self._failure is not None:
             stream.end(self._failure)
         else:
-            self._streams.add(stream)
+            self._streams.append(weakref.ref(stream, self._forget))
         return stream
 
     def reopen(self) -> None:
@@ -133,12 +134,20 @@ class Channel(Generic[T]):
 
     def push(self, item: T) -> None:
         """Hand an item to every stream."""
-        for stream in self._streams:
-            stream.push(item)
+        for reference in self._streams:
+            stream = reference()
+            if stream is not None:
+                stream.push(item)
 
     def end(self, failure: Callable[[], RobotiqError] | None = None) -> None:
         """End every stream, quietly or with a failure."""
         self._failure = failure
-        streams, self._streams = self._streams, weakref.WeakSet()
-        for stream in streams:
-            stream.end(failure)
+        streams, self._streams = self._streams, []
+        for reference in streams:
+            stream = reference()
+            if stream is not None:
+                stream.end(failure)
+
+    def _forget(self, reference: weakref.ref[Stream[T]]) -> None:
+        # A new list: this may happen while somebody goes through the old one.
+        self._streams = [each for each in self._streams if each is not reference]
