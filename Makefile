@@ -16,7 +16,7 @@ STAMP := $(VENV)/.complete
 unexport VIRTUAL_ENV CONDA_PREFIX PYTHONHOME PYTHONPATH PYTHONSTARTUP PIP_USER PIP_TARGET PIP_PREFIX UV_PYTHON
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test soak fuzz explore lint check format constraints clean
+.PHONY: help demo test soak fuzz explore bench lint check format constraints clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -36,6 +36,9 @@ fuzz: $(STAMP)  ## A million mutated replies through the decoder, 100,000 throug
 explore: $(STAMP)  ## Try random examples that the tests do not, for some minutes
 	@HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest -o faulthandler_timeout=1800 \
 		tests/adversity/test_model.py tests/core/test_random.py
+
+bench: $(STAMP)  ## Measure steadiness and cost beside bare pymodbus and a C thread (12 minutes; needs gcc)
+	@$(BIN)/python -m tests.benchmarks --json benchmarks.json
 
 lint: $(STAMP)  ## Check style and types
 	$(BIN)/ruff check
