@@ -310,7 +310,7 @@ class Core:
             return
         before = self.machine.state
         after = self.machine.happen(look(status))
-        if before in _COMMANDED and after not in (before, *RUNNING):
+        if after is not before and before in _COMMANDED and after not in RUNNING:
             self._leave(after, status)
         elif after in _COMMANDED:
             self._go_on(before, status)

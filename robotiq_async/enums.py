@@ -176,6 +176,9 @@ class State(Enum):
     the result.
     """
 
+    # Members are compared by identity; Enum's own hash goes by the name, and takes its time at every poll.
+    __hash__ = object.__hash__
+
     DISCONNECTED = "disconnected"
     """No link: before the first status, or while it is being opened again."""
     DO_ACTIVATION = "do_activation"

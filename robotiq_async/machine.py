@@ -33,6 +33,8 @@ from .status import RobotiqStatus
 class Trigger(Enum):
     """What can happen to the hand."""
 
+    __hash__ = object.__hash__  # see State
+
     ASK_START = "start()"
     ASK_ACTIVATE = "activate()"
     ASK_COMMAND = "a command"

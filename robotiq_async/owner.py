@@ -245,9 +245,15 @@ class Owner:
 
     async def _cycle(self) -> None:
         """Write what has changed, then read."""
+        if self._core.has_request:
+            await self._write()
+        await self._look()
+
+    async def _write(self) -> None:
+        """Write what has changed; look first if what is known is old by now."""
         core = self._core
         for _ in range(LOOKS):
-            if not (core.has_request and self._is_stale()):
+            if not self._is_stale():
                 break
             await self._look()
         request = core.take_request(self._tick.time())
@@ -255,7 +261,6 @@ class Owner:
             await self._transport.write(request.registers)
             self._counters.writes += 1
             core.acknowledged(self._tick.time())
-        await self._look()
 
     async def _look(self) -> None:
         """Read, and tell everybody."""
