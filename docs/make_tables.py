@@ -23,6 +23,7 @@ from robotiq_async import ReconnectPolicy, RobotiqHand, registers  # noqa: E402
 from robotiq_async.enums import Fault, Initialization, Mode, ObjectStatus, Severity  # noqa: E402
 from robotiq_async.machine import TRANSITIONS, Trigger  # noqa: E402
 from robotiq_async.registers import RTU_REGISTERS, TCP_REGISTERS, Field  # noqa: E402
+from robotiq_async.runs import SPEED, read_table, thesis_table  # noqa: E402
 from robotiq_async.simulator.trouble import KINDS  # noqa: E402
 
 DOCS: Final = ROOT / "docs"
@@ -201,6 +202,25 @@ def troubles() -> str:
     )
 
 
+# -- measurements --------------------------------------------------------------------------------------
+
+
+def closing_times() -> str:
+    """The thesis's table A1.1 beside a measured one, run by run."""
+    thesis = thesis_table("closing_time_ms", SPEED)
+    ours = read_table(DOCS / "measured" / "closing_time_ms.csv", SPEED)
+
+    def row(value: int) -> list[str]:
+        pairs = list(zip(thesis[value], ours[value], strict=True))
+        apart = [f"{100 * (mine / theirs - 1):+.1f}" for theirs, mine in pairs]
+        return [str(value), *(str(t) for t, _ in pairs), *(str(m) for _, m in pairs), *apart]
+
+    runs = ("2", "3")
+    firsts = ("thesis, ms: run 1", "simulated, ms: run 1", "apart, %: run 1")
+    head = ["speed", *(name for first in firsts for name in (first, *runs))]
+    return table(head, (row(value) for value in sorted(thesis)))
+
+
 def _arguments(documented: Callable[..., object], section: str) -> str:
     parameters = inspect.signature(documented).parameters
     text = inspect.getdoc(documented) or ""
@@ -236,6 +256,7 @@ PAGES: Final[dict[str, dict[str, Callable[[], str]]]] = {
         "gFLT": faults,
     },
     "how-to/simulator.md": {"troubles": troubles},
+    "how-to/measure.md": {"closing_times": closing_times},
     "reference.md": {"options": options, "reconnect": reconnect_policy},
 }
 """The tables of each page."""

@@ -31,9 +31,13 @@ The map; each module imports only what stands above it::
     timerfd      Linux's timer that is watched like a socket
     tick         the beat of the polling
     owner        the one task that owns the link
+    runs         tables of measured runs, in CSV files
+    calibration  what the values 0..255 mean
     options      checked options of a hand
     waiting      callers that wait for a state
     hand         RobotiqHand
+    measuring    closing times, force and current of a grasp
+    plots        pictures of measurements; needs matplotlib
     ------------------------------------------------------------
     simulator    a simulated gripper and its Modbus servers (shares enums, registers, status, request)
     cli          the command line

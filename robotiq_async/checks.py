@@ -72,10 +72,20 @@ def check_seconds(name: str, value: object, low: float, high: float) -> float:
         TypeError: not a number.
         ValueError: not finite, or outside the range.
     """
+    return check_number(name, value, low, high, "seconds")
+
+
+def check_number(name: str, value: object, low: float, high: float, what: str = "a number") -> float:
+    """A number within low..high; ``what`` is for the message.
+
+    Raises:
+        TypeError: not a number.
+        ValueError: not finite, or outside the range.
+    """
     if not isinstance(value, int | float) or isinstance(value, bool):
-        raise TypeError(f"{name} must be seconds in {low}..{high}, got {value!r}")
+        raise TypeError(f"{name} must be {what} in {low}..{high}, got {value!r}")
     if not low <= value <= high:
-        raise ValueError(f"{name} must be seconds in {low}..{high}, got {value!r}")
+        raise ValueError(f"{name} must be {what} in {low}..{high}, got {value!r}")
     return float(value)
 
 

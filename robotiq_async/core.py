@@ -15,6 +15,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
+from .closing_time import closing_time
 from .compose import compose
 from .desk import Delivery, Desk, Failure, tell
 from .enums import AXES, Finger, Severity, State
@@ -49,15 +50,23 @@ _COMMANDED: Final = RUNNING | {State.FAULT}
 class Core:
     """State, requests and moves of one hand."""
 
-    def __init__(self, machine: Machine, speed: int, force: int) -> None:
+    def __init__(
+        self,
+        machine: Machine,
+        speed: int,
+        force: int,
+        closing_time: Callable[[int], float] = closing_time,
+    ) -> None:
         """Start without a status.
 
         Args:
             machine: the state of the hand, in DISCONNECTED.
             speed: what every axis gets until set otherwise, 0..255.
             force: what every axis gets until set otherwise, 0..255.
+            closing_time: seconds of a full closing at a speed; default time-outs of moves come from it.
         """
         self.machine = machine
+        self._closing_time = closing_time
         self.status: RobotiqStatus | None = None
         self.foreign_commands = 0
         self._ledger = Ledger(speed, force)
@@ -235,7 +244,7 @@ class Core:
         """The default time-out of a move from where the axes are, in seconds."""
         assert self.status is not None, "the hand is running, so a status has been read"
         speeds = self.speeds() if speed is None else dict.fromkeys(AXES, speed)
-        return default_timeout(position, axes, self.status, speeds)
+        return default_timeout(position, axes, self.status, speeds, self._closing_time)
 
     def found(self, status: RobotiqStatus, *, activate: bool, asked: float | None = None) -> None:
         """Take in the first status after the link was opened; the policy says whether to activate."""

@@ -9,6 +9,7 @@ from typing import ClassVar, Final, Self
 
 import anyio
 
+from .calibration import SpeedCalibration
 from .checks import check_byte, check_int, check_mask, check_timeout
 from .core import Core
 from .desk import Delivery
@@ -82,6 +83,7 @@ class RobotiqHand:
         force: int = 64,
         request_address: int | None = None,
         status_address: int | None = None,
+        calibration: SpeedCalibration | None = None,
     ) -> None:
         """Check every option. Opens nothing and needs no running loop.
 
@@ -102,6 +104,8 @@ class RobotiqHand:
             force: what the axes get until set otherwise, 0..255.
             request_address: first request register; by default 0 over TCP and 0x03E8 over RTU.
             status_address: first status register; by default 0 over TCP and 0x07D0 over RTU.
+            calibration: how fast this gripper is: default time-outs of moves come from it. None for the
+                thesis's gripper.
 
         Raises:
             TypeError: an option of the wrong type.
@@ -119,9 +123,10 @@ class RobotiqHand:
             force=force,
             request_address=request_address,
             status_address=status_address,
+            calibration=calibration,
         )
         self._machine = Machine(self._on_transition)
-        self._core = Core(self._machine, self._options.speed, self._options.force)
+        self._core = self._new_core()
         self._counters = Counters()
         self._statuses: Channel[RobotiqStatus] = Channel()
         self._transitions: Channel[Transition] = Channel()
@@ -166,7 +171,7 @@ class RobotiqHand:
         if not isinstance(activate, bool):
             raise TypeError(f"activate must be True or False, got {activate!r}")
         self._claim()
-        self._core = Core(self._machine, self._options.speed, self._options.force)
+        self._core = self._new_core()
         self._counters = Counters()
         self._statuses.reopen()
         self._transitions.reopen()
@@ -614,6 +619,10 @@ class RobotiqHand:
         return f"<RobotiqHand {self._options.address} {self.state.name}>"
 
     # -- inside ----------------------------------------------------------------------------------------
+
+    def _new_core(self) -> Core:
+        options = self._options
+        return Core(self._machine, options.speed, options.force, options.closing_time)
 
     def _claim(self) -> None:
         """Own the address in this process.

@@ -108,7 +108,11 @@ class Move:
 
 
 def default_timeout(
-    position: int, axes: Finger, status: RobotiqStatus, speeds: Mapping[Finger, int]
+    position: int,
+    axes: Finger,
+    status: RobotiqStatus,
+    speeds: Mapping[Finger, int],
+    closing_time: Callable[[int], float] = closing_time,
 ) -> float:
     """Seconds a move may take: twice the expected time plus 2 s.
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
 from .address import parse_address
+from .calibration import SpeedCalibration
 from .checks import check_byte, check_int, check_seconds
+from .closing_time import closing_time
 from .guard import GuardedTransport
 from .link import ModbusTransport, Transport
 from .owner import ReconnectPolicy
@@ -35,6 +38,8 @@ class Options:
     policy: ReconnectPolicy | None
     speed: int
     force: int
+    closing_time: Callable[[int], float]
+    """Seconds of a full closing at a speed."""
 
 
 def check_options(
@@ -50,6 +55,7 @@ def check_options(
     force: object,
     request_address: object,
     status_address: object,
+    calibration: object,
 ) -> Options:
     """Check every option and make the transport; opens nothing and needs no running loop.
 
@@ -92,7 +98,19 @@ def check_options(
         policy=_check_reconnect(reconnect),
         speed=check_byte("speed", speed),
         force=check_byte("force", force),
+        closing_time=_check_calibration(calibration),
     )
+
+
+def _check_calibration(calibration: object) -> Callable[[int], float]:
+    if calibration is None:
+        return closing_time
+    if not isinstance(calibration, SpeedCalibration):
+        raise TypeError(f"calibration must be None or a SpeedCalibration, got {calibration!r}")
+    first, last = calibration.points[0][0], calibration.points[-1][0]
+    if (first, last) != (0, 255):
+        raise ValueError(f"calibration must reach over the speed values 0..255, got {first}..{last}")
+    return calibration.closing_time
 
 
 def _check_reconnect(reconnect: object) -> ReconnectPolicy | None:

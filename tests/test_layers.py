@@ -46,9 +46,13 @@ RUNTIME = [
     "timerfd",
     "tick",
     "owner",
+    "runs",
+    "calibration",
     "options",
     "waiting",
     "hand",
+    "measuring",
+    "plots",
 ]
 BESIDE = ["simulator", "cli"]
 ORDER = [*PURE, *RUNTIME]

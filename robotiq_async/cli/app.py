@@ -8,6 +8,7 @@ from cyclopts import App
 
 from .. import __version__
 from .demo import demo
+from .measure import measure_app
 from .move import move
 from .simulate import simulate
 from .status import status
@@ -32,4 +33,5 @@ def build() -> App:
     app = App(name="robotiq-async", help=_HELP, help_format="plaintext", version=__version__)
     for command in COMMANDS:
         app.command(command)
+    app.command(measure_app())
     return app

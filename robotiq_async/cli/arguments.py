@@ -16,6 +16,10 @@ class UsageError(Exception):
     """The command line asks for something that does not exist: exit code 2."""
 
 
+class CommandError(Exception):
+    """A command cannot do what it is asked, and it is not the gripper's fault: exit code 1."""
+
+
 @contextmanager
 def usage() -> Iterator[None]:
     """Around the construction of library objects: a value they refuse is wrong usage.

@@ -16,7 +16,7 @@ from cyclopts import CycloptsError
 
 from ..errors import RobotiqError
 from .app import build
-from .arguments import UsageError
+from .arguments import CommandError, UsageError
 from .remarks import collected
 
 SUCCESS, FAILURE, WRONG_USAGE, SIGNALLED = 0, 1, 2, 128
@@ -44,7 +44,7 @@ def _outcome(arguments: Sequence[str], signals: _Signals) -> tuple[int, str | No
         sys.stdout.flush()
     except (CycloptsError, UsageError) as error:
         return WRONG_USAGE, str(error)
-    except RobotiqError as error:
+    except (RobotiqError, CommandError) as error:
         return FAILURE, str(error)
     except BrokenPipeError:
         # Whoever read the output has had enough (status | head); the flush at exit must not fail over it.

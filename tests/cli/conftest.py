@@ -50,15 +50,15 @@ class Shell:
         """Run a command to its end."""
         return await self.finish(await self.start(*arguments))
 
-    async def start(self, *arguments: str) -> Process:
+    async def start(self, *arguments: str, stdin: int = DEVNULL) -> Process:
         """Start a command."""
-        return await self.python("-m", "robotiq_async", *arguments)
+        return await self.python("-m", "robotiq_async", *arguments, stdin=stdin)
 
-    async def python(self, *arguments: str) -> Process:
+    async def python(self, *arguments: str, stdin: int = DEVNULL) -> Process:
         """Start this interpreter."""
         environment = os.environ | {"PYTHONPATH": str(ROOT)}
         process = await asyncio.create_subprocess_exec(
-            sys.executable, *arguments, stdin=DEVNULL, stdout=PIPE, stderr=PIPE, env=environment
+            sys.executable, *arguments, stdin=stdin, stdout=PIPE, stderr=PIPE, env=environment
         )
         self.processes.append(process)
         return process

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+import robotiq_async
 from robotiq_async.closing_time import CLOSED_READING, OPEN_READING, STROKE_COUNTS, closing_time
 from robotiq_async.enums import AXES, Finger, ObjectStatus
 from tests.simulator.conftest import CYCLE
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
     from tests.simulator.conftest import Bench
 
-_TABLE = Path(__file__).parent.parent / "data" / "closing_time_ms.csv"
+_TABLE = Path(robotiq_async.__file__).parent / "data" / "closing_time_ms.csv"
 
 
 def _measured() -> dict[int, float]:

@@ -1,0 +1,77 @@
+"""``robotiq-async measure speed``."""
+
+from __future__ import annotations
+
+from collections.abc import Coroutine
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from ..enums import Finger
+from .arguments import Address, Fingers
+from .measure import NoPlot, Runs, Speedup, Yes, carry_out, check, consent, gripper, load_rich, refused, told
+
+WARNING = "the fingers open and close fully, some hundred times. Nothing may be between them."
+
+
+def speed(
+    address: Address = "sim://",
+    /,
+    *,
+    output: Annotated[Path, Parameter(metavar="FILE.csv")] = Path("closing_time_ms.csv"),
+    step: Annotated[int, Parameter(metavar="N")] = 4,
+    runs: Runs = 3,
+    fingers: Fingers = Finger.ABC,
+    speedup: Speedup = None,
+    no_plot: NoPlot = False,
+    yes: Yes = False,
+) -> Coroutine[None, None, None] | None:
+    """Measure how long a full closing takes at each speed value. THE FINGERS MOVE.
+
+    As the thesis did (table A1.1): every 4th value from 0, and 255, slowest first,
+    three runs, from the command until nothing moves. It takes 20 minutes. The file
+    is written after every row; started again, it goes on where it was. Beside it a
+    plot is drawn (PNG and SVG) with the thesis's own curve.
+
+    For example:
+
+        robotiq-async measure speed
+        robotiq-async measure speed 192.168.1.11 --step 25 --runs 1
+
+    Args:
+        output: The table; the plot has its name.
+        step: Every so many speed values.
+        runs: So many closings at each.
+        fingers: The axes that move: ABC, A,B, all.
+        speedup: How much faster the gripper of sim:// is (default: 15); times are its own.
+        no_plot: Draw nothing.
+        yes: Do not ask.
+    """
+    factor = check(address, speedup, runs, step, not no_plot)
+    if not consent(address, WARNING, yes):
+        return None
+    return _measure(address, output, step, runs, fingers, factor, not no_plot)
+
+
+async def _measure(
+    address: str, output: Path, step: int, runs: int, fingers: Finger, speedup: float, plot: bool
+) -> None:
+    from ..measuring import expected_seconds, speed_campaign, time_closing
+
+    with refused():
+        campaign = speed_campaign(output, step, runs)
+    if campaign.left:
+        load_rich()
+        async with gripper(address, speedup) as hand:
+
+            async def run(value: int, _: int) -> int:
+                return round(1000 * await time_closing(hand, value, fingers, speedup))
+
+            await carry_out(campaign, run, lambda value: expected_seconds(value) / speedup, "speed")
+    told([output])
+    if plot:
+        from ..plots import plot_speed
+
+        label = "simulated" if address.startswith("sim:") else "measured"
+        told(plot_speed(output.with_suffix(""), campaign.table, label))

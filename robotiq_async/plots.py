@@ -1,0 +1,142 @@
+"""Pictures of measurements, as PNG and SVG. Needs the extra ``plot`` (matplotlib)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import matplotlib as mpl
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from .calibration import ForceCalibration, SpeedCalibration, mean, newton
+from .measuring import Currents, peak_currents
+from .runs import Table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+OURS: Final = "#0b6ea8"
+THEIRS: Final = "#d1731f"
+COLOURS: Final = ("#0b6ea8", "#2a8f4c", "#b03a6b")
+"""Of the fingers A, B and C."""
+SHOWN_FORCES: Final = (0, 125, 250)
+"""Whose currents are drawn over time."""
+
+
+def plot_speed(path: Path, table: Table, label: str) -> list[Path]:
+    """Closing time against the speed value beside the thesis's, and how far the two are apart.
+
+    Args:
+        path: where to, without suffix.
+        table: closing times in milliseconds.
+        label: what the table is, for the legend.
+
+    Returns:
+        The files written.
+    """
+    thesis = SpeedCalibration.thesis()
+    values = sorted(table)
+    means = [mean(table[value]) / 1000 for value in values]
+    with _figure(path, "Full closing, 235 counts", rows=2, ratios=(3, 1)) as (axes, files):
+        times, apart = axes
+        times.plot(*zip(*thesis.points, strict=True), color=THEIRS, lw=4, alpha=0.45, label=thesis.source)
+        low = [mean_ - min(table[v]) / 1000 for v, mean_ in zip(values, means, strict=True)]
+        high = [max(table[v]) / 1000 - mean_ for v, mean_ in zip(values, means, strict=True)]
+        spread: Any = {"yerr": (low, high), "fmt": ".", "ms": 4, "lw": 1}
+        times.errorbar(values, means, color=OURS, label=f"{label}: mean and spread", **spread)
+        times.set_ylabel("closing time, s")
+        times.set_ylim(bottom=0)
+        times.legend()
+        off = [100 * (m / thesis.closing_time(v) - 1) for v, m in zip(values, means, strict=True)]
+        apart.axhline(0, color=THEIRS, lw=1)
+        apart.plot(values, off, ".", ms=4, color=OURS)
+        apart.set_ylabel("apart, %")
+        apart.set_xlabel("speed value")
+        reach = max(2.0, 1.1 * max(map(abs, off)))
+        apart.set_ylim(-reach, reach)
+    return files
+
+
+def plot_force(path: Path, table: Table, surface: str, label: str) -> list[Path]:
+    """Force against the force value, each run a point, beside the thesis's and the nominal figures."""
+    with _figure(path, f"Force of a grasp, {surface}") as ((axes,), files):
+        nominal, thesis = ForceCalibration.nominal(), ForceCalibration.thesis(surface)
+        axes.plot(*zip(*nominal.points, strict=True), color="0.6", ls="--", label=nominal.source)
+        name = f"{thesis.source}: mean"
+        axes.plot(*zip(*thesis.points, strict=True), color=THEIRS, lw=3, alpha=0.5, label=name)
+        values = sorted(table)
+        for number, runs in enumerate(zip(*(table[value] for value in values), strict=True)):
+            forces = [newton(reading) for reading in runs]
+            name = "" if number else f"{label}: runs"
+            axes.plot(values, forces, "o", ms=4, mfc="none", color=OURS, label=name)
+        axes.plot(values, [newton(mean(table[v])) for v in values], color=OURS, label=f"{label}: mean")
+        axes.set_xlabel("force value")
+        axes.set_ylabel("force, N (F = m g, g = 9.81 m/s²)")
+        axes.set_ylim(bottom=0)
+        axes.legend()
+    return files
+
+
+def plot_peak_currents(path: Path, currents: Currents, surface: str, label: str) -> list[Path]:
+    """The highest current of each finger against the force value."""
+    with _figure(path, f"Highest current of a grasp, {surface} ({label})") as ((axes,), files):
+        values = sorted(currents)
+        peaks = [peak_currents(currents[value]) for value in values]
+        for finger, colour, of_finger in zip("ABC", COLOURS, zip(*peaks, strict=True), strict=True):
+            style: Any = {"marker": dict(zip("ABC", "o^s", strict=True))[finger], "ms": 5, "mfc": "none"}
+            axes.plot(values, of_finger, color=colour, label=f"finger {finger}", **style)
+        axes.set_xlabel("force value")
+        axes.set_ylabel("highest current, mA")
+        axes.set_ylim(bottom=0)
+        axes.legend()
+    return files
+
+
+def plot_current_over_time(path: Path, by_surface: Mapping[str, Currents], label: str) -> list[Path]:
+    """The current of finger A during the first grasp at some force values, surfaces one above the other."""
+    with _figure(path, f"Current of finger A during a grasp ({label})", rows=len(by_surface)) as (
+        axes,
+        files,
+    ):
+        for each, (surface, currents) in zip(axes, by_surface.items(), strict=True):
+            for force, colour in zip(_shown(currents), COLOURS, strict=False):
+                run = currents[force][0]
+                seconds = [sample[0] / 1000 for sample in run]
+                milliampere = [sample[1] for sample in run]
+                each.plot(seconds, milliampere, color=colour, lw=1.2, label=f"force {force}")
+            each.set_title(surface, loc="left", fontsize=10)
+            each.set_ylabel("current, mA")
+            each.set_ylim(bottom=0)
+            each.legend()
+        axes[-1].set_xlabel("time since the command, s")
+    return files
+
+
+def _shown(currents: Currents) -> list[int]:
+    """The force values to draw: the usual ones, or what there is."""
+    usual: list[int] = [force for force in SHOWN_FORCES if force in currents]
+    return usual or sorted(currents)[: len(COLOURS)]
+
+
+@contextmanager
+def _figure(
+    path: Path, title: str, rows: int = 1, ratios: tuple[int, ...] | None = None
+) -> Iterator[tuple[list[Axes], list[Path]]]:
+    """A figure with axes one above the other; written at the end, always the same bytes for the same data."""
+    figure = Figure(figsize=(8, 4.6 if rows == 1 else 6.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    grid = figure.subplots(rows, 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": ratios})
+    axes: list[Axes] = list(grid[:, 0])
+    figure.suptitle(title)
+    for each in axes:
+        each.grid(alpha=0.3)
+    files: list[Path] = []
+    yield axes, files
+    for suffix, options in (("png", {"dpi": 120}), ("svg", {"metadata": {"Date": None}})):
+        target = path.with_name(f"{path.name}.{suffix}")
+        with mpl.rc_context({"svg.hashsalt": "robotiq_async"}):
+            figure.savefig(target, **options)
+        files.append(target)

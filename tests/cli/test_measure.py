@@ -1,0 +1,199 @@
+"""``robotiq-async measure``."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from asyncio.subprocess import PIPE
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from robotiq_async.cli import main
+from robotiq_async.measuring import read_currents
+from robotiq_async.runs import FORCE, SPEED, read_table, thesis_table
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+
+if TYPE_CHECKING:
+    from tests.cli.conftest import Shell
+
+WITHOUT_MATPLOTLIB = """
+import importlib.util, sys
+find = importlib.util.find_spec
+importlib.util.find_spec = lambda name, *rest: None if name == "matplotlib" else find(name, *rest)
+from robotiq_async.cli import main
+sys.exit(main(["measure", "speed"]))
+"""
+
+
+def files_in(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+async def test_speed_writes_table_and_pictures(shell: Shell, tmp_path: Path) -> None:
+    table = tmp_path / "mine.csv"
+    options = ("--output", str(table), "--step", "128", "--runs", "1", "--speedup", "30")
+    outcome = await shell.run("measure", "speed", *options)
+    outcome.assert_succeeded()
+    written = [tmp_path / name for name in ("mine.csv", "mine.png", "mine.svg")]
+    assert outcome.out.splitlines() == [str(file) for file in written]
+    assert files_in(tmp_path) == ["mine.csv", "mine.png", "mine.svg"]
+    assert sorted(read_table(table, SPEED)) == [0, 128, 255]
+    for line in ("speed 0: ", "speed 128: ", "speed 255: "):
+        assert line in outcome.err
+    # Complete: nothing is measured again, the pictures are made anew, byte for byte.
+    before = {file: file.read_bytes() for file in written}
+    outcome = await shell.run("measure", "speed", *options)
+    outcome.assert_succeeded()
+    assert outcome.err == ""
+    assert {file: file.read_bytes() for file in written} == before
+
+
+async def test_force_writes_readings_currents_and_pictures(shell: Shell, tmp_path: Path) -> None:
+    for surface in ("foam", "rigid"):
+        table = tmp_path / f"force_{surface}_grams.csv"
+        outcome = await shell.run(
+            *("measure", "force", "--surface", surface, "--output", str(table)),
+            *("--step", "125", "--runs", "2", "--speed", "255", "--speedup", "30"),
+        )
+        outcome.assert_succeeded()
+        readings = read_table(table, FORCE)
+        assert sorted(readings) == [0, 125, 250]
+        thesis = thesis_table(f"force_{surface}_grams", FORCE)
+        for force, runs in readings.items():
+            assert all(min(thesis[force]) <= reading <= max(thesis[force]) for reading in runs)
+        currents = read_currents(tmp_path / f"force_{surface}_currents.csv")
+        assert {force: len(runs) for force, runs in currents.items()} == {0: 2, 125: 2, 250: 2}
+        for name in ("grams", "currents_peak", "currents_over_time"):
+            assert (tmp_path / f"force_{surface}_{name}.svg").stat().st_size > 5000
+            assert (tmp_path / f"force_{surface}_{name}.png").stat().st_size > 5000
+    both = (tmp_path / "force_rigid_currents_over_time.svg").read_text(encoding="utf-8")
+    assert "foam" in both
+
+
+async def test_the_scale_is_read_by_a_person(shell: Shell, tmp_path: Path) -> None:
+    gripper = SimulatedGripper(speedup=30)
+    gripper.place_object(7, 150)
+    async with SimulatorServer(gripper) as server:
+        process = await shell.start(
+            *("measure", "force", server.address, "--output", str(tmp_path / "f.csv")),
+            *("--step", "250", "--runs", "1", "--speed", "255", "--no-plot"),
+            stdin=PIPE,
+        )
+        assert process.stdin is not None
+        process.stdin.write(b"much\n-5\n1500\n2500\n")
+        outcome = await shell.finish(process)
+    outcome.assert_succeeded()
+    assert outcome.out.count("An integer in 0..100000, please.") == 2
+    assert "Force 250, run 1: what does the scale show, in grams?" in outcome.out
+    assert read_table(tmp_path / "f.csv", FORCE) == {0: (1500,), 250: (2500,)}
+
+
+async def test_nobody_there_to_read_the_scale(shell: Shell, tmp_path: Path) -> None:
+    gripper = SimulatedGripper(speedup=30)
+    gripper.place_object(7, 150)
+    async with SimulatorServer(gripper) as server:
+        outcome = await shell.run(
+            *("measure", "force", server.address, "--output", str(tmp_path / "f.csv")),
+            *("--step", "250", "--runs", "1", "--speed", "255", "--no-plot"),
+        )
+    assert outcome.code == 1
+    assert "nobody answers: the input has ended" in outcome.err
+    assert not (tmp_path / "f.csv").exists()
+
+
+async def test_the_scale_is_read_from_a_table(shell: Shell, tmp_path: Path) -> None:
+    readings = tmp_path / "readings.csv"
+    readings.write_text("force_value,run_1_g\n0,1111\n250,2222\n", encoding="utf-8")
+    options = (
+        "--output",
+        str(tmp_path / "f.csv"),
+        "--speed",
+        "255",
+        "--speedup",
+        "30",
+        "--no-plot",
+        "--runs",
+        "1",
+    )
+    outcome = await shell.run("measure", "force", "--scale", str(readings), "--step", "250", *options)
+    outcome.assert_succeeded()
+    assert read_table(tmp_path / "f.csv", FORCE) == {0: (1111,), 250: (2222,)}
+    outcome = await shell.run("measure", "force", "--scale", str(readings), "--step", "125", *options)
+    outcome.assert_failed(1, "has no 1 runs for the force values [125]")
+
+
+async def test_ctrl_c_keeps_the_rows_and_stops_the_fingers(shell: Shell, tmp_path: Path) -> None:
+    gripper = SimulatedGripper(speedup=30)
+    async with SimulatorServer(gripper) as server:
+        table = tmp_path / "t.csv"
+        process = await shell.start(
+            *("measure", "speed", server.address, "--output", str(table), "--runs", "1", "--no-plot")
+        )
+        async with asyncio.timeout(20):
+            while not table.exists() or not gripper.is_moving:  # noqa: ASYNC110  # another process writes it
+                await asyncio.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        outcome = await shell.finish(process)
+        assert outcome.code == 130
+        assert not gripper.is_moving
+    rows = read_table(table, SPEED)
+    assert 0 in rows
+    assert files_in(tmp_path) == ["t.csv"]
+
+
+async def test_fingers_that_meet_something_end_it(shell: Shell, tmp_path: Path) -> None:
+    gripper = SimulatedGripper(speedup=30)
+    gripper.place_object(7, 150)
+    async with SimulatorServer(gripper) as server:
+        outcome = await shell.run(
+            "measure", "speed", server.address, "--output", str(tmp_path / "t.csv"), "--no-plot"
+        )
+    assert outcome.code == 1
+    assert "the fingers met something" in outcome.err
+    assert "0 rows are in" in outcome.err
+
+
+async def test_without_matplotlib_nothing_is_begun(shell: Shell) -> None:
+    outcome = await shell.finish(await shell.python("-c", WITHOUT_MATPLOTLIB))
+    outcome.assert_failed(1, "pip install 'robotiq-async[plot]'", "--no-plot")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["speed", "--runs", "0"], "--runs must be an integer in 1..100, got 0"),
+        (["speed", "--step", "0"], "--step must be an integer in 1..255, got 0"),
+        (["speed", "--speedup", "51"], "--speedup must be a number in 1..50, got 51"),
+        (["speed", "192.168.1.11", "--speedup", "2"], "--speedup is for sim:// only"),
+        (["speed", "tcp://"], "malformed address"),
+        (["force", "--surface", "wood"], "wood"),
+        (["force", "--speed", "256"], "256"),
+    ],
+)
+def test_wrong_usage(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["measure", *arguments]) == 2
+    assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("speed_value\n", "line 1: expected the columns"), ("speed_value,run_1_ms\n0,5\n", "holds 1 runs")],
+)
+def test_a_bad_table_is_refused(
+    text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = tmp_path / "t.csv"
+    table.write_text(text, encoding="utf-8")
+    assert main(["measure", "speed", "--output", str(table)]) == 1
+    assert words in capsys.readouterr().err
+    assert table.read_text(encoding="utf-8") == text
+
+
+@pytest.mark.parametrize("what", ["speed", "force"])
+def test_help(what: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["measure", what, "--help"]) == 0
+    out = capsys.readouterr().out
+    assert "FINGERS MOVE" in " ".join(out.split())
+    assert f"robotiq-async measure {what}" in out.partition("For example:")[2]

@@ -1,0 +1,152 @@
+"""What the values 0..255 mean."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from statistics import mean
+
+import pytest
+
+from robotiq_async import RobotiqHand
+from robotiq_async.calibration import (
+    ForceCalibration,
+    SpeedCalibration,
+    opening_mm,
+    position_of_opening,
+)
+from robotiq_async.closing_time import closing_time
+from robotiq_async.runs import FORCE, SPEED, TableError, thesis_table, write_table
+
+# -- positions ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("counts", "millimetres"), [(0, 155), (6, 155), (241, 0), (255, 0), (124, pytest.approx(77.2, abs=0.1))]
+)
+def test_opening(counts: int, millimetres: float) -> None:
+    assert opening_mm(counts) == millimetres
+
+
+def test_counts_and_millimetres_go_both_ways() -> None:
+    for counts in range(6, 242):
+        assert position_of_opening(opening_mm(counts)) == counts
+
+
+@pytest.mark.parametrize("millimetres", [-0.1, 155.1, float("nan"), float("inf")])
+def test_an_opening_that_there_is_not_is_refused(millimetres: float) -> None:
+    with pytest.raises(ValueError, match=r"millimetres must be a number in 0\.0\.\.155\.0"):
+        position_of_opening(millimetres)
+
+
+# -- speeds ------------------------------------------------------------------------------------------------
+
+
+def test_nominal_speeds_are_the_manuals() -> None:
+    nominal = SpeedCalibration.nominal()
+    assert nominal.mm_per_s(0) == pytest.approx(22)
+    assert nominal.mm_per_s(255) == pytest.approx(110)
+    assert nominal.closing_time(0) == pytest.approx(155 / 22)
+    assert nominal.speed_value(66) in (127, 128)
+
+
+def test_the_thesis_is_the_default_of_the_time_outs() -> None:
+    thesis = SpeedCalibration.thesis()
+    for speed in range(256):
+        assert thesis.closing_time(speed) == pytest.approx(closing_time(speed), abs=0.0006)
+    table = thesis_table("closing_time_ms", SPEED)
+    for speed, runs in table.items():
+        assert thesis.closing_time(speed) == pytest.approx(mean(runs) / 1000)
+
+
+@pytest.mark.parametrize("calibration", [SpeedCalibration.nominal(), SpeedCalibration.thesis()])
+def test_speed_values_and_millimetres_a_second_go_both_ways(calibration: SpeedCalibration) -> None:
+    for speed in range(256):
+        assert calibration.speed_value(calibration.mm_per_s(speed)) == speed
+
+
+def test_a_part_of_the_way_takes_a_part_of_the_time() -> None:
+    thesis = SpeedCalibration.thesis()
+    assert thesis.duration(235, 0) == pytest.approx(10.021)
+    assert thesis.duration(0, 0) == 0
+    assert thesis.duration(47, 0) == pytest.approx(10.021 / 5)
+
+
+@pytest.mark.parametrize("mm_per_s", [0, 15.0, 73.3, -1])
+def test_a_speed_that_no_value_has_is_refused(mm_per_s: float) -> None:
+    with pytest.raises(ValueError, match="mm_per_s must be a number in"):
+        SpeedCalibration.thesis().speed_value(mm_per_s)
+
+
+def test_an_owners_table(tmp_path: Path) -> None:
+    file = tmp_path / "mine.csv"
+    write_table(file, SPEED, {10: (9000, 11000), 20: (5000, 5000)})
+    mine = SpeedCalibration.from_csv(file)
+    assert mine.source == str(file)
+    assert mine.closing_time(10) == 10
+    assert mine.closing_time(15) == pytest.approx(7.5)
+    for outside in (9, 21):
+        with pytest.raises(ValueError, match=r"lies outside what was measured: 10\.\.20"):
+            mine.closing_time(outside)
+
+
+@pytest.mark.parametrize(
+    ("table", "words"), [({0: (5,)}, "at least two speed values"), ({0: (5,), 9: (0,)}, "longer than 0 ms")]
+)
+def test_a_table_that_says_nothing_is_refused(
+    tmp_path: Path, table: dict[int, tuple[int, ...]], words: str
+) -> None:
+    write_table(tmp_path / "t.csv", SPEED, table)
+    with pytest.raises(TableError, match=words):
+        SpeedCalibration.from_csv(tmp_path / "t.csv")
+
+
+# -- the hand ----------------------------------------------------------------------------------------------
+
+
+async def test_the_default_time_out_of_a_move_comes_from_the_calibration(tmp_path: Path) -> None:
+    write_table(tmp_path / "slow.csv", SPEED, {0: (90_000,), 255: (60_000,)})
+    slow = SpeedCalibration.from_csv(tmp_path / "slow.csv")
+    timeouts = []
+    for calibration in (None, slow):
+        async with RobotiqHand(calibration=calibration) as hand:
+            timeouts.append(hand._core.move_timeout(255, hand.status.moving | 1, 255))
+    assert timeouts[0] == pytest.approx(2 * 249 / 235 * 2.119 + 2, abs=0.05)
+    assert timeouts[1] == pytest.approx(2 * 249 / 235 * 60 + 2, abs=0.5)
+
+
+def test_a_calibration_that_does_not_reach_over_all_speeds_is_refused(tmp_path: Path) -> None:
+    write_table(tmp_path / "part.csv", SPEED, {0: (9000,), 200: (5000,)})
+    with pytest.raises(ValueError, match=r"must reach over the speed values 0\.\.255, got 0\.\.200"):
+        RobotiqHand(calibration=SpeedCalibration.from_csv(tmp_path / "part.csv"))
+    with pytest.raises(TypeError, match="calibration must be None or a SpeedCalibration"):
+        RobotiqHand(calibration="mine.csv")  # type: ignore[arg-type]
+
+
+# -- forces ------------------------------------------------------------------------------------------------
+
+
+def test_nominal_forces_are_the_manuals() -> None:
+    nominal = ForceCalibration.nominal()
+    assert (nominal.newton(0), nominal.newton(255)) == (15, 60)
+    assert nominal.force_value(30) == 85
+    with pytest.raises(ValueError, match="newton must be a number in"):
+        nominal.force_value(61)
+
+
+def test_grams_become_newton() -> None:
+    foam = ForceCalibration.thesis("foam")
+    assert foam.newton(0) == pytest.approx(mean((630, 650, 570)) / 1000 * 9.81)
+    with pytest.raises(ValueError, match="outside what was measured"):
+        foam.newton(255)
+    with pytest.raises(ValueError, match="surface must be 'foam' or 'rigid'"):
+        ForceCalibration.thesis("wood")
+
+
+def test_an_owners_forces(tmp_path: Path) -> None:
+    write_table(tmp_path / "f.csv", FORCE, {0: (1000,), 100: (2000,)})
+    mine = ForceCalibration.from_csv(tmp_path / "f.csv")
+    assert mine.newton(50) == pytest.approx(1.5 * 9.81)
+    assert mine.force_value(1.5 * 9.81) == 50
+    write_table(tmp_path / "f.csv", FORCE, {0: (1000,)})
+    with pytest.raises(TableError, match="at least two"):
+        ForceCalibration.from_csv(tmp_path / "f.csv")

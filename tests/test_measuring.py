@@ -1,0 +1,228 @@
+"""Measuring as the thesis did: on the simulated gripper, whose speeds are the thesis's."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+
+from robotiq_async import Finger, RobotiqHand
+from robotiq_async.closing_time import closing_time
+from robotiq_async.measuring import (
+    GRASP_S,
+    Campaign,
+    MeasuringError,
+    force_campaign,
+    force_values,
+    grasp,
+    peak_currents,
+    read_currents,
+    speed_campaign,
+    speed_values,
+    time_closing,
+    write_currents,
+)
+from robotiq_async.runs import FORCE, SPEED, TableError, read_table, thesis_table
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.simulator.scale import SimulatedScale
+from tests.virtual import run
+
+POLL_S = 0.005
+
+
+@asynccontextmanager
+async def active(speedup: float = 1.0) -> AsyncIterator[tuple[SimulatedGripper, RobotiqHand]]:
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, speedup=speedup)
+    async with SimulatorServer(gripper) as server, RobotiqHand(server.address, poll_interval=POLL_S) as hand:
+        yield gripper, hand
+
+
+# -- the order -------------------------------------------------------------------------------------------
+
+
+def test_speeds_are_every_fourth_and_255_slowest_first() -> None:
+    assert speed_values() == sorted(thesis_table("closing_time_ms", SPEED))
+    assert speed_values(100) == [0, 100, 200, 255]
+
+
+def test_forces_go_up_by_50_and_down_by_50() -> None:
+    assert force_values() == [0, 50, 100, 150, 200, 250, 225, 175, 125, 75, 25]
+    assert sorted(force_values()) == sorted(thesis_table("force_foam_grams", FORCE))
+
+
+# -- speed -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("speedup", [1.0, 10.0])
+def test_closing_times_are_those_of_the_thesis(speedup: float) -> None:
+    async def main() -> None:
+        async with active(speedup) as (_, hand):
+            for speed in (0, 30, 60, 128, 200, 255):
+                seconds = await time_closing(hand, speed, Finger.ABC, speedup)
+                expected = closing_time(speed)
+                assert expected <= seconds <= 1.01 * expected + 2 * POLL_S * speedup
+
+    run(main)
+
+
+def test_a_finger_that_meets_something_is_no_closing_time() -> None:
+    async def main() -> None:
+        async with active() as (gripper, hand):
+            gripper.place_object(Finger.B, 150)
+            with pytest.raises(MeasuringError, match=r"met something \(.*B"):
+                await time_closing(hand, 255, Finger.ABC)
+
+    run(main)
+
+
+def test_only_the_fingers_asked_for_move() -> None:
+    async def main() -> None:
+        async with active() as (gripper, hand):
+            before = gripper.travel(Finger.A)
+            await time_closing(hand, 255, Finger.B)
+            assert gripper.travel(Finger.A) == before
+
+    run(main)
+
+
+# -- force -------------------------------------------------------------------------------------------------
+
+
+def test_the_currents_of_a_grasp() -> None:
+    async def main() -> None:
+        async with active() as (gripper, hand):
+            gripper.place_object(Finger.ABC, 150)
+            samples = await grasp(hand, 200, 255)
+            times = [sample[0] for sample in samples]
+            assert times == sorted(times)
+            assert times[0] < 50
+            moving = 1000 * closing_time(255) * (150 - 6) / 235
+            assert times[-1] == pytest.approx(moving + 1000 * GRASP_S, abs=50)
+            assert len(samples) == pytest.approx(times[-1] / 1000 / POLL_S, rel=0.02)  # every poll
+            last = hand.status
+            assert peak_currents([samples]) == tuple(
+                last.current_ma(f) for f in (Finger.A, Finger.B, Finger.C)
+            )
+
+    run(main)
+
+
+def test_a_grasp_of_nothing_is_refused() -> None:
+    async def main() -> None:
+        async with active() as (_, hand):
+            with pytest.raises(MeasuringError, match="closed on nothing"):
+                await grasp(hand, 200, 255)
+
+    run(main)
+
+
+def test_the_currents_survive_a_file(tmp_path: Path) -> None:
+    file = tmp_path / "currents.csv"
+    currents = {50: [[(0, 1, 2, 3), (5, 4, 5, 6)], [(0, 7, 8, 9)]], 0: [[(0, 0, 0, 2550)]]}
+    write_currents(file, currents)
+    assert read_currents(file) == currents
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("a,b\n", "line 1: expected the columns force_value,run,time_ms,a_ma,b_ma,c_ma"),
+        ("force_value,run,time_ms,a_ma,b_ma,c_ma\n0,1,2,3,4\n", "line 2: expected 6 columns, got 5"),
+        (
+            "force_value,run,time_ms,a_ma,b_ma,c_ma\n0,1,2,3,4,x\n",
+            "line 2: c_ma must be an integer in 0..2550",
+        ),
+        ("force_value,run,time_ms,a_ma,b_ma,c_ma\n0,2,2,3,4,5\n", "line 2: run 2 of force 0 is out of order"),
+    ],
+)
+def test_bad_currents_are_refused(tmp_path: Path, text: str, words: str) -> None:
+    file = tmp_path / "currents.csv"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(TableError) as caught:
+        read_currents(file)
+    assert words in str(caught.value)
+
+
+# -- campaigns ---------------------------------------------------------------------------------------------
+
+
+class PowerCutError(Exception):
+    pass
+
+
+async def test_an_interrupted_campaign_goes_on_where_it_was(tmp_path: Path) -> None:
+    file = tmp_path / "table.csv"
+    asked: list[tuple[int, int]] = []
+
+    async def measure(value: int, number: int) -> int:
+        if (value, number) == (170, 2) and (170, 2) not in asked:
+            asked.append((value, number))
+            raise PowerCutError
+        asked.append((value, number))
+        return 1000 * number + value
+
+    with pytest.raises(PowerCutError):
+        await speed_campaign(file, step=85, runs=2).measure(measure)
+    assert read_table(file, SPEED) == {0: (1000, 2000), 85: (1085, 2085)}
+    asked.clear()
+    asked.append((170, 2))
+    again = speed_campaign(file, step=85, runs=2)
+    assert again.left == [170, 255]
+    await again.measure(measure)
+    assert asked[1:] == [(170, 1), (170, 2), (255, 1), (255, 2)]
+    assert sorted(read_table(file, SPEED)) == [0, 85, 170, 255]
+    assert speed_campaign(file, step=85, runs=2).left == []
+
+
+async def test_other_runs_than_those_in_the_file_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "table.csv"
+
+    async def measure(value: int, number: int) -> int:
+        return 5
+
+    await force_campaign(file, step=250, runs=2).measure(measure)
+    with pytest.raises(TableError, match="holds 2 runs, asked for are 3"):
+        force_campaign(file, step=250, runs=3)
+
+
+async def test_a_reading_beyond_the_layout_is_refused_and_not_written(tmp_path: Path) -> None:
+    file = tmp_path / "table.csv"
+
+    async def measure(value: int, number: int) -> int:
+        return 100_001
+
+    with pytest.raises(TableError, match="a reading of 100001 is beyond"):
+        await Campaign(file, FORCE, [0], 1).measure(measure)
+    assert not file.exists()
+
+
+def test_a_folder_that_is_not_there_is_refused_before_anything_moves(tmp_path: Path) -> None:
+    with pytest.raises(TableError, match="there is no folder"):
+        speed_campaign(tmp_path / "nowhere" / "table.csv")
+
+
+# -- the scale ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("surface", ["foam", "rigid"])
+def test_the_simulated_scale_shows_what_the_thesis_s_showed(surface: str) -> None:
+    scale = SimulatedScale(surface)  # type: ignore[arg-type]
+    for force, runs in thesis_table(f"force_{surface}_grams", FORCE).items():
+        readings = {scale.reading(force) for _ in range(200)}
+        assert min(runs) <= min(readings)
+        assert max(readings) <= max(runs)
+        assert len(readings) > 1 or max(runs) - min(runs) <= 10
+
+
+def test_the_same_seed_the_same_readings() -> None:
+    one, two, other = SimulatedScale("foam", 1), SimulatedScale("foam", 1), SimulatedScale("foam", 2)
+    readings = [[scale.reading(force) for force in range(256)] for scale in (one, two, other)]
+    assert readings[0] == readings[1] != readings[2]
+
+
+def test_another_surface_is_refused() -> None:
+    with pytest.raises(ValueError, match="surface must be 'foam' or 'rigid'"):
+        SimulatedScale("wood")  # type: ignore[arg-type]
