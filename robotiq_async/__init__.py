@@ -17,6 +17,7 @@ The map; each module imports only what stands above it::
     ledger       what the gripper has been asked, as far as is known
     desk         what callers have asked for
     compose      the next image, from what callers have asked
+    kinematics   joint angles from the positions of the axes
     motion       moves and their results
     core         decides what to write, learns from what is read
     ------------------------------------------------------------
@@ -36,6 +37,7 @@ The map; each module imports only what stands above it::
     options      checked options of a hand
     waiting      callers that wait for a state
     hand         RobotiqHand
+    doctor       what is wrong with a connection
     measuring    closing times, force and current of a grasp
     plots        pictures of measurements; needs matplotlib
     ------------------------------------------------------------

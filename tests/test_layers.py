@@ -30,6 +30,7 @@ PURE = [
     "ledger",
     "desk",
     "compose",
+    "kinematics",
     "motion",
     "core",
 ]
@@ -51,6 +52,7 @@ RUNTIME = [
     "options",
     "waiting",
     "hand",
+    "doctor",
     "measuring",
     "plots",
 ]

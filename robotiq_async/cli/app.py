@@ -8,12 +8,13 @@ from cyclopts import App
 
 from .. import __version__
 from .demo import demo
+from .doctor import doctor
 from .measure import measure_app
 from .move import move
 from .simulate import simulate
 from .status import status
 
-COMMANDS: Final = (demo, simulate, status, move)
+COMMANDS: Final = (demo, simulate, status, move, doctor)
 """A new sub-command is a module with a function of its name, and an entry here."""
 
 _HELP = """Control a Robotiq 3-Finger gripper, or a simulated one.

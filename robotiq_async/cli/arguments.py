@@ -72,6 +72,7 @@ Address = Annotated[
 Position = Annotated[int, Parameter(converter=_integer("POSITION", 0, 255))]
 Byte = Annotated[int, Parameter(converter=_integer("the value", 0, 255), metavar="0..255")]
 Port = Annotated[int, Parameter(converter=_integer("the port", 0, 65535), metavar="0..65535")]
+Unit = Annotated[int, Parameter(converter=_integer("the unit id", 1, 247), metavar="1..247")]
 Fingers = Annotated[
     Finger,
     Parameter(

@@ -166,3 +166,20 @@ async def test_a_reader_that_has_had_enough(shell: Shell, server: SimulatorServe
     outcome = await shell.finish(process)
     assert outcome.code == 1
     assert "Error" not in outcome.err
+
+
+# -- doctor ------------------------------------------------------------------------------------------------
+
+
+async def test_doctor_finds_nothing_wrong_with_the_simulator(shell: Shell) -> None:
+    outcome = await shell.run("doctor")
+    outcome.assert_succeeded()
+    lines = outcome.out.splitlines()
+    assert lines[0].split()[:2] == ["ok", "Modbus"]
+    assert not any(line.startswith(("FAIL", "warn")) for line in lines)
+
+
+async def test_doctor_fails_when_something_is_broken(shell: Shell) -> None:
+    outcome = await shell.run("doctor", "nowhere.invalid")
+    outcome.assert_failed(1, "tcp://nowhere.invalid:502: name: see above")
+    assert outcome.out.startswith("FAIL  name")

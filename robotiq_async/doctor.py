@@ -1,0 +1,259 @@
+"""What is wrong with my connection? One finding after the other, each with what to do about it.
+
+Reads only: nothing is written, nothing moves, and a gripper that other programs use is not disturbed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import socket
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Final
+
+from .address import Address
+from .enums import Severity
+from .errors import ConnectFailedError, ProtocolError, ResponseTimeoutError, RobotiqConnectionError
+from .link import ModbusTransport, Transport
+from .procedures import signature_of_status
+from .registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap
+from .simulated import SimulatedTransport
+from .status import RobotiqStatus
+
+REACH_S: Final = 3.0
+"""For a name to be resolved, and for a port to answer."""
+ANSWER_S: Final = 0.5
+PROBES: Final = 300
+"""Reads that round trip and rate are taken from."""
+WATCH_S: Final = 2.0
+"""How long another client is looked out for."""
+UNITS: Final = (2, 9, 1, 0, 255)
+"""Unit ids that are tried when the usual one does not answer."""
+SLOW_S: Final = 0.005
+"""A round trip above this does not fit into 200 Hz."""
+
+
+class Level(Enum):
+    """How bad a finding is."""
+
+    GOOD = "ok"
+    DOUBT = "warn"
+    BAD = "FAIL"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One line of the examination.
+
+    Attributes:
+        level: how bad it is.
+        what: what was looked at.
+        found: what was found.
+        advice: what to do about it; empty when nothing is to be done.
+    """
+
+    level: Level
+    what: str
+    found: str
+    advice: str = ""
+
+
+Report = Callable[[Finding], None]
+
+
+class _GiveUpError(Exception):
+    """There is nothing more to examine."""
+
+
+async def examine(address: Address, report: Report, *, device_id: int | None = None) -> None:
+    """Examine a connection; tells each finding as soon as it is there, and never raises for a bad one.
+
+    Args:
+        address: the gripper.
+        report: called with each finding.
+        device_id: Modbus unit id; None for the usual one.
+    """
+    registers = RTU_REGISTERS if address.kind == "rtu" else TCP_REGISTERS
+    if device_id is not None:
+        registers = replace(registers, device_id=device_id)
+    try:
+        if address.kind == "tcp":
+            await _reach(address, report)
+        link = await _answer(address, registers, report)
+        try:
+            await _timing(link, report)
+            _state(RobotiqStatus.from_registers(await link.read()), report)
+            await _others(link, report)
+        finally:
+            await link.close()
+    except _GiveUpError:
+        pass
+    except RobotiqConnectionError as error:
+        advice = "Look at cable, switch and power; something between here and the gripper drops packets."
+        report(Finding(Level.BAD, "link", f"lost during the examination: {error}", advice))
+
+
+async def _reach(address: Address, report: Report) -> None:
+    """Resolve the name and knock at the port."""
+    loop = asyncio.get_running_loop()
+    try:
+        async with asyncio.timeout(REACH_S):
+            found = await loop.getaddrinfo(address.host, address.port, type=socket.SOCK_STREAM)
+    except (OSError, UnicodeError, TimeoutError) as error:
+        why = "no answer" if isinstance(error, TimeoutError) else str(error)
+        advice = "Check the spelling, or use the IP address (shipped as 192.168.1.11)."
+        report(Finding(Level.BAD, "name", f"{address.host} cannot be resolved: {why}", advice))
+        raise _GiveUpError from error
+    addresses = ", ".join(dict.fromkeys(str(each[4][0]) for each in found))
+    report(Finding(Level.GOOD, "name", f"{address.host} is {addresses}"))
+    try:
+        async with asyncio.timeout(REACH_S):
+            _, writer = await asyncio.open_connection(address.host, address.port)
+    except TimeoutError as error:
+        advice = "Is it switched on, on this network, in this subnet? A firewall may drop the packets."
+        report(Finding(Level.BAD, "port", f"{address.port} does not answer within {REACH_S:g} s", advice))
+        raise _GiveUpError from error
+    except OSError as error:
+        advice = "Somebody is there, but serves no Modbus on this port: is it the right address and port?"
+        if not isinstance(error, ConnectionRefusedError):
+            advice = "There is no way to it: check cable, IP address and subnet mask of this computer."
+        report(Finding(Level.BAD, "port", f"{address.port}: {error.strerror or error}", advice))
+        raise _GiveUpError from error
+    writer.close()
+    report(Finding(Level.GOOD, "port", f"{address.port} is open"))
+
+
+async def _answer(address: Address, usual: RegisterMap, report: Report) -> Transport:
+    """A link that answers: the usual unit id and registers first, then others."""
+    first: RobotiqConnectionError | None = None
+    for registers in _candidates(address, usual):
+        link = _link(address, registers)
+        try:
+            await link.open()
+            await link.read()
+        except ConnectFailedError as error:
+            await link.close()
+            report(Finding(Level.BAD, "open", error.args[0], _advice_for_opening(address)))
+            raise _GiveUpError from error
+        except RobotiqConnectionError as error:
+            await link.close()
+            first = first or error
+            continue
+        except BaseException:
+            await link.close()
+            raise
+        _tell_answer(usual, registers, report)
+        return link
+    assert first is not None
+    report(Finding(Level.BAD, "Modbus", str(first), _advice_for_silence(first)))
+    raise _GiveUpError
+
+
+def _candidates(address: Address, usual: RegisterMap) -> list[RegisterMap]:
+    """What to try, the usual first: other units, then the registers of the other kind of link."""
+    if address.kind == "sim":
+        return [usual]
+    other = TCP_REGISTERS if usual.status == RTU_REGISTERS.status else RTU_REGISTERS
+    maps = [usual, *(replace(usual, device_id=unit) for unit in UNITS)]
+    maps += [replace(other, device_id=unit) for unit in dict.fromkeys((usual.device_id, *UNITS))]
+    return list(dict.fromkeys(maps))
+
+
+def _link(address: Address, registers: RegisterMap) -> Transport:
+    if address.kind == "sim":
+        return SimulatedTransport(registers, connect_timeout=REACH_S, response_timeout=ANSWER_S)
+    return ModbusTransport(address, registers, connect_timeout=REACH_S, response_timeout=ANSWER_S)
+
+
+def _tell_answer(usual: RegisterMap, found: RegisterMap, report: Report) -> None:
+    report(Finding(Level.GOOD, "Modbus", "answers"))
+    unit = Finding(Level.GOOD, "unit id", str(found.device_id))
+    if found.device_id != usual.device_id:
+        advice = f"Pass device_id={found.device_id}."
+        unit = Finding(Level.DOUBT, "unit id", f"{found.device_id}, and not {usual.device_id}", advice)
+    report(unit)
+    at = f"status at {found.status}, requests at {found.request}, function {found.read_function}"
+    where = Finding(Level.GOOD, "registers", at)
+    if found.status != usual.status:
+        advice = f"Pass request_address={found.request}, status_address={found.status}."
+        where = Finding(Level.DOUBT, "registers", f"{at}: unusual on this kind of link", advice)
+    report(where)
+
+
+def _advice_for_opening(address: Address) -> str:
+    if address.kind == "rtu":
+        return "Plugged in (ls /dev/ttyUSB*, dmesg)? May you open it (group dialout)? Does another use it?"
+    return "It took a connection before and refuses now: it may serve one client at a time. Stop the other."
+
+
+def _advice_for_silence(error: RobotiqConnectionError) -> str:
+    if isinstance(error, ResponseTimeoutError):
+        return "Connected, but no unit answers: another device, or the gripper's fieldbus is not Modbus."
+    if isinstance(error, ProtocolError):
+        return "Something speaks Modbus there, but is not this gripper, or has its registers elsewhere."
+    return "It hangs up when asked: it may serve one client at a time, or not speak Modbus."
+
+
+async def _timing(link: Transport, report: Report) -> None:
+    """How quickly it answers, and how often it can be asked."""
+    loop = asyncio.get_running_loop()
+    times, began = [], loop.time()
+    for _ in range(PROBES):
+        asked = loop.time()
+        await link.read()
+        times.append(loop.time() - asked)
+        if loop.time() - began > WATCH_S:
+            break
+    rate = len(times) / (loop.time() - began)
+    times.sort()
+    p50, p99 = (times[math.ceil(share * len(times)) - 1] for share in (0.5, 0.99))
+    found = f"{1000 * p50:.1f} ms, {1000 * p99:.1f} ms at worst but 1 in 100"
+    if p99 < SLOW_S:
+        report(Finding(Level.GOOD, "round trip", found))
+    else:
+        advice = "Too slow for 200 Hz at times: a wired network, or a larger poll_interval."
+        report(Finding(Level.DOUBT, "round trip", found, advice))
+    enough = rate >= 1 / SLOW_S
+    advice = "" if enough else f"Pass poll_interval={max(0.01, math.ceil(100 / rate) / 100):g}."
+    report(Finding(Level.GOOD if enough else Level.DOUBT, "rate", f"up to {rate:.0f} reads a second", advice))
+
+
+def _state(status: RobotiqStatus, report: Report) -> None:
+    """Activation and fault."""
+    if status.is_activated:
+        report(Finding(Level.GOOD, "activation", "active"))
+    elif status.activation_echo:
+        report(Finding(Level.DOUBT, "activation", "under way, or ended in a fault", "Wait, and look again."))
+    else:
+        advice = "activate() or start() activates it; the fingers MOVE then."
+        report(Finding(Level.GOOD, "activation", "not active", advice))
+    fault = status.fault
+    found = f"0x{int(fault):02X} {fault.name}: {fault.description}"
+    match fault.severity:
+        case Severity.NONE:
+            report(Finding(Level.GOOD, "fault", "none"))
+        case Severity.PRIORITY:
+            report(Finding(Level.GOOD, "fault", found, "This is a hint and not a failure."))
+        case Severity.MINOR:
+            report(Finding(Level.DOUBT, "fault", found, "It may clear by itself; recover() waits for that."))
+        case Severity.MAJOR:
+            advice = "recover() resets and activates: the part DROPS and the fingers MOVE."
+            report(Finding(Level.BAD, "fault", found, advice))
+
+
+async def _others(link: Transport, report: Report) -> None:
+    """Whether requests change although this program writes none."""
+    loop = asyncio.get_running_loop()
+    until, seen = loop.time() + WATCH_S, set()
+    while loop.time() < until:
+        seen.add(signature_of_status(RobotiqStatus.from_registers(await link.read())))
+        await asyncio.sleep(0.01)
+    if len(seen) == 1:
+        found = f"none seen to write within {WATCH_S:g} s"
+        report(Finding(Level.GOOD, "other clients", found))
+    else:
+        found = f"the requests changed {len(seen) - 1} times within {WATCH_S:g} s"
+        advice = "Another program commands the gripper. Two that do so disturb each other: stop one."
+        report(Finding(Level.DOUBT, "other clients", found, advice))

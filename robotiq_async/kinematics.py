@@ -1,0 +1,113 @@
+"""Joint angles of the hand from the positions of its four axes, as ROS's joint states name them.
+
+Each finger has three phalanges and one motor: up to about 110 counts the base turns and the tip stays
+parallel to itself, to 140 the base turns alone, from there to 240 the middle one, and beyond nothing moves
+(Indiana University, technical report 711; slopes and limits from recordings of real hands, see the points
+below). The scissor turns the bases of B and C against each other.
+
+Angles are what a mechanism without load and play would have; nothing here has been checked on a real hand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import radians
+from typing import Final
+
+from .checks import check_byte
+from .enums import Finger
+from .status import RobotiqStatus
+
+Points = tuple[tuple[int, float], ...]
+"""Position in counts, rising, and angle in degrees; straight in between, level beyond the ends."""
+
+BASE: Final[Points] = ((0, 0.0), (140, 70.0))
+"""joint_1. The ROS node has a slope of 70/148 with a jump at 140; a straight line to 70 degrees is meant."""
+MIDDLE: Final[Points] = ((140, 0.0), (240, 90.0))
+"""joint_2."""
+TIP: Final[Points] = ((0, 0.0), (110, -55.0))
+"""joint_3: against the base, for the tip stays parallel, until its stop."""
+PALM: Final[Points] = ((15, 11.0), (240, -11.0))
+"""The palm joint of finger_1 against the scissor; that of finger_2 is its negative. Measured on recordings;
+the manual says 32 degrees in all."""
+
+PREFIX: Final = {Finger.B: "finger_1", Finger.C: "finger_2", Finger.A: "finger_middle"}
+"""What the URDF of the hand (robotiq 3f description) calls the fingers. A stands alone opposite the other
+two and has no palm joint, so it is the middle one; the ROS node maps A to finger_1, against the hand's
+drawings."""
+
+JOINTS: Final = (
+    "palm_finger_1_joint",
+    "finger_1_joint_1",
+    "finger_1_joint_2",
+    "finger_1_joint_3",
+    "palm_finger_2_joint",
+    "finger_2_joint_1",
+    "finger_2_joint_2",
+    "finger_2_joint_3",
+    "finger_middle_joint_1",
+    "finger_middle_joint_2",
+    "finger_middle_joint_3",
+)
+"""The eleven names, in the order of :func:`joint_angles`."""
+
+
+def finger_angles(position: int) -> tuple[float, float, float]:
+    """The three joints of a finger in radians, from the palm on.
+
+    Args:
+        position: counts, 0..255.
+
+    Raises:
+        TypeError: position is not an int.
+        ValueError: position is outside 0..255.
+    """
+    counts = check_byte("position", position)
+    base, middle, tip = (radians(_between(counts, points)) for points in (BASE, MIDDLE, TIP))
+    return base, middle, tip
+
+
+def palm_angle(scissor: int) -> float:
+    """The palm joint of finger_1 in radians; that of finger_2 is its negative.
+
+    Args:
+        scissor: position of the scissor in counts, 0 (wide) .. 255 (pinch).
+
+    Raises:
+        TypeError: scissor is not an int.
+        ValueError: scissor is outside 0..255.
+    """
+    return radians(_between(check_byte("scissor", scissor), PALM))
+
+
+def joint_angles(status: RobotiqStatus) -> tuple[float, ...]:
+    """The eleven joints in radians, in the order of :data:`JOINTS`."""
+    palm = palm_angle(status.position(Finger.SCISSOR))
+    one, two, middle = (finger_angles(status.position(finger)) for finger in PREFIX)
+    return (palm, *one, -palm, *two, *middle)
+
+
+def joint_velocities(before: RobotiqStatus, after: RobotiqStatus) -> tuple[float, ...]:
+    """Radians a second between two statuses, in the order of :data:`JOINTS`.
+
+    A count is 0.5 degrees, so that between two polls this is either nothing or a lot: take statuses that are
+    some tens of milliseconds apart.
+
+    Raises:
+        ValueError: the second is not later than the first.
+    """
+    seconds = after.timestamp - before.timestamp
+    if seconds <= 0:
+        raise ValueError(f"after must be later than before, got {seconds} s")
+    return tuple(
+        (new - old) / seconds for old, new in zip(joint_angles(before), joint_angles(after), strict=True)
+    )
+
+
+def _between(counts: int, points: Sequence[tuple[int, float]]) -> float:
+    (first, at_first), (last, at_last) = points
+    if counts <= first:
+        return at_first
+    if counts >= last:
+        return at_last
+    return at_first + (at_last - at_first) * (counts - first) / (last - first)

@@ -1,0 +1,182 @@
+"""What is wrong with my connection? Each ailment is found, and told with what to do."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Callable
+from typing import Any
+
+import pytest
+
+from robotiq_async.address import parse_address
+from robotiq_async.doctor import Finding, Level, examine
+from robotiq_async.request import AxisRequest, Request
+from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
+from tests.serial_line import SerialLine
+
+HEALTHY = ["name", "port", "Modbus", "unit id", "registers", "round trip", "rate", "activation", "fault"]
+
+
+async def findings(address: str, **options: Any) -> dict[str, Finding]:
+    told: list[Finding] = []
+    async with asyncio.timeout(30):
+        await examine(parse_address(address), told.append, **options)
+    assert all(finding.advice for finding in told if finding.level is not Level.GOOD)
+    return {finding.what: finding for finding in told}
+
+
+class Device(asyncio.Protocol):
+    """Answers each request as told."""
+
+    def __init__(self, answer: Callable[[bytes], bytes]) -> None:
+        self._answer = answer
+
+    def connection_made(self, transport: Any) -> None:
+        self._transport = transport
+
+    def data_received(self, data: bytes) -> None:
+        self._transport.write(self._answer(data))
+
+
+@contextlib.asynccontextmanager
+async def answering(answer: Callable[[bytes], bytes]) -> AsyncIterator[str]:
+    """The address of a device that answers each request as told."""
+    server = await asyncio.get_running_loop().create_server(lambda: Device(answer), "127.0.0.1", 0)
+    async with server:
+        yield f"127.0.0.1:{server.sockets[0].getsockname()[1]}"
+
+
+def reply(request: bytes, pdu: bytes) -> bytes:
+    return request[:4] + (len(pdu) + 1).to_bytes(2, "big") + request[6:7] + pdu
+
+
+async def test_a_healthy_connection() -> None:
+    gripper = SimulatedGripper()
+    async with SimulatorServer(gripper) as server:
+        found = await findings(server.address)
+        assert not gripper.writes
+    assert list(found) == [*HEALTHY, "other clients"]
+    assert {finding.level for finding in found.values()} == {Level.GOOD}
+    assert found["activation"].found == "not active"
+    assert "none seen" in found["other clients"].found
+
+
+async def test_a_simulated_one_too() -> None:
+    found = await findings("sim://")
+    assert list(found) == [*HEALTHY[2:], "other clients"]
+
+
+async def test_a_name_that_does_not_exist() -> None:
+    found = await findings("nowhere.invalid")
+    assert list(found) == ["name"]
+    assert found["name"].level is Level.BAD
+
+
+async def test_nobody_listens() -> None:
+    async with SimulatorServer() as server:
+        address = server.address
+    found = await findings(address)
+    assert (found["name"].level, found["port"].level) == (Level.GOOD, Level.BAD)
+    assert "right address and port" in found["port"].advice
+
+
+async def test_somebody_who_speaks_no_modbus() -> None:
+    async with answering(lambda _: b"HTTP/1.1 400 Bad Request\r\n\r\n") as address:
+        found = await findings(address)
+    assert found["Modbus"].level is Level.BAD
+    assert "not this gripper" in found["Modbus"].advice
+
+
+async def test_another_unit_id() -> None:
+    async with answering(lambda request: other_unit(request, 9)) as address:
+        found = await findings(address)
+    assert found["unit id"].level is Level.DOUBT
+    assert found["unit id"].advice == "Pass device_id=9."
+
+
+def other_unit(request: bytes, unit: int) -> bytes:
+    if request[6] != unit:
+        return reply(request, bytes((request[7] | 0x80, 11)))
+    return reply(request, bytes((request[7], 16)) + bytes(16))
+
+
+async def test_registers_of_the_serial_kind_over_tcp() -> None:
+    def answer(request: bytes) -> bytes:
+        if request[7] == 3 and request[8:10] == b"\x07\xd0":
+            return reply(request, bytes((3, 16)) + bytes(16))
+        return reply(request, bytes((request[7] | 0x80, 2)))
+
+    async with answering(answer) as address:
+        found = await findings(address)
+    assert found["registers"].level is Level.DOUBT
+    assert found["registers"].advice == "Pass request_address=1000, status_address=2000."
+
+
+async def test_a_slow_gripper() -> None:
+    async with SimulatorServer() as server:
+        server.replies.delay(0.02)
+        found = await findings(server.address)
+    assert found["round trip"].level is Level.DOUBT
+    assert found["rate"].level is Level.DOUBT
+    assert "poll_interval=0.03" in found["rate"].advice
+
+
+@pytest.mark.parametrize(
+    ("code", "level", "words"),
+    [(7, Level.GOOD, "a hint"), (9, Level.DOUBT, "clear by itself"), (13, Level.BAD, "DROPS")],
+)
+async def test_a_fault(code: int, level: Level, words: str) -> None:
+    gripper = SimulatedGripper()
+    gripper.inject_fault(code)
+    async with SimulatorServer(gripper) as server:
+        found = await findings(server.address)
+    assert found["fault"].level is level
+    assert words in found["fault"].advice
+    assert f"0x{code:02X}" in found["fault"].found
+
+
+async def test_another_client() -> None:
+    gripper = SimulatedGripper()
+
+    async def command() -> None:
+        for position in range(256):
+            axes = (AxisRequest(position, 0, 0),) * 4
+            gripper.write(0, Request(activate=True, axes=axes).registers)
+            await asyncio.sleep(0.1)
+
+    async with SimulatorServer(gripper) as server:
+        other = asyncio.create_task(command())
+        found = await findings(server.address)
+        other.cancel()
+    assert found["other clients"].level is Level.DOUBT
+    assert "stop one" in found["other clients"].advice
+
+
+async def test_a_link_that_is_lost_in_the_middle() -> None:
+    async with SimulatorServer() as server:
+
+        def go_away() -> None:
+            server.refuse()
+            server.cut()
+
+        asyncio.get_running_loop().call_later(1.0, go_away)
+        found = await findings(server.address)
+    assert found["link"].level is Level.BAD
+
+
+async def test_a_serial_line(tmp_path: Any) -> None:
+    with SerialLine(tmp_path) as line:
+        async with SerialSimulatorServer(line.far):
+            found = await findings(f"rtu://{line.near}")
+    assert list(found) == [*HEALTHY[2:], "other clients"]
+    assert found["unit id"].found == "9"
+    found = await findings(f"rtu://{tmp_path}/nothing")
+    assert found["open"].level is Level.BAD
+    assert "dialout" in found["open"].advice
+
+
+async def test_the_unit_id_can_be_said() -> None:
+    async with answering(lambda request: other_unit(request, 5)) as address:
+        assert (await findings(address))["Modbus"].level is Level.BAD
+        assert (await findings(address, device_id=5))["unit id"].level is Level.GOOD
