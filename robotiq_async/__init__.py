@@ -37,6 +37,7 @@ The map; each module imports only what stands above it::
     options      checked options of a hand
     waiting      callers that wait for a state
     hand         RobotiqHand
+    metrics      figures for Prometheus; needs prometheus-client
     doctor       what is wrong with a connection
     measuring    closing times, force and current of a grasp
     plots        pictures of measurements; needs matplotlib

@@ -356,19 +356,22 @@ class RobotiqHand:
 
         move = Move(target, axes, loop.time(), resolve)
         core.move(move, speed, force)
-        try:
-            with anyio.move_on_after(limit):
-                return await ended
-        except asyncio.CancelledError:
-            core.abandon(move, unseen=True)
-            if ended.done() and not ended.cancelled():
-                ended.exception()  # nobody else will look at it
-            raise
-        finally:
-            core.abandon(move)
-        raise MoveTimeoutError(
-            f"{axes!r} still moved after {limit:.2f} s on the way to {target}", self.status
-        )
+        with self._counters.move() as note:
+            try:
+                with anyio.move_on_after(limit):
+                    result = await ended
+                    note(result)
+                    return result
+            except asyncio.CancelledError:
+                core.abandon(move, unseen=True)
+                if ended.done() and not ended.cancelled():
+                    ended.exception()  # nobody else will look at it
+                raise
+            finally:
+                core.abandon(move)
+            raise MoveTimeoutError(
+                f"{axes!r} still moved after {limit:.2f} s on the way to {target}", self.status
+            )
 
     async def open(
         self,
@@ -519,6 +522,11 @@ class RobotiqHand:
     # -- what is going on ------------------------------------------------------------------------------
 
     @property
+    def address(self) -> str:
+        """The gripper's address in its full form; for a transport object, what messages call it."""
+        return self._options.address
+
+    @property
     def state(self) -> State:
         """Where the hand is."""
         return self._machine.state
@@ -661,6 +669,7 @@ class RobotiqHand:
     def _on_transition(self, source: State, target: State, trigger: Trigger) -> None:
         now = asyncio.get_running_loop().time()
         self._transitions.push(Transition(source, target, trigger, now))
+        self._counters.faults += target is State.FAULT
         self._waiters.reached(target)
 
     def _started(self) -> Core:

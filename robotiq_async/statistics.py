@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections import deque
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final
+
+from .errors import RobotiqError
+from .motion import MoveResult
 
 SAMPLES: Final = 2000
 """Periods and round trips that percentiles are taken from: 10 s at 200 Hz."""
@@ -27,6 +32,9 @@ class Statistics:
         reconnects: times the link was opened again.
         foreign_commands: times another client was seen to command the gripper.
         tick: what the polls are timed by: "timerfd" (Linux), "loop timer", or nothing before the first.
+        faults: times the gripper reported a minor or a major fault.
+        moves: how often :meth:`RobotiqHand.move` ended how: "reached", "contact", "cancelled", or the name
+            of the error.
     """
 
     polls: int
@@ -40,13 +48,17 @@ class Statistics:
     reconnects: int
     foreign_commands: int
     tick: str
+    faults: int
+    moves: Mapping[str, int]
 
 
 class Counters:
     """What the owner task counts."""
 
     __slots__ = (
+        "faults",
         "longest_stall",
+        "moves",
         "overruns",
         "periods",
         "polls",
@@ -64,8 +76,27 @@ class Counters:
         self.reconnects = 0
         self.longest_stall = 0.0
         self.tick = ""
+        self.faults = 0
+        self.moves: Counter[str] = Counter()
         self.periods: deque[float] = deque(maxlen=SAMPLES)
         self.round_trips: deque[float] = deque(maxlen=SAMPLES)
+
+    @contextmanager
+    def move(self) -> Iterator[Callable[[MoveResult], None]]:
+        """Count how a move ends; gives what is to be called with its result."""
+        outcome = "cancelled"
+
+        def note(result: MoveResult) -> None:
+            nonlocal outcome
+            outcome = "contact" if result.object_detected else "reached"
+
+        try:
+            yield note
+        except RobotiqError as error:
+            outcome = type(error).__name__
+            raise
+        finally:
+            self.moves[outcome] += 1
 
     def snapshot(self, foreign_commands: int) -> Statistics:
         """The figures so far."""
@@ -82,6 +113,8 @@ class Counters:
             reconnects=self.reconnects,
             foreign_commands=foreign_commands,
             tick=self.tick,
+            faults=self.faults,
+            moves=dict(self.moves),
         )
 
 

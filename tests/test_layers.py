@@ -52,6 +52,7 @@ RUNTIME = [
     "options",
     "waiting",
     "hand",
+    "metrics",
     "doctor",
     "measuring",
     "plots",

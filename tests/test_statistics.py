@@ -24,6 +24,8 @@ def test_before_the_first_poll_every_figure_is_zero() -> None:
         reconnects=0,
         foreign_commands=0,
         tick="",
+        faults=0,
+        moves={},
     )
 
 
@@ -35,6 +37,8 @@ def test_a_snapshot_tells_each_counter_under_its_own_name() -> None:
     counters.reconnects = 4
     counters.longest_stall = 0.5
     counters.tick = "timerfd"
+    counters.faults = 9
+    counters.moves["reached"] = 10
     counters.periods.append(0.006)
     counters.round_trips.append(0.007)
     assert dataclasses.asdict(counters.snapshot(8)) == {
@@ -49,6 +53,8 @@ def test_a_snapshot_tells_each_counter_under_its_own_name() -> None:
         "round_trip_p99": 0.007,
         "foreign_commands": 8,
         "tick": "timerfd",
+        "faults": 9,
+        "moves": {"reached": 10},
     }
 
 

@@ -1,0 +1,118 @@
+"""Figures for Prometheus, asked for as Prometheus does."""
+
+from __future__ import annotations
+
+import asyncio
+import urllib.request
+from collections.abc import AsyncIterator
+
+import pytest
+from prometheus_client.parser import text_string_to_metric_families
+
+from robotiq_async import Finger, GripperFaultError, MoveSupersededError, RobotiqHand, State
+from robotiq_async.metrics import serve_metrics
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+
+Samples = dict[tuple[str, str], float]
+
+
+@pytest.fixture
+async def gripper() -> SimulatedGripper:
+    return SimulatedGripper(speedup=20)
+
+
+@pytest.fixture
+async def hand(gripper: SimulatedGripper) -> AsyncIterator[RobotiqHand]:
+    async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
+        yield hand
+
+
+async def asked(where: tuple[str, int]) -> Samples:
+    """Every sample, by its name and its second label."""
+
+    def get() -> str:
+        with urllib.request.urlopen(f"http://{where[0]}:{where[1]}/metrics", timeout=10) as answer:
+            text: str = answer.read().decode()
+            return text
+
+    families = text_string_to_metric_families(await asyncio.to_thread(get))
+    return {
+        (sample.name, next((v for k, v in sample.labels.items() if k != "hand"), "")): sample.value
+        for family in families
+        for sample in family.samples
+    }
+
+
+async def test_the_figures_are_the_hands(hand: RobotiqHand, gripper: SimulatedGripper) -> None:
+    async with serve_metrics(hand, port=0) as where:
+        assert where[0] == "127.0.0.1"
+        await hand.move(100)
+        gripper.place_object(Finger.ABC, 150)
+        await hand.move(200)
+        moving = asyncio.create_task(hand.move(0, speed=0))
+        await hand.wait_for_state(State.RUNNING_CC)
+        await hand.halt()
+        with pytest.raises(MoveSupersededError):
+            await moving
+        moving = asyncio.create_task(hand.move(0, speed=0))
+        await hand.wait_for_state(State.RUNNING_CC)
+        moving.cancel()
+        await asyncio.gather(moving, return_exceptions=True)
+        moving = asyncio.create_task(hand.move(0, speed=0))
+        await asyncio.sleep(0.02)
+        gripper.inject_fault(13)
+        with pytest.raises(GripperFaultError):
+            await moving
+        first = await asked(where)
+        statistics = hand.statistics
+        second = await asked(where)
+    outcomes = ["reached", "contact", "MoveSupersededError", "cancelled", "GripperFaultError"]
+    assert {
+        key[1]: value for key, value in first.items() if key[0] == "robotiq_moves_total"
+    } == dict.fromkeys(outcomes, 1.0)
+    assert dict(statistics.moves) == dict.fromkeys(outcomes, 1)
+    assert first["robotiq_faults_total", ""] == 1
+    for name in ("polls", "writes", "overruns", "reconnects", "foreign_commands"):
+        key = (f"robotiq_{name}_total", "")
+        assert first[key] <= getattr(statistics, name) <= second[key]
+    assert 0 < first["robotiq_round_trip_p50_seconds", ""] <= first["robotiq_round_trip_p99_seconds", ""] < 1
+    states = {key[1]: value for key, value in first.items() if key[0] == "robotiq_state"}
+    assert states.pop("FAULT") == 1
+    assert set(states.values()) == {0}
+    assert len(states) == len(State) - 1
+
+
+async def test_it_ends_with_the_block(hand: RobotiqHand) -> None:
+    async with serve_metrics(hand, port=0) as where:
+        await asked(where)
+    with pytest.raises(OSError, match="refused"):
+        await asked(where)
+
+
+async def test_several_hands_are_told_apart(hand: RobotiqHand) -> None:
+    async with RobotiqHand() as other, serve_metrics(hand, other, port=0) as (host, port):
+
+        def get() -> str:
+            with urllib.request.urlopen(f"http://{host}:{port}/metrics", timeout=10) as answer:
+                text: str = answer.read().decode()
+                return text
+
+        text = await asyncio.to_thread(get)
+        for each in (hand, other):
+            assert f'robotiq_polls_total{{hand="{each.address}"}}' in text
+
+
+async def test_wrong_arguments(hand: RobotiqHand) -> None:
+    with pytest.raises(ValueError, match="at least one RobotiqHand"):
+        async with serve_metrics():
+            pass
+    with pytest.raises(ValueError, match=r"port must be in 0\.\.65535"):
+        async with serve_metrics(hand, port=65536):
+            pass
+
+
+async def test_a_port_that_is_taken(hand: RobotiqHand) -> None:
+    async with serve_metrics(hand, port=0) as (_, port):
+        with pytest.raises(OSError, match="in use"):
+            async with serve_metrics(hand, port=port):
+                pass
