@@ -2,6 +2,7 @@
 
 The map; each module imports only what stands above it::
 
+    version      the version
     enums        the names of the field                        no I/O, no clock,
     errors       everything that is raised                     no event loop
     checks       argument checks
@@ -37,6 +38,10 @@ The map; each module imports only what stands above it::
     options      checked options of a hand
     waiting      callers that wait for a state
     hand         RobotiqHand
+    payloads     what is told of a hand in JSON
+    jointstate   joint states as ROS 2 encodes them
+    recorder     everything about a hand in an MCAP file; needs mcap
+    recording    what such a file holds
     metrics      figures for Prometheus; needs prometheus-client
     doctor       what is wrong with a connection
     measuring    closing times, force and current of a grasp
@@ -90,9 +95,8 @@ from .motion import MoveResult
 from .owner import ReconnectPolicy
 from .statistics import Statistics
 from .status import RobotiqStatus
-from .streams import Stream, Transition
-
-__version__ = "0.1.0"
+from .streams import SentRequest, Stream, Transition
+from .version import __version__ as __version__
 
 __all__ = [
     "CLOSED",
@@ -127,6 +131,7 @@ __all__ = [
     "RobotiqHand",
     "RobotiqStateError",
     "RobotiqStatus",
+    "SentRequest",
     "Severity",
     "State",
     "StateTimeoutError",

@@ -30,6 +30,11 @@ NOMINAL_SPEEDS_MM_S: Final = (22.0, 110.0)
 NOMINAL_FORCES_N: Final = (15.0, 60.0)
 """Grip force at the values 0 and 255 (manual, specifications)."""
 
+LONGEST_S: Final = 600.0
+"""No closing takes longer."""
+STRONGEST_N: Final = 1000.0
+"""No grasp is stronger."""
+
 Points = tuple[tuple[int, float], ...]
 
 
@@ -75,6 +80,17 @@ class SpeedCalibration:
 
     source: str
     points: Points
+
+    def __post_init__(self) -> None:
+        """Check the points.
+
+        Raises:
+            TypeError: a value or a figure of the wrong type.
+            ValueError: fewer than two, not rising, or outside 0..255 and 0..600 s.
+        """
+        check_points(self.points, LONGEST_S)
+        if not all(seconds for _, seconds in self.points):
+            raise ValueError("points: a closing time must be above 0 s")
 
     @classmethod
     def nominal(cls) -> SpeedCalibration:
@@ -156,6 +172,15 @@ class ForceCalibration:
     source: str
     points: Points
 
+    def __post_init__(self) -> None:
+        """Check the points.
+
+        Raises:
+            TypeError: a value or a figure of the wrong type.
+            ValueError: fewer than two, not rising, or outside 0..255 and 0..1000 N.
+        """
+        check_points(self.points, STRONGEST_N)
+
     @classmethod
     def nominal(cls) -> ForceCalibration:
         """The manual's figures, drawn as a straight line although it says that they are not one."""
@@ -219,6 +244,23 @@ def mean(runs: Sequence[int]) -> float:
 def newton(grams: float) -> float:
     """The force that a scale shows as a mass: F = m g, g = 9.81 m/s2."""
     return grams / 1000 * GRAVITY
+
+
+def check_points(points: Points, high: float) -> None:
+    """Refuse what is no curve.
+
+    Raises:
+        TypeError: a value or a figure of the wrong type.
+        ValueError: fewer than two points, values that do not rise, or a figure outside 0..high.
+    """
+    if len(points) < 2:
+        raise ValueError(f"points: at least two are needed, got {len(points)}")
+    for value, figure in points:
+        check_byte("a value of points", value)
+        check_number("a figure of points", figure, 0.0, high)
+    values = [value for value, _ in points]
+    if values != sorted(set(values)):
+        raise ValueError(f"points: the values must rise, got {values}")
 
 
 def covered(points: Points) -> range:

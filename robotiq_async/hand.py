@@ -40,7 +40,7 @@ from .options import (
 from .owner import Owner, ReconnectPolicy
 from .statistics import Counters, Statistics
 from .status import RobotiqStatus
-from .streams import Channel, Stream, Transition
+from .streams import Channel, SentRequest, Stream, Transition
 from .waiting import StateWaiters
 
 RESET_TIMEOUT_S: Final = 5.0
@@ -130,6 +130,7 @@ class RobotiqHand:
         self._counters = Counters()
         self._statuses: Channel[RobotiqStatus] = Channel()
         self._transitions: Channel[Transition] = Channel()
+        self._requests: Channel[SentRequest] = Channel()
         self._waiters = StateWaiters()
         self._owner: Owner | None = None
         self._task: asyncio.Task[None] | None = None
@@ -175,6 +176,7 @@ class RobotiqHand:
         self._counters = Counters()
         self._statuses.reopen()
         self._transitions.reopen()
+        self._requests.reopen()
         sequence = self._owner.sequence if self._owner is not None else 0
         owner = self._owner = Owner(
             self._options.transport,
@@ -186,6 +188,7 @@ class RobotiqHand:
             policy=self._options.policy,
             first_sequence=sequence,
             publish=self._statuses.push,
+            publish_request=self._requests.push,
         )
         self._machine.happen(Trigger.ASK_START)
         self._task = asyncio.get_running_loop().create_task(owner.run(), name="robotiq_async owner")
@@ -596,6 +599,10 @@ class RobotiqHand:
         """Every change of state from now on, for one reader, none lost. Ends after :meth:`stop`."""
         return self._transitions.open(None)
 
+    def requests(self) -> Stream[SentRequest]:
+        """Every request written from now on, for one reader, none lost. Ends after :meth:`stop`."""
+        return self._requests.open(None)
+
     async def wait_for_state(self, *states: State, timeout: float | None = None) -> State:
         """Wait until the hand is, if only for a moment, in one of these states, and return it.
 
@@ -665,6 +672,7 @@ class RobotiqHand:
         self._waiters.fail(failure or (lambda: NotStartedError("the hand was stopped")))
         self._statuses.end(failure)
         self._transitions.end(failure)
+        self._requests.end(failure)
 
     def _on_transition(self, source: State, target: State, trigger: Trigger) -> None:
         now = asyncio.get_running_loop().time()

@@ -31,6 +31,13 @@ from .runs import (
 
 REST_S: Final = 0.3
 """Between two runs, in the gripper's time: a finger that has just stopped may still swing."""
+ATTEMPTS: Final = 20
+"""So often a run is measured again in which the event loop was held up."""
+TOLERATED: Final = 0.01
+"""Share of a run for which it may be, and two polls more."""
+OPEN_BELOW: Final = 12
+CLOSED_ABOVE: Final = 234
+"""Counts that tell a full closing; open reads 6-7, closed 240 or more."""
 GRASP_S: Final = 1.0
 """How long a grasp is watched once the fingers have stopped, in the gripper's time."""
 CURRENT_MA: Final = 2550
@@ -68,18 +75,39 @@ def force_values(step: int = 25) -> list[int]:
 async def time_closing(hand: RobotiqHand, speed: int, fingers: Finger, speedup: float = 1.0) -> float:
     """Open fully and at full speed, then close at a speed: seconds from the command until nothing moves.
 
-    When cancelled, the fingers stop.
+    A run in which the event loop was held up is measured again. When cancelled, the fingers stop.
+
+    Args:
+        hand: the gripper.
+        speed: speed value, 0..255.
+        fingers: of A, B and C; the scissor has another stroke.
+        speedup: how much faster the gripper's clock is.
 
     Raises:
-        MeasuringError: the fingers met something.
+        ValueError: the scissor is among the fingers.
+        MeasuringError: the fingers met something, did not go the whole way, or the loop is too busy.
         RobotiqError: as :meth:`RobotiqHand.move`.
     """
-    await hand.open(fingers, speed=255)
-    await asyncio.sleep(REST_S / speedup)
-    result = await hand.close(fingers, speed=speed)
-    if result.object_detected:
-        raise MeasuringError(f"the fingers met something ({result.contacts!r}): nothing may be in their way")
-    return result.duration * speedup
+    if Finger.SCISSOR in fingers:
+        raise ValueError("fingers must be of A, B and C, got the scissor: its stroke is another")
+    for _ in range(ATTEMPTS):
+        opened = await hand.open(fingers, speed=255)
+        await asyncio.sleep(REST_S / speedup)
+        before = hand.statistics
+        closed = await hand.close(fingers, speed=speed)
+        for result in (opened, closed):
+            if result.object_detected:
+                what = f"the fingers met something ({result.contacts!r})"
+                raise MeasuringError(f"{what}: nothing may be in their way")
+        if max(opened.positions.values()) > OPEN_BELOW or min(closed.positions.values()) < CLOSED_ABOVE:
+            raise MeasuringError(
+                f"no full closing: from {dict(opened.positions)} to {dict(closed.positions)}"
+            )
+        after = hand.statistics
+        missed = max(0, after.overruns - before.overruns - 2)
+        if missed * after.period_p50 <= TOLERATED * closed.duration:
+            return closed.duration * speedup
+    raise MeasuringError(f"the event loop was held up in each of {ATTEMPTS} runs: too busy to measure")
 
 
 def expected_seconds(speed: int) -> float:
@@ -105,7 +133,9 @@ async def grasp(hand: RobotiqHand, force: int, speed: int, speedup: float = 1.0)
         MeasuringError: the fingers met nothing.
         RobotiqError: as :meth:`RobotiqHand.move`.
     """
-    await hand.open(speed=255)
+    opened = await hand.open(speed=255)
+    if opened.object_detected:
+        raise MeasuringError(f"something is in the way of opening ({opened.contacts!r})")
     await asyncio.sleep(REST_S / speedup)
     samples: list[Sample] = []
     began = asyncio.get_running_loop().time()
@@ -153,6 +183,7 @@ class Campaign:
     Attributes:
         path: the file; it is read if it is there.
         layout: of the table.
+        origin: what was measured and how; kept beside the table, and no other may go on with it.
         values: the rows that are wanted, in the order they are measured in.
         runs: columns.
         table: what has been measured so far.
@@ -162,6 +193,7 @@ class Campaign:
     layout: Layout
     values: list[int]
     runs: int
+    origin: dict[str, str] = field(default_factory=dict)
     table: Table = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -178,6 +210,14 @@ class Campaign:
         for runs in self.table.values():
             if len(runs) != self.runs:
                 raise TableError(self.path, None, f"holds {len(runs)} runs, asked for are {self.runs}")
+        was = read_origin(self.path)
+        if was != self.origin:
+            differs = ", ".join(
+                f"{name} {was.get(name, 'unknown')} there and {self.origin.get(name, 'unknown')} here"
+                for name in sorted({*was, *self.origin})
+                if was.get(name) != self.origin.get(name)
+            )
+            raise TableError(self.path, None, f"was measured otherwise: {differs}; choose another file")
 
     @property
     def left(self) -> list[int]:
@@ -200,18 +240,46 @@ class Campaign:
                     raise TableError(self.path, None, f"a reading of {reading} is beyond {limit}")
                 readings.append(reading)
             self.table[value] = tuple(readings)
+            if not origin_beside(self.path).exists():
+                await asyncio.to_thread(write_origin, self.path, self.origin)
             # In a thread: a disk may take its time, and the hand polls meanwhile.
             await asyncio.to_thread(write_table, self.path, self.layout, self.table)
 
 
-def speed_campaign(path: Path, step: int = 4, runs: int = 3) -> Campaign:
+def speed_campaign(path: Path, step: int = 4, runs: int = 3, **origin: str) -> Campaign:
     """Closing times for every so many speed values."""
-    return Campaign(path, SPEED, speed_values(step), runs)
+    return Campaign(path, SPEED, speed_values(step), runs, origin)
 
 
-def force_campaign(path: Path, step: int = 25, runs: int = 3) -> Campaign:
+def force_campaign(path: Path, step: int = 25, runs: int = 3, **origin: str) -> Campaign:
     """Scale readings for every so many force values."""
-    return Campaign(path, FORCE, force_values(step), runs)
+    return Campaign(path, FORCE, force_values(step), runs, origin)
+
+
+def origin_beside(path: Path) -> Path:
+    """Where it is kept what a table was measured on, and how."""
+    return path.with_name(f"{path.name}.origin.csv")
+
+
+def read_origin(path: Path) -> dict[str, str]:
+    """What a table was measured on, and how; empty when nobody knows.
+
+    Raises:
+        TableError: the file beside the table cannot be read.
+    """
+    beside = origin_beside(path)
+    if not beside.exists():
+        return {}
+    return {cells[0]: cells[1] for _, cells in read_rows(beside) if len(cells) == 2}
+
+
+def write_origin(path: Path, origin: dict[str, str]) -> None:
+    """Keep it.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    write_rows(origin_beside(path), sorted(origin.items()))
 
 
 # -- currents in a file ------------------------------------------------------------------------------------
@@ -243,6 +311,8 @@ def read_currents(path: Path) -> Currents:
             runs.append([])
         time, a, b, c = sample
         runs[-1].append((time, a, b, c))
+    if not currents:
+        raise TableError(path, None, "there are no currents in it")
     return currents
 
 

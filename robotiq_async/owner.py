@@ -32,6 +32,7 @@ from .log import log
 from .machine import Trigger
 from .statistics import Counters
 from .status import RobotiqStatus
+from .streams import SentRequest
 from .tick import Tick
 
 # anyio loads its backend when it is first used: some 20 ms that would hold up the loop in which a hand
@@ -104,6 +105,7 @@ class Owner:
         policy: ReconnectPolicy | None,
         first_sequence: int,
         publish: Callable[[RobotiqStatus], None],
+        publish_request: Callable[[SentRequest], None],
     ) -> None:
         """Prepare; must be made inside a running event loop.
 
@@ -117,6 +119,7 @@ class Owner:
             policy: what becomes of a lost link; None gives up at once.
             first_sequence: number of the first status.
             publish: called with each status, after the core has seen it.
+            publish_request: called with each image that was written.
         """
         self._transport = transport
         self._core = core
@@ -127,6 +130,7 @@ class Owner:
         self._policy = policy
         self.sequence = first_sequence
         self._publish = publish
+        self._publish_request = publish_request
         self._loop = asyncio.get_running_loop()
         self.connected: asyncio.Future[None] = self._loop.create_future()
         """Done when the first status has been taken in; holds the error when there was none."""
@@ -256,11 +260,18 @@ class Owner:
             if not self._is_stale():
                 break
             await self._look()
-        request = core.take_request(self._tick.time())
-        if request is not None:
+        now = self._tick.time()
+        request = core.take_request(now)
+        if request is None:
+            return
+        try:
             await self._transport.write(request.registers)
-            self._counters.writes += 1
-            core.acknowledged(self._tick.time())
+        except RobotiqConnectionError:
+            self._publish_request(SentRequest(request, now, acknowledged=False))
+            raise
+        self._counters.writes += 1
+        core.acknowledged(self._tick.time())
+        self._publish_request(SentRequest(request, now, acknowledged=True))
 
     async def _look(self) -> None:
         """Read, and tell everybody."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -112,6 +112,52 @@ def plot_current_over_time(path: Path, by_surface: Mapping[str, Currents], label
             each.set_ylim(bottom=0)
             each.legend()
         axes[-1].set_xlabel("time since the command, s")
+    return files
+
+
+def plot_recording(path: Path, entries: Sequence[tuple[str, int, dict[str, Any]]]) -> list[Path]:
+    """Positions, currents and events of a recording over time.
+
+    Args:
+        path: where to, without suffix.
+        entries: topic, nanoseconds and fields of its JSON messages.
+    """
+    began = min(nanoseconds for _, nanoseconds, _ in entries)
+    statuses = [((at - began) / 1e9, fields) for topic, at, fields in entries if topic == "/gripper/status"]
+    events = [((at - began) / 1e9, fields) for topic, at, fields in entries if topic == "/gripper/event"]
+    seconds = [at for at, _ in statuses]
+    with _figure(path, path.name, rows=2) as (axes, files):
+        positions, currents = axes
+        for name, colour in zip(("A", "B", "C", "SCISSOR"), (*COLOURS, "0.5"), strict=True):
+            of_axis = [fields[name] for _, fields in statuses]
+            line: Any = {"color": colour, "lw": 1.4}
+            dotted: Any = {"color": colour, "lw": 0.8, "ls": ":", "drawstyle": "steps"}
+            positions.plot(seconds, [each["position"] for each in of_axis], label=name, **line)
+            positions.plot(seconds, [each["requested"] for each in of_axis], **dotted)
+            currents.plot(seconds, [each["current_ma"] for each in of_axis], **line)
+        positions.set_ylabel("position, counts\n(dotted: requested)")
+        positions.set_ylim(-5, 260)
+        positions.legend(loc="center right", fontsize=8)
+        currents.set_ylabel("current, mA")
+        currents.set_ylim(bottom=0)
+        currents.set_xlabel("time, s")
+        for at, fields in events:
+            is_fault = fields["kind"] == "fault"
+            # A control loop goes to RUNNING_CC and back with every command: that is no event to look at.
+            if not is_fault and "RUNNING_CC" in (fields["source"], fields["target"]):
+                continue
+            words = fields["name"] if is_fault else fields["target"]
+            for each in axes:
+                each.axvline(at, color="crimson" if is_fault else "0.7", lw=0.8, zorder=0)
+            positions.annotate(
+                words,
+                (at, 258),
+                rotation=90,
+                va="top",
+                ha="left" if is_fault else "right",
+                fontsize=7,
+                color="crimson" if is_fault else "0.4",
+            )
     return files
 
 

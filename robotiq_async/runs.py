@@ -115,7 +115,7 @@ def read_rows(path: Path | str) -> Iterable[tuple[int, list[str]]]:
         with open(path, encoding="utf-8-sig", newline="") as file:
             lines = csv.reader(file, strict=True)
             return [(lines.line_num, [cell.strip() for cell in cells]) for cells in lines if cells]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except (OSError, ValueError, csv.Error) as error:
         why = error.strerror if isinstance(error, OSError) else str(error)
         raise TableError(path, None, f"cannot be read: {why}") from error
 
@@ -137,7 +137,7 @@ def write_rows(path: Path | str, rows: Iterable[Sequence[object]]) -> None:
     Raises:
         OSError: it cannot be written; the file is what it was.
     """
-    path = Path(path)
+    path = Path(os.path.realpath(path))
     beside = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         with open(beside, "w", encoding="utf-8", newline="") as file:

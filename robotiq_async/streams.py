@@ -16,6 +16,7 @@ from typing import Generic, Self, TypeVar
 from .enums import State
 from .errors import RobotiqError
 from .machine import Trigger
+from .request import Request
 
 T = TypeVar("T")
 
@@ -35,6 +36,21 @@ class Transition:
     target: State
     trigger: Trigger
     timestamp: float
+
+
+@dataclass(frozen=True, slots=True)
+class SentRequest:
+    """One image that was written.
+
+    Attributes:
+        request: the image.
+        timestamp: monotonic seconds (the clock of the statuses) at which it was sent.
+        acknowledged: whether the gripper has acknowledged it; if not, it may have arrived or not.
+    """
+
+    request: Request
+    timestamp: float
+    acknowledged: bool
 
 
 class Stream(Generic[T]):
@@ -83,6 +99,10 @@ class Stream(Generic[T]):
         if self._failure is not None:
             raise self._failure()
         raise StopAsyncIteration
+
+    def take_nowait(self) -> T | None:
+        """The next item if there is one already."""
+        return self._items.popleft() if self._items else None
 
     async def aclose(self) -> None:
         """End the stream; a waiting reader ends too. Idempotent."""

@@ -101,6 +101,8 @@ class _Bell:
     @classmethod
     def of(cls, loop: asyncio.AbstractEventLoop) -> _Bell:
         """The one of a loop."""
+        for closed in [each for each in cls._bells if each.is_closed()]:
+            cls._bells[closed].abandon()
         bell = cls._bells.get(loop)
         if bell is None:
             bell = cls._bells[loop] = cls(loop)
@@ -169,7 +171,15 @@ class _Bell:
             return timer
         return None
 
+    def abandon(self) -> None:
+        """The loop was closed without a word: give back what is left of it."""
+        del self._bells[self._loop]
+        if self._timerfd is not None:
+            self._timerfd.close()
+
     def _close(self) -> None:
+        if self._bells.get(self._loop) is not self:
+            return  # abandoned
         del self._bells[self._loop]
         if self._timerfd is not None:
             self._loop.remove_reader(self._timerfd.descriptor)

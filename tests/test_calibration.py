@@ -150,3 +150,30 @@ def test_an_owners_forces(tmp_path: Path) -> None:
     write_table(tmp_path / "f.csv", FORCE, {0: (1000,)})
     with pytest.raises(TableError, match="at least two"):
         ForceCalibration.from_csv(tmp_path / "f.csv")
+
+
+# -- by hand -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("points", "words"),
+    [
+        ((), "at least two are needed, got 0"),
+        (((0, 1.0),), "at least two are needed, got 1"),
+        (((0, 1.0), (256, 1.0)), "a value of points must be in 0..255"),
+        (((0, 1.0), (0, 2.0)), "the values must rise"),
+        (((9, 1.0), (0, 2.0)), "the values must rise"),
+        (((0, float("nan")), (255, 1.0)), "a figure of points must be a number"),
+        (((0, -1.0), (255, 1.0)), "a figure of points must be a number"),
+        (((0, 1e9), (255, 1.0)), "a figure of points must be a number"),
+    ],
+)
+def test_points_that_are_no_curve_are_refused(points: tuple[tuple[int, float], ...], words: str) -> None:
+    for kind in (SpeedCalibration, ForceCalibration):
+        with pytest.raises(ValueError, match=words.replace(".", r"\.")):
+            kind("mine", points)
+
+
+def test_no_closing_takes_no_time() -> None:
+    with pytest.raises(ValueError, match="must be above 0"):
+        SpeedCalibration("mine", ((0, 1.0), (255, 0.0)))

@@ -62,6 +62,7 @@ EXTRAS = {
     "Trigger": "type of Transition.trigger",
     "Statistics": "type of RobotiqHand.statistics",
     "Stream": "type of RobotiqHand.statuses() and .transitions()",
+    "SentRequest": "what RobotiqHand.requests() gives",
     "Transport": "what may be passed in place of an address",
     "ReconnectPolicy": "what may be passed as reconnect",
 }

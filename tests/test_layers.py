@@ -15,6 +15,7 @@ PACKAGE = "robotiq_async"
 ROOT = Path(robotiq_async.__file__).parent
 
 PURE = [
+    "version",
     "enums",
     "errors",
     "checks",
@@ -52,6 +53,10 @@ RUNTIME = [
     "options",
     "waiting",
     "hand",
+    "payloads",
+    "jointstate",
+    "recorder",
+    "recording",
     "metrics",
     "doctor",
     "measuring",

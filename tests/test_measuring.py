@@ -28,7 +28,7 @@ from robotiq_async.measuring import (
 from robotiq_async.runs import FORCE, SPEED, TableError, read_table, thesis_table
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.simulator.scale import SimulatedScale
-from tests.virtual import run
+from tests.virtual import VirtualLoop, run
 
 POLL_S = 0.005
 
@@ -73,6 +73,64 @@ def test_a_finger_that_meets_something_is_no_closing_time() -> None:
         async with active() as (gripper, hand):
             gripper.place_object(Finger.B, 150)
             with pytest.raises(MeasuringError, match=r"met something \(.*B"):
+                await time_closing(hand, 255, Finger.ABC)
+
+    run(main)
+
+
+def test_an_opening_that_is_blocked_is_no_full_closing() -> None:
+    async def main() -> None:
+        async with active() as (gripper, hand):
+            await hand.close(speed=255)
+            gripper.place_object(Finger.ABC, 150, opening=True)
+            with pytest.raises(MeasuringError, match="met something"):
+                await time_closing(hand, 255, Finger.ABC)
+            with pytest.raises(MeasuringError, match="in the way of opening"):
+                await grasp(hand, 200, 255)
+
+    run(main)
+
+
+def test_the_scissor_is_refused() -> None:
+    async def main() -> None:
+        async with active() as (_, hand):
+            with pytest.raises(ValueError, match="got the scissor"):
+                await time_closing(hand, 255, Finger.ALL)
+
+    run(main)
+
+
+def hold_up_after(seconds: float, times: int) -> None:
+    """Hold up the loop for half a second, so often, from some time on."""
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualLoop)
+    virtual = loop
+
+    def hold_up(left: int) -> None:
+        virtual.hold_up(0.5)
+        if left > 1:
+            virtual.call_later(1.0, hold_up, left - 1)
+
+    loop.call_later(seconds, hold_up, times)
+
+
+def test_a_run_in_which_the_loop_was_held_up_is_measured_again() -> None:
+    async def main() -> None:
+        async with active() as (_, hand):
+            hold_up_after(1.0, 1)
+            began = asyncio.get_running_loop().time()
+            seconds = await time_closing(hand, 255, Finger.ABC)
+            assert seconds == pytest.approx(closing_time(255), rel=0.02)
+            assert asyncio.get_running_loop().time() - began > 2 * closing_time(255)
+
+    run(main)
+
+
+def test_a_loop_that_is_held_up_all_the_time_is_no_place_to_measure() -> None:
+    async def main() -> None:
+        async with active() as (_, hand):
+            hold_up_after(1.0, 100)
+            with pytest.raises(MeasuringError, match="too busy to measure"):
                 await time_closing(hand, 255, Finger.ABC)
 
     run(main)

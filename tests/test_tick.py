@@ -228,3 +228,25 @@ def test_where_no_timerfd_is_to_be_had_the_loop_keeps_them(loop: type[DeafLoop])
         tick.close()
 
     in_loop(main, loop)
+
+
+@pytest.mark.skipif(not LINUX, reason="timerfd is Linux's")
+def test_what_a_loop_leaves_that_is_closed_without_a_word_is_given_back() -> None:
+    async def begin() -> Tick:
+        tick = Tick(INTERVAL)
+        tick.start()
+        await tick.wait()
+        return tick
+
+    def abandon() -> Tick:
+        loop = asyncio.new_event_loop()
+        tick = loop.run_until_complete(begin())
+        loop.close()
+        return tick
+
+    abandoned = [abandon() for _ in range(2)]
+    before = open_files()
+    abandoned += [abandon() for _ in range(5)]
+    assert open_files() <= before
+    for tick in abandoned:
+        tick.close()

@@ -11,15 +11,16 @@ from .demo import demo
 from .doctor import doctor
 from .measure import measure_app
 from .move import move
+from .record import plot, record, recover, replay
 from .simulate import simulate
 from .status import status
 
-COMMANDS: Final = (demo, simulate, status, move, doctor)
+COMMANDS: Final = (demo, simulate, status, move, doctor, record, replay, recover, plot)
 """A new sub-command is a module with a function of its name, and an entry here."""
 
 _HELP = """Control a Robotiq 3-Finger gripper, or a simulated one.
 
-Every command but simulate takes the address of a gripper as its last argument:
+Every command that talks to a gripper takes its address as the last argument:
 
     tcp://192.168.1.11   Modbus TCP; tcp:// and the port (:502) may be left out
     rtu:///dev/ttyUSB0   Modbus RTU on a serial line (extra serial)

@@ -47,7 +47,7 @@ def measure_app() -> App:
     return app
 
 
-def check(address: str, speedup: float | None, runs: int, step: int, plot: bool) -> float:
+def check(address: str, output: Path, speedup: float | None, runs: int, step: int, plot: bool) -> float:
     """Refuse what cannot be measured before anything moves; returns how much faster the gripper's time is.
 
     Raises:
@@ -56,6 +56,8 @@ def check(address: str, speedup: float | None, runs: int, step: int, plot: bool)
     """
     with usage():
         kind = parse_address(address).kind
+    if output.suffix != ".csv":
+        raise UsageError(f"--output must be a file named .csv, got {str(output)!r}")
     if not 1 <= runs <= 100:
         raise UsageError(f"--runs must be an integer in 1..100, got {runs}")
     if not 1 <= step <= 255:
@@ -119,6 +121,8 @@ async def carry_out(
     measure_run: Callable[[int, int], Awaitable[int]],
     seconds_of: Callable[[int], float],
     what: str,
+    *,
+    bar: bool = True,
 ) -> None:
     """Measure what is left, with a progress bar that knows how long each row takes.
 
@@ -131,6 +135,7 @@ async def carry_out(
     from ..measuring import MeasuringError
     from ..runs import TableError
 
+    # The bar would paint over what a person types.
     done, left = len(campaign.table), campaign.left
     if done and left:
         print(f"Going on with {campaign.path}: {done} rows are there, {len(left)} are left.", flush=True)
@@ -142,7 +147,9 @@ async def carry_out(
         TextColumn("left"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True), disable=not sys.stderr.isatty()) as progress:
+    with Progress(
+        *columns, console=Console(stderr=True), disable=not (bar and sys.stderr.isatty())
+    ) as progress:
         task = progress.add_task(what, total=campaign.runs * sum(seconds_of(value) for value in left))
 
         readings: list[str] = []
@@ -154,7 +161,10 @@ async def carry_out(
             readings.append(str(reading))
             if number == campaign.runs:
                 row = f"{what} {value}: {', '.join(readings)} {campaign.layout.unit}"
-                progress.console.print(row, highlight=False)
+                if progress.disable:
+                    print(row, flush=True)
+                else:
+                    progress.console.print(row, highlight=False)
                 readings.clear()
             return reading
 
@@ -193,16 +203,16 @@ async def asked(question: str) -> str:
 
 @contextmanager
 def refused() -> Iterator[None]:
-    """Around the reading of tables: one that is refused ends the command.
+    """Around tables and pictures: one that cannot be read or written ends the command.
 
     Raises:
-        CommandError: in place of TableError.
+        CommandError: in place of TableError and OSError.
     """
     from ..runs import TableError
 
     try:
         yield
-    except TableError as error:
+    except (TableError, OSError) as error:
         raise CommandError(str(error)) from error
 
 

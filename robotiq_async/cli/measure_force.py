@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from .arguments import Address, Byte, CommandError
+from ..address import parse_address
+from .arguments import Address, Byte, CommandError, UsageError
 from .measure import (
     NoPlot,
     Runs,
@@ -72,8 +73,10 @@ def force(
         no_plot: Draw nothing.
         yes: Do not ask.
     """
-    factor = check(address, speedup, runs, step, not no_plot)
     path = output or Path(f"force_{surface}_grams.csv")
+    if scale is not None and scale.resolve() == path.resolve():
+        raise UsageError("--scale must be another file than --output")
+    factor = check(address, path, speedup, runs, step, not no_plot)
     if not consent(address, WARNING, yes):
         return None
     return _measure(address, surface, path, scale, step, runs, speed, factor, not no_plot)
@@ -95,10 +98,21 @@ async def _measure(
     from ..runs import FORCE, read_table
 
     currents_file = currents_beside(output)
+    readings: Table | None = None
     with refused():
-        campaign = force_campaign(output, step, runs)
-        currents = read_currents(currents_file) if currents_file.exists() and campaign.table else {}
-        readings = None if scale is None else read_table(scale, FORCE)
+        if scale is not None:
+            readings = read_table(scale, FORCE)
+        origin = {"gripper": str(parse_address(address)), "surface": surface, "speed": str(speed)}
+        campaign = force_campaign(output, step, runs, **origin)
+        currents = read_currents(currents_file) if campaign.table else {}
+        lacking = [value for value in campaign.table if len(currents.get(value, ())) != runs]
+        if lacking:
+            raise CommandError(
+                f"{currents_file} lacks runs of the force values {lacking}; choose another file"
+            )
+    if not campaign.left:
+        print(f"{output} is complete: nothing is measured again.")
+    typed_in = readings is None and not address.startswith("sim:")
     read_scale = _scale(address, surface, readings, campaign.left, runs)
     if campaign.left:
         load_rich()
@@ -114,7 +128,7 @@ async def _measure(
                 return reading
 
             seconds = (closing_time(speed) + closing_time(255) + GRASP_S) / speedup
-            await carry_out(campaign, run, lambda _: seconds, "force")
+            await carry_out(campaign, run, lambda _: seconds, "force", bar=not typed_in)
     told([output, currents_file])
     if plot:
         _plot(output, surface, campaign.table, "simulated" if address.startswith("sim:") else "measured")
@@ -122,7 +136,7 @@ async def _measure(
 
 def currents_beside(output: Path) -> Path:
     """Where the currents go."""
-    return output.with_name(f"{output.stem.removesuffix('_grams')}_currents.csv")
+    return output.with_name(f"{output.stem}_currents.csv")
 
 
 def _place_scale(simulated: SimulatedGripper, surface: str) -> None:
@@ -182,10 +196,11 @@ def _plot(output: Path, surface: str, table: Table, label: str) -> None:
             over_time[other] = read_currents(currents_beside(beside))
     stem = output.with_suffix("")
     base = output.with_name(currents_beside(output).stem)
-    told(plot_force(stem, table, surface, label))
-    told(plot_peak_currents(base.with_name(f"{base.name}_peak"), currents, surface, label))
-    told(
-        plot_current_over_time(
-            base.with_name(f"{base.name}_over_time"), dict(sorted(over_time.items())), label
+    with refused():
+        told(plot_force(stem, table, surface, label))
+        told(plot_peak_currents(base.with_name(f"{base.name}_peak"), currents, surface, label))
+        told(
+            plot_current_over_time(
+                base.with_name(f"{base.name}_over_time"), dict(sorted(over_time.items())), label
+            )
         )
-    )

@@ -8,8 +8,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from ..address import parse_address
 from ..enums import Finger
-from .arguments import Address, Fingers
+from .arguments import Address, Fingers, UsageError
 from .measure import NoPlot, Runs, Speedup, Yes, carry_out, check, consent, gripper, load_rich, refused, told
 
 WARNING = "the fingers open and close fully, some hundred times. Nothing may be between them."
@@ -48,7 +49,9 @@ def speed(
         no_plot: Draw nothing.
         yes: Do not ask.
     """
-    factor = check(address, speedup, runs, step, not no_plot)
+    if Finger.SCISSOR in fingers:
+        raise UsageError("--fingers must be of A, B and C: the stroke of the scissor is another")
+    factor = check(address, output, speedup, runs, step, not no_plot)
     if not consent(address, WARNING, yes):
         return None
     return _measure(address, output, step, runs, fingers, factor, not no_plot)
@@ -60,7 +63,10 @@ async def _measure(
     from ..measuring import expected_seconds, speed_campaign, time_closing
 
     with refused():
-        campaign = speed_campaign(output, step, runs)
+        origin = {"gripper": str(parse_address(address)), "fingers": str(fingers.name)}
+        campaign = speed_campaign(output, step, runs, **origin)
+    if not campaign.left:
+        print(f"{output} is complete: nothing is measured again.")
     if campaign.left:
         load_rich()
         async with gripper(address, speedup) as hand:
@@ -74,4 +80,5 @@ async def _measure(
         from ..plots import plot_speed
 
         label = "simulated" if address.startswith("sim:") else "measured"
-        told(plot_speed(output.with_suffix(""), campaign.table, label))
+        with refused():
+            told(plot_speed(output.with_suffix(""), campaign.table, label))

@@ -16,7 +16,7 @@ from robotiq_async.runs import FORCE, SPEED, read_table, thesis_table
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
 if TYPE_CHECKING:
-    from tests.cli.conftest import Shell
+    from tests.cli.conftest import Outcome, Shell
 
 WITHOUT_MATPLOTLIB = """
 import importlib.util, sys
@@ -37,16 +37,17 @@ async def test_speed_writes_table_and_pictures(shell: Shell, tmp_path: Path) -> 
     outcome = await shell.run("measure", "speed", *options)
     outcome.assert_succeeded()
     written = [tmp_path / name for name in ("mine.csv", "mine.png", "mine.svg")]
-    assert outcome.out.splitlines() == [str(file) for file in written]
-    assert files_in(tmp_path) == ["mine.csv", "mine.png", "mine.svg"]
+    assert outcome.out.splitlines()[-3:] == [str(file) for file in written]
+    assert files_in(tmp_path) == ["mine.csv", "mine.csv.origin.csv", "mine.png", "mine.svg"]
     assert sorted(read_table(table, SPEED)) == [0, 128, 255]
     for line in ("speed 0: ", "speed 128: ", "speed 255: "):
-        assert line in outcome.err
+        assert line in outcome.out
     # Complete: nothing is measured again, the pictures are made anew, byte for byte.
     before = {file: file.read_bytes() for file in written}
     outcome = await shell.run("measure", "speed", *options)
     outcome.assert_succeeded()
     assert outcome.err == ""
+    assert outcome.out.startswith(f"{table} is complete: nothing is measured again.")
     assert {file: file.read_bytes() for file in written} == before
 
 
@@ -63,12 +64,12 @@ async def test_force_writes_readings_currents_and_pictures(shell: Shell, tmp_pat
         thesis = thesis_table(f"force_{surface}_grams", FORCE)
         for force, runs in readings.items():
             assert all(min(thesis[force]) <= reading <= max(thesis[force]) for reading in runs)
-        currents = read_currents(tmp_path / f"force_{surface}_currents.csv")
+        currents = read_currents(tmp_path / f"force_{surface}_grams_currents.csv")
         assert {force: len(runs) for force, runs in currents.items()} == {0: 2, 125: 2, 250: 2}
-        for name in ("grams", "currents_peak", "currents_over_time"):
+        for name in ("grams", "grams_currents_peak", "grams_currents_over_time"):
             assert (tmp_path / f"force_{surface}_{name}.svg").stat().st_size > 5000
             assert (tmp_path / f"force_{surface}_{name}.png").stat().st_size > 5000
-    both = (tmp_path / "force_rigid_currents_over_time.svg").read_text(encoding="utf-8")
+    both = (tmp_path / "force_rigid_grams_currents_over_time.svg").read_text(encoding="utf-8")
     assert "foam" in both
 
 
@@ -140,7 +141,7 @@ async def test_ctrl_c_keeps_the_rows_and_stops_the_fingers(shell: Shell, tmp_pat
         assert not gripper.is_moving
     rows = read_table(table, SPEED)
     assert 0 in rows
-    assert files_in(tmp_path) == ["t.csv"]
+    assert files_in(tmp_path) == ["t.csv", "t.csv.origin.csv"]
 
 
 async def test_fingers_that_meet_something_end_it(shell: Shell, tmp_path: Path) -> None:
@@ -168,6 +169,11 @@ async def test_without_matplotlib_nothing_is_begun(shell: Shell) -> None:
         (["speed", "--speedup", "51"], "--speedup must be a number in 1..50, got 51"),
         (["speed", "192.168.1.11", "--speedup", "2"], "--speedup is for sim:// only"),
         (["speed", "tcp://"], "malformed address"),
+        (["speed", "--output", "mine.png"], "--output must be a file named .csv, got 'mine.png'"),
+        (["speed", "--output", "mine"], "--output must be a file named .csv"),
+        (["force", "--output", "."], "--output must be a file named .csv"),
+        (["speed", "--fingers", "scissor"], "--fingers must be of A, B and C"),
+        (["force", "--output", "a.csv", "--scale", "a.csv"], "--scale must be another file than --output"),
         (["force", "--surface", "wood"], "wood"),
         (["force", "--speed", "256"], "256"),
     ],
@@ -197,3 +203,66 @@ def test_help(what: str, capsys: pytest.CaptureFixture[str]) -> None:
     out = capsys.readouterr().out
     assert "FINGERS MOVE" in " ".join(out.split())
     assert f"robotiq-async measure {what}" in out.partition("For example:")[2]
+
+
+QUICK = ("--runs", "1", "--no-plot")
+
+
+def gave_up(outcome: Outcome, *words: str) -> None:
+    """It ended with 1 and said why, without a traceback."""
+    assert outcome.code == 1
+    assert "Traceback" not in outcome.err
+    for word in words:
+        assert word in outcome.err
+
+
+async def test_what_was_measured_on_another_gripper_is_not_gone_on_with(shell: Shell, tmp_path: Path) -> None:
+    table = str(tmp_path / "t.csv")
+    first = await shell.run("measure", "speed", "--output", table, "--step", "255", "--speedup", "30", *QUICK)
+    first.assert_succeeded()
+    for options in (("10.255.255.1",), ("--fingers", "A")):
+        outcome = await shell.run("measure", "speed", *options, "--output", table, "--step", "255", *QUICK)
+        outcome.assert_failed(1, "was measured otherwise")
+
+
+async def test_another_surface_is_another_table(shell: Shell, tmp_path: Path) -> None:
+    table = str(tmp_path / "t.csv")
+    options = ("--output", table, "--step", "250", "--speed", "255", "--speedup", "30", *QUICK)
+    (await shell.run("measure", "force", *options)).assert_succeeded()
+    outcome = await shell.run("measure", "force", "--surface", "rigid", *options)
+    outcome.assert_failed(1, "was measured otherwise: surface foam there and rigid here")
+
+
+@pytest.mark.parametrize("damage", ["gone", "empty", "short"])
+async def test_readings_without_their_currents_are_refused(shell: Shell, tmp_path: Path, damage: str) -> None:
+    table, currents = tmp_path / "t.csv", tmp_path / "t_currents.csv"
+    options = ("--output", str(table), "--step", "250", "--speed", "255", "--speedup", "30", "--no-plot")
+    (await shell.run("measure", "force", *options, "--runs", "2")).assert_succeeded()
+    damaged(currents, damage)
+    outcome = await shell.run("measure", "force", *options, "--runs", "2")
+    outcome.assert_failed(1, "t_currents.csv")
+
+
+def damaged(file: Path, how: str) -> None:
+    if how == "gone":
+        file.unlink()
+    elif how == "empty":
+        file.write_text(file.read_text(encoding="utf-8").splitlines()[0] + "\n", encoding="utf-8")
+    else:
+        lines = file.read_text(encoding="utf-8").splitlines(keepends=True)
+        file.write_text("".join(line for line in lines if not line.startswith("0,2,")), encoding="utf-8")
+
+
+async def test_a_picture_that_cannot_be_written_is_one_line(shell: Shell, tmp_path: Path) -> None:
+    table = tmp_path / "t.csv"
+    (tmp_path / "t.png").mkdir()
+    outcome = await shell.run(
+        "measure", "speed", "--output", str(table), "--step", "255", "--runs", "1", "--speedup", "30"
+    )
+    gave_up(outcome, "t.png")
+    assert len(read_table(table, SPEED)) == 2
+
+
+async def test_a_name_that_is_too_long_is_one_line(shell: Shell, tmp_path: Path) -> None:
+    name = str(tmp_path / ("x" * 300 + ".csv"))
+    (await shell.run("measure", "speed", "--output", name, *QUICK)).assert_failed(1, "File name too long")

@@ -1,0 +1,182 @@
+"""``robotiq-async record``, ``replay``, ``recover`` and ``plot``."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from datetime import datetime
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from ..enums import AXES
+from .arguments import Address, CommandError, UsageError
+
+if TYPE_CHECKING:
+    from ..recorder import Recorder
+    from ..recording import Entry
+
+NAMES = [str(axis.name) for axis in AXES]
+
+
+async def record(
+    file: Path,
+    address: Address = "sim://",
+    /,
+    *,
+    seconds: Annotated[float | None, Parameter(metavar="SECONDS")] = None,
+) -> None:
+    """Record every poll, command, transition and fault in an MCAP file, until Ctrl-C.
+
+    It only looks: nothing moves and nothing is written to the gripper. Foxglove,
+    PlotJuggler and ROS 2 tools read the file; joint states are in it as ROS has them.
+    Commands are those of this program, so that a recording made by this command has
+    none: record from your own program with robotiq_async.recorder.Recorder. A
+    killed recording loses at most the last second; recover makes its file whole.
+
+    For example:
+
+        robotiq-async record grasp.mcap tcp://192.168.1.11
+        robotiq-async record --seconds 60 minute.mcap
+
+    Args:
+        file: The recording; it must not be there yet.
+        seconds: End by itself after so long.
+    """
+    need("mcap", "record")
+    from ..recorder import Recorder
+    from .connection import connected
+
+    if seconds is not None and not 0 < seconds < 1e9:
+        raise UsageError(f"--seconds must be seconds above 0, got {seconds:g}")
+    async with connected(address, halt=False) as hand:
+        recorder = Recorder(hand, file)
+        try:
+            async with recorder:
+                print(f"Recording {hand.address} in {file}; Ctrl-C ends it.", flush=True)
+                try:
+                    async with asyncio.timeout(seconds):
+                        await _watch(recorder)
+                except TimeoutError:
+                    pass
+        finally:
+            if recorder.recorded:
+                print(
+                    f"\n{recorder.recorded} polls, {recorder.missed} missed, {recorder.size} bytes",
+                    flush=True,
+                )
+
+
+async def _watch(recorder: Recorder) -> None:
+    """Say how it goes until it fails."""
+    failing = asyncio.ensure_future(recorder.failure())
+    try:
+        while not failing.done():
+            if sys.stderr.isatty():
+                text = f"\r{recorder.recorded} polls, {recorder.size / 1e6:.1f} MB "
+                print(text, end="", file=sys.stderr, flush=True)
+            await asyncio.wait({failing}, timeout=0.5)
+    finally:
+        failing.cancel()
+
+
+def replay(file: Path, /) -> None:
+    """Print what a recording holds: states, faults, commands, and what the fingers did.
+
+    A line for each event and command, and one for each status in which a finger has
+    come to another position or has begun or ended a contact.
+
+    For example:
+
+        robotiq-async replay grasp.mcap
+
+    Args:
+        file: The recording; a broken one is read as far as it goes.
+    """
+    need("mcap", "record")
+    from ..recording import read_recording
+
+    shown = ""
+    for entry in read_recording(file):
+        if not entry.is_json:
+            continue
+        line = _line(entry)
+        if entry.topic == "/gripper/status":
+            if line == shown:
+                continue
+            shown = line
+        stamp = datetime.fromtimestamp(entry.nanoseconds / 1e9).astimezone()
+        print(f"{stamp:%H:%M:%S.%f}"[:-3], line)
+
+
+def _line(entry: Entry) -> str:
+    """An entry in words."""
+    fields = entry.fields
+    if entry.topic == "/gripper/status":
+        axes = (f"{name}={fields[name]['position']} {fields[name]['status']}" for name in NAMES)
+        return f"status   {' '.join(axes)}"
+    if entry.topic == "/gripper/command":
+        axes = (f"{n}={fields[n]['position']}@{fields[n]['speed']}/{fields[n]['force']}" for n in NAMES)
+        bits = f"act={fields['activate']:d} go={fields['go']:d} release={fields['release']:d}"
+        return f"command  {bits} {' '.join(axes)}{'' if fields['acknowledged'] else ' NOT ACKNOWLEDGED'}"
+    if fields["kind"] == "fault":
+        return f"fault    0x{fields['code']:02X} {fields['name']}: {fields['description']}"
+    return f"state    {fields['source']} -> {fields['target']} ({fields['trigger']})"
+
+
+def recover(file: Path, target: Path | None = None, /) -> None:
+    """Make a recording whole whose program was killed.
+
+    For example:
+
+        robotiq-async recover grasp.mcap
+
+    Args:
+        file: The broken recording; it is left as it is.
+        target: The whole one (default: FILE.recovered.mcap).
+    """
+    need("mcap", "record")
+    from ..recording import recover as save
+
+    whole = target or file.with_name(f"{file.stem}.recovered.mcap")
+    found = save(file, whole)
+    if found.is_whole:
+        print(f"{file} was whole; {whole} is a copy of it")
+    print(f"{found.messages} messages in {whole}")
+
+
+def plot(file: Path, picture: Path | None = None, /) -> None:
+    """Draw positions, currents and events of a recording over time, as PNG and SVG.
+
+    For example:
+
+        robotiq-async plot grasp.mcap
+
+    Args:
+        file: The recording.
+        picture: The picture's name without suffix (default: that of the recording).
+    """
+    need("mcap", "record")
+    need("matplotlib", "plot")
+    from ..plots import plot_recording
+    from ..recording import read_recording
+
+    entries = [
+        (entry.topic, entry.nanoseconds, entry.fields) for entry in read_recording(file) if entry.is_json
+    ]
+    if not any(topic == "/gripper/status" for topic, _, _ in entries):
+        raise CommandError(f"{file}: there is no status in it")
+    for written in plot_recording(picture or file.with_suffix(""), entries):
+        print(written)
+
+
+def need(module: str, extra: str) -> None:
+    """Refuse when an extra is not installed.
+
+    Raises:
+        CommandError: it is not.
+    """
+    if find_spec(module) is None:
+        raise CommandError(f"this needs {module}: pip install 'robotiq-async[{extra}]'")

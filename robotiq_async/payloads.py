@@ -1,0 +1,132 @@
+"""What is told of a hand in JSON, to files and to programs, and the schemas of it."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from .enums import AXES, Fault, Finger
+from .kinematics import PREFIX
+from .status import RobotiqStatus
+from .streams import SentRequest, Transition
+
+Fields = dict[str, Any]
+
+_INTEGER: Final = {"type": "integer"}
+_NUMBER: Final = {"type": "number"}
+_STRING: Final = {"type": "string"}
+_BOOLEAN: Final = {"type": "boolean"}
+
+
+def _object(**properties: object) -> dict[str, object]:
+    return {"type": "object", "properties": properties}
+
+
+_AXES_NAMES: Final = {axis: str(axis.name) for axis in AXES}
+SCHEMAS: Final = {
+    "status": _object(
+        sequence=_INTEGER,
+        monotonic=_NUMBER,
+        registers={"type": "array", "items": _INTEGER},
+        fault=_INTEGER,
+        activated=_BOOLEAN,
+        go=_BOOLEAN,
+        moving=_BOOLEAN,
+        **{
+            name: _object(position=_INTEGER, requested=_INTEGER, current_ma=_INTEGER, status=_STRING)
+            for name in _AXES_NAMES.values()
+        },
+    ),
+    "command": _object(
+        monotonic=_NUMBER,
+        acknowledged=_BOOLEAN,
+        activate=_BOOLEAN,
+        go=_BOOLEAN,
+        release=_BOOLEAN,
+        registers={"type": "array", "items": _INTEGER},
+        **{name: _object(position=_INTEGER, speed=_INTEGER, force=_INTEGER) for name in _AXES_NAMES.values()},
+    ),
+    "event": _object(
+        kind={"type": "string", "enum": ["transition", "fault"]},
+        monotonic=_NUMBER,
+        source=_STRING,
+        target=_STRING,
+        trigger=_STRING,
+        code=_INTEGER,
+        name=_STRING,
+        severity=_STRING,
+        description=_STRING,
+    ),
+}
+"""JSON Schemas of the three JSON channels."""
+
+
+def status_fields(status: RobotiqStatus) -> Fields:
+    """A status."""
+    return {
+        "monotonic": _seconds(status.timestamp),
+        "sequence": status.sequence,
+        "registers": status.registers,
+        "fault": int(status.fault),
+        "activated": status.is_activated,
+        "go": status.go_echo,
+        "moving": status.is_moving,
+        **{
+            name: {
+                "position": status.position(axis),
+                "requested": status.requested_position(axis),
+                "current_ma": status.current_ma(axis),
+                "status": status.finger_status(axis).name,
+            }
+            for axis, name in _AXES_NAMES.items()
+        },
+    }
+
+
+def command_fields(sent: SentRequest) -> Fields:
+    """A request that was written."""
+    request = sent.request
+    return {
+        "monotonic": _seconds(sent.timestamp),
+        "acknowledged": sent.acknowledged,
+        "activate": request.activate,
+        "go": request.go,
+        "release": request.release,
+        "registers": request.registers,
+        **{
+            name: {"position": axis.position, "speed": axis.speed, "force": axis.force}
+            for name, axis in zip(_AXES_NAMES.values(), request.axes, strict=True)
+        },
+    }
+
+
+def transition_fields(transition: Transition) -> Fields:
+    """A change of state."""
+    return {
+        "monotonic": _seconds(transition.timestamp),
+        "kind": "transition",
+        "source": transition.source.name,
+        "target": transition.target.name,
+        "trigger": transition.trigger.value,
+    }
+
+
+def fault_fields(fault: Fault) -> Fields:
+    """A fault that has come, or gone (NONE)."""
+    return {
+        "kind": "fault",
+        "code": int(fault),
+        "name": fault.name,
+        "severity": fault.severity.value,
+        "description": fault.description,
+    }
+
+
+def efforts(status: RobotiqStatus) -> list[float]:
+    """Currents in ampere, at the joints that the motors turn first; torques are not known."""
+    scissor = status.current_ma(Finger.SCISSOR) / 1000
+    one, two, middle = (status.current_ma(finger) / 1000 for finger in PREFIX)
+    return [scissor, one, 0.0, 0.0, scissor, two, 0.0, 0.0, middle, 0.0, 0.0]
+
+
+def _seconds(timestamp: float) -> float:
+    return round(timestamp, 6)

@@ -1,0 +1,294 @@
+"""Recordings: nothing is lost, others can read them, and a killed one is made whole."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import json
+import os
+import signal
+import sys
+from asyncio.subprocess import PIPE
+from collections.abc import AsyncIterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.reader import make_reader
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from robotiq_async import ConnectionLostError, Finger, RobotiqHand, RobotiqStatus, State
+from robotiq_async.jointstate import SCHEMA, SCHEMA_NAME, JointStateEncoder
+from robotiq_async.kinematics import JOINTS, joint_angles
+from robotiq_async.recorder import Recorder, RecordingError
+from robotiq_async.recording import read_recording, recover
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture
+async def gripper() -> SimulatedGripper:
+    return SimulatedGripper(speedup=20)
+
+
+@pytest.fixture
+async def hand(gripper: SimulatedGripper) -> AsyncIterator[RobotiqHand]:
+    async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
+        yield hand
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "it.mcap"
+
+
+def statuses(file: Path) -> list[dict[str, Any]]:
+    return [entry.fields for entry in read_recording(file) if entry.topic == "/gripper/status"]
+
+
+# -- what is in it -----------------------------------------------------------------------------------------
+
+
+async def test_every_poll_is_recorded(hand: RobotiqHand, file: Path) -> None:
+    async with Recorder(hand, file) as recorder:
+        first = hand.status.sequence
+        await hand.move(200)
+        await hand.move(0)
+        last = hand.status.sequence
+    sequences = [fields["sequence"] for fields in statuses(file)]
+    assert sequences == list(range(sequences[0], sequences[-1] + 1))
+    assert sequences[0] <= first + 1
+    assert sequences[-1] >= last
+    assert recorder.recorded == len(sequences)
+    assert recorder.missed == 0
+
+
+async def test_commands_transitions_and_faults(
+    hand: RobotiqHand, gripper: SimulatedGripper, file: Path
+) -> None:
+    async with Recorder(hand, file):
+        await hand.set_speed(77, Finger.B)
+        await hand.move(120, Finger.A)
+        gripper.inject_fault(9)
+        await hand.wait_for_state(State.FAULT)
+        gripper.clear_faults()
+        await hand.wait_for_state(State.RUNNING_IDLE)
+    entries = list(read_recording(file))
+    commands = [entry.fields for entry in entries if entry.topic == "/gripper/command"]
+    assert commands[0]["B"]["speed"] == 77
+    assert any(command["A"]["position"] == 120 and command["go"] for command in commands)
+    assert all(command["acknowledged"] for command in commands)
+    assert [tuple(command["registers"]) for command in commands] == [
+        write.registers for write in list(gripper.writes)[-len(commands) :]
+    ]
+    events = [entry.fields for entry in entries if entry.topic == "/gripper/event"]
+    faults = [event["code"] for event in events if event["kind"] == "fault"]
+    assert faults == [9, 0]
+    moves = [(event["source"], event["target"]) for event in events if event["kind"] == "transition"]
+    assert ("RUNNING_IDLE", "FAULT") in moves
+    assert ("FAULT", "RUNNING_IDLE") in moves
+    assert all(before[1] == after[0] for before, after in pairwise(moves))
+
+
+async def test_a_request_tells_whether_it_was_acknowledged(gripper: SimulatedGripper) -> None:
+    async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
+        requests = hand.requests()
+        await hand.set_speed(5)
+        first = await anext(requests)
+        async with server.adversary.making(Trouble("drop", on="write")):
+            with pytest.raises(ConnectionLostError):
+                await hand.set_speed(6)
+        second = await anext(requests)
+        for sent, speed, acknowledged in ((first, 5, True), (second, 6, False)):
+            assert sent.acknowledged is acknowledged
+            assert sent.request.axes[0].speed == speed
+
+
+async def test_an_mcap_reader_of_others_reads_it(hand: RobotiqHand, file: Path) -> None:
+    async with Recorder(hand, file):
+        await hand.move(100)
+    with file.open("rb") as stream:
+        reader = make_reader(stream)
+        summary = reader.get_summary()
+        assert summary is not None
+        topics = {channel.topic: channel for channel in summary.channels.values()}
+        assert set(topics) == {"/gripper/status", "/gripper/command", "/gripper/event", "/joint_states"}
+        encodings = {summary.schemas[each.schema_id].encoding for each in topics.values()}
+        assert encodings == {"jsonschema", "ros2msg"}
+        stamps = []
+        for schema, _, message in reader.iter_messages(topics=["/gripper/status"]):
+            assert schema is not None
+            wanted = json.loads(schema.data)["properties"]
+            assert set(json.loads(message.data)) == set(wanted)
+            stamps.append(message.log_time)
+        assert stamps == sorted(stamps)
+        assert abs(stamps[-1] / 1e9 - os.stat(file).st_mtime) < 10
+
+
+async def test_ros_reads_the_joint_states(hand: RobotiqHand, file: Path) -> None:
+    seen: dict[int, RobotiqStatus] = {}
+
+    async def watch() -> None:
+        async for status in hand.statuses(buffer=10_000):
+            seen[status.sequence] = status
+
+    watching = asyncio.create_task(watch())
+    async with Recorder(hand, file):
+        await hand.move(180)
+    watching.cancel()
+    store = get_typestore(Stores.ROS2_JAZZY)
+    compared = moving = 0
+    for entry in read_recording(file):
+        if entry.topic != "/joint_states" or entry.sequence not in seen:
+            continue
+        message: Any = store.deserialize_cdr(entry.data, SCHEMA_NAME)
+        assert message.name == list(JOINTS)
+        assert list(message.position) == list(joint_angles(seen[entry.sequence]))
+        assert len(message.velocity) == len(message.effort) == 11
+        stamp = message.header.stamp
+        assert stamp.sec * 10**9 + stamp.nanosec == entry.nanoseconds
+        compared += 1
+        moving += any(message.velocity)
+    assert compared > 10
+    assert moving > 5
+
+
+def test_the_definition_is_ros_s_own() -> None:
+    mine = get_types_from_msg(SCHEMA, SCHEMA_NAME)
+    theirs = get_typestore(Stores.ROS2_JAZZY).fielddefs
+    for name, (_, fields) in mine.items():
+        assert fields == theirs[name][1]
+
+
+@pytest.mark.parametrize("frame", ["", "a", "palm", "the hand's own frame"])
+def test_whatever_the_frame_is_called_the_numbers_are_where_they_belong(frame: str) -> None:
+    numbers = [[float(10 * row + at) for at in range(11)] for row in range(3)]
+    data = JointStateEncoder(frame).encode(1_700_000_000_123_456_789, *numbers)
+    message: Any = get_typestore(Stores.ROS2_JAZZY).deserialize_cdr(data, SCHEMA_NAME)
+    assert message.header.frame_id == frame
+    assert [list(message.position), list(message.velocity), list(message.effort)] == numbers
+
+
+# -- what can go wrong -------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def precious(file: Path) -> Path:
+    file.write_bytes(b"precious")
+    return file
+
+
+async def test_a_file_that_is_there_is_not_overwritten(hand: RobotiqHand, precious: Path) -> None:
+    file = precious
+    with pytest.raises(RecordingError, match=r"it\.mcap: File exists"):
+        async with Recorder(hand, file):
+            pass
+    assert os.stat(file).st_size == len(b"precious")
+    with pytest.raises(RecordingError, match="No such file"):
+        async with Recorder(hand, file.parent / "nowhere" / "it.mcap"):
+            pass
+
+
+class FullDisk(Recorder):
+    """After some bytes the disk is full."""
+
+    room = 20_000
+
+    def _write(self, data: bytes) -> None:
+        self.room -= len(data)
+        if self.room < 0:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        super()._write(data)
+
+
+async def test_a_full_disk_ends_the_recording_and_nothing_else(
+    hand: RobotiqHand, gripper: SimulatedGripper, file: Path
+) -> None:
+    recorder = FullDisk(hand, file)
+    with pytest.raises(RecordingError, match=r"it\.mcap: No space left on device"):  # noqa: PT012
+        async with recorder:
+            writes = len(gripper.writes)
+            async with asyncio.timeout(20):
+                failure = await recorder.failure()
+            assert "No space left" in str(failure)
+            assert hand.state is State.RUNNING_IDLE
+            assert len(gripper.writes) == writes
+            await hand.move(50)
+    assert len(statuses(file)) > 0
+
+
+async def test_an_exception_of_the_block_is_not_hidden(hand: RobotiqHand, file: Path) -> None:
+    with pytest.raises(ZeroDivisionError):  # noqa: PT012
+        async with FullDisk(hand, file) as recorder:
+            await recorder.failure()
+            raise ZeroDivisionError
+
+
+async def test_a_killed_recording_loses_less_than_a_second_and_is_made_whole(
+    file: Path, tmp_path: Path
+) -> None:
+    program = f"""
+import asyncio
+from robotiq_async import RobotiqHand
+from robotiq_async.recorder import Recorder
+
+async def main():
+    async with RobotiqHand() as hand, Recorder(hand, {str(file)!r}):
+        async for status in hand.statuses():
+            print(status.sequence, flush=True)
+
+asyncio.run(main())
+"""
+    process = await asyncio.create_subprocess_exec(sys.executable, "-c", program, stdout=PIPE, cwd=ROOT)
+    assert process.stdout is not None
+    last = 0
+    async with asyncio.timeout(60):
+        while last < 1500:
+            last = int(await process.stdout.readline())
+    process.send_signal(signal.SIGKILL)
+    rest, _ = await process.communicate()
+    last = int(rest.split()[-1]) if rest.split() else last
+    with pytest.raises(Exception, match=r".*"), file.open("rb") as stream:
+        make_reader(stream).get_summary()
+    kept = [fields["sequence"] for fields in statuses(file)]
+    assert kept == list(range(kept[0], kept[-1] + 1))
+    assert last - kept[-1] < 200
+    whole = tmp_path / "whole.mcap"
+    found = recover(file, whole)
+    assert not found.is_whole
+    assert [fields["sequence"] for fields in statuses(whole)] == kept
+    assert list(read_recording(whole)) == list(read_recording(file))
+    with whole.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        assert summary.statistics.message_count == found.messages
+
+
+async def test_recovering_what_is_whole_changes_nothing(
+    hand: RobotiqHand, file: Path, tmp_path: Path
+) -> None:
+    async with Recorder(hand, file):
+        await hand.move(30)
+    found = recover(file, tmp_path / "again.mcap")
+    assert found.is_whole
+    assert list(read_recording(tmp_path / "again.mcap")) == list(read_recording(file))
+    with pytest.raises(RecordingError, match="File exists"):
+        recover(file, tmp_path / "again.mcap")
+
+
+@pytest.mark.parametrize("content", [b"", b"no recording", b"\x89MCAP0\r\n"])
+def test_what_is_no_recording_is_refused(content: bytes, file: Path) -> None:
+    file.write_bytes(content)
+    with pytest.raises(RecordingError, match="not an MCAP file"):
+        list(read_recording(file))
+    with pytest.raises(RecordingError, match="not an MCAP file"):
+        recover(file, file.with_name("whole.mcap"))
+    assert not file.with_name("whole.mcap").exists()
+
+
+def test_a_file_that_is_not_there(file: Path) -> None:
+    with pytest.raises(RecordingError, match="No such file"):
+        list(read_recording(file))
