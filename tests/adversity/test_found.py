@@ -68,6 +68,27 @@ def test_what_happened_while_the_loop_was_held_up_is_seen_before_the_next_write(
     run(main)
 
 
+@pytest.mark.parametrize("turns", range(1, 31))
+def test_wherever_in_a_poll_the_loop_is_held_up_what_happened_meanwhile_is_seen_first(turns: int) -> None:
+    async def main() -> None:
+        async with world() as here:
+            await here.activate_beforehand()
+            await here.hand.start()
+            await here.hand.move(50, A)
+
+            def hold_up() -> None:
+                here.gripper.write(0, [0x0000])
+                here.loop.hold_up(1.0)
+                here.hand.command(A, position=100)
+
+            here.loop.after_turns(turns, hold_up)
+            await asyncio.sleep(2.0)
+            await nothing_moves_for(here, 6)
+            assert not Request.from_registers(here.gripper.request_registers).activate
+
+    run(main)
+
+
 def test_a_move_cancelled_while_the_loop_was_held_up_stops_where_it_is_by_then() -> None:
     async def main() -> None:
         async with world() as here:

@@ -327,3 +327,16 @@ def test_an_acknowledged_speed_survives_a_blink_of_the_link(moved_before: bool) 
     bench.run(0.6)
     image = Request.from_registers(bench.written[-1])
     assert (image.axes[1].speed, image.axes[1].force) == (77, 33)
+
+
+def test_a_speed_that_was_not_acknowledged_is_not_taken_for_the_axis_s_own() -> None:
+    bench = started()
+    bench.command(B, speed=77, force=33)
+    bench.step(answer=False)
+    bench.now += 0.05
+    bench.connect(activate=False)
+    bench.run(0.3)
+    bench.command(A, position=60)
+    bench.run(0.6)
+    image = Request.from_registers(bench.written[-1])
+    assert (image.axes[1].speed, image.axes[1].force) == (128, 64)
