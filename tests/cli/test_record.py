@@ -1,0 +1,153 @@
+"""``robotiq-async record``, ``replay``, ``recover`` and ``plot``."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from robotiq_async import Finger, RobotiqHand, State
+from robotiq_async.cli import main
+from robotiq_async.recorder import Recorder
+from robotiq_async.recording import read_recording
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+
+if TYPE_CHECKING:
+    from tests.cli.conftest import Shell
+
+WITHOUT = """
+import importlib.util, sys
+find = importlib.util.find_spec
+importlib.util.find_spec = lambda name, *rest: None if name == "{}" else find(name, *rest)
+from robotiq_async.cli import main
+sys.exit(main({}))
+"""
+
+
+@pytest.fixture
+async def grasp(tmp_path: Path) -> Path:
+    """A recording of a grasp with a fault."""
+    gripper, file = SimulatedGripper(speedup=20), tmp_path / "grasp.mcap"
+    gripper.place_object(Finger.ABC, 150)
+    async with (
+        SimulatorServer(gripper) as server,
+        RobotiqHand(server.address) as hand,
+        Recorder(hand, file),
+    ):
+        await hand.close(speed=200)
+        gripper.inject_fault(9)
+        await hand.wait_for_state(State.FAULT)
+        gripper.clear_faults()
+        await hand.wait_for_state(State.RUNNING_IDLE)
+    return file
+
+
+async def test_ctrl_c_ends_a_recording_that_is_whole_and_touches_nothing(
+    shell: Shell, tmp_path: Path
+) -> None:
+    file = tmp_path / "it.mcap"
+    gripper = SimulatedGripper(speedup=20)
+    async with SimulatorServer(gripper) as server:
+        process = await shell.start("record", str(file), server.address)
+        assert (await shell.read_line(process)).startswith("Recording ")
+        async with asyncio.timeout(20):
+            while os.stat(file).st_size < 3000:  # noqa: ASYNC110  # another process writes it
+                await asyncio.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        outcome = await shell.finish(process)
+        assert outcome.code == 130
+        assert not gripper.writes
+    assert "0 missed" in outcome.out
+    recorded = [entry.sequence for entry in read_recording(file) if entry.topic == "/gripper/status"]
+    assert recorded == list(range(recorded[0], recorded[-1] + 1))
+
+
+async def test_it_ends_by_itself(shell: Shell, tmp_path: Path) -> None:
+    file = tmp_path / "it.mcap"
+    outcome = await shell.run("record", str(file), "--seconds", "0.5")
+    outcome.assert_succeeded()
+    assert len(list(read_recording(file))) > 20
+    again = await shell.run("record", str(file), "--seconds", "0.5")
+    again.assert_failed(1, "it.mcap: File exists")
+
+
+async def test_no_gripper_no_file(shell: Shell, tmp_path: Path) -> None:
+    async with SimulatorServer() as server:
+        address = server.address
+    outcome = await shell.run("record", str(tmp_path / "it.mcap"), address)
+    outcome.assert_failed(1, "refused")
+    assert not (tmp_path / "it.mcap").exists()
+
+
+def test_replay_tells_the_story(grasp: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", str(grasp)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    story = [line.split(maxsplit=1)[1] for line in lines]
+    assert any("command  act=1 go=1 release=0 A=255@200/64" in line for line in story)
+    assert any("CONTACT_CLOSING" in line for line in story)
+    (fault,) = [
+        at for at, line in enumerate(story) if line.startswith("fault    0x09 COMMUNICATION_NOT_READY")
+    ]
+    assert story.index("state    FAULT -> RUNNING_IDLE (gripper is active)") > fault
+    statuses = [line for line in story if line.startswith("status")]
+    assert all(before != after for before, after in pairwise(statuses))
+
+
+def test_recover_makes_a_broken_one_whole(grasp: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    whole = grasp.read_bytes()
+    grasp.write_bytes(whole[: len(whole) // 2])
+    assert main(["recover", str(grasp)]) == 0
+    out = capsys.readouterr().out
+    assert "was whole" not in out
+    recovered = grasp.with_name("grasp.recovered.mcap")
+    assert f"{len(list(read_recording(recovered)))} messages in {recovered}" in out
+    assert main(["recover", str(grasp)]) == 1
+    assert "File exists" in capsys.readouterr().err
+
+
+def test_plot_draws_it(grasp: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plot", str(grasp)]) == 0
+    pictures = [grasp.with_name(f"grasp.{suffix}") for suffix in ("png", "svg")]
+    assert capsys.readouterr().out.splitlines() == [str(picture) for picture in pictures]
+    before = pictures[1].read_bytes()
+    assert b"COMMUNICATION" in before or len(before) > 20_000
+    assert main(["plot", str(grasp), str(grasp.with_name("other"))]) == 0
+    assert grasp.with_name("other.svg").exists()
+
+
+@pytest.mark.parametrize("command", ["replay", "recover", "plot"])
+@pytest.mark.parametrize("content", [None, b"", b"no recording"])
+def test_what_is_no_recording_is_one_line(
+    command: str, content: bytes | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "it.mcap"
+    if content is not None:
+        file.write_bytes(content)
+    assert main([command, str(file)]) == 1
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert "not an MCAP file" in err or "No such file" in err
+
+
+@pytest.mark.parametrize(
+    ("module", "arguments", "extra"),
+    [
+        ("mcap", ["record", "x.mcap"], "record"),
+        ("mcap", ["replay", "x"], "record"),
+        ("matplotlib", ["plot", "x"], "plot"),
+    ],
+)
+async def test_a_missing_extra_is_named(shell: Shell, module: str, arguments: list[str], extra: str) -> None:
+    outcome = await shell.finish(await shell.python("-c", WITHOUT.format(module, arguments)))
+    outcome.assert_failed(1, f"pip install 'robotiq-async[{extra}]'")
+
+
+@pytest.mark.parametrize("seconds", ["0", "-1", "nan", "soon"])
+def test_wrong_usage(seconds: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["record", "x.mcap", "--seconds", seconds]) == 2
+    assert "--seconds" in capsys.readouterr().err
