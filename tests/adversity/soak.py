@@ -228,7 +228,7 @@ async def soak(link: str, seed: int, loop: LoopWatch) -> AsyncIterator[Soak]:
         line: SerialLine | None = None
         server: TcpServer | RtuServer
         if link == "rtu":
-            # In memory: pulling and plugging makes and removes a link, and a busy disk takes its time for that.
+            # In memory: pulling and plugging makes and removes a link, and a busy disk takes its time.
             memory = "/dev/shm" if Path("/dev/shm").is_dir() else None  # noqa: ASYNC240
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(dir=memory)))
             line = stack.enter_context(SerialLine(folder))
