@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -204,6 +205,8 @@ class Campaign:
         """
         if not self.path.parent.is_dir():
             raise TableError(self.path, None, f"there is no folder {self.path.parent}")
+        if not os.access(self.path.parent, os.W_OK):
+            raise TableError(self.path, None, f"the folder {self.path.parent} cannot be written to")
         if not self.path.exists():
             return
         self.table = read_table(self.path, self.layout)
