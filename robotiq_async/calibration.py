@@ -19,7 +19,7 @@ from typing import Final
 
 from .checks import check_byte, check_number
 from .closing_time import CLOSED_READING, OPEN_READING, STROKE_COUNTS
-from .runs import FORCE, SPEED, Table, TableError, read_table, thesis_table
+from .runs import FORCE, SPEED, Layout, Table, TableError, read_table, thesis_table
 
 STROKE_MM: Final = 155.0
 """Opening between the fingertips of an open gripper (manual, specifications)."""
@@ -111,9 +111,7 @@ class SpeedCalibration:
         Raises:
             TableError: the file is not such a table, or has fewer than two rows.
         """
-        table = read_table(path, SPEED)
-        if len(table) < 2:
-            raise TableError(path, None, f"at least two speed values are needed, got {len(table)}")
+        table = _owners_table(path, SPEED)
         if any(not all(runs) for runs in table.values()):
             raise TableError(path, None, "a closing takes longer than 0 ms")
         return cls.from_table(str(path), table)
@@ -207,10 +205,7 @@ class ForceCalibration:
         Raises:
             TableError: the file is not such a table, or has fewer than two rows.
         """
-        table = read_table(path, FORCE)
-        if len(table) < 2:
-            raise TableError(path, None, f"at least two force values are needed, got {len(table)}")
-        return cls.from_table(str(path), table)
+        return cls.from_table(str(path), _owners_table(path, FORCE))
 
     @classmethod
     def from_table(cls, source: str, table: Table) -> ForceCalibration:
@@ -234,6 +229,19 @@ class ForceCalibration:
             ValueError: weaker or stronger than any value.
         """
         return closest("newton", newton, {value: self.newton(value) for value in covered(self.points)})
+
+
+def _owners_table(path: Path | str, layout: Layout) -> Table:
+    """A table that makes a curve.
+
+    Raises:
+        TableError: the file is not such a table, or has fewer than two rows.
+    """
+    table = read_table(path, layout)
+    if len(table) < 2:
+        values = f"{layout.value.replace('_', ' ')}s"
+        raise TableError(path, None, f"at least two {values} are needed, got {len(table)}")
+    return table
 
 
 def mean(runs: Sequence[int]) -> float:

@@ -20,6 +20,7 @@ from .link import ModbusTransport, Transport
 from .procedures import signature_of_status
 from .registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap
 from .simulated import SimulatedTransport
+from .statistics import percentile
 from .status import RobotiqStatus
 
 REACH_S: Final = 3.0
@@ -208,7 +209,7 @@ async def _timing(link: Transport, report: Report) -> None:
             break
     rate = len(times) / (loop.time() - began)
     times.sort()
-    p50, p99 = (times[math.ceil(share * len(times)) - 1] for share in (0.5, 0.99))
+    p50, p99 = percentile(times, 0.5), percentile(times, 0.99)
     found = f"{1000 * p50:.1f} ms, {1000 * p99:.1f} ms at worst but 1 in 100"
     if p99 < SLOW_S:
         report(Finding(Level.GOOD, "round trip", found))

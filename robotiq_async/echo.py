@@ -8,7 +8,7 @@ it shows one of them it is ours; if it shows something else, another client comm
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from .procedures import Signature, signature_of, signature_of_status
@@ -72,8 +72,7 @@ class EchoWatch:
         self.restart(image, signature, now)
         for each in waiting:
             self._number += 1
-            again = _Written(self._number, each.image, each.signature, now, acknowledged=True, doubtful=True)
-            again.received = each.received
+            again = replace(each, number=self._number, time=now, acknowledged=True, doubtful=True)
             self._written.append(again)
 
     def writing(self, image: Request, now: float) -> int:

@@ -48,7 +48,7 @@ if _pymodbus_log.level == logging.NOTSET:
 LARGEST_READ: Final = 4096
 """Bytes taken from the socket at a time; the longest Modbus frame has 260."""
 HELD_S: Final = 0.01
-"""A watchdog that comes so late was kept from coming: the loop was held up."""
+"""A timer, or a tick, that comes so late was kept from coming: the loop was held up."""
 GRACE_S: Final = 0.02
 """A peer in the same loop (the simulated gripper) was held up with it, and gets so much more time."""
 

@@ -27,7 +27,7 @@ from .errors import (
     RobotiqConnectionError,
     RobotiqError,
 )
-from .link import Transport
+from .link import HELD_S, Transport
 from .log import log
 from .machine import Trigger
 from .statistics import Counters
@@ -49,8 +49,6 @@ SHUTDOWN_PAUSE_S: Final = 0.05
 """Between two attempts at that."""
 LATE_S: Final = 0.05
 """Later than this a poll is worth a warning; on a busy machine a few milliseconds are usual."""
-HELD_S: Final = 0.01
-"""A tick that comes so late was kept from coming."""
 LOOKS: Final = 3
 """At most so often a status that was asked for in a loop that was held up is asked for again."""
 LATE_WARNING_S: Final = 1.0

@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -79,14 +80,14 @@ def recover(path: Path | str, target: Path | str) -> Recovered:
     """
     found = Recovered()
     records = _records(path)
-    first = next(records, None)
+    first = next(records)  # refuses what is no recording before there is a target
     try:
         with open(target, "xb") as file:
             writer = Writer(file)
             writer.start()
             numbers: dict[int, int] = {}
             schemas: dict[int, int] = {0: 0}
-            for record in _chained(first, records):
+            for record in chain([first], records):
                 if isinstance(record, Schema) and record.id not in schemas:
                     schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
                 elif isinstance(record, Channel) and record.id not in numbers:
@@ -108,11 +109,6 @@ def recover(path: Path | str, target: Path | str) -> Recovered:
     except OSError as error:
         raise RecordingError(f"{target}: {error.strerror}") from error
     return found
-
-
-def _chained(first: object, rest: Iterator[object]) -> Iterator[object]:
-    yield first
-    yield from rest
 
 
 def _records(path: Path | str) -> Iterator[object]:

@@ -105,10 +105,10 @@ class Counters:
             polls=self.polls,
             writes=self.writes,
             overruns=self.overruns,
-            period_p50=_percentile(periods, 0.50),
-            period_p99=_percentile(periods, 0.99),
-            round_trip_p50=_percentile(round_trips, 0.50),
-            round_trip_p99=_percentile(round_trips, 0.99),
+            period_p50=percentile(periods, 0.50),
+            period_p99=percentile(periods, 0.99),
+            round_trip_p50=percentile(round_trips, 0.50),
+            round_trip_p99=percentile(round_trips, 0.99),
             longest_stall=self.longest_stall,
             reconnects=self.reconnects,
             foreign_commands=foreign_commands,
@@ -118,6 +118,6 @@ class Counters:
         )
 
 
-def _percentile(ordered: list[float], share: float) -> float:
+def percentile(ordered: list[float], share: float) -> float:
     """The value that this share of an ordered list does not exceed; 0 for an empty list."""
     return ordered[math.ceil(share * len(ordered)) - 1] if ordered else 0.0

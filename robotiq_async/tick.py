@@ -172,7 +172,7 @@ class _Bell:
         return None
 
     def abandon(self) -> None:
-        """The loop was closed without a word: give back what is left of it."""
+        """Give back what is left once the loop is not told any more, or was closed without a word."""
         del self._bells[self._loop]
         if self._timerfd is not None:
             self._timerfd.close()
@@ -180,9 +180,8 @@ class _Bell:
     def _close(self) -> None:
         if self._bells.get(self._loop) is not self:
             return  # abandoned
-        del self._bells[self._loop]
         if self._timerfd is not None:
             self._loop.remove_reader(self._timerfd.descriptor)
-            self._timerfd.close()
         if self._handle is not None:
             self._handle.cancel()
+        self.abandon()

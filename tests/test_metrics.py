@@ -27,15 +27,20 @@ async def hand(gripper: SimulatedGripper) -> AsyncIterator[RobotiqHand]:
         yield hand
 
 
-async def asked(where: tuple[str, int]) -> Samples:
-    """Every sample, by its name and its second label."""
+async def page(where: tuple[str, int]) -> str:
+    """What Prometheus gets."""
 
     def get() -> str:
         with urllib.request.urlopen(f"http://{where[0]}:{where[1]}/metrics", timeout=10) as answer:
             text: str = answer.read().decode()
             return text
 
-    families = text_string_to_metric_families(await asyncio.to_thread(get))
+    return await asyncio.to_thread(get)
+
+
+async def asked(where: tuple[str, int]) -> Samples:
+    """Every sample, by its name and its second label."""
+    families = text_string_to_metric_families(await page(where))
     return {
         (sample.name, next((v for k, v in sample.labels.items() if k != "hand"), "")): sample.value
         for family in families
@@ -89,14 +94,8 @@ async def test_it_ends_with_the_block(hand: RobotiqHand) -> None:
 
 
 async def test_several_hands_are_told_apart(hand: RobotiqHand) -> None:
-    async with RobotiqHand() as other, serve_metrics(hand, other, port=0) as (host, port):
-
-        def get() -> str:
-            with urllib.request.urlopen(f"http://{host}:{port}/metrics", timeout=10) as answer:
-                text: str = answer.read().decode()
-                return text
-
-        text = await asyncio.to_thread(get)
+    async with RobotiqHand() as other, serve_metrics(hand, other, port=0) as where:
+        text = await page(where)
         for each in (hand, other):
             assert f'robotiq_polls_total{{hand="{each.address}"}}' in text
 

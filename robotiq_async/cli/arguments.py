@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from importlib.util import find_spec
 from typing import Annotated
 
 from cyclopts import Parameter, Token
@@ -18,6 +19,16 @@ class UsageError(Exception):
 
 class CommandError(Exception):
     """A command cannot do what it is asked, and it is not the gripper's fault: exit code 1."""
+
+
+def need(module: str, extra: str, instead: str = "") -> None:
+    """Refuse when an extra is not installed; ``instead`` names another way out.
+
+    Raises:
+        CommandError: it is not.
+    """
+    if find_spec(module) is None:
+        raise CommandError(f"this needs {module}: pip install 'robotiq-async[{extra}]'{instead}")
 
 
 @contextmanager

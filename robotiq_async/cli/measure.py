@@ -7,14 +7,13 @@ import sys
 import threading
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager, suppress
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
 from ..address import parse_address
-from .arguments import CommandError, UsageError, usage
+from .arguments import CommandError, UsageError, need, usage
 
 if TYPE_CHECKING:
     from .. import RobotiqHand
@@ -66,8 +65,8 @@ def check(address: str, output: Path, speedup: float | None, runs: int, step: in
         raise UsageError("--speedup is for sim:// only: the time of a real gripper cannot be changed")
     if speedup is not None and not 1 <= speedup <= 50:
         raise UsageError(f"--speedup must be a number in 1..50, got {speedup:g}")
-    if plot and find_spec("matplotlib") is None:
-        raise CommandError("plots need matplotlib: pip install 'robotiq-async[plot]', or pass --no-plot")
+    if plot:
+        need("matplotlib", "plot", ", or pass --no-plot")
     if kind != "sim":
         return 1.0
     return SPEEDUP if speedup is None else speedup
@@ -126,6 +125,8 @@ async def carry_out(
 ) -> None:
     """Measure what is left, with a progress bar that knows how long each row takes.
 
+    Without ``bar`` there is none: it would paint over what a person types.
+
     Raises:
         CommandError: the measurement went wrong, or a file could not be written; what is whole is kept.
     """
@@ -135,7 +136,6 @@ async def carry_out(
     from ..measuring import MeasuringError
     from ..runs import TableError
 
-    # The bar would paint over what a person types.
     done, left = len(campaign.table), campaign.left
     if done and left:
         print(f"Going on with {campaign.path}: {done} rows are there, {len(left)} are left.", flush=True)

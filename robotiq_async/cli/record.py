@@ -5,14 +5,13 @@ from __future__ import annotations
 import asyncio
 import sys
 from datetime import datetime
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from ..enums import AXES
-from .arguments import Address, CommandError, UsageError
+from .arguments import Address, CommandError, UsageError, need
 
 if TYPE_CHECKING:
     from ..recorder import Recorder
@@ -170,13 +169,3 @@ def plot(file: Path, picture: Path | None = None, /) -> None:
         raise CommandError(f"{file}: there is no status in it")
     for written in plot_recording(picture or file.with_suffix(""), entries):
         print(written)
-
-
-def need(module: str, extra: str) -> None:
-    """Refuse when an extra is not installed.
-
-    Raises:
-        CommandError: it is not.
-    """
-    if find_spec(module) is None:
-        raise CommandError(f"this needs {module}: pip install 'robotiq-async[{extra}]'")

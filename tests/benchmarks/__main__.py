@@ -18,12 +18,12 @@ import tempfile
 from collections.abc import Callable, Iterator
 from importlib.metadata import version
 from importlib.util import find_spec
-from itertools import pairwise
 from pathlib import Path
 from statistics import median
 from typing import Any
 
-from tests.benchmarks.contenders import INTERVAL_S, Figures
+from robotiq_async.statistics import percentile
+from tests.benchmarks.contenders import INTERVAL_S, Figures, periods
 from tests.benchmarks.native import MissingToolError, build, grippers
 
 PARTS = ("steady", "many", "latency", "readers", "import", "memory")
@@ -33,18 +33,12 @@ HANDS = {"asyncio": (64, 96, 128), "uvloop": (96, 128, 160, 192)}
 Row = dict[str, str]
 
 
-def percentile(values: list[float], share: float) -> float:
-    """The value that this share of them does not exceed."""
-    ordered = sorted(values)
-    return ordered[min(len(ordered) - 1, int(share * len(ordered)))]
-
-
-def jitter(periods: list[float]) -> dict[str, float]:
+def jitter(measured: list[float]) -> dict[str, float]:
     """How far periods are from the interval, in microseconds."""
-    off = [abs(period - INTERVAL_S) * 1e6 for period in periods]
+    off = sorted(abs(period - INTERVAL_S) * 1e6 for period in measured)
     return {
         **{f"p{100 * share:g}": percentile(off, share) for share in (0.5, 0.99, 0.999)},
-        "max": max(off),
+        "max": off[-1],
     }
 
 
@@ -87,8 +81,7 @@ class Benchmarks:
         out = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
         cpu, *lines = out.splitlines()
         times = [int(line.split()[0]) / 1e9 for line in lines]
-        periods = [later - earlier for earlier, later in pairwise(times)]
-        return {"periods": periods, "cpu_per_poll": float(cpu) / polls}
+        return {"periods": periods(times), "cpu_per_poll": float(cpu) / polls}
 
     def steady(self) -> Iterator[Row]:
         """Jitter of the period, and CPU per poll, of one gripper at 200 Hz."""
@@ -144,7 +137,7 @@ class Benchmarks:
             figures = self.contender("latency", loop, self.seconds)
             self.results.setdefault("latency", {})[loop] = figures
             for name, values in figures.items():
-                p50, p99 = (1e6 * percentile(values, share) for share in (0.5, 0.99))
+                p50, p99 = (1e6 * percentile(sorted(values), share) for share in (0.5, 0.99))
                 yield {
                     "what": name.replace("_", " "),
                     "loop": loop,
