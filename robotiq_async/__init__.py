@@ -40,6 +40,7 @@ The map; each module imports only what stands above it::
     hand         RobotiqHand
     payloads     what is told of a hand in JSON
     jointstate   joint states as ROS 2 encodes them
+    feed         everything about a hand as messages
     recorder     everything about a hand in an MCAP file; needs mcap
     recording    what such a file holds
     metrics      figures for Prometheus; needs prometheus-client

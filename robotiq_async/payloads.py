@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from .enums import AXES, Fault, Finger
+from .enums import AXES, Finger
 from .kinematics import PREFIX
 from .status import RobotiqStatus
 from .streams import SentRequest, Transition
@@ -110,9 +110,11 @@ def transition_fields(transition: Transition) -> Fields:
     }
 
 
-def fault_fields(fault: Fault) -> Fields:
-    """A fault that has come, or gone (NONE)."""
+def fault_fields(status: RobotiqStatus) -> Fields:
+    """The fault of a status in which it has come, or gone (NONE)."""
+    fault = status.fault
     return {
+        "monotonic": _seconds(status.timestamp),
         "kind": "fault",
         "code": int(fault),
         "name": fault.name,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import weakref
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Generic, Self, TypeVar
 
@@ -103,6 +103,11 @@ class Stream(Generic[T]):
     def take_nowait(self) -> T | None:
         """The next item if there is one already."""
         return self._items.popleft() if self._items else None
+
+    def drain(self) -> Iterator[T]:
+        """What is there already, one after the other."""
+        while self._items:
+            yield self._items.popleft()
 
     async def aclose(self) -> None:
         """End the stream; a waiting reader ends too. Idempotent."""

@@ -55,6 +55,7 @@ RUNTIME = [
     "hand",
     "payloads",
     "jointstate",
+    "feed",
     "recorder",
     "recording",
     "metrics",

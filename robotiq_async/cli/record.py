@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ..enums import AXES
 from .arguments import Address, CommandError, UsageError, need
+from .words import IN_WORDS, clock
 
 if TYPE_CHECKING:
     from ..recorder import Recorder
-    from ..recording import Entry
-
-NAMES = [str(axis.name) for axis in AXES]
 
 
 async def record(
@@ -101,28 +97,12 @@ def replay(file: Path, /) -> None:
     for entry in read_recording(file):
         if not entry.is_json:
             continue
-        line = _line(entry)
+        line = IN_WORDS[entry.topic](entry.fields)
         if entry.topic == "/gripper/status":
             if line == shown:
                 continue
             shown = line
-        stamp = datetime.fromtimestamp(entry.nanoseconds / 1e9).astimezone()
-        print(f"{stamp:%H:%M:%S.%f}"[:-3], line)
-
-
-def _line(entry: Entry) -> str:
-    """An entry in words."""
-    fields = entry.fields
-    if entry.topic == "/gripper/status":
-        axes = (f"{name}={fields[name]['position']} {fields[name]['status']}" for name in NAMES)
-        return f"status   {' '.join(axes)}"
-    if entry.topic == "/gripper/command":
-        axes = (f"{n}={fields[n]['position']}@{fields[n]['speed']}/{fields[n]['force']}" for n in NAMES)
-        bits = f"act={fields['activate']:d} go={fields['go']:d} release={fields['release']:d}"
-        return f"command  {bits} {' '.join(axes)}{'' if fields['acknowledged'] else ' NOT ACKNOWLEDGED'}"
-    if fields["kind"] == "fault":
-        return f"fault    0x{fields['code']:02X} {fields['name']}: {fields['description']}"
-    return f"state    {fields['source']} -> {fields['target']} ({fields['trigger']})"
+        print(clock(entry.nanoseconds / 1e9), line)
 
 
 def recover(file: Path, target: Path | None = None, /) -> None:

@@ -1,0 +1,175 @@
+"""Everything about a hand as messages on four topics, for recordings and for viewers.
+
+``/gripper/status`` (every poll), ``/gripper/command`` (every request that was written) and ``/gripper/event``
+(transitions and faults) are JSON with a JSON Schema; ``/joint_states`` is what ROS 2 encodes.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from .enums import Fault
+from .errors import RobotiqError
+from .hand import RobotiqHand
+from .jointstate import SCHEMA, SCHEMA_NAME, JointStateEncoder
+from .kinematics import joint_angles, joint_velocities
+from .payloads import (
+    SCHEMAS,
+    Fields,
+    command_fields,
+    efforts,
+    fault_fields,
+    status_fields,
+    transition_fields,
+)
+from .status import RobotiqStatus
+from .streams import SentRequest, Stream, Transition
+
+BUFFER: Final = 100_000
+"""Statuses that wait for a loop that is held up: minutes."""
+VELOCITY_S: Final = 0.05
+"""Joint velocities are taken over this time: a count is half a degree."""
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """What is sent on a topic, in the words of MCAP and Foxglove.
+
+    Attributes:
+        name: the topic.
+        encoding: of its messages.
+        schema_name: the type of its messages.
+        schema_encoding: how the type is described.
+        schema: the description.
+    """
+
+    name: str
+    encoding: str
+    schema_name: str
+    schema_encoding: str
+    schema: bytes
+
+
+def json_topic(name: str, schema: object) -> Topic:
+    """A topic ``/gripper/NAME`` of JSON objects."""
+    return Topic(f"/gripper/{name}", "json", f"gripper.{name}", "jsonschema", json.dumps(schema).encode())
+
+
+def compact(fields: Fields) -> bytes:
+    """An object as one short line of JSON."""
+    return json.dumps(fields, separators=(",", ":")).encode()
+
+
+STATUS: Final = json_topic("status", SCHEMAS["status"])
+COMMAND: Final = json_topic("command", SCHEMAS["command"])
+EVENT: Final = json_topic("event", SCHEMAS["event"])
+JOINTS: Final = Topic("/joint_states", "cdr", SCHEMA_NAME, "ros2msg", SCHEMA.encode())
+TOPICS: Final = (STATUS, COMMAND, EVENT, JOINTS)
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One message.
+
+    Attributes:
+        topic: where it belongs.
+        nanoseconds: since 1970: when it happened.
+        data: encoded as the topic says.
+        sequence: the number of the status it was made from; 0 for commands and events.
+    """
+
+    topic: Topic
+    nanoseconds: int
+    data: bytes
+    sequence: int = 0
+
+
+class Feed:
+    """Turns what happens to a hand into messages. It only listens."""
+
+    def __init__(self, hand: RobotiqHand, take: Callable[[Message], None]) -> None:
+        """Prepare.
+
+        Args:
+            hand: started before or while it is listened to.
+            take: is called with every message, in the event loop.
+        """
+        self._hand = hand
+        self._take = take
+        self._encoder = JointStateEncoder()
+        self._before: list[RobotiqStatus] = []
+        self._fault = Fault.NONE
+        self._epoch = 0.0
+        self._statuses: Stream[RobotiqStatus]
+        self._listened: list[tuple[Stream[Any], Callable[[Any], None]]] = []
+        self._tasks: list[asyncio.Task[None]] = []
+
+    @property
+    def missed(self) -> int:
+        """Statuses that were lost because the event loop was held up for minutes."""
+        return self._statuses.missed
+
+    def begin(self) -> None:
+        """Listen from now on; :meth:`end` ends it."""
+        loop = asyncio.get_running_loop()
+        # Statuses carry the loop's clock; messages are stamped with the world's.
+        self._epoch = time.time() - loop.time()
+        self._statuses = self._hand.statuses(BUFFER)
+        self._listened = [
+            (self._statuses, self._take_status),
+            (self._hand.requests(), self._take_request),
+            (self._hand.transitions(), self._take_transition),
+        ]
+        self._tasks = [
+            loop.create_task(self._listen(stream, take), name="robotiq_async feed")
+            for stream, take in self._listened
+        ]
+
+    async def end(self) -> None:
+        """Take what was published before now and not seen yet, and listen no longer."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        for stream, take in self._listened:
+            for item in stream.drain():
+                take(item)
+
+    async def _listen(self, stream: Stream[Any], take: Callable[[Any], None]) -> None:
+        with contextlib.suppress(RobotiqError):  # the hand gave up; its transitions tell
+            async for item in stream:
+                take(item)
+
+    def _nanoseconds(self, timestamp: float) -> int:
+        return round((timestamp + self._epoch) * 1e9)
+
+    def _tell(self, topic: Topic, timestamp: float, fields: Fields, sequence: int = 0) -> None:
+        self._take(Message(topic, self._nanoseconds(timestamp), compact(fields), sequence))
+
+    def _take_status(self, status: RobotiqStatus) -> None:
+        self._tell(STATUS, status.timestamp, status_fields(status), status.sequence)
+        self._take_joints(status)
+        if status.fault != self._fault:
+            self._fault = status.fault
+            self._tell(EVENT, status.timestamp, fault_fields(status))
+
+    def _take_joints(self, status: RobotiqStatus) -> None:
+        while len(self._before) > 1 and status.timestamp - self._before[1].timestamp >= VELOCITY_S:
+            del self._before[0]
+        self._before.append(status)
+        angles, seconds = joint_angles(status), status.timestamp - self._before[0].timestamp
+        velocities = joint_velocities(self._before[0], status) if seconds else (0.0,) * len(angles)
+        stamp = self._nanoseconds(status.timestamp)
+        data = self._encoder.encode(stamp, angles, velocities, efforts(status))
+        self._take(Message(JOINTS, stamp, data, status.sequence))
+
+    def _take_request(self, sent: SentRequest) -> None:
+        self._tell(COMMAND, sent.timestamp, command_fields(sent))
+
+    def _take_transition(self, transition: Transition) -> None:
+        self._tell(EVENT, transition.timestamp, transition_fields(transition))
