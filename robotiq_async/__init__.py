@@ -38,6 +38,7 @@ The map; each module imports only what stands above it::
     options      checked options of a hand
     waiting      callers that wait for a state
     hand         RobotiqHand
+    actions      what a person asks of a hand
     payloads     what is told of a hand in JSON
     jointstate   joint states as ROS 2 encodes them
     feed         everything about a hand as messages

@@ -48,6 +48,25 @@ def check_mask(fingers: object) -> Finger:
     return Finger(int(fingers))
 
 
+def parse_fingers(name: str, text: str) -> Finger:
+    """A mask of axes from words: ``ABC``, ``A,B``, ``scissor``, ``all``.
+
+    Raises:
+        ValueError: it names something else, or nothing.
+    """
+    mask = Finger(0)
+    for word in text.upper().split(","):
+        word = word.strip()
+        if word in Finger.__members__:
+            mask |= Finger[word]
+        elif word and set(word) <= set("ABC"):
+            for letter in word:
+                mask |= Finger[letter]
+        else:
+            raise ValueError(f"{name} must name axes (ABC, or A,B, or scissor, or all), got {word!r}")
+    return mask
+
+
 def check_axis(finger: object) -> Finger:
     """Exactly one axis.
 

@@ -53,6 +53,7 @@ RUNTIME = [
     "options",
     "waiting",
     "hand",
+    "actions",
     "payloads",
     "jointstate",
     "feed",

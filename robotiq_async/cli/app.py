@@ -10,12 +10,13 @@ from .. import __version__
 from .demo import demo
 from .doctor import doctor
 from .measure import measure_app
+from .monitor import monitor
 from .move import move
 from .record import plot, record, recover, replay
 from .simulate import simulate
 from .status import status
 
-COMMANDS: Final = (demo, simulate, status, move, doctor, record, replay, recover, plot)
+COMMANDS: Final = (demo, simulate, status, move, monitor, doctor, record, replay, recover, plot)
 """A new sub-command is a module with a function of its name, and an entry here."""
 
 _HELP = """Control a Robotiq 3-Finger gripper, or a simulated one.

@@ -10,7 +10,8 @@ from typing import Annotated
 
 from cyclopts import Parameter, Token
 
-from ..enums import AXES, Finger
+from ..checks import parse_fingers
+from ..enums import Finger
 
 
 class UsageError(Exception):
@@ -58,22 +59,8 @@ def _integer(name: str, low: int, high: int) -> Callable[[object, Sequence[Token
 
 
 def _fingers(_type: object, tokens: Sequence[Token]) -> Finger:
-    mask = Finger(0)
-    for word in tokens[0].value.upper().split(","):
-        mask |= _axes(word.strip())
-    return mask
-
-
-def _axes(word: str) -> Finger:
-    if word in Finger.__members__:
-        return Finger[word]
-    letters = {axis.name: axis for axis in AXES if axis.name is not None}
-    if word and set(word) <= set("ABC"):
-        mask = Finger(0)
-        for letter in word:
-            mask |= letters[letter]
-        return mask
-    raise UsageError(f"--fingers must name axes (ABC, or A,B, or scissor, or all), got {word!r}")
+    with usage():
+        return parse_fingers("--fingers", tokens[0].value)
 
 
 Address = Annotated[

@@ -3,27 +3,40 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 
-class _Collector(logging.Handler):
-    """Keeps messages."""
+class _Teller(logging.Handler):
+    """Tells messages."""
 
-    def __init__(self) -> None:
+    def __init__(self, tell: Callable[[str], object]) -> None:
         super().__init__(logging.WARNING)
-        self.messages: list[str] = []
+        self._tell = tell
 
     def emit(self, record: logging.LogRecord) -> None:
-        self.messages.append(record.getMessage())
+        self._tell(record.getMessage())
 
 
 @contextmanager
 def collected() -> Iterator[list[str]]:
     """Collect the library's warnings instead of printing them between the lines of the command."""
-    log, collector = logging.getLogger("robotiq_async"), _Collector()
-    log.addHandler(collector)
+    messages: list[str] = []
+    with told(messages.append):
+        yield messages
+
+
+@contextmanager
+def told(tell: Callable[[str], object]) -> Iterator[None]:
+    """Tell the library's warnings at once, and nowhere else while this lasts."""
+    log, teller = logging.getLogger("robotiq_async"), _Teller(tell)
+    others = [handler for handler in log.handlers if isinstance(handler, _Teller)]
+    for other in others:
+        log.removeHandler(other)
+    log.addHandler(teller)
     try:
-        yield collector.messages
+        yield
     finally:
-        log.removeHandler(collector)
+        log.removeHandler(teller)
+        for other in others:
+            log.addHandler(other)

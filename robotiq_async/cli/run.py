@@ -19,6 +19,7 @@ from .app import build
 from .arguments import CommandError, UsageError
 from .remarks import collected
 
+_ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 SUCCESS, FAILURE, WRONG_USAGE, SIGNALLED = 0, 1, 2, 128
 
 
@@ -56,7 +57,9 @@ def _outcome(arguments: Sequence[str], signals: _Signals) -> tuple[int, str | No
 
 
 class _Signals:
-    """SIGINT and SIGTERM: the first one ends what runs, a second one has its ordinary effect.
+    """SIGINT, SIGTERM and SIGHUP (a terminal that is closed): the first one ends what runs.
+
+    A second one has its ordinary effect.
 
     In the event loop that is a cancellation, so that leaving ``async with`` stops the fingers; elsewhere
     it is a KeyboardInterrupt. While the loop is set up the signal is only noted: asyncio could not tell
@@ -69,7 +72,7 @@ class _Signals:
 
     def __enter__(self) -> Self:
         # A SIGINT that is ignored stays so: that is how a shell keeps Ctrl-C from its background jobs.
-        numbers = [n for n in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(n) is not signal.SIG_IGN]
+        numbers = [number for number in _ENDING if signal.getsignal(number) is not signal.SIG_IGN]
         self._previous = {number: signal.signal(number, self._handle) for number in numbers}
         return self
 

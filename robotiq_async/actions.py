@@ -1,0 +1,225 @@
+"""What a person asks of a hand through a program: a key of the monitor, a button of a viewer."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from .enums import AXES, FORCE_MAX, SPEED_MAX, WIDTH_NORMAL, WIDTH_PINCH, WIDTH_WIDE, Finger
+from .hand import RobotiqHand
+from .motion import MoveResult
+from .streams import SentRequest
+
+SPEED: Final = 128
+FORCE: Final = 64
+"""What the axes get until a person asks otherwise: those of :class:`RobotiqHand`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """One thing to ask for, without arguments.
+
+    Attributes:
+        name: one word.
+        what: it in a few words.
+        run: does it; gives how it ended, in words.
+        moves: whether fingers move, or may let go.
+        warning: what happens that nobody may expect; a person is asked first. Empty: nothing.
+    """
+
+    name: str
+    what: str
+    run: Callable[[RobotiqHand], Awaitable[str]]
+    moves: bool = True
+    warning: str = ""
+
+
+class Operator:
+    """A person at a hand, and whether this person has moved anything.
+
+    Attributes:
+        hand: the hand.
+        speed: what the axes get, 0..255.
+        force: what the axes get, 0..255.
+    """
+
+    def __init__(self, hand: RobotiqHand) -> None:
+        """Listen to what is written; asks for nothing.
+
+        Args:
+            hand: started before or after.
+        """
+        self.hand = hand
+        self.speed = SPEED
+        self.force = FORCE
+        self._requests = hand.requests()
+        self._last: SentRequest | None = None
+        self._asked = False
+        self._moved = False
+
+    @property
+    def has_moved(self) -> bool:
+        """Whether something that moves was asked for, and anything was written after that."""
+        self._listen()
+        return self._moved
+
+    @property
+    def was_stopped(self) -> bool:
+        """Whether the last thing that was written stops the fingers, and the gripper has acknowledged it.
+
+        An automatic release is not stopped by anything but a reset.
+        """
+        self._listen()
+        last = self._last
+        return last is not None and last.acknowledged and not (last.request.go or last.request.release)
+
+    async def act(self, action: Action) -> str:
+        """Carry out an action; gives how it ended, in words.
+
+        When cancelled, a move is held; a sequence that has begun (activation, release, reset) goes on.
+
+        Raises:
+            RobotiqError: it could not be carried out.
+        """
+        if action.moves:
+            self._ask()
+        return await action.run(self.hand)
+
+    async def move(
+        self, position: int, fingers: Finger, *, speed: int | None = None, force: int | None = None
+    ) -> str:
+        """Move axes; gives how it ended, in words.
+
+        Raises:
+            TypeError, ValueError, RobotiqError: as :meth:`RobotiqHand.move`.
+        """
+        self._ask()
+        return in_words(await self.hand.move(position, fingers, speed=speed, force=force))
+
+    async def set_speed(self, value: int) -> str:
+        """Set the speed of all axes, also of a motion under way.
+
+        Raises:
+            TypeError, ValueError, RobotiqError: as :meth:`RobotiqHand.set_speed`.
+        """
+        await self.hand.set_speed(value)
+        self.speed = value
+        return f"speed {value}"
+
+    async def set_force(self, value: int) -> str:
+        """Set the force of all axes; more tightens a grip.
+
+        Raises:
+            TypeError, ValueError, RobotiqError: as :meth:`RobotiqHand.set_force`.
+        """
+        await self.hand.set_force(value)
+        self.force = value
+        return f"force {value}"
+
+    async def change_speed(self, by: int) -> str:
+        """Set the speed of all axes so much higher, or as high as it can be.
+
+        Raises:
+            RobotiqError: as :meth:`set_speed`.
+        """
+        return await self.set_speed(max(0, min(self.speed + by, SPEED_MAX)))
+
+    async def change_force(self, by: int) -> str:
+        """Set the force of all axes so much higher, or as high as it can be.
+
+        Raises:
+            RobotiqError: as :meth:`set_force`.
+        """
+        return await self.set_force(max(0, min(self.force + by, FORCE_MAX)))
+
+    def _ask(self) -> None:
+        self._listen()
+        self._asked = True
+
+    def _listen(self) -> None:
+        for sent in self._requests.drain():
+            self._last = sent
+            self._moved |= self._asked
+
+
+def in_words(result: MoveResult) -> str:
+    """How a move ended: ``A at 241, B CONTACT_CLOSING at 130, C at 241; 2.31 s``."""
+    ends = []
+    for axis in AXES:
+        if axis in result.outcomes:
+            how = f" {result.outcomes[axis].name}" if axis in result.contacts else ""
+            ends.append(f"{axis.name}{how} at {result.positions[axis]}")
+    return f"{', '.join(ends)}; {result.duration:.2f} s"
+
+
+async def _open(hand: RobotiqHand) -> str:
+    return in_words(await hand.open())
+
+
+async def _close(hand: RobotiqHand) -> str:
+    return in_words(await hand.close())
+
+
+def _width(position: int) -> Callable[[RobotiqHand], Awaitable[str]]:
+    async def run(hand: RobotiqHand) -> str:
+        return in_words(await hand.move(position, Finger.SCISSOR))
+
+    return run
+
+
+async def _halt(hand: RobotiqHand) -> str:
+    await hand.halt()
+    return "every axis stands still"
+
+
+async def _activate(hand: RobotiqHand) -> str:
+    await hand.activate()
+    return "the gripper is active"
+
+
+async def _reset(hand: RobotiqHand) -> str:
+    await hand.reset()
+    return "the gripper is reset"
+
+
+async def _release(hand: RobotiqHand) -> str:
+    await hand.atr()
+    return "released; only a reset helps now"
+
+
+async def _recover(hand: RobotiqHand) -> str:
+    await hand.recover()
+    return "the gripper is active"
+
+
+_ALL: Final = (
+    Action("open", "open the fingers", _open),
+    Action("close", "close the fingers", _close),
+    Action("wide", "B and C furthest apart", _width(WIDTH_WIDE)),
+    Action("normal", "B and C as usual", _width(WIDTH_NORMAL)),
+    Action("pinch", "B and C together", _width(WIDTH_PINCH)),
+    Action("halt", "stop every axis", _halt, moves=False),
+    Action(
+        "activate",
+        "activate the gripper",
+        _activate,
+        warning="The fingers MOVE: they open and close to their stops.",
+    ),
+    Action("reset", "reset the gripper", _reset, warning="The gripper lets go: what it holds DROPS."),
+    Action(
+        "release",
+        "release in a fault",
+        _release,
+        warning="All fingers OPEN slowly, whatever the fault: what they hold DROPS.",
+    ),
+    Action(
+        "recover",
+        "do what the fault needs",
+        _recover,
+        warning="A major fault needs a reset and an activation: what it holds DROPS, the fingers MOVE.",
+    ),
+)
+ACTIONS: Final = MappingProxyType({action.name: action for action in _ALL})
+"""Every action by its name."""

@@ -1,0 +1,184 @@
+"""The monitor's screen: shows a hand, and does what keys ask. Needs the extra ``monitor`` (textual)."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import deque
+from collections.abc import Coroutine, Iterable
+from typing import ClassVar, Final
+
+from rich.text import Text
+from textual.app import App, ComposeResult
+from textual.binding import BindingType
+from textual.widgets import RichLog, Static
+
+from ..actions import ACTIONS, Operator
+from ..enums import AXES, Fault, State
+from ..errors import RobotiqError
+from ..payloads import fault_fields, transition_fields
+from ..status import RobotiqStatus
+from .widgets import Axes, Question, link_text, state_text
+from .words import clock, event_line
+
+FRAMES: Final = 12
+"""Paints a second."""
+FIGURES_S: Final = 0.5
+"""Between two looks at the figures of the polling."""
+BUFFER: Final = 400
+"""Statuses kept for the next paint: two seconds."""
+STEP: Final = 16
+"""Of speed and force, for one press of a key."""
+LOG_LINES: Final = 2000
+
+KEYS: Final = """\
+ o open  c close  1 wide  2 normal  3 pinch   SPACE halt   + - speed   ] [ force
+ a activate  r reset  l release in a fault  v recover                     q quit"""
+
+
+class Monitor(App[None]):
+    """The screen."""
+
+    ENABLE_COMMAND_PALETTE = False
+    CSS = """
+    #state { height: 2; }
+    #axes { height: 5; margin: 1 0; }
+    #link { height: 2; }
+    #log { height: 1fr; border: round $surface-lighten-2; }
+    #keys { height: 2; color: $text-muted; }
+    Question { align: center middle; }
+    #question { width: 60; height: auto; padding: 1 2; border: thick $warning; background: $surface; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        ("o", "act('open')", "open"),
+        ("c", "act('close')", "close"),
+        ("1", "act('wide')", "wide"),
+        ("2", "act('normal')", "normal"),
+        ("3", "act('pinch')", "pinch"),
+        ("space,h", "act('halt')", "halt"),
+        ("a", "act('activate')", "activate"),
+        ("r", "act('reset')", "reset"),
+        ("l", "act('release')", "release"),
+        ("v", "act('recover')", "recover"),
+        ("plus,equals_sign", f"speed({STEP})", "faster"),
+        ("minus", f"speed(-{STEP})", "slower"),
+        ("right_square_bracket", f"force({STEP})", "stronger"),
+        ("left_square_bracket", f"force(-{STEP})", "weaker"),
+        ("q,ctrl+c", "quit", "quit"),
+    ]
+
+    def __init__(self, operator: Operator, remarks: deque[str] | None = None) -> None:
+        """Prepare a screen.
+
+        Args:
+            operator: at a hand that has been started.
+            remarks: what is put in here is moved into the log.
+        """
+        super().__init__()
+        self._operator = operator
+        self._hand = operator.hand
+        self._remarks = deque() if remarks is None else remarks
+        self._statuses = operator.hand.statuses(BUFFER)
+        self._transitions = operator.hand.transitions()
+        self._newest = operator.hand.status
+        self._fault = Fault.NONE
+        self._shown: dict[str, Text] = {}
+        self._polls = (asyncio.get_running_loop().time(), operator.hand.statistics.polls)
+
+    def compose(self) -> ComposeResult:
+        """From top to bottom."""
+        yield Static(id="state")
+        yield Axes()
+        yield Static(id="link")
+        log = RichLog(id="log", max_lines=LOG_LINES, wrap=True)
+        log.can_focus = False  # It would take keys.
+        yield log
+        yield Static(KEYS, id="keys", markup=False)
+
+    def on_mount(self) -> None:
+        """Begin to paint."""
+        self.note("Watching. Nothing has been written to the gripper.")
+        self._look([self._newest])
+        self._paint_state()
+        self._paint_figures()
+        self.set_interval(1 / FRAMES, self._paint)
+        self.set_interval(FIGURES_S, self._paint_figures)
+
+    # -- what is shown ---------------------------------------------------------------------------------
+
+    def note(self, words: str, style: str = "") -> None:
+        """A line for the log."""
+        self.query_one("#log", RichLog).write(Text(f"{clock(time.time())} {words}", style))
+
+    def _paint(self) -> None:
+        """Show what has come since the last time; of the statuses, the newest."""
+        while self._remarks:
+            self.note(self._remarks.popleft(), "yellow")
+        for transition in self._transitions.drain():
+            self.note(event_line(transition_fields(transition)))
+        self._look(self._statuses.drain())
+        self._paint_state()
+
+    def _look(self, statuses: Iterable[RobotiqStatus]) -> None:
+        peaks = dict.fromkeys(AXES, -1)
+        for status in statuses:
+            self._newest = status
+            for axis in AXES:
+                peaks[axis] = max(peaks[axis], status.current_ma(axis))
+            if status.fault != self._fault:
+                self._fault = status.fault
+                self.note(event_line(fault_fields(status)), "bold" if status.fault else "")
+        if peaks[AXES[0]] >= 0:
+            self.query_one(Axes).show(self._newest, peaks)
+
+    def _paint_state(self) -> None:
+        state, age = self._hand.state, asyncio.get_running_loop().time() - self._newest.timestamp
+        self._show("#state", state_text(self._hand.address, state, self._newest, age))
+        self.query_one(Axes).show_age(state is State.DISCONNECTED)
+
+    def _paint_figures(self) -> None:
+        figures, now = self._hand.statistics, asyncio.get_running_loop().time()
+        before, polls = self._polls
+        self._polls = (now, figures.polls)
+        rate = (figures.polls - polls) / (now - before) if now > before else 0.0
+        operator = self._operator
+        self._show("#link", link_text(figures, rate, operator.speed, operator.force))
+
+    def _show(self, where: str, text: Text) -> None:
+        """Change a text of a fixed size; painting is the dear part, so only if it is another one."""
+        if self._shown.get(where) != text:
+            self._shown[where] = text
+            self.query_one(where, Static).update(text, layout=False)
+
+    # -- what keys do ----------------------------------------------------------------------------------
+
+    def action_act(self, name: str) -> None:
+        """Carry out an action; a dangerous one only after a yes."""
+        action = ACTIONS[name]
+
+        def answered(yes: bool | None) -> None:
+            if yes:
+                self._begin(action.name, self._operator.act(action))
+
+        if action.warning:
+            self.push_screen(Question(action.what, action.warning), answered)
+        else:
+            answered(True)
+
+    def action_speed(self, by: int) -> None:
+        """Change the speed of every axis."""
+        self._begin("speed", self._operator.change_speed(by))
+
+    def action_force(self, by: int) -> None:
+        """Change the force of every axis."""
+        self._begin("force", self._operator.change_force(by))
+
+    def _begin(self, name: str, work: Coroutine[None, None, str]) -> None:
+        self.run_worker(self._carry_out(name, work))
+
+    async def _carry_out(self, name: str, work: Coroutine[None, None, str]) -> None:
+        try:
+            self.note(f"{name}: {await work}", "bold")
+        except RobotiqError as error:
+            self.note(f"{name}: {error}", "bold red")
+        self._paint_figures()

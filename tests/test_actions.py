@@ -1,0 +1,169 @@
+"""What a person asks for, and whether this person has moved anything."""
+
+from __future__ import annotations
+
+import asyncio
+import inspect
+from collections.abc import AsyncIterator
+
+import pytest
+
+from robotiq_async import (
+    WIDTH_NORMAL,
+    WIDTH_PINCH,
+    WIDTH_WIDE,
+    Finger,
+    GripperFaultError,
+    NotActivatedError,
+    RobotiqHand,
+    State,
+)
+from robotiq_async.actions import ACTIONS, FORCE, SPEED, Operator
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+
+
+@pytest.fixture
+async def gripper() -> SimulatedGripper:
+    return SimulatedGripper(speedup=20)
+
+
+@pytest.fixture
+async def operator(gripper: SimulatedGripper) -> AsyncIterator[Operator]:
+    async with SimulatorServer(gripper) as server:
+        hand = RobotiqHand(server.address)
+        operator = Operator(hand)
+        await hand.start(activate=False)
+        yield operator
+        await hand.stop()
+
+
+async def test_open_close_and_widths(operator: Operator, gripper: SimulatedGripper) -> None:
+    assert await operator.act(ACTIONS["activate"]) == "the gripper is active"
+    gripper.place_object(Finger.B, 150)
+    closed = await operator.act(ACTIONS["close"])
+    assert "A at 241, B CONTACT_CLOSING at 150, C at 241; " in closed
+    assert "SCISSOR" not in closed
+    assert (await operator.act(ACTIONS["open"])).startswith("A at 6, B at 6, C at 6; ")
+    for name, width in (("wide", WIDTH_WIDE), ("pinch", WIDTH_PINCH), ("normal", WIDTH_NORMAL)):
+        assert (await operator.act(ACTIONS[name])).startswith("SCISSOR at ")
+        assert operator.hand.status.requested_position(Finger.SCISSOR) == width
+
+
+async def test_halt_reset_release_and_recover(operator: Operator, gripper: SimulatedGripper) -> None:
+    await operator.act(ACTIONS["activate"])
+    moving = asyncio.create_task(operator.act(ACTIONS["close"]))
+    await operator.hand.wait_for_state(State.RUNNING_CC)
+    assert await operator.act(ACTIONS["halt"]) == "every axis stands still"
+    assert not operator.hand.status.go_echo
+    with pytest.raises(Exception, match="halt"):
+        await moving
+    gripper.inject_fault(0x0E)
+    await operator.hand.wait_for_state(State.FAULT)
+    assert "only a reset" in await operator.act(ACTIONS["release"])
+    assert await operator.act(ACTIONS["recover"]) == "the gripper is active"
+    assert await operator.act(ACTIONS["reset"]) == "the gripper is reset"
+    assert operator.hand.state is State.RESET
+
+
+async def test_speed_and_force_stay_in_range(operator: Operator) -> None:
+    await operator.act(ACTIONS["activate"])
+    assert await operator.change_speed(1000) == "speed 255"
+    assert await operator.change_speed(-5) == "speed 250"
+    assert await operator.change_force(-1000) == "force 0"
+    assert (operator.speed, operator.force) == (250, 0)
+
+
+async def test_what_is_refused_changes_nothing(operator: Operator) -> None:
+    with pytest.raises(NotActivatedError):
+        await operator.change_speed(16)
+    assert operator.speed == SPEED
+
+
+def test_they_begin_where_the_hand_begins() -> None:
+    defaults = inspect.signature(RobotiqHand).parameters
+    assert (defaults["speed"].default, defaults["force"].default) == (SPEED, FORCE)
+
+
+def test_what_is_dangerous_is_warned_about() -> None:
+    assert {name for name, action in ACTIONS.items() if action.warning} == {
+        "activate",
+        "reset",
+        "release",
+        "recover",
+    }
+
+
+# -- whether anything was moved ----------------------------------------------------------------------------
+
+
+async def test_nobody_has_moved_what_was_only_looked_at(operator: Operator) -> None:
+    assert not operator.has_moved
+
+
+async def test_what_was_refused_has_not_moved_anything(operator: Operator) -> None:
+    with pytest.raises(NotActivatedError):
+        await operator.act(ACTIONS["close"])
+    assert not operator.has_moved
+
+
+async def test_speed_alone_moves_nothing(gripper: SimulatedGripper) -> None:
+    async with SimulatorServer(gripper) as server:
+        async with RobotiqHand(server.address):
+            pass
+        hand = RobotiqHand(server.address)
+        operator = Operator(hand)
+        await hand.start(activate=False)
+        await operator.set_speed(10)
+        assert not operator.has_moved
+        gripper.inject_fault(0x0E)
+        await hand.wait_for_state(State.FAULT)
+        with pytest.raises(GripperFaultError):
+            await operator.move(30, Finger.A)
+        assert not operator.has_moved
+        gripper.clear_faults()
+        await hand.wait_for_state(State.RUNNING_IDLE)
+        await operator.move(30, Finger.A)
+        assert operator.has_moved
+        await hand.stop()
+
+
+async def test_stopped_is_what_the_gripper_acknowledged(gripper: SimulatedGripper) -> None:
+    async with SimulatorServer(gripper) as server:
+        hand = RobotiqHand(server.address)
+        operator = Operator(hand)
+        await hand.start()
+        await operator.move(100, Finger.A)
+        assert operator.has_moved
+        assert not operator.was_stopped
+        await hand.stop()
+        assert operator.was_stopped
+
+
+async def test_a_gripper_that_is_gone_was_not_stopped(gripper: SimulatedGripper) -> None:
+    async with SimulatorServer(gripper) as server:
+        hand = RobotiqHand(server.address)
+        operator = Operator(hand)
+        await hand.start()
+        await operator.move(100, Finger.A)
+        server.refuse()
+        server.cut()
+        await hand.wait_for_state(State.DISCONNECTED)
+        await hand.stop()
+        assert operator.has_moved
+        assert not operator.was_stopped
+
+
+async def test_a_release_is_not_stopped_by_leaving(gripper: SimulatedGripper) -> None:
+    async with SimulatorServer(gripper) as server:
+        hand = RobotiqHand(server.address)
+        operator = Operator(hand)
+        await hand.start()
+        await operator.move(200, Finger.ABC)
+        gripper.inject_fault(0x0E)
+        await hand.wait_for_state(State.FAULT)
+        releasing = asyncio.create_task(operator.act(ACTIONS["release"]))
+        await hand.wait_for_state(State.WF_ATR)
+        await hand.stop()
+        assert not operator.was_stopped
+        with pytest.raises(Exception, match="stopped"):
+            await releasing
