@@ -44,6 +44,8 @@ The map; each module imports only what stands above it::
     feed         everything about a hand as messages
     recorder     everything about a hand in an MCAP file; needs mcap
     recording    what such a file holds
+    services     commands by name, with arguments in JSON
+    viewer       a hand for Foxglove; needs foxglove-sdk
     metrics      figures for Prometheus; needs prometheus-client
     doctor       what is wrong with a connection
     measuring    closing times, force and current of a grasp

@@ -99,24 +99,24 @@ class Operator:
         return in_words(await self.hand.move(position, fingers, speed=speed, force=force))
 
     async def set_speed(self, value: int) -> str:
-        """Set the speed of all axes, also of a motion under way.
+        """Set the speed of all axes, also of a motion under way; gives it in words.
 
         Raises:
             TypeError, ValueError, RobotiqError: as :meth:`RobotiqHand.set_speed`.
         """
         await self.hand.set_speed(value)
         self.speed = value
-        return f"speed {value}"
+        return str(value)
 
     async def set_force(self, value: int) -> str:
-        """Set the force of all axes; more tightens a grip.
+        """Set the force of all axes; more tightens a grip. Gives it in words.
 
         Raises:
             TypeError, ValueError, RobotiqError: as :meth:`RobotiqHand.set_force`.
         """
         await self.hand.set_force(value)
         self.force = value
-        return f"force {value}"
+        return str(value)
 
     async def change_speed(self, by: int) -> str:
         """Set the speed of all axes so much higher, or as high as it can be.

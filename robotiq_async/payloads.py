@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any, Final
 
 from .enums import AXES, Finger
+from .hand import RobotiqHand
 from .kinematics import PREFIX
 from .status import RobotiqStatus
 from .streams import SentRequest, Transition
@@ -56,8 +58,28 @@ SCHEMAS: Final = {
         severity=_STRING,
         description=_STRING,
     ),
+    "state": _object(
+        address=_STRING,
+        state=_STRING,
+        fault=_INTEGER,
+        severity=_STRING,
+        description=_STRING,
+        polls=_INTEGER,
+        writes=_INTEGER,
+        overruns=_INTEGER,
+        period_p50=_NUMBER,
+        period_p99=_NUMBER,
+        round_trip_p50=_NUMBER,
+        round_trip_p99=_NUMBER,
+        longest_stall=_NUMBER,
+        reconnects=_INTEGER,
+        foreign_commands=_INTEGER,
+        tick=_STRING,
+        faults=_INTEGER,
+        moves={"type": "object", "additionalProperties": _INTEGER},
+    ),
 }
-"""JSON Schemas of the three JSON channels."""
+"""JSON Schemas of what is told."""
 
 
 def status_fields(status: RobotiqStatus) -> Fields:
@@ -120,6 +142,19 @@ def fault_fields(status: RobotiqStatus) -> Fields:
         "name": fault.name,
         "severity": fault.severity.value,
         "description": fault.description,
+    }
+
+
+def state_fields(hand: RobotiqHand) -> Fields:
+    """The state of a hand that was started, the fault of its last status, and its figures."""
+    fault = hand.status.fault
+    return {
+        "address": hand.address,
+        "state": hand.state.name,
+        "fault": int(fault),
+        "severity": fault.severity.value,
+        "description": fault.description,
+        **asdict(hand.statistics),
     }
 
 

@@ -67,9 +67,9 @@ async def test_halt_reset_release_and_recover(operator: Operator, gripper: Simul
 
 async def test_speed_and_force_stay_in_range(operator: Operator) -> None:
     await operator.act(ACTIONS["activate"])
-    assert await operator.change_speed(1000) == "speed 255"
-    assert await operator.change_speed(-5) == "speed 250"
-    assert await operator.change_force(-1000) == "force 0"
+    assert await operator.change_speed(1000) == "255"
+    assert await operator.change_speed(-5) == "250"
+    assert await operator.change_force(-1000) == "0"
     assert (operator.speed, operator.force) == (250, 0)
 
 

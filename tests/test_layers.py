@@ -59,6 +59,8 @@ RUNTIME = [
     "feed",
     "recorder",
     "recording",
+    "services",
+    "viewer",
     "metrics",
     "doctor",
     "measuring",

@@ -15,8 +15,9 @@ from .move import move
 from .record import plot, record, recover, replay
 from .simulate import simulate
 from .status import status
+from .view import view
 
-COMMANDS: Final = (demo, simulate, status, move, monitor, doctor, record, replay, recover, plot)
+COMMANDS: Final = (demo, simulate, status, move, monitor, view, doctor, record, replay, recover, plot)
 """A new sub-command is a module with a function of its name, and an entry here."""
 
 _HELP = """Control a Robotiq 3-Finger gripper, or a simulated one.

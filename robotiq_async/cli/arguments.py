@@ -32,6 +32,11 @@ def need(module: str, extra: str, instead: str = "") -> None:
         raise CommandError(f"this needs {module}: pip install 'robotiq-async[{extra}]'{instead}")
 
 
+def is_loopback(host: str) -> bool:
+    """Whether only programs on this machine reach what listens there."""
+    return host.startswith(("127.", "::1", "localhost"))
+
+
 @contextmanager
 def usage() -> Iterator[None]:
     """Around the construction of library objects: a value they refuse is wrong usage.

@@ -77,7 +77,9 @@ async def _watch(recorder: Recorder) -> None:
         failing.cancel()
 
 
-def replay(file: Path, /) -> None:
+def replay(
+    file: Path, /, *, as_picture: Annotated[bool, Parameter(name="--plot", negative=())] = False
+) -> None:
     """Print what a recording holds: states, faults, commands, and what the fingers did.
 
     A line for each event and command, and one for each status in which a finger has
@@ -89,10 +91,14 @@ def replay(file: Path, /) -> None:
 
     Args:
         file: The recording; a broken one is read as far as it goes.
+        as_picture: Draw it in place of printing it, as the command plot does.
     """
     need("mcap", "record")
     from ..recording import read_recording
 
+    if as_picture:
+        plot(file)
+        return
     shown = ""
     for entry in read_recording(file):
         if not entry.is_json:

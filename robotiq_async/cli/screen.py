@@ -32,8 +32,8 @@ STEP: Final = 16
 LOG_LINES: Final = 2000
 
 KEYS: Final = """\
- o open  c close  1 wide  2 normal  3 pinch   SPACE halt   + - speed   ] [ force
- a activate  r reset  l release in a fault  v recover                     q quit"""
+o open  c close  1 wide  2 normal  3 pinch   SPACE halt   + - speed   ] [ force
+a activate  r reset  l release in a fault  v recover                     q quit"""
 
 
 class Monitor(App[None]):
@@ -41,11 +41,10 @@ class Monitor(App[None]):
 
     ENABLE_COMMAND_PALETTE = False
     CSS = """
-    #state { height: 2; }
-    #axes { height: 5; margin: 1 0; }
-    #link { height: 2; }
+    #state, #link, #keys { height: 2; padding: 0 1; }
+    #axes { height: 5; margin: 1 0; padding: 0 1; }
     #log { height: 1fr; border: round $surface-lighten-2; }
-    #keys { height: 2; color: $text-muted; }
+    #keys { color: $text-muted; }
     Question { align: center middle; }
     #question { width: 60; height: auto; padding: 1 2; border: thick $warning; background: $surface; }
     """
@@ -106,16 +105,19 @@ class Monitor(App[None]):
 
     # -- what is shown ---------------------------------------------------------------------------------
 
-    def note(self, words: str, style: str = "") -> None:
-        """A line for the log."""
-        self.query_one("#log", RichLog).write(Text(f"{clock(time.time())} {words}", style))
+    def note(self, words: str, style: str = "", when: float | None = None) -> None:
+        """A line for the log; ``when`` by the loop's clock."""
+        now = time.time()
+        if when is not None:
+            now += when - asyncio.get_running_loop().time()
+        self.query_one("#log", RichLog).write(Text(f"{clock(now)} {words}", style), expand=True)
 
     def _paint(self) -> None:
         """Show what has come since the last time; of the statuses, the newest."""
         while self._remarks:
             self.note(self._remarks.popleft(), "yellow")
         for transition in self._transitions.drain():
-            self.note(event_line(transition_fields(transition)))
+            self.note(event_line(transition_fields(transition)), when=transition.timestamp)
         self._look(self._statuses.drain())
         self._paint_state()
 
@@ -127,7 +129,7 @@ class Monitor(App[None]):
                 peaks[axis] = max(peaks[axis], status.current_ma(axis))
             if status.fault != self._fault:
                 self._fault = status.fault
-                self.note(event_line(fault_fields(status)), "bold" if status.fault else "")
+                self.note(event_line(fault_fields(status)), "bold" if status.fault else "", status.timestamp)
         if peaks[AXES[0]] >= 0:
             self.query_one(Axes).show(self._newest, peaks)
 
@@ -161,7 +163,7 @@ class Monitor(App[None]):
                 self._begin(action.name, self._operator.act(action))
 
         if action.warning:
-            self.push_screen(Question(action.what, action.warning), answered)
+            self.push_screen(Question(f"{action.name}: {action.what}?", action.warning), answered)
         else:
             answered(True)
 
@@ -178,7 +180,9 @@ class Monitor(App[None]):
 
     async def _carry_out(self, name: str, work: Coroutine[None, None, str]) -> None:
         try:
-            self.note(f"{name}: {await work}", "bold")
+            ended, style = await work, "bold"
         except RobotiqError as error:
-            self.note(f"{name}: {error}", "bold red")
+            ended, style = str(error), "bold red"
+        self._paint()  # first what led to it
         self._paint_figures()
+        self.note(f"{name}: {ended}", style)

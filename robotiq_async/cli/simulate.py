@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ..errors import RobotiqError
-from .arguments import Port, usage
+from .arguments import Port, is_loopback, usage
 
 if TYPE_CHECKING:
     from ..simulator import Trouble
-
-_LOOPBACK = ("127.", "::1", "localhost")
 
 
 async def simulate(
@@ -68,7 +66,7 @@ async def simulate(
         else:
             server = SerialSimulatorServer(serial, gripper)
         server.adversary.check(plan)
-    if serial is None and not host.startswith(_LOOPBACK):
+    if serial is None and not is_loopback(host):
         print(f"robotiq-async: anyone who reaches {host} can command this gripper", file=sys.stderr)
     try:
         async with server:

@@ -23,7 +23,7 @@ FULL: Final = 255
 SMALL_MA: Final = 500
 """Currents below this do not fill their column: the noise of a standing motor is no mountain."""
 LEVELS: Final = "▁▂▃▄▅▆▇█"
-FIXED: Final = 48
+FIXED: Final = 47
 """Columns of a line that are not pictures."""
 _OBJECT: Final = {
     ObjectStatus.IN_MOTION: ("moving", "cyan"),
@@ -66,7 +66,7 @@ class Axes(Widget):
         # What is left of the width goes to the two columns that are pictures.
         bar = max((self.size.width - FIXED) // 2, 8)
         where, current = (f"{words:{bar}.{bar}}" for words in ("position, ▼ request", "current, 5 s"))
-        head = Text(f" axis     {where}   counts   {'':15} {current}      now", "dim")
+        head = Text(f"axis     {where}   counts   {'':15} {current}      now", "dim")
         lines = [head, *(self._line(axis, bar) for axis in AXES)]
         text = Text("\n", no_wrap=True, overflow="crop").join(lines)
         if self._stale:
@@ -76,7 +76,7 @@ class Axes(Widget):
     def _line(self, axis: Finger, bar: int) -> Text:
         status, currents = self._status, self._currents[axis]
         position, requested = status.position(axis), status.requested_position(axis)
-        line = Text(f" {axis.name:8} ", "bold")
+        line = Text(f"{axis.name:8} ", "bold")
         line.append_text(position_bar(position, requested, bar))
         line.append(f" {position:3} → {requested:<3} ", "not bold")
         line.append_text(self._does(axis))
@@ -104,10 +104,11 @@ def position_bar(position: int, requested: int, width: int) -> Text:
 
 
 def sparkline(values: Sequence[int], width: int) -> str:
-    """The last values; the top is their peak, or half an ampere if that is more."""
-    top = max(SMALL_MA, *values)
-    last = list(values)[-width:]
-    return "".join(LEVELS[value * (len(LEVELS) - 1) // top] for value in last).rjust(width)
+    """Currents in mA, their peaks in so many columns; the top is the highest, or half an ampere."""
+    count, top = len(values), max(SMALL_MA, *values)
+    columns = min(width, count)
+    peaks = (max(values[n * count // columns : (n + 1) * count // columns]) for n in range(columns))
+    return "".join(LEVELS[peak * (len(LEVELS) - 1) // top] for peak in peaks).rjust(width)
 
 
 def state_text(address: str, state: State, status: RobotiqStatus, age: float) -> Text:
@@ -119,14 +120,14 @@ def state_text(address: str, state: State, status: RobotiqStatus, age: float) ->
         status: the last one.
         age: its age in seconds.
     """
-    text = Text(f" {address}  ", "dim")
+    text = Text(f"{address}  ", "dim")
     text.append(f" {state.name} ", f"bold {'black on green' if state in _CALM else 'black on yellow'}")
     if state is State.DISCONNECTED:
         text.stylize("bold white on red", len(text) - len(state.name) - 2)
-        text.append(f"  no gripper answers: what you see is {age:.1f} s old\n ")
+        text.append(f"  no gripper answers: what you see is {age:.1f} s old\n")
     else:
         activation = "active" if status.is_activated else "reset" if status.is_reset else "activating"
-        text.append(f"  {activation}, {'moving' if status.is_moving else 'not moving'}\n ")
+        text.append(f"  {activation}, {'moving' if status.is_moving else 'not moving'}\n")
     fault = status.fault
     if fault is Fault.NONE:
         text.append("no fault", "dim")
@@ -139,13 +140,13 @@ def state_text(address: str, state: State, status: RobotiqStatus, age: float) ->
 def link_text(figures: Statistics, rate: float, speed: int, force: int) -> Text:
     """How the polling goes, and what the next motion is asked to be like."""
     jitter = 1000 * (figures.period_p99 - figures.period_p50)
-    text = Text(f" {rate:5.1f} polls/s  jitter {jitter:.2f} ms  ", "dim")
+    text = Text(f"{rate:.1f} polls/s  jitter {jitter:.2f} ms  ", "dim")
     text.append(
         f"round trip {1000 * figures.round_trip_p50:.2f}/{1000 * figures.round_trip_p99:.2f} ms  ", "dim"
     )
     text.append(f"overruns {figures.overruns}  ", "yellow" if figures.overruns else "dim")
     text.append(f"reconnects {figures.reconnects}", "yellow" if figures.reconnects else "dim")
-    text.append(f"\n speed {speed:<3}  force {force:<3}", "bold")
+    text.append(f"\nspeed {speed:<3}  force {force:<3}", "bold")
     if figures.foreign_commands:
         text.append(
             f"  ANOTHER CLIENT commands this gripper ({figures.foreign_commands} times)", "bold yellow"
@@ -162,15 +163,15 @@ class Question(ModalScreen[bool]):
         ("space,h", "app.act('halt')", "halt"),
     ]
 
-    def __init__(self, what: str, warning: str) -> None:
+    def __init__(self, question: str, warning: str) -> None:
         """Prepare the question."""
         super().__init__()
-        self._what = what
+        self._question = question
         self._warning = warning
 
     def compose(self) -> ComposeResult:
         """The question."""
-        text = Text(f"{self._what}?\n\n", "bold")
+        text = Text(f"{self._question}\n\n", "bold")
         text.append(self._warning, "bold yellow")
         text.append("\n\ny yes    n no    space halt")
         yield Static(text, id="question")

@@ -19,7 +19,7 @@ from robotiq_async.cli import main
 sys.exit(main([]))
 """
 
-COMMANDS = ("demo", "simulate", "status", "move", "monitor", "doctor")
+COMMANDS = ("demo", "simulate", "status", "move", "monitor", "view", "doctor")
 
 
 def test_help_lists_every_command_and_the_addresses(capsys: pytest.CaptureFixture[str]) -> None:

@@ -308,7 +308,8 @@ def test_the_bar() -> None:
 def test_the_sparkline() -> None:
     assert sparkline([0, 500, 250], 5) == "  ▁█▄"
     assert sparkline([0, 20, 0], 3) == "▁▁▁"
-    assert sparkline([0, 1000, 500, 2000], 2) == "▂█"
+    assert sparkline([0, 1000, 500, 2000], 2) == "▄█"
+    assert sparkline(range(0, 1000, 10), 10) == "▁▂▃▃▄▅▅▆▇█"
 
 
 # -- without a screen --------------------------------------------------------------------------------------

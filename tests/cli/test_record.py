@@ -120,6 +120,12 @@ def test_plot_draws_it(grasp: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert grasp.with_name("other.svg").exists()
 
 
+def test_replay_draws_it_too(grasp: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", "--plot", str(grasp)]) == 0
+    assert capsys.readouterr().out.splitlines()[1] == str(grasp.with_suffix(".svg"))
+    assert grasp.with_suffix(".svg").exists()
+
+
 @pytest.mark.parametrize("command", ["replay", "recover", "plot"])
 @pytest.mark.parametrize("content", [None, b"", b"no recording"])
 def test_what_is_no_recording_is_one_line(

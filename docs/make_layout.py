@@ -1,0 +1,153 @@
+"""The layout for Foxglove and Lichtblick: what ``robotiq-async view`` shows, and buttons for its services.
+
+The file lies in the package, so that an installed command can hand it out; make_pages.py writes it.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Final
+
+from robotiq_async.actions import ACTIONS
+from robotiq_async.enums import AXES, Fault, Severity, State
+
+FILE: Final = Path(__file__).parents[1] / "robotiq_async" / "data" / "foxglove_layout.json"
+GREEN, YELLOW, RED, GREY = "#4caf50", "#ffb300", "#e53935", "#9e9e9e"
+COLOURS: Final = {
+    Severity.NONE: GREEN,
+    Severity.PRIORITY: YELLOW,
+    Severity.MINOR: YELLOW,
+    Severity.MAJOR: RED,
+}
+STATES: Final = {
+    State.RUNNING_IDLE: GREEN,
+    State.RUNNING_CC: GREEN,
+    State.DISCONNECTED: RED,
+    State.FAULT: RED,
+}
+TIMEOUT_S: Final = 100
+"""Longer than any command takes."""
+
+Panel = dict[str, Any]
+
+
+def draw() -> str:
+    """The file's text."""
+    layout = {
+        "configById": panels(),
+        "globalVariables": {},
+        "userNodes": {},
+        "playbackConfig": {"speed": 1},
+        "layout": _side_by_side(
+            _stacked(
+                _side_by_side("Indicator!state", "Indicator!fault"),
+                _stacked("Plot!positions", _stacked("Plot!currents", "StateTransitions!states", 60), 40),
+                12,
+            ),
+            _stacked(
+                _buttons("halt", "open", "close", "wide", "normal", "pinch"),
+                _stacked(
+                    "CallService!move",
+                    _stacked(_buttons("recover", "activate", "reset", "release"), "RawMessages!state", 65),
+                    25,
+                ),
+                35,
+            ),
+            65,
+        ),
+    }
+    return json.dumps(layout, indent=1) + "\n"
+
+
+def panels() -> dict[str, Panel]:
+    """Every panel by its name."""
+    names = [str(axis.name) for axis in AXES]
+    states = [(state.name, STATES.get(state, YELLOW), state.name) for state in State]
+    faults = [(str(int(fault)), COLOURS[fault.severity], fault.description) for fault in Fault]
+    series = [("state", "/gripper/event.target"), *((n, f"/gripper/status.{n}.status") for n in names)]
+    return {
+        "Indicator!state": _indicator("state", states),
+        "Indicator!fault": _indicator("fault", faults),
+        "Plot!positions": _plot("Positions", [(name, f"{name}.position") for name in names]),
+        "Plot!currents": _plot("Currents in mA", [(name, f"{name}.current_ma") for name in names]),
+        "StateTransitions!states": {
+            "foxglovePanelTitle": "State and axes",
+            "lichtblickPanelTitle": "State and axes",
+            "isSynced": True,
+            "paths": [{"label": label, "value": v, "timestampMethod": "receiveTime"} for label, v in series],
+        },
+        "RawMessages!state": {"topicPath": "/gripper/state", "diffEnabled": False, "expansion": "all"},
+        "CallService!move": _button("move", {"position": 100, "fingers": "ABC", "speed": 128, "force": 64}),
+        **{
+            f"CallService!{name}": _button(name, {"confirm": False} if action.warning else {})
+            for name, action in ACTIONS.items()
+        },
+    }
+
+
+def _indicator(field: str, rules: list[tuple[str, str, str]]) -> Panel:
+    return {
+        "path": f"/gripper/state.{field}",
+        "style": "background",
+        "fallbackColor": GREY,
+        "fallbackLabel": "unknown",
+        "rules": [
+            {"operator": "=", "rawValue": value, "color": colour, "label": label}
+            for value, colour, label in rules
+        ],
+    }
+
+
+def _plot(title: str, fields: list[tuple[str, str]]) -> Panel:
+    return {
+        "foxglovePanelTitle": title,
+        "lichtblickPanelTitle": title,
+        "paths": [
+            {
+                "label": label,
+                "value": f"/gripper/status.{field}",
+                "enabled": True,
+                "timestampMethod": "receiveTime",
+            }
+            for label, field in fields
+        ],
+        "showLegend": True,
+        "legendDisplay": "floating",
+        "showXAxisLabels": True,
+        "showYAxisLabels": True,
+        "showPlotValuesInLegend": True,
+        "isSynced": True,
+        "xAxisVal": "timestamp",
+        "followingViewWidth": 30,
+    }
+
+
+def _button(name: str, request: dict[str, object]) -> Panel:
+    """A button; what takes arguments, or has to be confirmed, shows them for editing."""
+    return {
+        "serviceName": f"/gripper/{name}",
+        "requestPayload": json.dumps(request, indent=1),
+        "layout": "vertical",
+        "buttonText": name,
+        "buttonTooltip": ACTIONS[name].what if name in ACTIONS else name,
+        "buttonColor": RED if request.get("confirm") is False else GREEN,
+        "editingMode": bool(request),
+        "timeoutSeconds": TIMEOUT_S,
+    }
+
+
+def _buttons(*names: str) -> object:
+    """Buttons side by side, of equal width."""
+    first, *others = (f"CallService!{name}" for name in names)
+    if not others:
+        return first
+    return _side_by_side(first, _buttons(*names[1:]), 100 / len(names))
+
+
+def _side_by_side(first: object, second: object, percent: float = 50) -> object:
+    return {"direction": "row", "first": first, "second": second, "splitPercentage": round(percent, 1)}
+
+
+def _stacked(first: object, second: object, percent: float = 50) -> object:
+    return {"direction": "column", "first": first, "second": second, "splitPercentage": round(percent, 1)}

@@ -1,0 +1,78 @@
+"""Makes the pictures of the monitor, from a simulated gripper that grasps something. Takes half a minute.
+
+    python docs/make_screens.py
+
+They are made by hand when the screen has changed, and looked at: they hold times and figures of that day.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import sys
+from pathlib import Path
+from typing import Final
+
+ROOT: Final = Path(__file__).parents[1]
+if __name__ == "__main__":
+    sys.path.insert(0, str(ROOT))
+
+from robotiq_async import Finger, RobotiqHand, State  # noqa: E402
+from robotiq_async.actions import ACTIONS, Operator  # noqa: E402
+from robotiq_async.cli.screen import Monitor  # noqa: E402
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer  # noqa: E402
+
+FOLDER: Final = ROOT / "docs" / "measured"
+FONT: Final = re.compile(r"@font-face \{.*?\}", re.DOTALL)
+"""The pictures would fetch a font from elsewhere; any font of even width will do."""
+
+
+async def main() -> None:
+    """All of them."""
+    gripper = SimulatedGripper()
+    async with SimulatorServer(gripper, port=5020) as server:
+        hand = RobotiqHand(server.address)
+        operator = Operator(hand)
+        await hand.start()
+        screen = Monitor(operator)
+        async with screen.run_test(size=(100, 28)):
+            await grasp(screen, operator, gripper)
+            gripper.inject_fault(0x0E)
+            await hand.wait_for_state(State.FAULT)
+            screen.action_act("recover")
+            await asyncio.sleep(0.5)
+            save(screen, "monitor_question")
+            screen.pop_screen()
+            server.refuse()
+            server.cut()
+            await hand.wait_for_state(State.DISCONNECTED)
+            await asyncio.sleep(1.5)
+            save(screen, "monitor_lost")
+            await server.accept()
+        await hand.stop()
+
+
+async def grasp(screen: Monitor, operator: Operator, gripper: SimulatedGripper) -> None:
+    """A is stopped by something early, B and C go on; the picture is of the moment in between."""
+    await asyncio.sleep(2)
+    screen.action_act("pinch")
+    await asyncio.sleep(2)
+    screen.action_speed(-64)
+    await asyncio.sleep(0.5)
+    gripper.place_object(Finger.A, 90)
+    gripper.place_object(Finger.B, 200)
+    closing = asyncio.ensure_future(operator.act(ACTIONS["close"]))
+    await asyncio.sleep(3)
+    save(screen, "monitor")
+    screen.note(f"close: {await closing}", "bold")
+
+
+def save(screen: Monitor, name: str) -> None:
+    """Write the screen as it is."""
+    file = FOLDER / f"{name}.svg"
+    file.write_text(FONT.sub("", screen.export_screenshot(title="robotiq-async monitor")), encoding="utf-8")
+    sys.stdout.write(f"{file.relative_to(ROOT)}\n")
+
+
+if __name__ == "__main__":
+    asyncio.run(main())
