@@ -6,9 +6,10 @@ import asyncio
 import inspect
 import os
 import signal
+import socket
 import sys
-from collections.abc import Callable, Coroutine, Sequence
-from contextlib import closing, suppress
+from collections.abc import Callable, Coroutine, Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
 from types import FrameType
 from typing import Self
 
@@ -108,12 +109,37 @@ class _Signals:
         self._end = cancel
         if self.received:
             raise asyncio.CancelledError
-        await work
+        with _awake(loop):
+            await work
 
     def _handle(self, number: int, _frame: FrameType | None) -> None:
         self.__exit__()
         self.received = number
         self._end()
+
+
+@contextmanager
+def _awake(loop: asyncio.AbstractEventLoop) -> Iterator[None]:
+    """Let every signal wake the loop.
+
+    One that comes while the loop goes to sleep, or that the system hands to another thread, would be
+    noticed only when something else wakes it: an idle server would have to be told twice.
+    """
+    reading, writing = socket.socketpair()
+    with reading, writing:
+        reading.setblocking(False)
+        writing.setblocking(False)
+        try:
+            loop.add_reader(reading, reading.recv, 64)
+        except NotImplementedError:  # Windows, where a loop does not sleep so soundly
+            yield
+            return
+        before = signal.set_wakeup_fd(writing.fileno(), warn_on_full_buffer=False)
+        try:
+            yield
+        finally:
+            signal.set_wakeup_fd(before)
+            loop.remove_reader(reading)
 
 
 def _interrupt() -> None:

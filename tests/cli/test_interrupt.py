@@ -64,3 +64,20 @@ async def test_a_move_in_its_activation(shell: Shell) -> None:
         await interrupted(shell, process)
         assert not server.gripper.is_moving
         assert not Request.from_registers(server.gripper.request_registers).activate
+
+
+ASLEEP = """
+import signal, sys, threading, time
+threading.Thread(target=time.sleep, args=(60,), daemon=True).start()
+signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTERM])
+from robotiq_async.cli import main
+sys.exit(main(["simulate", "--port", "0"]))
+"""
+"""The signal goes to the other thread; the loop's own sleeps on, as when it comes while it falls asleep."""
+
+
+async def test_a_signal_wakes_an_idle_loop(shell: Shell) -> None:
+    process = await shell.python("-c", ASLEEP)
+    assert (await shell.read_line(process)).startswith("tcp://")
+    process.send_signal(signal.SIGTERM)
+    assert (await shell.finish(process)).code == 0

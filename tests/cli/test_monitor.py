@@ -242,20 +242,26 @@ async def test_what_is_dangerous_asks_first(
     requests = active.hand.requests()
     async with shown(active) as pilot:
         await pilot.press(key)
-        assert isinstance(pilot.app.screen, Question)
+        await until(pilot, lambda: isinstance(pilot.app.screen, Question))
         assert warning in str(pilot.app.screen.query_one("#question", Static).render())
         await pilot.press("o", "r")  # nothing else works meanwhile
         assert isinstance(pilot.app.screen, Question)
         await pilot.press(answer)
-        assert not isinstance(pilot.app.screen, Question)
+        await until(pilot, lambda: not isinstance(pilot.app.screen, Question))
     assert requests.take_nowait() is None
+
+
+async def confirmed(pilot: Screen, key: str) -> None:
+    await pilot.press(key)
+    await until(pilot, lambda: isinstance(pilot.app.screen, Question))
+    await pilot.press("y")
 
 
 async def test_a_yes_resets_and_activates(active: Operator) -> None:
     async with shown(active) as pilot:
-        await pilot.press("r", "y")
+        await confirmed(pilot, "r")
         await until(pilot, lambda: active.hand.state is State.RESET)
-        await pilot.press("a", "y")
+        await confirmed(pilot, "a")
         await until(pilot, lambda: "activate: the gripper is active" in log(pilot))
 
 
@@ -265,7 +271,9 @@ async def test_halt_works_while_a_question_is_open() -> None:
         async with hand, shown(Operator(hand)) as pilot:
             await pilot.press("c")
             await until(pilot, lambda: hand.is_moving)
-            await pilot.press("r", "space")
+            await pilot.press("r")
+            await until(pilot, lambda: isinstance(pilot.app.screen, Question))
+            await pilot.press("space")
             await until(pilot, lambda: not hand.is_moving)
             assert isinstance(pilot.app.screen, Question)
 
