@@ -18,7 +18,7 @@ from ..enums import AXES, Fault, State
 from ..errors import RobotiqError
 from ..payloads import fault_fields, transition_fields
 from ..status import RobotiqStatus
-from .widgets import Axes, Question, link_text, state_text
+from .widgets import Axes, Line, Question, link_text, state_text
 from .words import clock, event_line
 
 FRAMES: Final = 12
@@ -81,17 +81,20 @@ class Monitor(App[None]):
         self._transitions = operator.hand.transitions()
         self._newest = operator.hand.status
         self._fault = Fault.NONE
-        self._shown: dict[str, Text] = {}
+        # Held here and not looked up: a paint may come when the screen is already being taken down.
+        self._top = Line(id="state")
+        self._axes = Axes()
+        self._figures = Line(id="link")
+        self._history = RichLog(id="log", max_lines=LOG_LINES, wrap=True)
         self._polls = (asyncio.get_running_loop().time(), operator.hand.statistics.polls)
 
     def compose(self) -> ComposeResult:
         """From top to bottom."""
-        yield Static(id="state")
-        yield Axes()
-        yield Static(id="link")
-        log = RichLog(id="log", max_lines=LOG_LINES, wrap=True)
-        log.can_focus = False  # It would take keys.
-        yield log
+        yield self._top
+        yield self._axes
+        yield self._figures
+        self._history.can_focus = False  # It would take keys.
+        yield self._history
         yield Static(KEYS, id="keys", markup=False)
 
     def on_mount(self) -> None:
@@ -110,7 +113,7 @@ class Monitor(App[None]):
         now = time.time()
         if when is not None:
             now += when - asyncio.get_running_loop().time()
-        self.query_one("#log", RichLog).write(Text(f"{clock(now)} {words}", style), expand=True)
+        self._history.write(Text(f"{clock(now)} {words}", style), expand=True)
 
     def _paint(self) -> None:
         """Show what has come since the last time; of the statuses, the newest."""
@@ -131,12 +134,12 @@ class Monitor(App[None]):
                 self._fault = status.fault
                 self.note(event_line(fault_fields(status)), "bold" if status.fault else "", status.timestamp)
         if peaks[AXES[0]] >= 0:
-            self.query_one(Axes).show(self._newest, peaks)
+            self._axes.show(self._newest, peaks)
 
     def _paint_state(self) -> None:
         state, age = self._hand.state, asyncio.get_running_loop().time() - self._newest.timestamp
-        self._show("#state", state_text(self._hand.address, state, self._newest, age))
-        self.query_one(Axes).show_age(state is State.DISCONNECTED)
+        self._top.show(state_text(self._hand.address, state, self._newest, age))
+        self._axes.show_age(state is State.DISCONNECTED)
 
     def _paint_figures(self) -> None:
         figures, now = self._hand.statistics, asyncio.get_running_loop().time()
@@ -144,13 +147,7 @@ class Monitor(App[None]):
         self._polls = (now, figures.polls)
         rate = (figures.polls - polls) / (now - before) if now > before else 0.0
         operator = self._operator
-        self._show("#link", link_text(figures, rate, operator.speed, operator.force))
-
-    def _show(self, where: str, text: Text) -> None:
-        """Change a text of a fixed size; painting is the dear part, so only if it is another one."""
-        if self._shown.get(where) != text:
-            self._shown[where] = text
-            self.query_one(where, Static).update(text, layout=False)
+        self._figures.show(link_text(figures, rate, operator.speed, operator.force))
 
     # -- what keys do ----------------------------------------------------------------------------------
 

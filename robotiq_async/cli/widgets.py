@@ -34,6 +34,18 @@ _OBJECT: Final = {
 _CALM: Final = (State.RUNNING_IDLE, State.RUNNING_CC)
 
 
+class Line(Static):
+    """A text of a fixed size that is painted only when it is another one: painting is the dear part."""
+
+    _text = Text()
+
+    def show(self, text: Text) -> None:
+        """Change it."""
+        if text != self._text:
+            self._text = text
+            self.update(text, layout=False)
+
+
 class Axes(Widget):
     """A line for each axis: position and request, what it does, its current now and in the last seconds.
 
