@@ -13,7 +13,17 @@ from pathlib import Path
 
 import pytest
 
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+
 ROOT = Path(__file__).parents[2]
+WITHOUT = """
+import importlib.util, sys
+find = importlib.util.find_spec
+importlib.util.find_spec = lambda name, *rest: None if name == "{}" else find(name, *rest)
+from robotiq_async.cli import main
+sys.exit(main({}))
+"""
+"""A command line that does not find a module."""
 PATIENCE = 30.0
 """Seconds after which a command counts as hanging."""
 
@@ -85,3 +95,14 @@ async def shell() -> AsyncIterator[Shell]:
         with contextlib.suppress(ProcessLookupError):
             process.kill()
         await process.communicate()
+
+
+@pytest.fixture
+async def gripper() -> SimulatedGripper:
+    return SimulatedGripper(speedup=20)
+
+
+@pytest.fixture
+async def server(gripper: SimulatedGripper) -> AsyncIterator[SimulatorServer]:
+    async with SimulatorServer(gripper) as server:
+        yield server

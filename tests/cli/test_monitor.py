@@ -1,20 +1,12 @@
-"""``robotiq-async monitor``: its screen driven by textual's pilot, its lines read by a program."""
+"""The screen of ``robotiq-async monitor``, driven by textual's pilot."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-import fcntl
-import json
-import os
-import pty
-import signal
-import struct
-import sys
-import termios
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pytest
 from textual.pilot import Pilot
@@ -22,37 +14,14 @@ from textual.widgets import RichLog, Static
 
 from robotiq_async import Fault, Finger, RobotiqHand, RobotiqStatus, State
 from robotiq_async.actions import Operator
-from robotiq_async.cli import main
-from robotiq_async.cli.lines import print_objects
 from robotiq_async.cli.screen import Monitor
 from robotiq_async.cli.widgets import Axes, Question, position_bar, sparkline
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from tests.cli.conftest import ROOT
 
 if TYPE_CHECKING:
-    from tests.cli.conftest import Shell
-
     Screen = Pilot[None]
 
 
-@pytest.fixture
-async def gripper() -> SimulatedGripper:
-    return SimulatedGripper(speedup=20)
-
-
-@pytest.fixture
-async def server(gripper: SimulatedGripper) -> AsyncIterator[SimulatorServer]:
-    async with SimulatorServer(gripper) as server:
-        yield server
-
-
-WITHOUT = """
-import importlib.util, sys
-find = importlib.util.find_spec
-importlib.util.find_spec = lambda name, *rest: None if name == "{}" else find(name, *rest)
-from robotiq_async.cli import main
-sys.exit(main({}))
-"""
 SLOWLY = 0.05
 """The pilot waits for a moment in which the process does nothing: at 200 Hz there is none."""
 
@@ -318,212 +287,3 @@ def test_the_sparkline() -> None:
     assert sparkline([0, 20, 0], 3) == "▁▁▁"
     assert sparkline([0, 1000, 500, 2000], 2) == "▄█"
     assert sparkline(range(0, 1000, 10), 10) == "▁▂▃▃▄▅▅▆▇█"
-
-
-# -- without a screen --------------------------------------------------------------------------------------
-
-
-async def test_in_a_pipe_it_prints_every_poll_as_an_object(shell: Shell, server: SimulatorServer) -> None:
-    async with RobotiqHand(server.address):
-        process = await shell.start("monitor", server.address)
-        objects = [json.loads(await shell.read_line(process)) for _ in range(50)]
-        process.send_signal(signal.SIGINT)
-        outcome = await shell.finish(process)
-    assert outcome.code == 130
-    assert {each["kind"] for each in objects} == {"status"}
-    sequences = [each["sequence"] for each in objects]
-    assert sequences == list(range(sequences[0], sequences[0] + 50))
-    assert objects[0]["state"] == "RUNNING_IDLE"
-    assert objects[0]["A"]["position"] == 6
-
-
-async def test_objects_tell_of_faults_and_lost_links(
-    shell: Shell, server: SimulatorServer, gripper: SimulatedGripper
-) -> None:
-    process = await shell.start("monitor", "--json", server.address)
-    await shell.read_line(process)
-    gripper.inject_fault(Fault.SCISSOR_BLOCKED)
-
-    async def object_of(kind: str, **fields: object) -> dict[str, Any]:
-        while True:
-            found: dict[str, Any] = json.loads(await shell.read_line(process))
-            if found["kind"] == kind and fields.items() <= found.items():
-                return found
-
-    assert (await object_of("fault"))["name"] == "SCISSOR_BLOCKED"
-    await object_of("transition", target="FAULT")
-    assert (await object_of("status", fault=14))["state"] in ("RESET", "FAULT")
-    server.cut()
-    await object_of("transition", target="DISCONNECTED")
-    assert (await object_of("status"))["fault"] == 14, "it comes back by itself"
-
-
-async def test_watch_prints_what_changes(
-    shell: Shell, server: SimulatorServer, gripper: SimulatedGripper
-) -> None:
-    async with RobotiqHand(server.address) as hand:
-        process = await shell.start("monitor", "--watch", server.address)
-        assert "A=6 - B=6 - C=6" in await shell.read_line(process)
-        await hand.move(100, Finger.A)
-        lines = []
-        while "A=100 AT_POSITION" not in (line := await shell.read_line(process)):
-            lines.append(line)
-        assert all(" status   A=" in line for line in lines)
-        gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
-        told = {(await shell.read_line(process))[13:].split()[0] for _ in range(2)}
-        assert told == {"state", "fault"}
-        process.send_signal(signal.SIGTERM)
-        assert (await shell.finish(process)).code == 143
-
-
-async def test_it_only_looks(shell: Shell, server: SimulatorServer, gripper: SimulatedGripper) -> None:
-    before = gripper.request_registers
-    process = await shell.start("monitor", "--watch", server.address)
-    await shell.read_line(process)
-    process.send_signal(signal.SIGINT)
-    await shell.finish(process)
-    assert gripper.request_registers == before
-
-
-async def test_a_reader_that_stops_reading_does_not_hold_up_the_polling(
-    server: SimulatorServer, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A full pipe: the gripper is read on, and the reader is told what it has missed."""
-    reading, writing = os.pipe()
-    hand = RobotiqHand(server.address, poll_interval=0.002)
-    await hand.start(activate=False)
-    with os.fdopen(writing, "w") as full, os.fdopen(reading) as reader:
-        monkeypatch.setattr(sys, "stdout", full)
-        printing = asyncio.create_task(print_objects(hand, buffer=50))
-        async with asyncio.timeout(20):
-            async for status in hand.statuses():
-                if status.sequence > 1000:  # half a megabyte, and a pipe holds 64 KiB
-                    break
-
-        def read_until_missed() -> list[dict[str, Any]]:
-            objects = []
-            for line in reader:
-                objects.append(json.loads(line))
-                if objects[-1]["kind"] == "missed":
-                    break
-            return objects
-
-        objects = await asyncio.to_thread(read_until_missed)
-        printing.cancel()
-        await asyncio.gather(printing, return_exceptions=True)
-        await asyncio.to_thread(reader.readline)
-    await hand.stop()
-    assert objects[-1]["count"] > 100
-    assert len(objects) < 500
-
-
-def test_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["monitor", "--watch", "--json"]) == 2
-    assert "exclude" in capsys.readouterr().err
-
-
-async def test_nobody_there_is_one_line(shell: Shell) -> None:
-    (await shell.run("monitor", "tcp://127.0.0.1:1")).assert_failed(1, "127.0.0.1:1")
-
-
-# -- on a terminal -----------------------------------------------------------------------------------------
-
-
-class Terminal:
-    """Python on a terminal of its own (Linux, macOS)."""
-
-    def __init__(self, *arguments: str) -> None:
-        self.out = b""
-        self._process, self._fd = pty.fork()
-        if self._process == 0:
-            fcntl.ioctl(0, termios.TIOCSWINSZ, struct.pack("HHHH", 30, 100, 0, 0))
-            os.environ |= {"TERM": "xterm-256color", "PYTHONPATH": str(ROOT)}
-            os.execv(sys.executable, [sys.executable, *arguments])
-        asyncio.get_running_loop().add_reader(self._fd, self._read)
-        self._read_something = asyncio.Event()
-
-    def _read(self) -> None:
-        try:
-            self.out += os.read(self._fd, 65536)
-        except OSError:  # the command has ended
-            asyncio.get_running_loop().remove_reader(self._fd)
-        self._read_something.set()
-
-    async def shows(self, words: bytes) -> None:
-        async with asyncio.timeout(30):
-            while words not in self.out:
-                self._read_something.clear()
-                await self._read_something.wait()
-
-    def press(self, keys: str) -> None:
-        os.write(self._fd, keys.encode())
-
-    def kill(self, number: signal.Signals) -> None:
-        os.kill(self._process, number)
-
-    def hang_up(self) -> None:
-        asyncio.get_running_loop().remove_reader(self._fd)
-        os.close(self._fd)
-
-    async def end(self) -> int:
-        async with asyncio.timeout(30):
-            _, status = await asyncio.to_thread(os.waitpid, self._process, 0)
-        return os.waitstatus_to_exitcode(status)
-
-
-async def told_to_go(gripper: SimulatedGripper) -> None:
-    """Wait for a command of another process."""
-    async with asyncio.timeout(20):
-        while not gripper.request_registers[0] & 0x0800:  # noqa: ASYNC110
-            await asyncio.sleep(0.01)
-
-
-async def test_quitting_without_having_moved_leaves_the_fingers_alone(
-    server: SimulatorServer, gripper: SimulatedGripper
-) -> None:
-    async with RobotiqHand(server.address) as hand:
-        await hand.move(100)
-        before = gripper.request_registers
-        terminal = Terminal("-m", "robotiq_async", "monitor", server.address)
-        await terminal.shows(b"RUNNING_IDLE")
-        terminal.press("q")
-        await terminal.shows(b"The fingers were left as they are")
-        assert await terminal.end() == 0
-        assert gripper.request_registers == before
-
-
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
-async def test_a_signal_stops_what_was_moved(number: signal.Signals, code: int) -> None:
-    gripper = SimulatedGripper(speedup=4)
-    async with SimulatorServer(gripper) as server:
-        async with RobotiqHand(server.address):
-            pass
-        terminal = Terminal("-m", "robotiq_async", "monitor", server.address)
-        await terminal.shows(b"RUNNING_IDLE")
-        terminal.press("c")
-        await told_to_go(gripper)
-        terminal.kill(number)
-        await terminal.shows(b"The fingers were stopped")
-        assert await terminal.end() == code
-        assert b"Traceback" not in terminal.out
-        assert not gripper.request_registers[0] & 0x0800
-
-
-async def test_a_terminal_that_is_closed_stops_what_was_moved() -> None:
-    gripper = SimulatedGripper(speedup=4)
-    async with SimulatorServer(gripper) as server:
-        async with RobotiqHand(server.address):
-            pass
-        terminal = Terminal("-m", "robotiq_async", "monitor", server.address)
-        await terminal.shows(b"RUNNING_IDLE")
-        terminal.press("c")
-        await told_to_go(gripper)
-        terminal.hang_up()
-        await terminal.end()
-        assert not gripper.request_registers[0] & 0x0800
-
-
-async def test_without_textual_one_line_names_the_extra_and_another_way() -> None:
-    terminal = Terminal("-c", WITHOUT.format("textual", ["monitor"]))
-    await terminal.shows(b"pip install 'robotiq-async[monitor]', or pass --watch")
-    assert await terminal.end() == 1

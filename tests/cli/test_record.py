@@ -16,17 +16,10 @@ from robotiq_async.cli import main
 from robotiq_async.recorder import Recorder
 from robotiq_async.recording import read_recording
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from tests.cli.conftest import WITHOUT
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Shell
-
-WITHOUT = """
-import importlib.util, sys
-find = importlib.util.find_spec
-importlib.util.find_spec = lambda name, *rest: None if name == "{}" else find(name, *rest)
-from robotiq_async.cli import main
-sys.exit(main({}))
-"""
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from websockets.typing import Subprotocol
 from docs import make_layout
 from robotiq_async import RobotiqHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from tests.cli.test_record import WITHOUT
+from tests.cli.conftest import WITHOUT
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Shell

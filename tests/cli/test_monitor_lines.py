@@ -1,0 +1,123 @@
+"""``robotiq-async monitor`` without a screen: what people and programs read."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import signal
+import sys
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from robotiq_async import Fault, Finger, RobotiqHand
+from robotiq_async.cli import main
+from robotiq_async.cli.lines import print_objects
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+
+if TYPE_CHECKING:
+    from tests.cli.conftest import Shell
+
+
+async def test_in_a_pipe_it_prints_every_poll_as_an_object(shell: Shell, server: SimulatorServer) -> None:
+    async with RobotiqHand(server.address):
+        process = await shell.start("monitor", server.address)
+        objects = [json.loads(await shell.read_line(process)) for _ in range(50)]
+        process.send_signal(signal.SIGINT)
+        outcome = await shell.finish(process)
+    assert outcome.code == 130
+    assert {each["kind"] for each in objects} == {"status"}
+    sequences = [each["sequence"] for each in objects]
+    assert sequences == list(range(sequences[0], sequences[0] + 50))
+    assert objects[0]["state"] == "RUNNING_IDLE"
+    assert objects[0]["A"]["position"] == 6
+
+
+async def test_objects_tell_of_faults_and_lost_links(
+    shell: Shell, server: SimulatorServer, gripper: SimulatedGripper
+) -> None:
+    process = await shell.start("monitor", "--json", server.address)
+    await shell.read_line(process)
+    gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+
+    async def object_of(kind: str, **fields: object) -> dict[str, Any]:
+        while True:
+            found: dict[str, Any] = json.loads(await shell.read_line(process))
+            if found["kind"] == kind and fields.items() <= found.items():
+                return found
+
+    assert (await object_of("fault"))["name"] == "SCISSOR_BLOCKED"
+    await object_of("transition", target="FAULT")
+    assert (await object_of("status", fault=14))["state"] in ("RESET", "FAULT")
+    server.cut()
+    await object_of("transition", target="DISCONNECTED")
+    assert (await object_of("status"))["fault"] == 14, "it comes back by itself"
+
+
+async def test_watch_prints_what_changes(
+    shell: Shell, server: SimulatorServer, gripper: SimulatedGripper
+) -> None:
+    async with RobotiqHand(server.address) as hand:
+        process = await shell.start("monitor", "--watch", server.address)
+        assert "A=6 - B=6 - C=6" in await shell.read_line(process)
+        await hand.move(100, Finger.A)
+        lines = []
+        while "A=100 AT_POSITION" not in (line := await shell.read_line(process)):
+            lines.append(line)
+        assert all(" status   A=" in line for line in lines)
+        gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
+        told = {(await shell.read_line(process))[13:].split()[0] for _ in range(2)}
+        assert told == {"state", "fault"}
+        process.send_signal(signal.SIGTERM)
+        assert (await shell.finish(process)).code == 143
+
+
+async def test_it_only_looks(shell: Shell, server: SimulatorServer, gripper: SimulatedGripper) -> None:
+    before = gripper.request_registers
+    process = await shell.start("monitor", "--watch", server.address)
+    await shell.read_line(process)
+    process.send_signal(signal.SIGINT)
+    await shell.finish(process)
+    assert gripper.request_registers == before
+
+
+async def test_a_reader_that_stops_reading_does_not_hold_up_the_polling(
+    server: SimulatorServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A full pipe: the gripper is read on, and the reader is told what it has missed."""
+    reading, writing = os.pipe()
+    hand = RobotiqHand(server.address, poll_interval=0.002)
+    await hand.start(activate=False)
+    with os.fdopen(writing, "w") as full, os.fdopen(reading) as reader:
+        monkeypatch.setattr(sys, "stdout", full)
+        printing = asyncio.create_task(print_objects(hand, buffer=50))
+        async with asyncio.timeout(20):
+            async for status in hand.statuses():
+                if status.sequence > 1000:  # half a megabyte, and a pipe holds 64 KiB
+                    break
+
+        def read_until_missed() -> list[dict[str, Any]]:
+            objects = []
+            for line in reader:
+                objects.append(json.loads(line))
+                if objects[-1]["kind"] == "missed":
+                    break
+            return objects
+
+        objects = await asyncio.to_thread(read_until_missed)
+        printing.cancel()
+        await asyncio.gather(printing, return_exceptions=True)
+        await asyncio.to_thread(reader.readline)
+    await hand.stop()
+    assert objects[-1]["count"] > 100
+    assert len(objects) < 500
+
+
+def test_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["monitor", "--watch", "--json"]) == 2
+    assert "exclude" in capsys.readouterr().err
+
+
+async def test_nobody_there_is_one_line(shell: Shell) -> None:
+    (await shell.run("monitor", "tcp://127.0.0.1:1")).assert_failed(1, "127.0.0.1:1")

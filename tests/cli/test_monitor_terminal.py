@@ -1,0 +1,118 @@
+"""``robotiq-async monitor`` on a terminal: what quitting, signals and a closed terminal leave behind."""
+
+from __future__ import annotations
+
+import asyncio
+import fcntl
+import os
+import pty
+import signal
+import struct
+import sys
+import termios
+
+import pytest
+
+from robotiq_async import RobotiqHand
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from tests.cli.conftest import ROOT, WITHOUT
+
+
+class Terminal:
+    """Python on a terminal of its own (Linux, macOS)."""
+
+    def __init__(self, *arguments: str) -> None:
+        self.out = b""
+        self._process, self._fd = pty.fork()
+        if self._process == 0:
+            fcntl.ioctl(0, termios.TIOCSWINSZ, struct.pack("HHHH", 30, 100, 0, 0))
+            os.environ |= {"TERM": "xterm-256color", "PYTHONPATH": str(ROOT)}
+            os.execv(sys.executable, [sys.executable, *arguments])
+        asyncio.get_running_loop().add_reader(self._fd, self._read)
+        self._read_something = asyncio.Event()
+
+    def _read(self) -> None:
+        try:
+            self.out += os.read(self._fd, 65536)
+        except OSError:  # the command has ended
+            asyncio.get_running_loop().remove_reader(self._fd)
+        self._read_something.set()
+
+    async def shows(self, words: bytes) -> None:
+        async with asyncio.timeout(30):
+            while words not in self.out:
+                self._read_something.clear()
+                await self._read_something.wait()
+
+    def press(self, keys: str) -> None:
+        os.write(self._fd, keys.encode())
+
+    def kill(self, number: signal.Signals) -> None:
+        os.kill(self._process, number)
+
+    def hang_up(self) -> None:
+        asyncio.get_running_loop().remove_reader(self._fd)
+        os.close(self._fd)
+
+    async def end(self) -> int:
+        async with asyncio.timeout(30):
+            _, status = await asyncio.to_thread(os.waitpid, self._process, 0)
+        return os.waitstatus_to_exitcode(status)
+
+
+async def told_to_go(gripper: SimulatedGripper) -> None:
+    """Wait for a command of another process."""
+    async with asyncio.timeout(20):
+        while not gripper.request_registers[0] & 0x0800:  # noqa: ASYNC110
+            await asyncio.sleep(0.01)
+
+
+async def test_quitting_without_having_moved_leaves_the_fingers_alone(
+    server: SimulatorServer, gripper: SimulatedGripper
+) -> None:
+    async with RobotiqHand(server.address) as hand:
+        await hand.move(100)
+        before = gripper.request_registers
+        terminal = Terminal("-m", "robotiq_async", "monitor", server.address)
+        await terminal.shows(b"RUNNING_IDLE")
+        terminal.press("q")
+        await terminal.shows(b"The fingers were left as they are")
+        assert await terminal.end() == 0
+        assert gripper.request_registers == before
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+async def test_a_signal_stops_what_was_moved(number: signal.Signals, code: int) -> None:
+    gripper = SimulatedGripper(speedup=4)
+    async with SimulatorServer(gripper) as server:
+        async with RobotiqHand(server.address):
+            pass
+        terminal = Terminal("-m", "robotiq_async", "monitor", server.address)
+        await terminal.shows(b"RUNNING_IDLE")
+        terminal.press("c")
+        await told_to_go(gripper)
+        terminal.kill(number)
+        await terminal.shows(b"The fingers were stopped")
+        assert await terminal.end() == code
+        assert b"Traceback" not in terminal.out
+        assert not gripper.request_registers[0] & 0x0800
+
+
+async def test_a_terminal_that_is_closed_stops_what_was_moved() -> None:
+    gripper = SimulatedGripper(speedup=4)
+    async with SimulatorServer(gripper) as server:
+        async with RobotiqHand(server.address):
+            pass
+        terminal = Terminal("-m", "robotiq_async", "monitor", server.address)
+        await terminal.shows(b"RUNNING_IDLE")
+        terminal.press("c")
+        await told_to_go(gripper)
+        terminal.hang_up()
+        await terminal.end()
+        assert not gripper.request_registers[0] & 0x0800
+
+
+async def test_without_textual_one_line_names_the_extra_and_another_way() -> None:
+    terminal = Terminal("-c", WITHOUT.format("textual", ["monitor"]))
+    await terminal.shows(b"pip install 'robotiq-async[monitor]', or pass --watch")
+    assert await terminal.end() == 1
