@@ -37,6 +37,7 @@ The map; each module imports only what stands above it::
     calibration  what the values 0..255 mean
     options      checked options of a hand
     waiting      callers that wait for a state
+    ending       work that ends well
     hand         RobotiqHand
     actions      what a person asks of a hand
     payloads     what is told of a hand in JSON

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+import asyncio
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from .enums import AXES, FORCE_MAX, SPEED_MAX, WIDTH_NORMAL, WIDTH_PINCH, WIDTH_WIDE, Finger
+from .enums import AXES, FORCE_MAX, SPEED_MAX, WIDTH_NORMAL, WIDTH_PINCH, WIDTH_WIDE, Finger, State
 from .hand import RobotiqHand
 from .motion import MoveResult
 from .streams import SentRequest
@@ -54,26 +56,18 @@ class Operator:
         self.hand = hand
         self.speed = SPEED
         self.force = FORCE
-        self._requests = hand.requests()
+        self._requests = hand.requests(1)
         self._last: SentRequest | None = None
-        self._asked = False
+        self._asking = 0
+        """Motions asked for that have not ended."""
         self._moved = False
+        self._changing = asyncio.Lock()
 
     @property
     def has_moved(self) -> bool:
-        """Whether something that moves was asked for, and anything was written after that."""
+        """Whether anything was written while something that moves was asked for."""
         self._listen()
         return self._moved
-
-    @property
-    def was_stopped(self) -> bool:
-        """Whether the last thing that was written stops the fingers, and the gripper has acknowledged it.
-
-        An automatic release is not stopped by anything but a reset.
-        """
-        self._listen()
-        last = self._last
-        return last is not None and last.acknowledged and not (last.request.go or last.request.release)
 
     async def act(self, action: Action) -> str:
         """Carry out an action; gives how it ended, in words.
@@ -83,9 +77,10 @@ class Operator:
         Raises:
             RobotiqError: it could not be carried out.
         """
-        if action.moves:
-            self._ask()
-        return await action.run(self.hand)
+        if not action.moves:
+            return await action.run(self.hand)
+        with self._counted():
+            return await action.run(self.hand)
 
     async def move(
         self, position: int, fingers: Finger, *, speed: int | None = None, force: int | None = None
@@ -95,8 +90,21 @@ class Operator:
         Raises:
             TypeError, ValueError, RobotiqError: as :meth:`RobotiqHand.move`.
         """
-        self._ask()
-        return in_words(await self.hand.move(position, fingers, speed=speed, force=force))
+        with self._counted():
+            return in_words(await self.hand.move(position, fingers, speed=speed, force=force))
+
+    async def leave(self) -> str:
+        """Stop the hand, and the fingers only if this person has moved them; tells what became of them.
+
+        Ends as :meth:`RobotiqHand.stop` does.
+        """
+        has_moved, rests = self.has_moved, self.hand.state is State.RESET
+        await self.hand.stop(halt=has_moved)
+        if not has_moved:
+            return "The fingers were left as they are: nothing here has moved them."
+        if rests or self._was_stopped():
+            return "The fingers were stopped: they had been moved from here."
+        return "The fingers had been moved from here and may STILL MOVE: the gripper was not seen to stop."
 
     async def set_speed(self, value: int) -> str:
         """Set the speed of all axes, also of a motion under way; gives it in words.
@@ -119,29 +127,49 @@ class Operator:
         return str(value)
 
     async def change_speed(self, by: int) -> str:
-        """Set the speed of all axes so much higher, or as high as it can be.
+        """Set the speed of all axes so much higher, or as high as it can be; one change after the other.
 
         Raises:
             RobotiqError: as :meth:`set_speed`.
         """
-        return await self.set_speed(max(0, min(self.speed + by, SPEED_MAX)))
+        async with self._changing:
+            return await self.set_speed(max(0, min(self.speed + by, SPEED_MAX)))
 
     async def change_force(self, by: int) -> str:
-        """Set the force of all axes so much higher, or as high as it can be.
+        """Set the force of all axes so much higher, or as high as it can be; one change after the other.
 
         Raises:
             RobotiqError: as :meth:`set_force`.
         """
-        return await self.set_force(max(0, min(self.force + by, FORCE_MAX)))
+        async with self._changing:
+            return await self.set_force(max(0, min(self.force + by, FORCE_MAX)))
 
-    def _ask(self) -> None:
+    @contextmanager
+    def _counted(self) -> Iterator[None]:
+        """Around something that moves: what is written meanwhile is its doing."""
         self._listen()
-        self._asked = True
+        self._requests = self.hand.requests(1)  # the one before ends when the hand is stopped
+        self._asking += 1
+        try:
+            yield
+        except asyncio.CancelledError:
+            self._moved = True  # what it has begun may be written yet
+            raise
+        finally:
+            self._listen()
+            self._asking -= 1
 
     def _listen(self) -> None:
         for sent in self._requests.drain():
             self._last = sent
-            self._moved |= self._asked
+            self._moved |= self._asking > 0
+
+    def _was_stopped(self) -> bool:
+        """Whether the last request stops the fingers, and the gripper has acknowledged it."""
+        self._listen()
+        last = self._last
+        # An automatic release is not stopped by anything but a reset.
+        return last is not None and last.acknowledged and not (last.request.go or last.request.release)
 
 
 def in_words(result: MoveResult) -> str:

@@ -105,7 +105,7 @@ class Core:
         self.refuse_unless_running(Trigger.ASK_COMMAND)
         if position is not None:
             self._end_moves(
-                lambda: MoveSupersededError(f"another command moves {axes!r}"),
+                lambda: MoveSupersededError(f"another command moves {axes}"),
                 lambda move: bool(move.axes & axes),
             )
         self._desk.put(axes, position, speed, force, delivery)

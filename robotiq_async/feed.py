@@ -7,7 +7,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import json
 import time
 from collections.abc import Callable
@@ -15,10 +14,11 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from .enums import Fault
-from .errors import RobotiqError
+from .errors import RobotiqConnectionError
 from .hand import RobotiqHand
 from .jointstate import SCHEMA, SCHEMA_NAME, JointStateEncoder
 from .kinematics import joint_angles, joint_velocities
+from .log import log
 from .payloads import (
     SCHEMAS,
     Fields,
@@ -32,7 +32,9 @@ from .status import RobotiqStatus
 from .streams import SentRequest, Stream, Transition
 
 BUFFER: Final = 100_000
-"""Statuses that wait for a loop that is held up: minutes."""
+"""Statuses that wait to be taken: minutes."""
+GIVEN_UP_S: Final = 0.2
+"""Between two looks at a hand that has given up."""
 VELOCITY_S: Final = 0.05
 """Joint velocities are taken over this time: a count is half a degree."""
 
@@ -90,8 +92,39 @@ class Message:
     sequence: int = 0
 
 
+class _Source:
+    """A stream of a hand that is opened again when it ends."""
+
+    def __init__(self, stream: Callable[[], Stream[Any]], take: Callable[[Any], None]) -> None:
+        self._make = stream
+        self._take = take
+        self._stream: Stream[Any]
+        self._missed_before = 0
+
+    @property
+    def missed(self) -> int:
+        return self._missed_before + self._stream.missed
+
+    def open(self) -> None:
+        self._stream = self._make()
+
+    async def listen(self) -> None:
+        while True:
+            try:
+                async for item in self._stream:
+                    self._take(item)
+            except RobotiqConnectionError:
+                await asyncio.sleep(GIVEN_UP_S)  # until the hand is started again, its streams end at once
+            self._missed_before = self.missed
+            self.open()
+
+    def drain(self) -> None:
+        for item in self._stream.drain():
+            self._take(item)
+
+
 class Feed:
-    """Turns what happens to a hand into messages. It only listens."""
+    """Turns what happens to a hand into messages. It only listens, also over stops and starts of the hand."""
 
     def __init__(self, hand: RobotiqHand, take: Callable[[Message], None]) -> None:
         """Prepare.
@@ -100,56 +133,50 @@ class Feed:
             hand: started before or while it is listened to.
             take: is called with every message, in the event loop.
         """
-        self._hand = hand
         self._take = take
         self._encoder = JointStateEncoder()
         self._before: list[RobotiqStatus] = []
         self._fault = Fault.NONE
         self._epoch = 0.0
-        self._statuses: Stream[RobotiqStatus]
-        self._listened: list[tuple[Stream[Any], Callable[[Any], None]]] = []
+        self._sources: tuple[_Source, ...] = (
+            _Source(lambda: hand.statuses(BUFFER), self._take_status),
+            _Source(hand.requests, self._take_request),
+            _Source(hand.transitions, self._take_transition),
+        )
         self._tasks: list[asyncio.Task[None]] = []
 
     @property
     def missed(self) -> int:
-        """Statuses that were lost because the event loop was held up for minutes."""
-        return self._statuses.missed
+        """Statuses that came and were not taken in time. A loop that is held up polls none: see overruns."""
+        return self._sources[0].missed
 
     def begin(self) -> None:
         """Listen from now on; :meth:`end` ends it."""
         loop = asyncio.get_running_loop()
         # Statuses carry the loop's clock; messages are stamped with the world's.
         self._epoch = time.time() - loop.time()
-        self._statuses = self._hand.statuses(BUFFER)
-        self._listened = [
-            (self._statuses, self._take_status),
-            (self._hand.requests(), self._take_request),
-            (self._hand.transitions(), self._take_transition),
-        ]
+        for source in self._sources:
+            source.open()
         self._tasks = [
-            loop.create_task(self._listen(stream, take), name="robotiq_async feed")
-            for stream, take in self._listened
+            loop.create_task(source.listen(), name="robotiq_async feed") for source in self._sources
         ]
 
     async def end(self) -> None:
         """Take what was published before now and not seen yet, and listen no longer."""
         for task in self._tasks:
             task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-        for stream, take in self._listened:
-            for item in stream.drain():
-                take(item)
+        for ended in await asyncio.gather(*self._tasks, return_exceptions=True):
+            if isinstance(ended, Exception):
+                log.critical("what happened to a hand could not be told any more", exc_info=ended)
+        for source in self._sources:
+            source.drain()
 
-    async def _listen(self, stream: Stream[Any], take: Callable[[Any], None]) -> None:
-        with contextlib.suppress(RobotiqError):  # the hand gave up; its transitions tell
-            async for item in stream:
-                take(item)
-
-    def _nanoseconds(self, timestamp: float) -> int:
+    def nanoseconds(self, timestamp: float) -> int:
+        """A time of the loop's clock, since 1970."""
         return round((timestamp + self._epoch) * 1e9)
 
     def _tell(self, topic: Topic, timestamp: float, fields: Fields, sequence: int = 0) -> None:
-        self._take(Message(topic, self._nanoseconds(timestamp), compact(fields), sequence))
+        self._take(Message(topic, self.nanoseconds(timestamp), compact(fields), sequence))
 
     def _take_status(self, status: RobotiqStatus) -> None:
         self._tell(STATUS, status.timestamp, status_fields(status), status.sequence)
@@ -164,7 +191,7 @@ class Feed:
         self._before.append(status)
         angles, seconds = joint_angles(status), status.timestamp - self._before[0].timestamp
         velocities = joint_velocities(self._before[0], status) if seconds else (0.0,) * len(angles)
-        stamp = self._nanoseconds(status.timestamp)
+        stamp = self.nanoseconds(status.timestamp)
         data = self._encoder.encode(stamp, angles, velocities, efforts(status))
         self._take(Message(JOINTS, stamp, data, status.sequence))
 

@@ -13,6 +13,7 @@ from .calibration import SpeedCalibration
 from .checks import check_byte, check_int, check_mask, check_timeout
 from .core import Core
 from .desk import Delivery
+from .ending import to_the_end
 from .enums import CLOSED, OPEN, Finger, Severity, State
 from .errors import (
     ActivationTimeoutError,
@@ -217,16 +218,10 @@ class RobotiqHand:
         if task is None or owner is None:
             return
         owner.request_stop(halt=halt)
-        cancelled: asyncio.CancelledError | None = None
-        with anyio.CancelScope(shield=True):
-            while not task.done():
-                try:
-                    await asyncio.wait({task})
-                except asyncio.CancelledError as error:
-                    cancelled = error
-        self._on_owner_done(task)
-        if cancelled is not None:
-            raise cancelled
+        try:
+            await to_the_end(task)
+        finally:
+            self._on_owner_done(task)
 
     # -- commands --------------------------------------------------------------------------------------
 
@@ -373,7 +368,7 @@ class RobotiqHand:
             finally:
                 core.abandon(move)
             raise MoveTimeoutError(
-                f"{axes!r} still moved after {limit:.2f} s on the way to {target}", self.status
+                f"{axes} still moved after {limit:.2f} s on the way to {target}", self.status
             )
 
     async def open(
@@ -599,9 +594,17 @@ class RobotiqHand:
         """Every change of state from now on, for one reader, none lost. Ends after :meth:`stop`."""
         return self._transitions.open(None)
 
-    def requests(self) -> Stream[SentRequest]:
-        """Every request written from now on, for one reader, none lost. Ends after :meth:`stop`."""
-        return self._requests.open(None)
+    def requests(self, buffer: int | None = None) -> Stream[SentRequest]:
+        """Every request written from now on, for one reader. Ends after :meth:`stop`.
+
+        Args:
+            buffer: requests kept for the reader, the newest ones, 1..1000000; None loses none.
+
+        Raises:
+            TypeError: buffer is not an int.
+            ValueError: buffer is outside its range.
+        """
+        return self._requests.open(None if buffer is None else check_int("buffer", buffer, 1, 1_000_000))
 
     async def wait_for_state(self, *states: State, timeout: float | None = None) -> State:
         """Wait until the hand is, if only for a moment, in one of these states, and return it.

@@ -14,9 +14,12 @@ import contextlib
 from collections.abc import AsyncIterator, Iterable, Iterator
 from typing import Final
 
-from prometheus_client import CollectorRegistry, start_http_server
-from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
-from prometheus_client.registry import Collector
+try:
+    from prometheus_client import CollectorRegistry, start_http_server
+    from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+    from prometheus_client.registry import Collector
+except ModuleNotFoundError as error:
+    raise ImportError("metrics need prometheus-client: pip install 'robotiq-async[metrics]'") from error
 
 from .checks import check_int
 from .enums import State

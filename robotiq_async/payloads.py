@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any, Final
 
-from .enums import AXES, Finger
+from .enums import AXES, Finger, State
+from .errors import NotStartedError
 from .hand import RobotiqHand
 from .kinematics import PREFIX
 from .status import RobotiqStatus
@@ -61,6 +62,7 @@ SCHEMAS: Final = {
     "state": _object(
         address=_STRING,
         state=_STRING,
+        age=_NUMBER,
         fault=_INTEGER,
         severity=_STRING,
         description=_STRING,
@@ -145,17 +147,24 @@ def fault_fields(status: RobotiqStatus) -> Fields:
     }
 
 
-def state_fields(hand: RobotiqHand) -> Fields:
-    """The state of a hand that was started, the fault of its last status, and its figures."""
-    fault = hand.status.fault
-    return {
-        "address": hand.address,
-        "state": hand.state.name,
-        "fault": int(fault),
-        "severity": fault.severity.value,
-        "description": fault.description,
-        **asdict(hand.statistics),
-    }
+def state_fields(hand: RobotiqHand, now: float) -> Fields:
+    """State and figures of a hand; fault and age of the last status only while these are known.
+
+    Args:
+        hand: the hand.
+        now: by the clock of the statuses.
+    """
+    fields: Fields = {"address": hand.address, "state": hand.state.name, **asdict(hand.statistics)}
+    try:
+        status = hand.status
+    except NotStartedError:
+        return fields
+    fields["age"] = _seconds(now - status.timestamp)
+    if hand.state not in (State.DISCONNECTED, State.SHUTDOWN):
+        fields["fault"] = int(status.fault)
+        fields["severity"] = status.fault.severity.value
+        fields["description"] = status.fault.description
+    return fields
 
 
 def efforts(status: RobotiqStatus) -> list[float]:

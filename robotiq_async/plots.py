@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from array import array
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-import matplotlib as mpl
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+try:
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+except ModuleNotFoundError as error:
+    raise ImportError("pictures need matplotlib: pip install 'robotiq-async[plot]'") from error
 
 from .calibration import ForceCalibration, SpeedCalibration, mean, newton
 from .measuring import Currents, peak_currents
@@ -22,6 +26,11 @@ OURS: Final = "#0b6ea8"
 THEIRS: Final = "#d1731f"
 COLOURS: Final = ("#0b6ea8", "#2a8f4c", "#b03a6b")
 """Of the fingers A, B and C."""
+WIDTHS: Final = {"A": 4.2, "B": 2.6, "C": 1.1, "SCISSOR": 1.4}
+"""Of the lines in the picture of a recording."""
+DRAWN: Final = ("position", "requested", "current_ma")
+LABEL: Final = 0.012
+"""Width of a label, as a share of the picture's."""
 SHOWN_FORCES: Final = (0, 125, 250)
 """Whose currents are drawn over time."""
 
@@ -115,50 +124,74 @@ def plot_current_over_time(path: Path, by_surface: Mapping[str, Currents], label
     return files
 
 
-def plot_recording(path: Path, entries: Sequence[tuple[str, int, dict[str, Any]]]) -> list[Path]:
+def plot_recording(path: Path, entries: Iterable[tuple[str, int, dict[str, Any]]]) -> list[Path]:
     """Positions, currents and events of a recording over time.
 
     Args:
         path: where to, without suffix.
-        entries: topic, nanoseconds and fields of its JSON messages.
+        entries: topic, nanoseconds and fields of its JSON messages; only the numbers that are drawn are kept.
+
+    Returns:
+        The files; none when there is no status to draw.
+
+    Raises:
+        OSError: they cannot be written.
     """
-    began = min(nanoseconds for _, nanoseconds, _ in entries)
-    statuses = [((at - began) / 1e9, fields) for topic, at, fields in entries if topic == "/gripper/status"]
-    events = [((at - began) / 1e9, fields) for topic, at, fields in entries if topic == "/gripper/event"]
-    seconds = [at for at, _ in statuses]
+    seconds, began = array("d"), 0
+    events: list[tuple[float, dict[str, Any]]] = []
+    drawn = {axis: {what: array("h") for what in DRAWN} for axis in WIDTHS}
+    for topic, at, fields in entries:
+        began = began or at
+        if topic == "/gripper/event":
+            events.append(((at - began) / 1e9, fields))
+        if topic == "/gripper/status":
+            seconds.append((at - began) / 1e9)
+            for axis, columns in drawn.items():
+                for what, column in columns.items():
+                    column.append(fields[axis][what])
+    if not seconds:
+        return []
     with _figure(path, path.name, rows=2) as (axes, files):
         positions, currents = axes
-        for name, colour in zip(("A", "B", "C", "SCISSOR"), (*COLOURS, "0.5"), strict=True):
-            of_axis = [fields[name] for _, fields in statuses]
-            line: Any = {"color": colour, "lw": 1.4}
+        # Fingers that move together lie on each other: the first is the broadest, and shows at the sides.
+        for (name, width), colour in zip(WIDTHS.items(), (*COLOURS, "0.5"), strict=True):
+            line: Any = {"color": colour, "lw": width}
             dotted: Any = {"color": colour, "lw": 0.8, "ls": ":", "drawstyle": "steps"}
-            positions.plot(seconds, [each["position"] for each in of_axis], label=name, **line)
-            positions.plot(seconds, [each["requested"] for each in of_axis], **dotted)
-            currents.plot(seconds, [each["current_ma"] for each in of_axis], **line)
+            positions.plot(seconds, drawn[name]["position"], label=name, **line)
+            positions.plot(seconds, drawn[name]["requested"], **dotted)
+            currents.plot(seconds, drawn[name]["current_ma"], **line)
         positions.set_ylabel("position, counts\n(dotted: requested)")
         positions.set_ylim(-5, 260)
         positions.legend(loc="center right", fontsize=8)
         currents.set_ylabel("current, mA")
         currents.set_ylim(bottom=0)
         currents.set_xlabel("time, s")
-        for at, fields in events:
-            is_fault = fields["kind"] == "fault"
-            # A control loop goes to RUNNING_CC and back with every command: that is no event to look at.
-            if not is_fault and "RUNNING_CC" in (fields["source"], fields["target"]):
-                continue
-            words = fields["name"] if is_fault else fields["target"]
+        for when, words, is_fault in _labels(events, apart=LABEL * seconds[-1]):
             for each in axes:
-                each.axvline(at, color="crimson" if is_fault else "0.7", lw=0.8, zorder=0)
-            positions.annotate(
-                words,
-                (at, 258),
-                rotation=90,
-                va="top",
-                ha="left" if is_fault else "right",
-                fontsize=7,
-                color="crimson" if is_fault else "0.4",
-            )
+                each.axvline(when, color="crimson" if is_fault else "0.7", lw=0.8, zorder=0)
+            style: Any = {"color": "crimson" if is_fault else "0.4", "fontsize": 7, "rotation": 90}
+            positions.annotate(words, (when, 258), va="top", ha="right", **style)
     return files
+
+
+def _labels(
+    events: Iterable[tuple[float, dict[str, Any]]], apart: float
+) -> Iterator[tuple[float, str, bool]]:
+    """When, what, and whether it is about a fault; what comes too soon after a label joins it."""
+    began, words, is_fault = 0.0, "", False
+    for at, fields in events:
+        # A control loop goes to RUNNING_CC and back with every command: that is no event to look at.
+        if "RUNNING_CC" in (fields.get("source"), fields.get("target")):
+            continue
+        if words and at - began > apart:
+            yield began, words, is_fault
+            words, is_fault = "", False
+        began = began if words else at
+        name = fields["target"] if fields["kind"] == "transition" else fields["name"]
+        words += (", " if words else "") + ("fault cleared" if name == "NONE" else name)
+        is_fault = is_fault or fields["kind"] == "fault"
+    if words:
+        yield began, words, is_fault
 
 
 def _shown(currents: Currents) -> list[int]:

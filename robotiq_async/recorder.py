@@ -1,7 +1,10 @@
 """Records everything about a hand in an MCAP file. Needs the extra ``record`` (mcap).
 
-    async with RobotiqHand(address) as hand, Recorder(hand, "grasp.mcap"):
+    hand = RobotiqHand(address)
+    async with Recorder(hand, "grasp.mcap"), hand:
         ...
+
+In this order the start and the stop are in it too, and nothing that concerns the file delays the stop.
 
 Four channels: ``/gripper/status`` (every poll), ``/gripper/command`` (every request that was written) and
 ``/gripper/event`` (transitions and faults) as JSON with a JSON Schema; ``/joint_states`` as ROS 2 encodes it.
@@ -12,13 +15,20 @@ that, and ``robotiq-async recover`` makes its file whole.
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import errno
 import os
+from io import FileIO
 from pathlib import Path
 from types import TracebackType
-from typing import Any, BinaryIO, Final, Self
+from typing import Any, Final, Self
 
-from mcap.writer import CompressionType, Writer
+try:
+    from mcap.writer import CompressionType, Writer
+except ModuleNotFoundError as error:
+    raise ImportError("recordings need mcap: pip install 'robotiq-async[record]'") from error
 
+from .ending import in_a_thread, to_the_end
 from .errors import RobotiqError
 from .feed import STATUS, TOPICS, Feed, Message, Topic
 from .hand import RobotiqHand
@@ -26,6 +36,8 @@ from .version import __version__
 
 FLUSH_S: Final = 0.5
 """Between two writes to the disk."""
+DISK_S: Final = 10.0
+"""What a disk may take for the last of it."""
 
 
 class RecordingError(RobotiqError):
@@ -75,15 +87,16 @@ class Recorder:
         self._address = hand.address
         self._feed = Feed(hand, self._take)
         self._outbox = _Outbox()
-        self._file: BinaryIO
+        self._file: FileIO
         self._writer: Any
         self._channels: dict[Topic, int] = {}
         self._saving: asyncio.Task[None]
+        self._over: asyncio.Event
         self._failed: asyncio.Future[RecordingError]
 
     @property
     def missed(self) -> int:
-        """Statuses that were lost because the event loop was held up for minutes."""
+        """Statuses that were not taken in time; a loop that is held up polls none: see ``overruns``."""
         return self._feed.missed
 
     @property
@@ -99,8 +112,17 @@ class Recorder:
         """
         loop = asyncio.get_running_loop()
         self._failed = loop.create_future()
+        self._over = asyncio.Event()
+        opening = in_a_thread(lambda: FileIO(self.path, "x"))
         try:
-            self._file = await asyncio.to_thread(open, self.path, "xb")
+            await to_the_end(opening)
+        except asyncio.CancelledError:
+            if opening.exception() is None:
+                opening.result().close()
+                self.path.unlink(missing_ok=True)
+            raise
+        try:
+            self._file = opening.result()
         except OSError as error:
             raise RecordingError(f"{self.path}: {error.strerror}") from error
         self._begin()
@@ -111,18 +133,12 @@ class Recorder:
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Write what is left and close the file.
+        """Write what is left and close the file, also when cancelled meanwhile.
 
         Raises:
             RecordingError: something could not be written; never in place of another exception.
         """
-        self._saving.cancel()
-        await asyncio.gather(self._saving, return_exceptions=True)
-        await self._feed.end()
-        if not self._failed.done():
-            self._writer.finish()
-            await self._save()
-        await asyncio.to_thread(self._file.close)
+        await to_the_end(asyncio.ensure_future(self._end()))
         if self._failed.done() and error is None:
             raise self._failed.result()
 
@@ -146,22 +162,47 @@ class Recorder:
         self._writer.add_message(channel, stamp, message.data, stamp, message.sequence & 0xFFFFFFFF)
         self.recorded += message.topic is STATUS
 
+    # -- the disk --------------------------------------------------------------------------------------
+
     async def _save_again_and_again(self) -> None:
-        while not self._failed.done():
-            await asyncio.sleep(FLUSH_S)
+        while not (self._over.is_set() or self._failed.done()):
             self._writer.flush()
             await self._save()
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(FLUSH_S):
+                    await self._over.wait()
+
+    async def _end(self) -> None:
+        await self._feed.end()
+        self._over.set()
+        try:
+            async with asyncio.timeout(DISK_S):
+                await self._saving
+                if not self._failed.done():
+                    self._writer.finish()
+                    await self._save()
+                await in_a_thread(self._file.close)
+        except TimeoutError:
+            self._fail(f"the disk does not answer within {DISK_S:g} s")
+        except OSError as error:
+            self._fail(error.strerror)
 
     async def _save(self) -> None:
         """Take to the disk what waits; a failure ends the recording."""
         data = self._outbox.take()
         try:
-            await asyncio.shield(asyncio.to_thread(self._write, data))
+            await in_a_thread(lambda: self._write(data))
         except OSError as error:
-            if not self._failed.done():
-                self._failed.set_result(RecordingError(f"{self.path}: {error.strerror}"))
+            self._fail(error.strerror)
+
+    def _fail(self, why: str | None) -> None:
+        if not self._failed.done():
+            self._failed.set_result(RecordingError(f"{self.path}: {why}"))
 
     def _write(self, data: bytes) -> None:
-        self._file.write(data)
-        self._file.flush()
+        left = memoryview(data)
+        while left:
+            left = left[self._file.write(left) :]
         os.fsync(self._file.fileno())
+        if os.fstat(self._file.fileno()).st_nlink == 0:
+            raise FileNotFoundError(errno.ENOENT, "the file has been deleted")

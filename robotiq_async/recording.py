@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -10,10 +11,13 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from mcap.exceptions import McapError
-from mcap.records import Channel, Footer, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader
-from mcap.writer import Writer
+try:
+    from mcap.exceptions import McapError
+    from mcap.records import Channel, Footer, Message, Metadata, Schema
+    from mcap.stream_reader import StreamReader
+    from mcap.writer import Writer
+except ModuleNotFoundError as error:
+    raise ImportError("recordings need mcap: pip install 'robotiq-async[record]'") from error
 
 from .recorder import RecordingError
 
@@ -106,7 +110,10 @@ def recover(path: Path | str, target: Path | str) -> Recovered:
                 elif isinstance(record, Footer):
                     found.is_whole = True
             writer.finish()  # type: ignore[no-untyped-call]
+    except FileExistsError as error:
+        raise RecordingError(f"{target}: {error.strerror}") from error
     except OSError as error:
+        Path(target).unlink(missing_ok=True)  # half of it looks like the whole
         raise RecordingError(f"{target}: {error.strerror}") from error
     return found
 
@@ -119,7 +126,7 @@ def _records(path: Path | str) -> Iterator[object]:
             records = iter(reader.records)
             try:
                 yield next(records)
-            except (McapError, StopIteration, EOFError, ValueError) as error:
+            except (McapError, StopIteration, EOFError, ValueError, struct.error) as error:
                 raise RecordingError(f"{path}: not an MCAP file") from error
             # A killed recorder leaves a file that ends anywhere, and damaged bytes may raise anything.
             with suppress(Exception):

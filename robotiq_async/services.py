@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import reprlib
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -66,11 +67,11 @@ class Service:
         except ValueError as error:
             raise ValueError(f"{self.name} takes a JSON object: {error}") from None
         if not isinstance(arguments, dict):
-            raise ValueError(f"{self.name} takes a JSON object, got {arguments!r}")
+            raise ValueError(f"{self.name} takes a JSON object, got {reprlib.repr(arguments)}")
         for name in arguments:
             if name not in self.arguments:
                 known = ", ".join(self.arguments) or "none"
-                raise ValueError(f"{self.name} has no argument {name!r}; it has: {known}")
+                raise ValueError(f"{self.name} has no argument {reprlib.repr(name)}; it has: {known}")
         for name in self.required:
             if name not in arguments:
                 raise ValueError(f"{self.name} needs the argument {name!r}")
@@ -108,7 +109,7 @@ async def _set_force(operator: Operator, arguments: Arguments) -> str:
 def _fingers(arguments: Arguments, usual: str) -> Finger:
     words = arguments.get("fingers", usual)
     if not isinstance(words, str):
-        raise TypeError(f"fingers must be a text like ABC, or scissor, got {words!r}")
+        raise TypeError(f"fingers must be a text like ABC, or scissor, got {reprlib.repr(words)}")
     return parse_fingers("fingers", words)
 
 

@@ -15,6 +15,7 @@ from robotiq_async import (
     Finger,
     GripperFaultError,
     NotActivatedError,
+    NotStartedError,
     RobotiqHand,
     State,
 )
@@ -127,43 +128,105 @@ async def test_speed_alone_moves_nothing(gripper: SimulatedGripper) -> None:
         await hand.stop()
 
 
-async def test_stopped_is_what_the_gripper_acknowledged(gripper: SimulatedGripper) -> None:
+LEFT, STOPPED, MOVING = "left as they are", "were stopped", "may STILL MOVE"
+
+
+@pytest.fixture
+async def new(gripper: SimulatedGripper) -> AsyncIterator[tuple[Operator, SimulatorServer]]:
+    """Somebody at a hand that is active, and whom the test lets leave."""
     async with SimulatorServer(gripper) as server:
         hand = RobotiqHand(server.address)
         operator = Operator(hand)
         await hand.start()
-        await operator.move(100, Finger.A)
-        assert operator.has_moved
-        assert not operator.was_stopped
+        yield operator, server
         await hand.stop()
-        assert operator.was_stopped
 
 
-async def test_a_gripper_that_is_gone_was_not_stopped(gripper: SimulatedGripper) -> None:
-    async with SimulatorServer(gripper) as server:
-        hand = RobotiqHand(server.address)
-        operator = Operator(hand)
-        await hand.start()
-        await operator.move(100, Finger.A)
-        server.refuse()
-        server.cut()
-        await hand.wait_for_state(State.DISCONNECTED)
-        await hand.stop()
-        assert operator.has_moved
-        assert not operator.was_stopped
+Someone = tuple[Operator, SimulatorServer]
 
 
-async def test_a_release_is_not_stopped_by_leaving(gripper: SimulatedGripper) -> None:
-    async with SimulatorServer(gripper) as server:
-        hand = RobotiqHand(server.address)
-        operator = Operator(hand)
-        await hand.start()
-        await operator.move(200, Finger.ABC)
-        gripper.inject_fault(0x0E)
-        await hand.wait_for_state(State.FAULT)
-        releasing = asyncio.create_task(operator.act(ACTIONS["release"]))
-        await hand.wait_for_state(State.WF_ATR)
-        await hand.stop()
-        assert not operator.was_stopped
-        with pytest.raises(Exception, match="stopped"):
-            await releasing
+async def test_leaving_stops_what_was_moved(new: Someone, gripper: SimulatedGripper) -> None:
+    operator, _ = new
+    await operator.move(100, Finger.A)
+    assert operator.has_moved
+    assert STOPPED in await operator.leave()
+    assert not gripper.request_registers[0] & 0x0800
+
+
+async def test_leaving_leaves_alone_what_was_not(new: Someone, gripper: SimulatedGripper) -> None:
+    operator, _ = new
+    await operator.hand.move(100)
+    await operator.set_speed(9)
+    assert LEFT in await operator.leave()
+    assert gripper.request_registers[0] & 0x0800
+
+
+async def test_a_gripper_that_is_gone_was_not_stopped(new: Someone) -> None:
+    operator, server = new
+    await operator.move(100, Finger.A)
+    server.refuse()
+    server.cut()
+    await operator.hand.wait_for_state(State.DISCONNECTED)
+    assert MOVING in await operator.leave()
+
+
+async def test_a_release_is_not_stopped_by_leaving(new: Someone, gripper: SimulatedGripper) -> None:
+    operator, _ = new
+    await operator.move(200, Finger.ABC)
+    gripper.inject_fault(0x0E)
+    await operator.hand.wait_for_state(State.FAULT)
+    releasing = asyncio.create_task(operator.act(ACTIONS["release"]))
+    await operator.hand.wait_for_state(State.WF_ATR)
+    assert MOVING in await operator.leave()
+    with pytest.raises(NotStartedError):
+        await releasing
+
+
+async def test_a_gripper_that_came_back_reset_stands_still(new: Someone) -> None:
+    operator, server = new
+    await operator.move(100, Finger.A)
+    await server.power_cycle()
+    await operator.hand.wait_for_state(State.RESET)
+    assert STOPPED in await operator.leave()
+
+
+async def test_what_was_refused_does_not_count_with_what_comes_after(
+    new: Someone, gripper: SimulatedGripper
+) -> None:
+    operator, _ = new
+    with pytest.raises(ValueError, match="position"):
+        await operator.move(300, Finger.A)
+    await operator.set_force(3)
+    assert not operator.has_moved
+
+
+async def test_what_was_cancelled_may_have_moved(new: Someone) -> None:
+    operator, _ = new
+    with pytest.raises(TimeoutError):
+        async with asyncio.timeout(0):
+            await operator.move(200, Finger.A)
+    assert operator.has_moved
+
+
+async def test_it_still_knows_after_the_hand_was_started_again(new: Someone) -> None:
+    operator, _ = new
+    await operator.hand.stop()
+    await operator.hand.start()
+    assert not operator.has_moved
+    await operator.move(200, Finger.A)
+    assert operator.has_moved
+    assert STOPPED in await operator.leave()
+
+
+async def test_it_keeps_nothing_of_what_others_write(new: Someone) -> None:
+    """A control loop beside it writes for days."""
+    operator, _ = new
+    for position in (10, 20, 30):
+        await operator.hand.set_position(position)
+    assert len(operator._requests._items) == 1
+
+
+async def test_steps_of_the_speed_add_up(new: Someone) -> None:
+    operator, _ = new
+    await asyncio.gather(*(operator.change_speed(16) for _ in range(3)))
+    assert operator.speed == SPEED + 48

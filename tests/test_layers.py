@@ -52,6 +52,7 @@ RUNTIME = [
     "calibration",
     "options",
     "waiting",
+    "ending",
     "hand",
     "actions",
     "payloads",

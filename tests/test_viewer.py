@@ -7,12 +7,13 @@ import contextlib
 import json
 import struct
 from collections.abc import AsyncIterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 from rosbags.typesys import Stores, get_typestore
 from websockets.asyncio.client import ClientConnection, connect
-from websockets.exceptions import InvalidStatus
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.typing import Subprotocol
 
 from docs import make_layout
@@ -24,6 +25,8 @@ from robotiq_async.services import SERVICES
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.viewer import Viewer, ViewerError
 
+SOCKETS = Path("/proc/net/tcp")
+LINUX = SOCKETS.exists()
 MESSAGE_DATA, CALL, ANSWER = 1, 2, 3
 """Binary operations of the protocol foxglove.sdk.v1."""
 
@@ -39,6 +42,7 @@ class Client:
         self._topics: dict[int, str] = {}
         self.received: list[tuple[str, int, bytes]] = []
         self.answers: dict[int, Any] = {}
+        self._objects: dict[str, list[dict[str, Any]]] = {}
 
     async def read(self) -> None:
         """One frame."""
@@ -55,7 +59,10 @@ class Client:
                 self.answers[said["callId"]] = ValueError(said["message"])
         elif frame[0] == MESSAGE_DATA:
             number, nanoseconds = struct.unpack_from("<IQ", frame, 1)
-            self.received.append((self._topics[number], nanoseconds, frame[13:]))
+            topic = self._topics[number]
+            self.received.append((topic, nanoseconds, frame[13:]))
+            if topic != "/joint_states":
+                self._objects.setdefault(topic, []).append(json.loads(frame[13:]))
         elif frame[0] == ANSWER:
             _, call, length = struct.unpack_from("<III", frame, 1)
             self.answers[call] = json.loads(frame[13 + length :])["outcome"]
@@ -89,7 +96,7 @@ class Client:
         return await self.answer(99)
 
     def objects(self, topic: str) -> list[dict[str, Any]]:
-        return [json.loads(data) for where, _, data in self.received if where == topic]
+        return self._objects.get(topic, [])
 
 
 @pytest.fixture
@@ -128,10 +135,27 @@ async def viewed(operator: Operator) -> AsyncIterator[Client]:
 # -- what is told ------------------------------------------------------------------------------------------
 
 
+@pytest.mark.skipif(not LINUX, reason="asks Linux who listens where")
 async def test_it_listens_on_loopback_only(operator: Operator) -> None:
     async with Viewer(operator.hand, port=0) as viewer:
         assert viewer.url == f"ws://127.0.0.1:{viewer.port}"
-        assert viewer.port > 0
+        assert listeners(viewer.port) == ["0100007F"]
+    assert listeners(viewer.port) == []
+
+
+def listeners(port: int) -> list[str]:
+    """The interfaces on which this process listens on a port, as Linux writes them."""
+    ours = set()
+    for file in Path("/proc/self/fd").iterdir():
+        with contextlib.suppress(OSError):
+            ours.add(str(file.readlink()))
+    found = []
+    for line in SOCKETS.read_text().splitlines()[1:]:
+        columns = line.split()
+        interface, _, number = columns[1].partition(":")
+        if columns[3] == "0A" and int(number, 16) == port and f"socket:[{columns[9]}]" in ours:
+            found.append(interface)
+    return found
 
 
 async def test_the_topics_are_described(operator: Operator) -> None:
@@ -157,6 +181,8 @@ async def test_every_poll_arrives(operator: Operator) -> None:
 async def test_the_messages_have_what_their_schema_says(operator: Operator) -> None:
     async with viewed(operator) as client:
         await client.subscribe("/gripper/status", "/gripper/command", "/gripper/event", "/gripper/state")
+        while not client.received:
+            await client.read()
         await operator.move(100, Finger.A)
         while not all(client.objects(f"/gripper/{name}") for name in ("status", "command", "event", "state")):
             await client.read()
@@ -203,7 +229,8 @@ async def test_whoever_comes_late_is_told_the_state(operator: Operator, server: 
         while not client.received:
             await client.read()
         state = client.objects("/gripper/state")[0]
-        assert (state["state"], state["fault"]) == ("DISCONNECTED", 0)
+        assert state["state"] == "DISCONNECTED"
+        assert "fault" not in state, "what is not known is not told"
         assert state["polls"] == operator.hand.statistics.polls
         await server.accept()
         while client.objects("/gripper/state")[-1]["state"] != "RUNNING_IDLE":
@@ -277,6 +304,147 @@ async def seen(hand: RobotiqHand, *, moving: bool) -> RobotiqStatus:
             if status.is_moving is moving:
                 return status
     raise AssertionError("the hand has ended")
+
+
+async def test_a_client_that_says_nothing_does_not_keep_the_viewer(operator: Operator) -> None:
+    """nc, a scanner of ports, a browser that connects in advance."""
+    async with Viewer(operator.hand, port=0) as viewer:
+        _, silent = await asyncio.open_connection("127.0.0.1", viewer.port)
+        began = asyncio.get_running_loop().time()
+    assert asyncio.get_running_loop().time() - began < 5
+    silent.close()
+    await silent.wait_closed()
+
+
+async def test_nothing_that_concerns_viewers_delays_the_stop() -> None:
+    gripper = SimulatedGripper(speedup=2)
+    async with SimulatorServer(gripper) as server:
+        hand = RobotiqHand(server.address)
+        viewer = Viewer(hand, port=0, operator=Operator(hand))
+        async with viewer, hand, client(viewer) as one:
+            _, silent = await asyncio.open_connection("127.0.0.1", viewer.port)
+            await one.ask(1, "close", {})
+            await seen(hand, moving=True)
+        assert not gripper.request_registers[0] & 0x0800
+        assert not gripper.is_moving
+        silent.close()
+        await silent.wait_closed()
+
+
+async def test_calls_that_come_while_it_is_left_move_nothing() -> None:
+    async with SimulatorServer(SimulatedGripper(speedup=4)) as slow, RobotiqHand(slow.address) as hand:
+        operator = Operator(hand)
+        async with Viewer(hand, port=0, operator=operator) as viewer:
+            connection = await connect(
+                viewer.url, subprotocols=[Subprotocol("foxglove.sdk.v1")], max_queue=None
+            )
+            one = Client(connection)
+            await one.meet(services=True)
+
+            async def insist() -> None:
+                with contextlib.suppress(ConnectionClosed):
+                    for number in range(1000):
+                        await one.ask(number, "close", {})
+                        await asyncio.sleep(0)
+
+            insisting = asyncio.create_task(insist())
+            await seen(hand, moving=True)
+        assert not viewer._serving
+        await seen(hand, moving=False)
+        requests = hand.requests()
+        await insisting
+        await connection.close()
+        for _ in range(20):
+            await anext(hand.statuses())
+        assert requests.take_nowait() is None
+        assert not hand.is_moving
+
+
+@pytest.mark.parametrize("steps", range(12))
+async def test_cancelled_at_any_moment_it_leaves_nothing(operator: Operator, steps: int) -> None:
+    viewer = Viewer(operator.hand, port=0, operator=operator)
+
+    async def use() -> None:
+        async with viewer:
+            pass
+
+    using = asyncio.create_task(use())
+    for _ in range(steps):
+        await asyncio.sleep(0)
+    using.cancel()
+    await asyncio.gather(using, return_exceptions=True)
+    if LINUX and viewer.port:
+        assert listeners(viewer.port) == []
+
+
+async def test_a_hand_that_is_started_again_is_shown_again(server: SimulatorServer) -> None:
+    hand = RobotiqHand(server.address)
+    async with Viewer(hand, port=0) as viewer, client(viewer, services=False) as one:
+        await one.subscribe("/gripper/status", "/gripper/state")
+        while not one.objects("/gripper/state"):
+            await one.read()
+        assert one.objects("/gripper/state")[0]["state"] == "DISCONNECTED", "it is not started yet"
+        for _ in range(2):
+            async with hand:
+                sequence = hand.status.sequence + 5
+                while not any(each["sequence"] > sequence for each in one.objects("/gripper/status")):
+                    await one.read()
+        while one.objects("/gripper/state")[-1]["state"] != "SHUTDOWN":
+            await one.read()
+
+
+async def test_the_state_is_told_when_it_changes(operator: Operator, gripper: SimulatedGripper) -> None:
+    async with viewed(operator) as one:
+        await one.subscribe("/gripper/state")
+        while not one.received:
+            await one.read()
+        gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+        await operator.hand.wait_for_state(State.FAULT)
+        told = asyncio.get_running_loop().time()
+        while one.objects("/gripper/state")[-1].get("fault") != 14:
+            await one.read()
+        assert asyncio.get_running_loop().time() - told < 0.5
+        assert one.objects("/gripper/state")[-1]["description"] == Fault.SCISSOR_BLOCKED.description
+
+
+async def test_a_control_loop_does_not_make_the_state_the_talk_of_the_town(operator: Operator) -> None:
+    async with viewed(operator) as one:
+        await one.subscribe("/gripper/state", "/gripper/event")
+        for position in range(100):
+            await operator.hand.set_position(position)
+        while len(one.objects("/gripper/event")) < 200:
+            await one.read()
+        assert len(one.objects("/gripper/state")) < 20
+
+
+async def test_a_request_of_megabytes_is_refused_unread(operator: Operator) -> None:
+    async with viewed(operator) as one:
+        with pytest.raises(ValueError, match="4096 bytes at most") as error:
+            await one.call("move", position=[1] * 2_000_000)
+        assert len(str(error.value)) < 200
+        assert not operator.has_moved
+
+
+async def test_a_halt_finds_its_way_through_a_crowd() -> None:
+    async with SimulatorServer(SimulatedGripper(speedup=4)) as slow, RobotiqHand(slow.address) as hand:
+        slow.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
+        await hand.wait_for_state(State.FAULT)
+        async with viewed(Operator(hand)) as one:
+            for number in range(20):
+                await one.ask(number, "recover", {"confirm": True})
+            while len(one.answers) < 4:
+                await one.read()
+            assert all("16 calls wait" in str(answer) for answer in one.answers.values())
+            assert await one.call("halt") == "every axis stands still"
+
+
+async def test_an_operator_of_another_hand_is_refused(operator: Operator) -> None:
+    with pytest.raises(ValueError, match="operator must be at"):
+        Viewer(RobotiqHand(), operator=operator)
+
+
+def test_an_address_of_the_sixth_version_has_brackets() -> None:
+    assert Viewer(RobotiqHand(), host="::1").url == "ws://[::1]:8765"
 
 
 async def test_a_port_that_is_taken(operator: Operator) -> None:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
+from ipaddress import ip_address
 from typing import Annotated
 
 from cyclopts import Parameter, Token
@@ -34,7 +35,10 @@ def need(module: str, extra: str, instead: str = "") -> None:
 
 def is_loopback(host: str) -> bool:
     """Whether only programs on this machine reach what listens there."""
-    return host.startswith(("127.", "::1", "localhost"))
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return host.lower() == "localhost"
 
 
 @contextmanager

@@ -13,6 +13,18 @@ if TYPE_CHECKING:
     from ..actions import Operator
 
 
+def make_hand(address: str) -> RobotiqHand:
+    """A hand that is not started.
+
+    Raises:
+        UsageError: a malformed address.
+    """
+    from .. import RobotiqHand
+
+    with usage():
+        return RobotiqHand(address)
+
+
 @asynccontextmanager
 async def connected(address: str, *, halt: bool) -> AsyncIterator[RobotiqHand]:
     """A hand that has been read and not yet written to.
@@ -25,10 +37,7 @@ async def connected(address: str, *, halt: bool) -> AsyncIterator[RobotiqHand]:
         UsageError: a malformed address.
         RobotiqError: no gripper there, or a link that failed.
     """
-    from .. import RobotiqHand
-
-    with usage():
-        hand = RobotiqHand(address)
+    hand = make_hand(address)
     try:
         await hand.start(activate=False)
         yield hand
@@ -37,39 +46,20 @@ async def connected(address: str, *, halt: bool) -> AsyncIterator[RobotiqHand]:
 
 
 @asynccontextmanager
-async def operated(address: str, tell: Callable[[str], object]) -> AsyncIterator[Operator]:
-    """A hand that has not been written to, for a person who may move it.
+async def operated(operator: Operator, tell: Callable[[str], object]) -> AsyncIterator[None]:
+    """Start the hand of a person; nothing is written until this person asks.
 
     Leaving stops the fingers only if this person has moved them.
 
     Args:
-        address: the gripper.
+        operator: the person.
         tell: is told in the end what has become of the fingers.
 
     Raises:
-        UsageError: a malformed address.
         RobotiqError: no gripper there, or a link that failed.
     """
-    from .. import RobotiqHand
-    from ..actions import Operator
-
-    with usage():
-        hand = RobotiqHand(address)
-    operator, has_started = Operator(hand), False
+    await operator.hand.start(activate=False)
     try:
-        await hand.start(activate=False)
-        has_started = True
-        yield operator
+        yield
     finally:
-        has_moved = operator.has_moved
-        await hand.stop(halt=has_moved)
-        if has_started:
-            tell(_farewell(has_moved, operator.was_stopped))
-
-
-def _farewell(has_moved: bool, was_stopped: bool) -> str:
-    if not has_moved:
-        return "The fingers were left as they are: nothing here has moved them."
-    if was_stopped:
-        return "The fingers were stopped: they had been moved from here."
-    return "The fingers had been moved from here and may STILL MOVE: the gripper was not seen to take a stop."
+        tell(await operator.leave())

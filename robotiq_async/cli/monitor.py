@@ -6,6 +6,7 @@ import asyncio
 import os
 import sys
 from collections import deque
+from contextlib import suppress
 from typing import Annotated
 
 from cyclopts import Parameter
@@ -44,11 +45,14 @@ async def monitor(
     """
     if watch and as_json:
         raise UsageError("--watch and --json exclude each other")
-    if watch or as_json or not _is_terminal():
-        await _look(address, as_json=not watch)
-        return
-    need("textual", "monitor", ", or pass --watch")
-    await _screen(address)
+    try:
+        if watch or as_json or not _is_terminal():
+            await _look(address, as_json=not watch)
+            return
+        need("textual", "monitor", ", or pass --watch")
+        await _screen(address)
+    except asyncio.CancelledError:
+        pass  # Being told to stop is how this command ends well.
 
 
 def _is_terminal() -> bool:
@@ -68,17 +72,27 @@ async def _look(address: str, *, as_json: bool) -> None:
 
 
 async def _screen(address: str) -> None:
-    from .connection import operated
+    from ..actions import Operator
+    from .connection import make_hand, operated
     from .remarks import told
     from .screen import Monitor
 
     remarks: deque[str] = deque(maxlen=1000)
-    async with operated(address, print) as operator:
-        with told(remarks.append):
+    operator = Operator(make_hand(address))
+    with told(remarks.append):
+        async with operated(operator, _say):
             screen = Monitor(operator, remarks)
             await screen.run_async()
-            task = asyncio.current_task()
-            if task is not None and task.cancelling():  # textual ends in good order when it is cancelled
-                raise asyncio.CancelledError
-    if screen.return_code:
+    if screen.return_code and not _is_cancelled():
         raise CommandError("the screen failed; what it says is above")
+
+
+def _is_cancelled() -> bool:
+    """Whether a signal has come; a screen whose terminal is gone may fail then."""
+    task = asyncio.current_task()
+    return task is not None and task.cancelling() > 0
+
+
+def _say(words: str) -> None:
+    with suppress(OSError):  # the terminal may be gone
+        print(words, flush=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,6 +14,7 @@ from .arguments import Address, CommandError, UsageError, need
 from .words import IN_WORDS, clock
 
 if TYPE_CHECKING:
+    from ..hand import RobotiqHand
     from ..recorder import Recorder
 
 
@@ -46,22 +48,26 @@ async def record(
 
     if seconds is not None and not 0 < seconds < 1e9:
         raise UsageError(f"--seconds must be seconds above 0, got {seconds:g}")
-    async with connected(address, halt=False) as hand:
-        recorder = Recorder(hand, file)
-        try:
-            async with recorder:
-                print(f"Recording {hand.address} in {file}; Ctrl-C ends it.", flush=True)
-                try:
-                    async with asyncio.timeout(seconds):
-                        await _watch(recorder)
-                except TimeoutError:
-                    pass
-        finally:
-            if recorder.recorded:
-                print(
-                    f"\n{recorder.recorded} polls, {recorder.missed} missed, {recorder.size} bytes",
-                    flush=True,
-                )
+    try:
+        async with connected(address, halt=False) as hand:
+            recorder = Recorder(hand, file)
+            try:
+                async with recorder:
+                    print(f"Recording {hand.address} in {file}; Ctrl-C ends it.", flush=True)
+                    with suppress(TimeoutError):
+                        async with asyncio.timeout(seconds):
+                            await _watch(recorder)
+            finally:
+                if recorder.recorded:
+                    _tell_figures(recorder, hand)
+    except asyncio.CancelledError:
+        pass  # Being told to stop is how this command ends well.
+
+
+def _tell_figures(recorder: Recorder, hand: RobotiqHand) -> None:
+    # What was not polled is not in the file and not missed either: the polling tells of it.
+    figures = f"{recorder.missed} lost, {hand.statistics.overruns} not polled in time, {recorder.size} bytes"
+    print(f"\n{recorder.recorded} polls, {figures}", flush=True)
 
 
 async def _watch(recorder: Recorder) -> None:
@@ -102,6 +108,8 @@ def replay(
     shown = ""
     for entry in read_recording(file):
         if not entry.is_json:
+            continue
+        if entry.topic not in IN_WORDS:
             continue
         line = IN_WORDS[entry.topic](entry.fields)
         if entry.topic == "/gripper/status":
@@ -148,10 +156,15 @@ def plot(file: Path, picture: Path | None = None, /) -> None:
     from ..plots import plot_recording
     from ..recording import read_recording
 
-    entries = [
-        (entry.topic, entry.nanoseconds, entry.fields) for entry in read_recording(file) if entry.is_json
-    ]
-    if not any(topic == "/gripper/status" for topic, _, _ in entries):
+    target = picture or file
+    if target.suffix in (".mcap", ".png", ".svg"):
+        target = target.with_suffix("")
+    entries = ((each.topic, each.nanoseconds, each.fields) for each in read_recording(file) if each.is_json)
+    try:
+        pictures = plot_recording(target, entries)
+    except OSError as error:
+        raise CommandError(f"{target}: {error.strerror}") from error
+    if not pictures:
         raise CommandError(f"{file}: there is no status in it")
-    for written in plot_recording(picture or file.with_suffix(""), entries):
+    for written in pictures:
         print(written)

@@ -28,15 +28,18 @@ def collected() -> Iterator[list[str]]:
 
 @contextmanager
 def told(tell: Callable[[str], object]) -> Iterator[None]:
-    """Tell the library's warnings at once, and nowhere else while this lasts."""
+    """Tell the library's warnings at once, and nowhere else while this lasts; those of foxglove-sdk too."""
+    foxglove = logging.getLogger("foxglove")
     log, teller = logging.getLogger("robotiq_async"), _Teller(tell)
     others = [handler for handler in log.handlers if isinstance(handler, _Teller)]
     for other in others:
         log.removeHandler(other)
     log.addHandler(teller)
+    foxglove.addHandler(teller)
     try:
         yield
     finally:
+        foxglove.removeHandler(teller)
         log.removeHandler(teller)
         for other in others:
             log.addHandler(other)

@@ -49,16 +49,20 @@ async def view(
         _write(layout)
         return
     need("foxglove", "view")
+    from ..actions import Operator
     from ..viewer import Viewer
-    from .connection import operated
+    from .connection import make_hand, operated
+    from .remarks import told
 
     if not is_loopback(host):
         what = "see this gripper" if read_only else "see this gripper and COMMAND it"
         _tell(f"anyone who reaches {host} can {what}: there is no password")
     try:
-        async with operated(address, _tell) as operator:
-            who = None if read_only else operator
-            async with Viewer(operator.hand, host=host, port=port, operator=who) as viewer:
+        operator = Operator(make_hand(address))
+        viewer = Viewer(operator.hand, host=host, port=port, operator=None if read_only else operator)
+        # In this order no viewer delays the stop of the fingers.
+        with told(_tell):
+            async with viewer, operated(operator, _tell):
                 print(viewer.url, flush=True)
                 await asyncio.Event().wait()
     except asyncio.CancelledError:

@@ -81,8 +81,8 @@ async def test_quitting_without_having_moved_leaves_the_fingers_alone(
         assert gripper.request_registers == before
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
-async def test_a_signal_stops_what_was_moved(number: signal.Signals, code: int) -> None:
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+async def test_a_signal_stops_what_was_moved(number: signal.Signals) -> None:
     gripper = SimulatedGripper(speedup=4)
     async with SimulatorServer(gripper) as server:
         async with RobotiqHand(server.address):
@@ -93,7 +93,7 @@ async def test_a_signal_stops_what_was_moved(number: signal.Signals, code: int) 
         await told_to_go(gripper)
         terminal.kill(number)
         await terminal.shows(b"The fingers were stopped")
-        assert await terminal.end() == code
+        assert await terminal.end() == 0
         assert b"Traceback" not in terminal.out
         assert not gripper.request_registers[0] & 0x0800
 
@@ -108,7 +108,7 @@ async def test_a_terminal_that_is_closed_stops_what_was_moved() -> None:
         terminal.press("c")
         await told_to_go(gripper)
         terminal.hang_up()
-        await terminal.end()
+        assert await terminal.end() == 0
         assert not gripper.request_registers[0] & 0x0800
 
 
