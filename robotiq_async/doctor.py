@@ -30,6 +30,8 @@ PROBES: Final = 300
 """Reads that round trip and rate are taken from."""
 WATCH_S: Final = 2.0
 """How long another client is looked out for."""
+TRIES: Final = 3
+"""Of the usual unit and registers, before others are tried."""
 UNITS: Final = (2, 9, 1, 0, 255)
 """Unit ids that are tried when the usual one does not answer."""
 SLOW_S: Final = 0.005
@@ -129,14 +131,14 @@ async def _reach(address: Address, report: Report) -> None:
 async def _answer(address: Address, usual: RegisterMap, report: Report) -> Transport:
     """A link that answers: the usual unit id and registers first, then others."""
     first: RobotiqConnectionError | None = None
-    for registers in _candidates(address, usual):
+    for tries, registers in enumerate(_candidates(address, usual), 1):
         link = _link(address, registers)
         try:
             await link.open()
-            await link.read()
+            status = RobotiqStatus.from_registers(await link.read())
         except ConnectFailedError as error:
             await link.close()
-            report(Finding(Level.BAD, "open", error.args[0], _advice_for_opening(address)))
+            report(Finding(Level.BAD, "open", error.args[0], _advice_for_opening(address, str(error))))
             raise _GiveUpError from error
         except RobotiqConnectionError as error:
             await link.close()
@@ -145,7 +147,8 @@ async def _answer(address: Address, usual: RegisterMap, report: Report) -> Trans
         except BaseException:
             await link.close()
             raise
-        _tell_answer(usual, registers, report)
+        _tell_answer(usual, registers, tries, report)
+        _tell_doubts(status, report)
         return link
     assert first is not None
     report(Finding(Level.BAD, "Modbus", str(first), _advice_for_silence(first)))
@@ -153,13 +156,15 @@ async def _answer(address: Address, usual: RegisterMap, report: Report) -> Trans
 
 
 def _candidates(address: Address, usual: RegisterMap) -> list[RegisterMap]:
-    """What to try, the usual first: other units, then the registers of the other kind of link."""
+    """What to try: the usual again and again, for replies get lost; other units; other registers."""
     if address.kind == "sim":
         return [usual]
-    other = TCP_REGISTERS if usual.status == RTU_REGISTERS.status else RTU_REGISTERS
-    maps = [usual, *(replace(usual, device_id=unit) for unit in UNITS)]
-    maps += [replace(other, device_id=unit) for unit in dict.fromkeys((usual.device_id, *UNITS))]
-    return list(dict.fromkeys(maps))
+    others = [replace(usual, device_id=unit) for unit in UNITS]
+    for kind in (RTU_REGISTERS, TCP_REGISTERS):
+        for function in dict.fromkeys((usual.read_function, 3, 4)):
+            moved = replace(usual, request=kind.request, status=kind.status, read_function=function)
+            others += [replace(moved, device_id=unit) for unit in dict.fromkeys((usual.device_id, *UNITS))]
+    return [usual] * TRIES + [each for each in dict.fromkeys(others) if each != usual]
 
 
 def _link(address: Address, registers: RegisterMap) -> Transport:
@@ -168,22 +173,42 @@ def _link(address: Address, registers: RegisterMap) -> Transport:
     return ModbusTransport(address, registers, connect_timeout=REACH_S, response_timeout=ANSWER_S)
 
 
-def _tell_answer(usual: RegisterMap, found: RegisterMap, report: Report) -> None:
-    report(Finding(Level.GOOD, "Modbus", "answers"))
+def _tell_answer(usual: RegisterMap, found: RegisterMap, tries: int, report: Report) -> None:
+    answers = Finding(Level.GOOD, "Modbus", "answers")
+    if found == usual and tries > 1:
+        advice = "Replies get lost or damaged: look at cable and switch, and for another client."
+        answers = Finding(Level.DOUBT, "Modbus", f"answers when asked {tries} times", advice)
+    report(answers)
     unit = Finding(Level.GOOD, "unit id", str(found.device_id))
     if found.device_id != usual.device_id:
-        advice = f"Pass device_id={found.device_id}."
+        advice = f"Pass device_id={found.device_id}, or --device-id {found.device_id}."
         unit = Finding(Level.DOUBT, "unit id", f"{found.device_id}, and not {usual.device_id}", advice)
     report(unit)
     at = f"status at {found.status}, requests at {found.request}, function {found.read_function}"
     where = Finding(Level.GOOD, "registers", at)
-    if found.status != usual.status:
-        advice = f"Pass request_address={found.request}, status_address={found.status}."
+    if found.read_function != usual.read_function:
+        how = f"RobotiqHand asks with function {usual.read_function} on this kind of link"
+        advice = f"{how}, and no option changes that: pass it a Transport of your own."
+        where = Finding(Level.BAD, "registers", f"{at}: unusual on this kind of link", advice)
+    elif found.status != usual.status:
+        advice = (
+            f"Pass request_address={found.request}, status_address={found.status}, or the options so called."
+        )
         where = Finding(Level.DOUBT, "registers", f"{at}: unusual on this kind of link", advice)
     report(where)
 
 
-def _advice_for_opening(address: Address) -> str:
+def _tell_doubts(status: RobotiqStatus, report: Report) -> None:
+    """Whether what answers can be a gripper at all."""
+    if len(set(status.registers)) == 1:
+        found = f"all registers read {status.registers[0]}, which those of a gripper never do"
+        advice = "The gripper behind the fieldbus may be without power, or this is another device."
+        report(Finding(Level.DOUBT, "gripper", found, advice))
+
+
+def _advice_for_opening(address: Address, why: str) -> str:
+    if "pip install" in why:
+        return "Install that, and look again."
     if address.kind == "rtu":
         return "Plugged in (ls /dev/ttyUSB*, dmesg)? May you open it (group dialout)? Does another use it?"
     return "It took a connection before and refuses now: it may serve one client at a time. Stop the other."
@@ -193,7 +218,7 @@ def _advice_for_silence(error: RobotiqConnectionError) -> str:
     if isinstance(error, ResponseTimeoutError):
         return "Connected, but no unit answers: another device, or the gripper's fieldbus is not Modbus."
     if isinstance(error, ProtocolError):
-        return "Something speaks Modbus there, but is not this gripper, or has its registers elsewhere."
+        return "What answers is not this gripper: it has its registers elsewhere, or does not speak Modbus."
     return "It hangs up when asked: it may serve one client at a time, or not speak Modbus."
 
 
@@ -252,9 +277,9 @@ async def _others(link: Transport, report: Report) -> None:
         seen.add(signature_of_status(RobotiqStatus.from_registers(await link.read())))
         await asyncio.sleep(0.01)
     if len(seen) == 1:
-        found = f"none seen to write within {WATCH_S:g} s"
+        found = f"no request changed within {WATCH_S:g} s: none seen to write, unless always the same"
         report(Finding(Level.GOOD, "other clients", found))
     else:
-        found = f"the requests changed {len(seen) - 1} times within {WATCH_S:g} s"
+        found = f"the requests changed within {WATCH_S:g} s, to {len(seen) - 1} others"
         advice = "Another program commands the gripper. Two that do so disturb each other: stop one."
         report(Finding(Level.DOUBT, "other clients", found, advice))

@@ -9,10 +9,11 @@ from typing import Any
 
 import pytest
 
+from robotiq_async import RobotiqHand
 from robotiq_async.address import parse_address
-from robotiq_async.doctor import Finding, Level, examine
+from robotiq_async.doctor import Finding, Level, _advice_for_opening, examine
 from robotiq_async.request import AxisRequest, Request
-from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
+from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, Trouble
 from tests.serial_line import SerialLine
 
 HEALTHY = ["name", "port", "Modbus", "unit id", "registers", "round trip", "rate", "activation", "fault"]
@@ -92,7 +93,7 @@ async def test_another_unit_id() -> None:
     async with answering(lambda request: other_unit(request, 9)) as address:
         found = await findings(address)
     assert found["unit id"].level is Level.DOUBT
-    assert found["unit id"].advice == "Pass device_id=9."
+    assert found["unit id"].advice == "Pass device_id=9, or --device-id 9."
 
 
 def other_unit(request: bytes, unit: int) -> bytes:
@@ -101,16 +102,55 @@ def other_unit(request: bytes, unit: int) -> bytes:
     return reply(request, bytes((request[7], 16)) + bytes(16))
 
 
-async def test_registers_of_the_serial_kind_over_tcp() -> None:
+def registers_at(function: int, address: bytes) -> Callable[[bytes], bytes]:
+    """A device that answers one function at one address."""
+
     def answer(request: bytes) -> bytes:
-        if request[7] == 3 and request[8:10] == b"\x07\xd0":
-            return reply(request, bytes((3, 16)) + bytes(16))
+        if request[7] == function and request[8:10] == address:
+            return reply(request, bytes((function, 16)) + bytes(15) + b"\x06")
         return reply(request, bytes((request[7] | 0x80, 2)))
 
-    async with answering(answer) as address:
+    return answer
+
+
+async def test_registers_of_the_serial_kind_over_tcp() -> None:
+    async with answering(registers_at(4, b"\x07\xd0")) as address:
         found = await findings(address)
+        hand = RobotiqHand(f"tcp://{address}", request_address=1000, status_address=2000)
+        await hand.start(activate=False)  # the advice helps
+        await hand.stop(halt=False)
     assert found["registers"].level is Level.DOUBT
-    assert found["registers"].advice == "Pass request_address=1000, status_address=2000."
+    advice = "Pass request_address=1000, status_address=2000, or the options so called."
+    assert found["registers"].advice == advice
+
+
+@pytest.mark.parametrize("where", [b"\x07\xd0", b"\x00\x00"])
+async def test_a_function_that_no_option_helps_with(where: bytes) -> None:
+    async with answering(registers_at(3, where)) as address:
+        found = await findings(address)
+    assert found["registers"].level is Level.BAD
+    assert "a Transport of your own" in found["registers"].advice
+
+
+@pytest.mark.parametrize("words", ["drop", "wrong-function"])
+async def test_one_lost_reply_does_not_make_it_another_unit(words: str) -> None:
+    async with SimulatorServer() as server, server.adversary.making(Trouble(words)):
+        found = await findings(server.address)
+    assert found["unit id"] == Finding(Level.GOOD, "unit id", "2")
+    assert found["Modbus"].found == "answers when asked 2 times"
+
+
+@pytest.mark.parametrize("byte", [b"\0", b"\xff"])
+async def test_a_device_that_is_no_gripper(byte: bytes) -> None:
+    async with answering(lambda request: reply(request, bytes((request[7], 16)) + 16 * byte)) as address:
+        found = await findings(address)
+    assert found["gripper"].level is Level.DOUBT
+
+
+def test_an_extra_that_is_missing_is_no_question_of_cables() -> None:
+    assert _advice_for_opening(parse_address("rtu:///dev/x"), "pip install 'robotiq-async[serial]'") == (
+        "Install that, and look again."
+    )
 
 
 async def test_a_slow_gripper() -> None:

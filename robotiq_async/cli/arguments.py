@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib.util import find_spec
 from ipaddress import ip_address
-from typing import Annotated
+from typing import Annotated, Final
 
 from cyclopts import Parameter, Token
 
@@ -80,6 +81,7 @@ Position = Annotated[int, Parameter(converter=_integer("POSITION", 0, 255))]
 Byte = Annotated[int, Parameter(converter=_integer("the value", 0, 255), metavar="0..255")]
 Port = Annotated[int, Parameter(converter=_integer("the port", 0, 65535), metavar="0..65535")]
 Unit = Annotated[int, Parameter(converter=_integer("the unit id", 1, 247), metavar="1..247")]
+Register = Annotated[int, Parameter(converter=_integer("the register", 0, 65528), metavar="0..65528")]
 Fingers = Annotated[
     Finger,
     Parameter(
@@ -91,3 +93,20 @@ Fingers = Annotated[
         show_default=lambda mask: mask.name,
     ),
 ]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Link:
+    """How a gripper is reached that is not set up as usual; doctor finds out."""
+
+    device_id: Annotated[Unit | None, Parameter(help="Modbus unit id (default: 2 on TCP, 9 serial).")] = None
+    request_address: Annotated[
+        Register | None, Parameter(help="First request register (default: 0 on TCP, 1000 serial).")
+    ] = None
+    status_address: Annotated[
+        Register | None, Parameter(help="First status register (default: 0 on TCP, 2000 serial).")
+    ] = None
+
+
+USUAL: Final = Link()

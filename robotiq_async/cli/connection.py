@@ -6,14 +6,14 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING
 
-from .arguments import usage
+from .arguments import USUAL, Link, usage
 
 if TYPE_CHECKING:
     from .. import RobotiqHand
     from ..actions import Operator
 
 
-def make_hand(address: str) -> RobotiqHand:
+def make_hand(address: str, link: Link = USUAL) -> RobotiqHand:
     """A hand that is not started.
 
     Raises:
@@ -22,22 +22,28 @@ def make_hand(address: str) -> RobotiqHand:
     from .. import RobotiqHand
 
     with usage():
-        return RobotiqHand(address)
+        return RobotiqHand(
+            address,
+            device_id=link.device_id,
+            request_address=link.request_address,
+            status_address=link.status_address,
+        )
 
 
 @asynccontextmanager
-async def connected(address: str, *, halt: bool) -> AsyncIterator[RobotiqHand]:
+async def connected(address: str, link: Link = USUAL, *, halt: bool) -> AsyncIterator[RobotiqHand]:
     """A hand that has been read and not yet written to.
 
     Args:
         address: the gripper.
+        link: how it is reached.
         halt: whether leaving stops the fingers; a command that only looks leaves them alone.
 
     Raises:
         UsageError: a malformed address.
         RobotiqError: no gripper there, or a link that failed.
     """
-    hand = make_hand(address)
+    hand = make_hand(address, link)
     try:
         await hand.start(activate=False)
         yield hand

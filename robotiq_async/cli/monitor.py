@@ -11,7 +11,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .arguments import Address, CommandError, UsageError, need
+from .arguments import USUAL, Address, CommandError, Link, UsageError, need
 
 
 async def monitor(
@@ -20,6 +20,7 @@ async def monitor(
     *,
     watch: Annotated[bool, Parameter(negative=())] = False,
     as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+    link: Link = USUAL,
 ) -> None:
     """Show a gripper while it works, and move it by keys. Nothing moves until a key is pressed.
 
@@ -47,10 +48,10 @@ async def monitor(
         raise UsageError("--watch and --json exclude each other")
     try:
         if watch or as_json or not _is_terminal():
-            await _look(address, as_json=not watch)
+            await _look(address, link, as_json=not watch)
             return
         need("textual", "monitor", ", or pass --watch")
-        await _screen(address)
+        await _screen(address, link)
     except asyncio.CancelledError:
         pass  # Being told to stop is how this command ends well.
 
@@ -61,24 +62,24 @@ def _is_terminal() -> bool:
     return all(each is not None and each.isatty() for each in streams) and os.environ.get("TERM") != "dumb"
 
 
-async def _look(address: str, *, as_json: bool) -> None:
+async def _look(address: str, link: Link, *, as_json: bool) -> None:
     from .connection import connected
     from .lines import print_objects, watch
     from .remarks import told
 
-    async with connected(address, halt=False) as hand:
+    async with connected(address, link, halt=False) as hand:
         with told(lambda remark: print("robotiq-async:", remark, file=sys.stderr, flush=True)):
             await (print_objects if as_json else watch)(hand)
 
 
-async def _screen(address: str) -> None:
+async def _screen(address: str, link: Link) -> None:
     from ..actions import Operator
     from .connection import make_hand, operated
     from .remarks import told
     from .screen import Monitor
 
     remarks: deque[str] = deque(maxlen=1000)
-    operator = Operator(make_hand(address))
+    operator = Operator(make_hand(address, link))
     with told(remarks.append):
         async with operated(operator, _say):
             screen = Monitor(operator, remarks)

@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from ..checks import check_timeout
 from ..enums import Finger
-from .arguments import Address, Byte, Fingers, Position, usage
+from .arguments import USUAL, Address, Byte, Fingers, Link, Position, usage
 
 
 async def move(
@@ -20,6 +20,7 @@ async def move(
     speed: Byte | None = None,
     force: Byte | None = None,
     timeout: Annotated[float | None, Parameter(metavar="SECONDS")] = None,
+    link: Link = USUAL,
 ) -> None:
     """Move axes and wait until they have stopped. THE FINGERS MOVE.
 
@@ -45,7 +46,7 @@ async def move(
 
     with usage():
         check_timeout("timeout", timeout)
-    async with connected(address, halt=True) as hand:
+    async with connected(address, link, halt=True) as hand:
         if not hand.is_activated:
             print("Activating: the fingers open and close.", flush=True)
             await hand.activate()

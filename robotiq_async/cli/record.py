@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from .arguments import Address, CommandError, UsageError, need
+from .arguments import USUAL, Address, CommandError, Link, UsageError, need
 from .words import IN_WORDS, clock
 
 if TYPE_CHECKING:
@@ -24,6 +24,7 @@ async def record(
     /,
     *,
     seconds: Annotated[float | None, Parameter(metavar="SECONDS")] = None,
+    link: Link = USUAL,
 ) -> None:
     """Record every poll, command, transition and fault in an MCAP file, until Ctrl-C.
 
@@ -49,7 +50,7 @@ async def record(
     if seconds is not None and not 0 < seconds < 1e9:
         raise UsageError(f"--seconds must be seconds above 0, got {seconds:g}")
     try:
-        async with connected(address, halt=False) as hand:
+        async with connected(address, link, halt=False) as hand:
             recorder = Recorder(hand, file)
             try:
                 async with recorder:

@@ -32,8 +32,8 @@ STEP: Final = 16
 LOG_LINES: Final = 2000
 
 KEYS: Final = """\
-o open  c close  1 wide  2 normal  3 pinch   SPACE halt   + - speed   ] [ force
-a activate  r reset  l release in a fault  v recover                     q quit"""
+o open  c close  1 wide  2 normal  3 pinch  SPACE halt  + - speed  ] [ force
+a activate  r reset  l release  v recover                             q quit"""
 
 
 class Monitor(App[None]):
@@ -41,11 +41,12 @@ class Monitor(App[None]):
 
     ENABLE_COMMAND_PALETTE = False
     CSS = """
-    #state, #link, #keys { height: 2; padding: 0 1; }
-    #axes { height: 5; margin: 1 0; padding: 0 1; }
+    #state, #link, #keys, #axes { padding: 0 1; text-wrap: nowrap; text-overflow: ellipsis; }
+    #state, #link, #keys { height: 2; }
+    #axes { height: 5; margin: 1 0; }
     #log { height: 1fr; border: round $surface-lighten-2; }
     #keys { color: $text-muted; }
-    Question { align: center middle; }
+    Question { align: center middle; background: transparent; }
     #question { width: 60; height: auto; padding: 1 2; border: thick $warning; background: $surface; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -86,6 +87,7 @@ class Monitor(App[None]):
         self._axes = Axes()
         self._figures = Line(id="link")
         self._history = RichLog(id="log", max_lines=LOG_LINES, wrap=True)
+        self._overruns = 0
         self._polls = (asyncio.get_running_loop().time(), operator.hand.statistics.polls)
 
     def compose(self) -> ComposeResult:
@@ -147,7 +149,8 @@ class Monitor(App[None]):
         self._polls = (now, figures.polls)
         rate = (figures.polls - polls) / (now - before) if now > before else 0.0
         operator = self._operator
-        self._figures.show(link_text(figures, rate, operator.speed, operator.force))
+        held_up, self._overruns = figures.overruns > self._overruns, figures.overruns
+        self._figures.show(link_text(figures, rate, held_up, operator.speed, operator.force))
 
     # -- what keys do ----------------------------------------------------------------------------------
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ..enums import AXES
-from .arguments import Address
+from .arguments import USUAL, Address, Link
 
 if TYPE_CHECKING:
     from .. import RobotiqHand
@@ -19,6 +19,7 @@ async def status(
     /,
     *,
     as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+    link: Link = USUAL,
 ) -> None:
     """Read the gripper once and print what it says. Nothing moves and nothing is written.
 
@@ -33,7 +34,7 @@ async def status(
     from .connection import connected
     from .tables import print_status
 
-    async with connected(address, halt=False) as hand:
+    async with connected(address, link, halt=False) as hand:
         if as_json:
             print(json.dumps(as_dict(hand), indent=2))
         else:

@@ -10,7 +10,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .arguments import Address, CommandError, Port, is_loopback, need
+from .arguments import USUAL, Address, CommandError, Link, Port, is_loopback, need
 
 
 async def view(
@@ -21,6 +21,7 @@ async def view(
     host: str = "127.0.0.1",
     read_only: Annotated[bool, Parameter(negative=())] = False,
     layout: Annotated[Path | None, Parameter(metavar="FILE")] = None,
+    link: Link = USUAL,
 ) -> None:
     """Show a gripper in Foxglove or Lichtblick, and let buttons there move it, until Ctrl-C.
 
@@ -58,7 +59,7 @@ async def view(
         what = "see this gripper" if read_only else "see this gripper and COMMAND it"
         _tell(f"anyone who reaches {host} can {what}: there is no password")
     try:
-        operator = Operator(make_hand(address))
+        operator = Operator(make_hand(address, link))
         viewer = Viewer(operator.hand, host=host, port=port, operator=None if read_only else operator)
         # In this order no viewer delays the stop of the fingers.
         with told(_tell):

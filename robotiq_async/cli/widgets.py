@@ -132,14 +132,15 @@ def state_text(address: str, state: State, status: RobotiqStatus, age: float) ->
         status: the last one.
         age: its age in seconds.
     """
-    text = Text(f"{address}  ", "dim")
-    text.append(f" {state.name} ", f"bold {'black on green' if state in _CALM else 'black on yellow'}")
-    if state is State.DISCONNECTED:
-        text.stylize("bold white on red", len(text) - len(state.name) - 2)
-        text.append(f"  no gripper answers: what you see is {age:.1f} s old\n")
+    lost = state is State.DISCONNECTED
+    colours = "white on red" if lost else "black on green" if state in _CALM else "black on yellow"
+    text = Text.assemble((f" {state.name} ", f"bold {colours}"))
+    if lost:
+        text.append(f"  no gripper answers: what you see is {age:.1f} s old")
     else:
         activation = "active" if status.is_activated else "reset" if status.is_reset else "activating"
-        text.append(f"  {activation}, {'moving' if status.is_moving else 'not moving'}\n")
+        text.append(f"  {activation}, {'moving' if status.is_moving else 'not moving'}")
+    text.append(f"  {address}\n", "dim")
     fault = status.fault
     if fault is Fault.NONE:
         text.append("no fault", "dim")
@@ -149,14 +150,14 @@ def state_text(address: str, state: State, status: RobotiqStatus, age: float) ->
     return text
 
 
-def link_text(figures: Statistics, rate: float, speed: int, force: int) -> Text:
-    """How the polling goes, and what the next motion is asked to be like."""
+def link_text(figures: Statistics, rate: float, held_up: bool, speed: int, force: int) -> Text:
+    """How the polling goes, whether it was held up lately, and what the next motion is asked to be like."""
     jitter = 1000 * (figures.period_p99 - figures.period_p50)
-    text = Text(f"{rate:.1f} polls/s  jitter {jitter:.2f} ms  ", "dim")
+    text = Text(f"{rate:.1f} Hz  jitter {jitter:.2f} ms  ", "dim")
     text.append(
         f"round trip {1000 * figures.round_trip_p50:.2f}/{1000 * figures.round_trip_p99:.2f} ms  ", "dim"
     )
-    text.append(f"overruns {figures.overruns}  ", "yellow" if figures.overruns else "dim")
+    text.append(f"overruns {figures.overruns}  ", "yellow" if held_up else "dim")
     text.append(f"reconnects {figures.reconnects}", "yellow" if figures.reconnects else "dim")
     text.append(f"\nspeed {speed:<3}  force {force:<3}", "bold")
     if figures.foreign_commands:
