@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import re
 import sys
+from collections import deque
 from pathlib import Path
 from typing import Final
 
@@ -19,6 +20,7 @@ if __name__ == "__main__":
 
 from robotiq_async import Finger, RobotiqHand, State  # noqa: E402
 from robotiq_async.actions import ACTIONS, Operator  # noqa: E402
+from robotiq_async.cli.remarks import told  # noqa: E402
 from robotiq_async.cli.screen import Monitor  # noqa: E402
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer  # noqa: E402
 
@@ -34,21 +36,13 @@ async def main() -> None:
         hand = RobotiqHand(server.address)
         operator = Operator(hand)
         await hand.start()
-        screen = Monitor(operator)
-        async with screen.run_test(size=(100, 28)):
-            await grasp(screen, operator, gripper)
-            gripper.inject_fault(0x0E)
-            await hand.wait_for_state(State.FAULT)
-            screen.action_act("recover")
-            await asyncio.sleep(0.5)
-            save(screen, "monitor_question")
-            screen.pop_screen()
-            server.refuse()
-            server.cut()
-            await hand.wait_for_state(State.DISCONNECTED)
-            await asyncio.sleep(1.5)
-            save(screen, "monitor_lost")
-            await server.accept()
+        remarks: deque[str] = deque()
+        screen = Monitor(operator, remarks)
+        with told(remarks.append):
+            async with screen.run_test(size=(100, 28)):
+                await grasp(screen, operator, gripper)
+                await fault(screen, operator, gripper)
+                await loss(screen, operator, server)
         await hand.stop()
 
 
@@ -65,6 +59,26 @@ async def grasp(screen: Monitor, operator: Operator, gripper: SimulatedGripper) 
     await asyncio.sleep(3)
     save(screen, "monitor")
     screen.note(f"close: {await closing}", "bold")
+
+
+async def fault(screen: Monitor, operator: Operator, gripper: SimulatedGripper) -> None:
+    """A question is asked."""
+    gripper.inject_fault(0x0E)
+    await operator.hand.wait_for_state(State.FAULT)
+    screen.action_act("recover")
+    await asyncio.sleep(0.5)
+    save(screen, "monitor_question")
+    screen.pop_screen()
+
+
+async def loss(screen: Monitor, operator: Operator, server: SimulatorServer) -> None:
+    """The link is gone, and comes back."""
+    server.refuse()
+    server.cut()
+    await operator.hand.wait_for_state(State.DISCONNECTED)
+    await asyncio.sleep(1.5)
+    save(screen, "monitor_lost")
+    await server.accept()
 
 
 def save(screen: Monitor, name: str) -> None:

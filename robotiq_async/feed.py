@@ -22,6 +22,7 @@ from .log import log
 from .payloads import (
     SCHEMAS,
     Fields,
+    beginning_fields,
     command_fields,
     efforts,
     fault_fields,
@@ -133,6 +134,7 @@ class Feed:
             hand: started before or while it is listened to.
             take: is called with every message, in the event loop.
         """
+        self._hand = hand
         self._take = take
         self._encoder = JointStateEncoder()
         self._before: list[RobotiqStatus] = []
@@ -155,6 +157,7 @@ class Feed:
         loop = asyncio.get_running_loop()
         # Statuses carry the loop's clock; messages are stamped with the world's.
         self._epoch = time.time() - loop.time()
+        self._tell(EVENT, loop.time(), beginning_fields(self._hand.state, loop.time()))
         for source in self._sources:
             source.open()
         self._tasks = [

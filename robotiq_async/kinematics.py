@@ -24,7 +24,7 @@ Points = tuple[tuple[int, float], ...]
 BASE: Final[Points] = ((0, 0.0), (140, 70.0))
 """joint_1. The ROS node has a slope of 70/148 with a jump at 140; a straight line to 70 degrees is meant."""
 MIDDLE: Final[Points] = ((140, 0.0), (240, 90.0))
-"""joint_2."""
+"""joint_2: still until the base stops, then up to its own stop (report and recordings as above)."""
 TIP: Final[Points] = ((0, 0.0), (110, -55.0))
 """joint_3: against the base, for the tip stays parallel, until its stop."""
 PALM: Final[Points] = ((15, 11.0), (240, -11.0))

@@ -49,7 +49,7 @@ SCHEMAS: Final = {
         **{name: _object(position=_INTEGER, speed=_INTEGER, force=_INTEGER) for name in _AXES_NAMES.values()},
     ),
     "event": _object(
-        kind={"type": "string", "enum": ["transition", "fault"]},
+        kind={"type": "string", "enum": ["state", "transition", "fault"]},
         monotonic=_NUMBER,
         source=_STRING,
         target=_STRING,
@@ -121,6 +121,11 @@ def command_fields(sent: SentRequest) -> Fields:
             for name, axis in zip(_AXES_NAMES.values(), request.axes, strict=True)
         },
     }
+
+
+def beginning_fields(state: State, now: float) -> Fields:
+    """The state in which somebody began to listen."""
+    return {"monotonic": _seconds(now), "kind": "state", "target": state.name}
 
 
 def transition_fields(transition: Transition) -> Fields:

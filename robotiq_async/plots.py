@@ -187,7 +187,7 @@ def _labels(
             yield began, words, is_fault
             words, is_fault = "", False
         began = began if words else at
-        name = fields["target"] if fields["kind"] == "transition" else fields["name"]
+        name = fields["name"] if fields["kind"] == "fault" else fields["target"]
         words += (", " if words else "") + ("fault cleared" if name == "NONE" else name)
         is_fault = is_fault or fields["kind"] == "fault"
     if words:

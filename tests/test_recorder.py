@@ -8,6 +8,7 @@ import json
 import os
 import signal
 import sys
+import threading
 from asyncio.subprocess import PIPE
 from collections.abc import AsyncIterator
 from itertools import pairwise
@@ -224,6 +225,83 @@ async def test_an_exception_of_the_block_is_not_hidden(hand: RobotiqHand, file: 
         async with FullDisk(hand, file) as recorder:
             await recorder.failure()
             raise ZeroDivisionError
+
+
+async def test_who_stops_waiting_for_a_failure_does_not_end_it(hand: RobotiqHand, file: Path) -> None:
+    with pytest.raises(RecordingError):  # noqa: PT012
+        async with FullDisk(hand, file) as recorder:
+            with pytest.raises(TimeoutError):
+                await asyncio.wait_for(recorder.failure(), 0.01)
+            await recorder.failure()
+
+
+async def test_a_file_that_is_deleted_meanwhile_is_a_failure(hand: RobotiqHand, file: Path) -> None:
+    with pytest.raises(RecordingError, match="deleted"):  # noqa: PT012
+        async with Recorder(hand, file) as recorder:
+            await asyncio.to_thread(file.unlink)
+            async with asyncio.timeout(20):
+                await recorder.failure()
+
+
+async def test_threads_that_are_all_busy_do_not_hold_it_up(hand: RobotiqHand, file: Path) -> None:
+    release = threading.Event()
+    busy = [asyncio.ensure_future(asyncio.to_thread(release.wait)) for _ in range(64)]
+    async with Recorder(hand, file), asyncio.timeout(20):
+        while os.stat(file).st_size < 5000:  # noqa: ASYNC110  # written from a thread
+            await asyncio.sleep(0.05)
+    assert statuses(file)
+    release.set()
+    await asyncio.gather(*busy)
+
+
+def is_whole_or_not_there(file: Path) -> bool:
+    if not file.exists():
+        return True
+    with file.open("rb") as stream:
+        return make_reader(stream).get_summary() is not None
+
+
+@pytest.mark.parametrize("steps", range(14))
+async def test_cancelled_at_any_moment_the_file_is_whole_or_not_there(
+    hand: RobotiqHand, file: Path, steps: int
+) -> None:
+    entered = asyncio.Event()
+
+    async def use() -> None:
+        async with Recorder(hand, file):
+            entered.set()
+            await asyncio.Event().wait()
+
+    using = asyncio.create_task(use())
+    if steps >= 7:
+        await entered.wait()
+    for _ in range(steps % 7):
+        await asyncio.sleep(0)
+    using.cancel()
+    for _ in range(steps % 5):
+        await asyncio.sleep(0)
+        using.cancel()
+    await asyncio.gather(using, return_exceptions=True)
+    assert is_whole_or_not_there(file)
+
+
+async def test_a_hand_that_is_started_again_is_recorded_again(gripper: SimulatedGripper, file: Path) -> None:
+    async with SimulatorServer(gripper) as server:
+        hand = RobotiqHand(server.address)
+        async with Recorder(hand, file) as recorder:
+            for _ in range(2):
+                async with hand:
+                    await hand.move(100)
+                    await hand.move(0)
+        assert recorder.missed == 0
+    entries = list(read_recording(file))
+    states = [entry.fields["target"] for entry in entries if entry.topic == "/gripper/event"]
+    assert states[0] == "DISCONNECTED", "the state it began in"
+    assert states.count("SHUTDOWN") == 2, "around the hand it sees both stops"
+    last = [entry.fields for entry in entries if entry.topic == "/gripper/command"][-1]
+    assert (last["go"], last["acknowledged"]) == (False, True)
+    sequences = [fields["sequence"] for fields in statuses(file)]
+    assert sequences == list(range(sequences[0], sequences[-1] + 1))
 
 
 async def test_a_killed_recording_loses_less_than_a_second_and_is_made_whole(

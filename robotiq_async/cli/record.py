@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import sys
+from collections.abc import Iterator
 from contextlib import suppress
+from heapq import heappop, heappush
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,6 +18,10 @@ from .words import IN_WORDS, clock
 if TYPE_CHECKING:
     from ..hand import RobotiqHand
     from ..recorder import Recorder
+    from ..recording import Entry
+
+NEARBY = 100
+"""Entries that are put in order."""
 
 
 async def record(
@@ -107,9 +113,7 @@ def replay(
         plot(file)
         return
     shown = ""
-    for entry in read_recording(file):
-        if not entry.is_json:
-            continue
+    for entry in _in_order(entry for entry in read_recording(file) if entry.is_json):
         if entry.topic not in IN_WORDS:
             continue
         line = IN_WORDS[entry.topic](entry.fields)
@@ -118,6 +122,17 @@ def replay(
                 continue
             shown = line
         print(clock(entry.nanoseconds / 1e9), line)
+
+
+def _in_order(entries: Iterator[Entry]) -> Iterator[Entry]:
+    """By time: what different streams told lies in the file some milliseconds out of order."""
+    waiting: list[tuple[int, int, Entry]] = []
+    for number, entry in enumerate(entries):
+        heappush(waiting, (entry.nanoseconds, number, entry))
+        if len(waiting) > NEARBY:
+            yield heappop(waiting)[2]
+    while waiting:
+        yield heappop(waiting)[2]
 
 
 def recover(file: Path, target: Path | None = None, /) -> None:

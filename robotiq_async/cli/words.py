@@ -37,7 +37,9 @@ def command_line(fields: Fields) -> str:
 
 
 def event_line(fields: Fields) -> str:
-    """A transition, or a fault."""
+    """The state at the beginning, a transition, or a fault."""
+    if fields["kind"] == "state":
+        return f"state    {fields['target']}"
     if fields["kind"] == "fault":
         return f"fault    0x{fields['code']:02X} {fields['name']}: {fields['description']}"
     return f"state    {fields['source']} -> {fields['target']} ({fields['trigger']})"

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-import json
+import asyncio
 import signal
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,38 +15,101 @@ from websockets.typing import Subprotocol
 
 from docs import make_layout
 from robotiq_async import RobotiqHand
+from robotiq_async.cli.arguments import is_loopback
+from robotiq_async.services import SERVICES
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.conftest import WITHOUT
+from tests.test_viewer import Client
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Shell
 
 
-async def first_words(url: str) -> list[str]:
-    """The operations of the first frames."""
-    async with connect(url, subprotocols=[Subprotocol("foxglove.sdk.v1")]) as socket:
-        return [str(json.loads(await socket.recv())["op"]) for _ in range(2)]
+@asynccontextmanager
+async def met(url: str, *, services: bool) -> AsyncIterator[Client]:
+    async with connect(url, subprotocols=[Subprotocol("foxglove.sdk.v1")], max_queue=None) as socket:
+        client = Client(socket)
+        await client.meet(services=services)
+        yield client
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 async def test_it_prints_where_to_look_and_leaves_the_fingers_alone(
-    shell: Shell, number: signal.Signals
+    shell: Shell, server: SimulatorServer, gripper: SimulatedGripper, number: signal.Signals
 ) -> None:
-    gripper = SimulatedGripper(speedup=20)
-    async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
+    async with RobotiqHand(server.address) as hand:
         await hand.move(50)
         before = gripper.request_registers
         process = await shell.start("view", "--port", "0", server.address)
         url = await shell.read_line(process)
         assert url.startswith("ws://127.0.0.1:")
-        assert await first_words(url) == ["serverInfo", "advertise"]
+        async with met(url, services=True) as client:
+            assert set(client.services) == set(SERVICES)
         process.send_signal(number)
         outcome = await shell.finish(process)
         assert (outcome.code, outcome.out) == (0, "")
-        assert (
-            outcome.err == "robotiq-async: The fingers were left as they are: nothing here has moved them.\n"
-        )
+        assert "The fingers were left as they are: nothing here has moved them." in outcome.err
         assert gripper.request_registers == before
+
+
+async def test_what_a_viewer_moved_is_stopped_although_another_says_nothing(shell: Shell) -> None:
+    gripper = SimulatedGripper(speedup=4)
+    async with SimulatorServer(gripper) as server:
+        async with RobotiqHand(server.address):
+            pass
+        process = await shell.start("view", "--port", "0", server.address)
+        url = await shell.read_line(process)
+        _, silent = await asyncio.open_connection("127.0.0.1", int(url.rpartition(":")[2]))
+        async with met(url, services=True) as client:
+            await client.ask(1, "close", {})
+            async with asyncio.timeout(20):
+                while not gripper.is_moving:  # noqa: ASYNC110  # another process tells it
+                    await asyncio.sleep(0.01)
+            process.send_signal(signal.SIGTERM)
+            outcome = await shell.finish(process)
+        silent.close()
+        assert outcome.code == 0
+        assert "The fingers were stopped" in outcome.err
+        assert not gripper.request_registers[0] & 0x0800
+
+
+async def test_read_only_offers_no_commands(shell: Shell, server: SimulatorServer) -> None:
+    process = await shell.start("view", "--read-only", "--port", "0", server.address)
+    url = await shell.read_line(process)
+    async with met(url, services=False) as client:
+        await client.subscribe("/gripper/status")
+        while len(client.received) < 20:
+            await client.read()
+        assert client.services == {}
+        assert client.told[0]["capabilities"] == []
+
+
+async def test_a_lost_gripper_is_told_at_once(shell: Shell, server: SimulatorServer) -> None:
+    process = await shell.start("view", "--port", "0", server.address)
+    await shell.read_line(process)
+    server.cut()
+    assert process.stderr is not None
+    async with asyncio.timeout(20):
+        while b"link lost" not in (line := await process.stderr.readline()):
+            assert line
+
+
+@pytest.mark.parametrize(
+    ("host", "inside"),
+    [
+        ("127.0.0.1", True),
+        ("127.1.2.3", True),
+        ("::1", True),
+        ("localhost", True),
+        ("LOCALHOST", True),
+        ("127.evil.example", False),
+        ("localhost.example.com", False),
+        ("::1234", False),
+        ("0.0.0.0", False),
+    ],
+)
+def test_who_is_outside(host: str, inside: bool) -> None:
+    assert is_loopback(host) is inside
 
 
 async def test_another_interface_is_warned_about(shell: Shell) -> None:
