@@ -162,7 +162,7 @@ def plot_recording(path: Path, entries: Iterable[tuple[str, int, dict[str, Any]]
             currents.plot(seconds, drawn[name]["current_ma"], **line)
         positions.set_ylabel("position, counts\n(dotted: requested)")
         positions.set_ylim(-5, 260)
-        positions.legend(loc="center right", fontsize=8)
+        positions.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
         currents.set_ylabel("current, mA")
         currents.set_ylim(bottom=0)
         currents.set_xlabel("time, s")
@@ -170,6 +170,7 @@ def plot_recording(path: Path, entries: Iterable[tuple[str, int, dict[str, Any]]
             for each in axes:
                 each.axvline(when, color="crimson" if is_fault else "0.7", lw=0.8, zorder=0)
             style: Any = {"color": "crimson" if is_fault else "0.4", "fontsize": 7, "rotation": 90}
+            style["bbox"] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5}
             positions.annotate(words, (when, 258), va="top", ha="right", **style)
     return files
 

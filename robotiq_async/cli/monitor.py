@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import os
 import sys
-from collections import deque
 from contextlib import suppress
 from typing import Annotated
 
@@ -78,11 +77,10 @@ async def _screen(address: str, link: Link) -> None:
     from .remarks import told
     from .screen import Monitor
 
-    remarks: deque[str] = deque(maxlen=1000)
     operator = Operator(make_hand(address, link))
-    with told(remarks.append):
-        async with operated(operator, _say):
-            screen = Monitor(operator, remarks)
+    async with operated(operator, _say):
+        screen = Monitor(operator)
+        with told(screen.remark):
             await screen.run_async()
     if screen.return_code and not _is_cancelled():
         raise CommandError("the screen failed; what it says is above")

@@ -67,17 +67,12 @@ class Monitor(App[None]):
         ("q,ctrl+c", "quit", "quit"),
     ]
 
-    def __init__(self, operator: Operator, remarks: deque[str] | None = None) -> None:
-        """Prepare a screen.
-
-        Args:
-            operator: at a hand that has been started.
-            remarks: what is put in here is moved into the log.
-        """
+    def __init__(self, operator: Operator) -> None:
+        """Prepare a screen for somebody at a hand that has been started."""
         super().__init__()
         self._operator = operator
         self._hand = operator.hand
-        self._remarks = deque() if remarks is None else remarks
+        self._remarks: deque[tuple[float, str]] = deque(maxlen=LOG_LINES)
         self._statuses = operator.hand.statuses(BUFFER)
         self._transitions = operator.hand.transitions()
         self._newest = operator.hand.status
@@ -117,12 +112,19 @@ class Monitor(App[None]):
             now += when - asyncio.get_running_loop().time()
         self._history.write(Text(f"{clock(now)} {words}", style), expand=True)
 
+    def remark(self, words: str) -> None:
+        """A line for the log from elsewhere, at any time."""
+        self._remarks.append((asyncio.get_running_loop().time(), words))
+
     def _paint(self) -> None:
         """Show what has come since the last time; of the statuses, the newest."""
-        while self._remarks:
-            self.note(self._remarks.popleft(), "yellow")
-        for transition in self._transitions.drain():
-            self.note(event_line(transition_fields(transition)), when=transition.timestamp)
+        remarks = [(when, words, "yellow") for when, words in self._remarks]
+        self._remarks.clear()
+        changes = [
+            (each.timestamp, event_line(transition_fields(each)), "") for each in self._transitions.drain()
+        ]
+        for when, words, style in sorted(remarks + changes):
+            self.note(words, style, when)
         self._look(self._statuses.drain())
         self._paint_state()
 

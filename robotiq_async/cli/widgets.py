@@ -145,7 +145,7 @@ def state_text(address: str, state: State, status: RobotiqStatus, age: float) ->
     if fault is Fault.NONE:
         text.append("no fault", "dim")
     else:
-        severe = "bold red" if fault.severity is Severity.MAJOR else "yellow"
+        severe = "dim" if lost else "bold red" if fault.severity is Severity.MAJOR else "yellow"
         text.append(f"{fault.severity.value} fault 0x{int(fault):02X}: {fault.description}", severe)
     return text
 

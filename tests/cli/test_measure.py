@@ -33,7 +33,7 @@ def files_in(folder: Path) -> list[str]:
 
 async def test_speed_writes_table_and_pictures(shell: Shell, tmp_path: Path) -> None:
     table = tmp_path / "mine.csv"
-    options = ("--output", str(table), "--step", "128", "--runs", "1", "--speedup", "30")
+    options = ("--output", str(table), "--step", "128", "--runs", "1", "--speedup", "10")
     outcome = await shell.run("measure", "speed", *options)
     outcome.assert_succeeded()
     written = [tmp_path / name for name in ("mine.csv", "mine.png", "mine.svg")]
@@ -56,7 +56,7 @@ async def test_force_writes_readings_currents_and_pictures(shell: Shell, tmp_pat
         table = tmp_path / f"force_{surface}_grams.csv"
         outcome = await shell.run(
             *("measure", "force", "--surface", surface, "--output", str(table)),
-            *("--step", "125", "--runs", "2", "--speed", "255", "--speedup", "30"),
+            *("--step", "125", "--runs", "2", "--speed", "255", "--speedup", "10"),
         )
         outcome.assert_succeeded()
         readings = read_table(table, FORCE)
@@ -218,7 +218,7 @@ def gave_up(outcome: Outcome, *words: str) -> None:
 
 async def test_what_was_measured_on_another_gripper_is_not_gone_on_with(shell: Shell, tmp_path: Path) -> None:
     table = str(tmp_path / "t.csv")
-    first = await shell.run("measure", "speed", "--output", table, "--step", "255", "--speedup", "30", *QUICK)
+    first = await shell.run("measure", "speed", "--output", table, "--step", "255", "--speedup", "10", *QUICK)
     first.assert_succeeded()
     for options in (("10.255.255.1",), ("--fingers", "A")):
         outcome = await shell.run("measure", "speed", *options, "--output", table, "--step", "255", *QUICK)
@@ -227,7 +227,7 @@ async def test_what_was_measured_on_another_gripper_is_not_gone_on_with(shell: S
 
 async def test_another_surface_is_another_table(shell: Shell, tmp_path: Path) -> None:
     table = str(tmp_path / "t.csv")
-    options = ("--output", table, "--step", "250", "--speed", "255", "--speedup", "30", *QUICK)
+    options = ("--output", table, "--step", "250", "--speed", "255", "--speedup", "10", *QUICK)
     (await shell.run("measure", "force", *options)).assert_succeeded()
     outcome = await shell.run("measure", "force", "--surface", "rigid", *options)
     outcome.assert_failed(1, "was measured otherwise: surface foam there and rigid here")
@@ -236,7 +236,7 @@ async def test_another_surface_is_another_table(shell: Shell, tmp_path: Path) ->
 @pytest.mark.parametrize("damage", ["gone", "empty", "short"])
 async def test_readings_without_their_currents_are_refused(shell: Shell, tmp_path: Path, damage: str) -> None:
     table, currents = tmp_path / "t.csv", tmp_path / "t_currents.csv"
-    options = ("--output", str(table), "--step", "250", "--speed", "255", "--speedup", "30", "--no-plot")
+    options = ("--output", str(table), "--step", "250", "--speed", "255", "--speedup", "10", "--no-plot")
     (await shell.run("measure", "force", *options, "--runs", "2")).assert_succeeded()
     damaged(currents, damage)
     outcome = await shell.run("measure", "force", *options, "--runs", "2")
@@ -257,7 +257,7 @@ async def test_a_picture_that_cannot_be_written_is_one_line(shell: Shell, tmp_pa
     table = tmp_path / "t.csv"
     (tmp_path / "t.png").mkdir()
     outcome = await shell.run(
-        "measure", "speed", "--output", str(table), "--step", "255", "--runs", "1", "--speedup", "30"
+        "measure", "speed", "--output", str(table), "--step", "255", "--runs", "1", "--speedup", "10"
     )
     gave_up(outcome, "t.png")
     assert len(read_table(table, SPEED)) == 2

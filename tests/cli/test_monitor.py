@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections import deque
 from collections.abc import AsyncIterator, Callable, Mapping
 from typing import TYPE_CHECKING
 
@@ -42,8 +41,8 @@ async def active(operator: Operator) -> Operator:
 
 
 @contextlib.asynccontextmanager
-async def shown(operator: Operator, remarks: deque[str] | None = None) -> AsyncIterator[Screen]:
-    async with Monitor(operator, remarks).run_test(size=(100, 30)) as pilot:
+async def shown(operator: Operator) -> AsyncIterator[Screen]:
+    async with Monitor(operator).run_test(size=(100, 30)) as pilot:
         yield pilot
 
 
@@ -124,9 +123,9 @@ async def test_a_lost_gripper_is_a_state_and_comes_back(active: Operator, server
 
 
 async def test_what_the_library_remarks_comes_into_the_log(operator: Operator) -> None:
-    remarks: deque[str] = deque()
-    async with shown(operator, remarks) as pilot:
-        remarks.append("polling is late")
+    async with shown(operator) as pilot:
+        assert isinstance(pilot.app, Monitor)
+        pilot.app.remark("polling is late")
         await until(pilot, lambda: "polling is late" in log(pilot))
 
 

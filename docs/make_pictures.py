@@ -1,8 +1,8 @@
-"""Makes the pictures of the monitor, from a simulated gripper that grasps something. Takes half a minute.
+"""Makes the pictures of the monitor and of a recording, from a simulated gripper. Takes half a minute.
 
-    python docs/make_screens.py
+    python docs/make_pictures.py
 
-They are made by hand when the screen has changed, and looked at: they hold times and figures of that day.
+They are made by hand when what they show has changed, and looked at: they hold times and figures of that day.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from __future__ import annotations
 import asyncio
 import re
 import sys
-from collections import deque
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Final
 
 ROOT: Final = Path(__file__).parents[1]
@@ -22,6 +22,9 @@ from robotiq_async import Finger, RobotiqHand, State  # noqa: E402
 from robotiq_async.actions import ACTIONS, Operator  # noqa: E402
 from robotiq_async.cli.remarks import told  # noqa: E402
 from robotiq_async.cli.screen import Monitor  # noqa: E402
+from robotiq_async.plots import plot_recording  # noqa: E402
+from robotiq_async.recorder import Recorder  # noqa: E402
+from robotiq_async.recording import read_recording  # noqa: E402
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer  # noqa: E402
 
 FOLDER: Final = ROOT / "docs" / "measured"
@@ -31,19 +34,47 @@ FONT: Final = re.compile(r"@font-face \{.*?\}", re.DOTALL)
 
 async def main() -> None:
     """All of them."""
+    await recording()
     gripper = SimulatedGripper()
     async with SimulatorServer(gripper, port=5020) as server:
         hand = RobotiqHand(server.address)
         operator = Operator(hand)
         await hand.start()
-        remarks: deque[str] = deque()
-        screen = Monitor(operator, remarks)
-        with told(remarks.append):
+        screen = Monitor(operator)
+        with told(screen.remark):
             async with screen.run_test(size=(100, 28)):
                 await grasp(screen, operator, gripper)
                 await fault(screen, operator, gripper)
                 await loss(screen, operator, server)
         await hand.stop()
+
+
+async def recording() -> None:
+    """A grasp of something soft, and a fault in the middle of the opening."""
+    gripper = SimulatedGripper()
+    gripper.place_object(Finger.A, 120, soft=20)
+    gripper.place_object(Finger.B, 150, soft=20)
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "grasp.mcap"
+        async with (
+            SimulatorServer(gripper) as server,
+            RobotiqHand(server.address) as hand,
+            Recorder(hand, file),
+        ):
+            await hand.close(speed=200, force=200)
+            opening = asyncio.ensure_future(hand.open(speed=100))
+            await asyncio.sleep(1)
+            gripper.inject_fault(0x09)
+            await asyncio.sleep(0.5)
+            gripper.clear_faults()
+            await asyncio.gather(opening, return_exceptions=True)
+            await hand.wait_for_state(State.RUNNING_IDLE)
+            await hand.open()
+        entries = (
+            (each.topic, each.nanoseconds, each.fields) for each in read_recording(file) if each.is_json
+        )
+        plot_recording(FOLDER / "grasp", entries)
+    (FOLDER / "grasp.png").unlink()
 
 
 async def grasp(screen: Monitor, operator: Operator, gripper: SimulatedGripper) -> None:
