@@ -89,7 +89,7 @@ async def grasp(screen: Monitor, operator: Operator, gripper: SimulatedGripper) 
     closing = asyncio.ensure_future(operator.act(ACTIONS["close"]))
     await asyncio.sleep(3)
     save(screen, "monitor")
-    screen.note(f"close: {await closing}", "bold")
+    screen.remark(f"close: {await closing}", "bold")
 
 
 async def fault(screen: Monitor, operator: Operator, gripper: SimulatedGripper) -> None:

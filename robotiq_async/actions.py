@@ -9,7 +9,19 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from .enums import AXES, FORCE_MAX, SPEED_MAX, WIDTH_NORMAL, WIDTH_PINCH, WIDTH_WIDE, Finger, State
+from .enums import (
+    AXES,
+    FORCE_MAX,
+    SPEED_MAX,
+    WIDTH_NORMAL,
+    WIDTH_PINCH,
+    WIDTH_WIDE,
+    Fault,
+    Finger,
+    Initialization,
+    State,
+)
+from .errors import InvalidStateError, MoveSupersededError, NotStartedError
 from .hand import RobotiqHand
 from .motion import MoveResult
 from .streams import SentRequest
@@ -17,6 +29,8 @@ from .streams import SentRequest
 SPEED: Final = 128
 FORCE: Final = 64
 """What the axes get until a person asks otherwise: those of :class:`RobotiqHand`."""
+ENDING: Final = frozenset({"halt", "reset", "release"})
+"""Whoever asks for one of these wants no recovery to go on by itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,21 +61,24 @@ class Operator:
         force: what the axes get, 0..255.
     """
 
-    def __init__(self, hand: RobotiqHand) -> None:
+    def __init__(self, hand: RobotiqHand, *, speed: int = SPEED, force: int = FORCE) -> None:
         """Listen to what is written; asks for nothing.
 
         Args:
             hand: started before or after.
+            speed: what the hand was made with.
+            force: what the hand was made with.
         """
         self.hand = hand
-        self.speed = SPEED
-        self.force = FORCE
+        self.speed = speed
+        self.force = force
         self._requests = hand.requests(1)
         self._last: SentRequest | None = None
         self._asking = 0
         """Motions asked for that have not ended."""
         self._moved = False
         self._changing = asyncio.Lock()
+        self._recoveries: set[asyncio.Future[str]] = set()
 
     @property
     def has_moved(self) -> bool:
@@ -77,10 +94,26 @@ class Operator:
         Raises:
             RobotiqError: it could not be carried out.
         """
+        if action.name in ENDING:
+            for recovery in self._recoveries:
+                recovery.cancel()
         if not action.moves:
             return await action.run(self.hand)
         with self._counted():
-            return await action.run(self.hand)
+            return await (self._recover(action) if action.name == "recover" else action.run(self.hand))
+
+    async def _recover(self, action: Action) -> str:
+        """It waits for faults and goes on by itself: nobody who has halted since may be surprised by that."""
+        work = asyncio.ensure_future(action.run(self.hand))
+        self._recoveries.add(work)
+        try:
+            await asyncio.wait({work})
+        finally:
+            work.cancel()
+            self._recoveries.discard(work)
+        if work.cancelled():
+            raise MoveSupersededError("something else was asked for meanwhile")
+        return work.result()
 
     async def move(
         self, position: int, fingers: Finger, *, speed: int | None = None, force: int | None = None
@@ -98,11 +131,12 @@ class Operator:
 
         Ends as :meth:`RobotiqHand.stop` does.
         """
-        has_moved, rests = self.has_moved, self.hand.state is State.RESET
+        has_moved, rests = self.has_moved, self.hand.state in (State.RESET, State.ATR_DONE)
+        began = asyncio.get_running_loop().time()
         await self.hand.stop(halt=has_moved)
         if not has_moved:
             return "The fingers were left as they are: nothing here has moved them."
-        if rests or self._was_stopped():
+        if rests or self._stands_still(began):
             return "The fingers were stopped: they had been moved from here."
         return "The fingers had been moved from here and may STILL MOVE: the gripper was not seen to stop."
 
@@ -164,12 +198,14 @@ class Operator:
             self._last = sent
             self._moved |= self._asking > 0
 
-    def _was_stopped(self) -> bool:
-        """Whether the last request stops the fingers, and the gripper has acknowledged it."""
-        self._listen()
-        last = self._last
-        # An automatic release is not stopped by anything but a reset.
-        return last is not None and last.acknowledged and not (last.request.go or last.request.release)
+    def _stands_still(self, since: float) -> bool:
+        """Whether the gripper has shown since then that nothing moves it: no go, activation or release."""
+        try:
+            status = self.hand.status
+        except NotStartedError:
+            return False
+        busy = status.go_echo or status.initialization is Initialization.ACTIVATING
+        return status.timestamp >= since and not busy and status.fault is not Fault.AUTOMATIC_RELEASE
 
 
 def in_words(result: MoveResult) -> str:
@@ -198,7 +234,11 @@ def _width(position: int) -> Callable[[RobotiqHand], Awaitable[str]]:
 
 
 async def _halt(hand: RobotiqHand) -> str:
-    await hand.halt()
+    try:
+        await hand.halt()
+    except InvalidStateError as error:
+        what = "a halt does not stop an activation or a release; a reset does"
+        raise InvalidStateError(what, error.state, error.allowed) from error
     return "every axis stands still"
 
 

@@ -12,8 +12,11 @@ from robotiq_async import (
     WIDTH_NORMAL,
     WIDTH_PINCH,
     WIDTH_WIDE,
+    Fault,
     Finger,
     GripperFaultError,
+    InvalidStateError,
+    MoveSupersededError,
     NotActivatedError,
     NotStartedError,
     RobotiqHand,
@@ -230,3 +233,51 @@ async def test_steps_of_the_speed_add_up(new: Someone) -> None:
     operator, _ = new
     await asyncio.gather(*(operator.change_speed(16) for _ in range(3)))
     assert operator.speed == SPEED + 48
+
+
+async def test_a_recovery_does_not_go_on_after_a_halt_or_a_reset(
+    new: Someone, gripper: SimulatedGripper
+) -> None:
+    """It waits for a minor fault to clear; what comes after that would surprise whoever has halted."""
+    operator, _ = new
+    for name in ("halt", "reset"):
+        gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
+        await operator.hand.wait_for_state(State.FAULT)
+        recovering = asyncio.create_task(operator.act(ACTIONS["recover"]))
+        await anext(operator.hand.statuses())
+        await operator.act(ACTIONS[name])
+        with pytest.raises(MoveSupersededError):
+            await recovering
+    for _ in range(20):
+        await anext(operator.hand.statuses())
+    assert operator.hand.state is State.RESET
+
+
+async def test_a_halt_says_what_stops_an_activation(operator: Operator) -> None:
+    activating = asyncio.create_task(operator.act(ACTIONS["activate"]))
+    await operator.hand.wait_for_state(State.WF_ACTIVATION)
+    with pytest.raises(InvalidStateError, match="a reset does"):
+        await operator.act(ACTIONS["halt"])
+    await activating
+
+
+async def test_an_old_halt_is_no_stop(new: Someone, gripper: SimulatedGripper) -> None:
+    """Another client goes on after it, and the link is lost."""
+    operator, server = new
+    await operator.move(50, Finger.A)
+    await operator.act(ACTIONS["halt"])
+    image = list(gripper.request_registers)
+    image[0] |= 0x0800
+    gripper.write(0, image)
+    server.refuse()
+    server.cut()
+    await operator.hand.wait_for_state(State.DISCONNECTED)
+    assert MOVING in await operator.leave()
+
+
+async def test_a_release_that_is_done_is_at_rest(new: Someone, gripper: SimulatedGripper) -> None:
+    operator, _ = new
+    gripper.inject_fault(0x0E)
+    await operator.hand.wait_for_state(State.FAULT)
+    await operator.act(ACTIONS["release"])
+    assert STOPPED in await operator.leave()

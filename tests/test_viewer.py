@@ -152,16 +152,21 @@ async def closed(port: int) -> None:
 
 def listeners(port: int) -> list[str]:
     """The interfaces on which this process listens on a port, as Linux writes them."""
+    return [interface for interface, number in listening() if number == port]
+
+
+def listening() -> set[tuple[str, int]]:
+    """Where this process listens."""
     ours = set()
     for file in Path("/proc/self/fd").iterdir():
         with contextlib.suppress(OSError):
             ours.add(str(file.readlink()))
-    found = []
+    found = set()
     for line in SOCKETS.read_text().splitlines()[1:]:
         columns = line.split()
         interface, _, number = columns[1].partition(":")
-        if columns[3] == "0A" and int(number, 16) == port and f"socket:[{columns[9]}]" in ours:
-            found.append(interface)
+        if columns[3] == "0A" and f"socket:[{columns[9]}]" in ours:
+            found.add((interface, int(number, 16)))
     return found
 
 
@@ -367,12 +372,13 @@ async def test_calls_that_come_while_it_is_left_move_nothing() -> None:
         assert not hand.is_moving
 
 
+@pytest.mark.skipif(not LINUX, reason="asks Linux who listens where")
 @pytest.mark.parametrize("steps", range(12))
 async def test_cancelled_at_any_moment_it_leaves_nothing(operator: Operator, steps: int) -> None:
-    viewer = Viewer(operator.hand, port=0, operator=operator)
+    before = listening()
 
     async def use() -> None:
-        async with viewer:
+        async with Viewer(operator.hand, port=0, operator=operator):
             pass
 
     using = asyncio.create_task(use())
@@ -380,8 +386,18 @@ async def test_cancelled_at_any_moment_it_leaves_nothing(operator: Operator, ste
         await asyncio.sleep(0)
     using.cancel()
     await asyncio.gather(using, return_exceptions=True)
-    if LINUX and viewer.port:
-        await closed(viewer.port)
+    async with asyncio.timeout(5):
+        while listening() != before:  # noqa: ASYNC110
+            await asyncio.sleep(0.01)
+
+
+async def test_what_comes_after_the_end_is_refused(operator: Operator) -> None:
+    viewer = Viewer(operator.hand, port=0, operator=operator)
+    async with viewer:
+        pass
+    with pytest.raises(ViewerError, match="no more calls"):
+        await viewer._serve(SERVICES["/gripper/close"], b"{}")
+    assert not operator.has_moved
 
 
 async def test_a_hand_that_is_started_again_is_shown_again(server: SimulatorServer) -> None:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from ..actions import Operator
 
 
-def make_hand(address: str, link: Link = USUAL) -> RobotiqHand:
+def make_hand(address: str, link: Link = USUAL, *, speed: int = 128, force: int = 64) -> RobotiqHand:
     """A hand that is not started.
 
     Raises:
@@ -27,6 +27,8 @@ def make_hand(address: str, link: Link = USUAL) -> RobotiqHand:
             device_id=link.device_id,
             request_address=link.request_address,
             status_address=link.status_address,
+            speed=speed,
+            force=force,
         )
 
 

@@ -6,15 +6,17 @@ import asyncio
 import os
 import sys
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Final
 
 from ..ending import in_a_thread
-from ..enums import Fault
+from ..enums import Fault, State
 from ..feed import compact
 from ..payloads import Fields, fault_fields, status_fields, transition_fields
 from ..status import RobotiqStatus
 from ..streams import Transition
+from .remarks import told
 from .words import clock, event_line, status_line
 
 if TYPE_CHECKING:
@@ -24,15 +26,16 @@ BUFFER: Final = 4000
 """Statuses kept for a reader that is slow: twenty seconds."""
 JSON_BEAT_S: Final = 0.02
 WATCH_BEAT_S: Final = 0.1
+EVENTS: Final = ("transition", "fault", "remark")
 
 Form = Callable[[list[Fields]], list[str]]
 
 
 async def print_objects(hand: RobotiqHand, buffer: int = BUFFER) -> None:
-    """Every status, transition and fault as a JSON object a line, for ever; ``kind`` tells which.
+    """Every status, transition and fault as a JSON object a line, until the hand ends; ``kind`` tells which.
 
     ``time`` is in seconds since 1970. A reader that is slow loses the oldest statuses; an object of the kind
-    ``missed`` tells how many.
+    ``missed`` tells how many. What the library has to say is of the kind ``remark``.
     """
     await _print(_Story(hand, buffer), lambda told: [compact(each).decode() for each in told], JSON_BEAT_S)
 
@@ -44,12 +47,15 @@ async def watch(hand: RobotiqHand) -> None:
 
 
 async def _print(story: _Story, form: Form, beat: float) -> None:
-    while True:
-        if lines := form(list(story.go_on())):
-            data = "".join(f"{line}\n" for line in lines).encode()
-            # Whoever reads may be slow: a full pipe must not hold up the loop that polls, nor the end.
-            await in_a_thread(lambda: _write(data))  # noqa: B023  # awaited before it changes
-        await asyncio.sleep(beat)
+    with told(story.remark):
+        ended = False
+        while not ended:
+            ended = story.has_ended  # and once more for what has come with the end
+            if lines := form(list(story.go_on())):
+                data = "".join(f"{line}\n" for line in lines).encode()
+                # Whoever reads may be slow: a full pipe must not hold up the loop that polls, nor the end.
+                await in_a_thread(lambda: _write(data))  # noqa: B023  # awaited before it changes
+            await asyncio.sleep(beat)
 
 
 def _write(data: bytes) -> None:
@@ -63,6 +69,8 @@ class _Story:
     """What happens to a hand, in the order in which it happened."""
 
     def __init__(self, hand: RobotiqHand, buffer: int) -> None:
+        self._hand = hand
+        self._remarks: deque[tuple[float, str]] = deque(maxlen=BUFFER)
         self._statuses = hand.statuses(buffer)
         self._transitions = hand.transitions()
         self._state = hand.state
@@ -71,8 +79,20 @@ class _Story:
         # Happenings carry the loop's clock; people and files go by the world's.
         self._epoch = time.time() - asyncio.get_running_loop().time()
 
+    @property
+    def has_ended(self) -> bool:
+        """Whether nothing more will come."""
+        return self._hand.state is State.SHUTDOWN
+
+    def remark(self, words: str) -> None:
+        """What the library has to say; at any time."""
+        self._remarks.append((time.time(), words))
+
     def go_on(self) -> Iterator[Fields]:
         """What has happened since the last time."""
+        while self._remarks:
+            at, words = self._remarks.popleft()
+            yield {"kind": "remark", "time": at, "words": words}
         if self._statuses.missed > self._missed:
             yield {"kind": "missed", "time": time.time(), "count": self._statuses.missed - self._missed}
             self._missed = self._statuses.missed
@@ -96,8 +116,7 @@ class _Words:
         self._shown = ""
 
     def __call__(self, told: list[Fields]) -> list[str]:
-        events = [each for each in told if each["kind"] in ("transition", "fault")]
-        lines = [f"{clock(each['time'])} {event_line(each)}" for each in events]
+        lines = [f"{clock(each['time'])} {event_line(each)}" for each in told if each["kind"] in EVENTS]
         newest = next((each for each in reversed(told) if each["kind"] == "status"), None)
         if newest is not None and (line := status_line(newest)) != self._shown:
             self._shown = line

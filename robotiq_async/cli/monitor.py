@@ -6,11 +6,14 @@ import asyncio
 import os
 import sys
 from contextlib import suppress
-from typing import Annotated
+from typing import Annotated, Final
 
 from cyclopts import Parameter
 
-from .arguments import USUAL, Address, CommandError, Link, UsageError, need
+from .arguments import USUAL, Address, Byte, CommandError, Link, UsageError, need
+
+SCREEN_S: Final = 1.0
+"""What the screen may take to leave the terminal as it was."""
 
 
 async def monitor(
@@ -19,6 +22,8 @@ async def monitor(
     *,
     watch: Annotated[bool, Parameter(negative=())] = False,
     as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+    speed: Byte = 128,
+    force: Byte = 64,
     link: Link = USUAL,
 ) -> None:
     """Show a gripper while it works, and move it by keys. Nothing moves until a key is pressed.
@@ -40,6 +45,8 @@ async def monitor(
         robotiq-async monitor --json 192.168.1.11 | jq .A.position
 
     Args:
+        speed: What the axes get with the first command from here: what they have is not known.
+        force: The same. A grip that was made with more is loosened.
         watch: Only look, and print a line for whatever changes, until Ctrl-C.
         as_json: Only look, and print every poll and event as a JSON object a line.
     """
@@ -50,7 +57,7 @@ async def monitor(
             await _look(address, link, as_json=not watch)
             return
         need("textual", "monitor", ", or pass --watch")
-        await _screen(address, link)
+        await _screen(address, link, speed, force)
     except asyncio.CancelledError:
         pass  # Being told to stop is how this command ends well.
 
@@ -64,32 +71,44 @@ def _is_terminal() -> bool:
 async def _look(address: str, link: Link, *, as_json: bool) -> None:
     from .connection import connected
     from .lines import print_objects, watch
-    from .remarks import told
 
     async with connected(address, link, halt=False) as hand:
-        with told(lambda remark: print("robotiq-async:", remark, file=sys.stderr, flush=True)):
-            await (print_objects if as_json else watch)(hand)
+        await (print_objects if as_json else watch)(hand)
+    raise CommandError("the hand has ended; what became of it is above")
 
 
-async def _screen(address: str, link: Link) -> None:
+async def _screen(address: str, link: Link, speed: int, force: int) -> None:
     from ..actions import Operator
-    from .connection import make_hand, operated
+    from .connection import make_hand
     from .remarks import told
     from .screen import Monitor
 
-    operator = Operator(make_hand(address, link))
-    async with operated(operator, _say):
+    operator = Operator(make_hand(address, link, speed=speed, force=force), speed=speed, force=force)
+    await operator.hand.start(activate=False)
+    screen, words = None, ""
+    try:
         screen = Monitor(operator)
+        _forget_keys()
+        showing = asyncio.ensure_future(screen.run_async())
         with told(screen.remark):
-            await screen.run_async()
-    if screen.return_code and not _is_cancelled():
+            await asyncio.wait({showing})
+    finally:
+        # First the fingers: a screen whose terminal is gone may take its time, or not come back at all.
+        words = await operator.leave()
+        if screen is not None:
+            showing.cancel()
+            await asyncio.wait({showing}, timeout=SCREEN_S)
+        _say(words)
+    if screen.return_code:
         raise CommandError("the screen failed; what it says is above")
 
 
-def _is_cancelled() -> bool:
-    """Whether a signal has come; a screen whose terminal is gone may fail then."""
-    task = asyncio.current_task()
-    return task is not None and task.cancelling() > 0
+def _forget_keys() -> None:
+    """What was typed before there was a screen to look at is no command."""
+    with suppress(ImportError, OSError):  # Windows; no terminal
+        import termios
+
+        termios.tcflush(sys.stdin, termios.TCIFLUSH)
 
 
 def _say(words: str) -> None:

@@ -15,7 +15,10 @@ class _Teller(logging.Handler):
         self._tell = tell
 
     def emit(self, record: logging.LogRecord) -> None:
-        self._tell(record.getMessage())
+        try:
+            self._tell(record.getMessage())
+        except Exception:  # noqa: BLE001  # whoever listens must not hurt who speaks: the hand's own task
+            self.handleError(record)
 
 
 @contextmanager

@@ -52,6 +52,9 @@ def _outcome(arguments: Sequence[str], signals: _Signals) -> tuple[int, str | No
         # Whoever read the output has had enough (status | head); the flush at exit must not fail over it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILURE, None
+    except OSError as error:
+        # The environment's doing: a full disk behind standard output, say.
+        return FAILURE, str(error)
     except KeyboardInterrupt:
         return SIGNALLED + (signals.received or signal.SIGINT), "interrupted"
     return SUCCESS, None
@@ -60,7 +63,8 @@ def _outcome(arguments: Sequence[str], signals: _Signals) -> tuple[int, str | No
 class _Signals:
     """SIGINT, SIGTERM and SIGHUP (a terminal that is closed): the first one ends what runs.
 
-    A second one has its ordinary effect.
+    A second SIGINT has its ordinary effect; of the others no second one is heard, for closing a terminal
+    sends several, and none of them may keep the first from stopping the fingers.
 
     In the event loop that is a cancellation, so that leaving ``async with`` stops the fingers; elsewhere
     it is a KeyboardInterrupt. While the loop is set up the signal is only noted: asyncio could not tell
@@ -113,7 +117,8 @@ class _Signals:
             await work
 
     def _handle(self, number: int, _frame: FrameType | None) -> None:
-        self.__exit__()
+        for each, before in self._previous.items():
+            signal.signal(each, before if each == signal.SIGINT else _unheard)
         self.received = number
         self._end()
 
@@ -140,6 +145,10 @@ def _awake(loop: asyncio.AbstractEventLoop) -> Iterator[None]:
         finally:
             signal.set_wakeup_fd(before)
             loop.remove_reader(reading)
+
+
+def _unheard(_number: int, _frame: FrameType | None) -> None:
+    """The end has begun already."""
 
 
 def _interrupt() -> None:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 import time
 from collections import deque
-from collections.abc import Coroutine, Iterable
+from collections.abc import Awaitable, Callable, Iterable
+from functools import partial
 from typing import ClassVar, Final
 
 from rich.text import Text
 from textual.app import App, ComposeResult
 from textual.binding import BindingType
 from textual.widgets import RichLog, Static
+from textual.worker import Worker
 
 from ..actions import ACTIONS, Operator
 from ..enums import AXES, Fault, State
@@ -20,6 +23,13 @@ from ..payloads import fault_fields, transition_fields
 from ..status import RobotiqStatus
 from .widgets import Axes, Line, Question, link_text, state_text
 from .words import clock, event_line
+
+if sys.platform == "win32":
+    DRIVER, UNHURRIED = None, ()
+else:
+    from .unhurried import UnhurriedDriver
+
+    DRIVER, UNHURRIED = UnhurriedDriver, UnhurriedDriver
 
 FRAMES: Final = 12
 """Paints a second."""
@@ -40,6 +50,7 @@ class Monitor(App[None]):
     """The screen."""
 
     ENABLE_COMMAND_PALETTE = False
+    ALLOW_SELECT = False  # Ctrl-C would copy what is selected, and not quit.
     CSS = """
     #state, #link, #keys, #axes { padding: 0 1; text-wrap: nowrap; text-overflow: ellipsis; }
     #state, #link, #keys { height: 2; }
@@ -47,7 +58,8 @@ class Monitor(App[None]):
     #log { height: 1fr; border: round $surface-lighten-2; }
     #keys { color: $text-muted; }
     Question { align: center middle; background: transparent; }
-    #question { width: 60; height: auto; padding: 1 2; border: thick $warning; background: $surface; }
+    #question { width: 60; max-width: 100%; height: auto; padding: 1 2; background: $surface; }
+    #question { border: thick $warning; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         ("o", "act('open')", "open"),
@@ -69,10 +81,11 @@ class Monitor(App[None]):
 
     def __init__(self, operator: Operator) -> None:
         """Prepare a screen for somebody at a hand that has been started."""
-        super().__init__()
+        super().__init__(driver_class=DRIVER)
         self._operator = operator
         self._hand = operator.hand
-        self._remarks: deque[tuple[float, str]] = deque(maxlen=LOG_LINES)
+        self._lines: deque[tuple[float, str, str]] = deque(maxlen=LOG_LINES)
+        """For the log, at the next paint: when, what, how."""
         self._statuses = operator.hand.statuses(BUFFER)
         self._transitions = operator.hand.transitions()
         self._newest = operator.hand.status
@@ -96,7 +109,7 @@ class Monitor(App[None]):
 
     def on_mount(self) -> None:
         """Begin to paint."""
-        self.note("Watching. Nothing has been written to the gripper.")
+        self.remark("Watching. Nothing has been written to the gripper.", "")
         self._look([self._newest])
         self._paint_state()
         self._paint_figures()
@@ -105,27 +118,25 @@ class Monitor(App[None]):
 
     # -- what is shown ---------------------------------------------------------------------------------
 
-    def note(self, words: str, style: str = "", when: float | None = None) -> None:
-        """A line for the log; ``when`` by the loop's clock."""
-        now = time.time()
-        if when is not None:
-            now += when - asyncio.get_running_loop().time()
-        self._history.write(Text(f"{clock(now)} {words}", style), expand=True)
-
-    def remark(self, words: str) -> None:
-        """A line for the log from elsewhere, at any time."""
-        self._remarks.append((asyncio.get_running_loop().time(), words))
+    def remark(self, words: str, style: str = "yellow", when: float | None = None) -> None:
+        """A line for the log, at any time; ``when`` by the loop's clock."""
+        self._lines.append((asyncio.get_running_loop().time() if when is None else when, words, style))
 
     def _paint(self) -> None:
         """Show what has come since the last time; of the statuses, the newest."""
-        remarks = [(when, words, "yellow") for when, words in self._remarks]
-        self._remarks.clear()
-        changes = [
-            (each.timestamp, event_line(transition_fields(each)), "") for each in self._transitions.drain()
-        ]
-        for when, words, style in sorted(remarks + changes):
-            self.note(words, style, when)
+        driver = self._driver
+        if isinstance(driver, UNHURRIED) and driver.is_behind:
+            if not driver.has_caught_up:
+                return  # nobody sees it
+            driver.is_behind = False
+            self.refresh(layout=True)
         self._look(self._statuses.drain())
+        for each in self._transitions.drain():
+            self.remark(event_line(transition_fields(each)), "", each.timestamp)
+        epoch = time.time() - asyncio.get_running_loop().time()
+        for when, words, style in sorted(self._lines):
+            self._history.write(Text(f"{clock(epoch + when)} {words}", style), expand=True)
+        self._lines.clear()
         self._paint_state()
 
     def _look(self, statuses: Iterable[RobotiqStatus]) -> None:
@@ -136,9 +147,9 @@ class Monitor(App[None]):
                 peaks[axis] = max(peaks[axis], status.current_ma(axis))
             if status.fault != self._fault:
                 self._fault = status.fault
-                self.note(event_line(fault_fields(status)), "bold" if status.fault else "", status.timestamp)
-        if peaks[AXES[0]] >= 0:
-            self._axes.show(self._newest, peaks)
+                style = "bold" if status.fault else ""
+                self.remark(event_line(fault_fields(status)), style, status.timestamp)
+        self._axes.show(self._newest, peaks)
 
     def _paint_state(self) -> None:
         state, age = self._hand.state, asyncio.get_running_loop().time() - self._newest.timestamp
@@ -162,7 +173,7 @@ class Monitor(App[None]):
 
         def answered(yes: bool | None) -> None:
             if yes:
-                self._begin(action.name, self._operator.act(action))
+                self._begin(action.name, partial(self._operator.act, action))
 
         if action.warning:
             self.push_screen(Question(f"{action.name}: {action.what}?", action.warning), answered)
@@ -171,20 +182,19 @@ class Monitor(App[None]):
 
     def action_speed(self, by: int) -> None:
         """Change the speed of every axis."""
-        self._begin("speed", self._operator.change_speed(by))
+        self._begin("speed", partial(self._operator.change_speed, by))
 
     def action_force(self, by: int) -> None:
         """Change the force of every axis."""
-        self._begin("force", self._operator.change_force(by))
+        self._begin("force", partial(self._operator.change_force, by))
 
-    def _begin(self, name: str, work: Coroutine[None, None, str]) -> None:
-        self.run_worker(self._carry_out(name, work))
+    def _begin(self, name: str, work: Callable[[], Awaitable[str]]) -> None:
+        # A function and not a coroutine: one that is not begun any more would complain.
+        async def carry_out() -> None:
+            # Painted with the next paint: a key that is held would paint thirty times a second.
+            try:
+                self.remark(f"{name}: {await work()}", "bold")
+            except RobotiqError as error:
+                self.remark(f"{name}: {error}", "bold red")
 
-    async def _carry_out(self, name: str, work: Coroutine[None, None, str]) -> None:
-        try:
-            ended, style = await work, "bold"
-        except RobotiqError as error:
-            ended, style = str(error), "bold red"
-        self._paint()  # first what led to it
-        self._paint_figures()
-        self.note(f"{name}: {ended}", style)
+        _: Worker[None] = self.run_worker(carry_out)

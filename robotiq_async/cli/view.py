@@ -10,7 +10,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .arguments import USUAL, Address, CommandError, Link, Port, is_loopback, need
+from .arguments import USUAL, Address, Byte, CommandError, Link, Port, is_loopback, need
 
 
 async def view(
@@ -21,6 +21,8 @@ async def view(
     host: str = "127.0.0.1",
     read_only: Annotated[bool, Parameter(negative=())] = False,
     layout: Annotated[Path | None, Parameter(metavar="FILE")] = None,
+    speed: Byte = 128,
+    force: Byte = 64,
     link: Link = USUAL,
 ) -> None:
     """Show a gripper in Foxglove or Lichtblick, and let buttons there move it, until Ctrl-C.
@@ -44,6 +46,8 @@ async def view(
         port: TCP port; 0 takes a free one.
         host: Interface to listen on. Another one than 127.0.0.1 lets others in.
         read_only: Show, and take no commands.
+        speed: What the axes get with the first command from here: what they have is not known.
+        force: The same. A grip that was made with more is loosened.
         layout: Write the layout that goes with it to a file, for Foxglove to import, and end.
     """
     if layout is not None:
@@ -59,7 +63,7 @@ async def view(
         what = "see this gripper" if read_only else "see this gripper and COMMAND it"
         _tell(f"anyone who reaches {host} can {what}: there is no password")
     try:
-        operator = Operator(make_hand(address, link))
+        operator = Operator(make_hand(address, link, speed=speed, force=force))
         viewer = Viewer(operator.hand, host=host, port=port, operator=None if read_only else operator)
         # In this order no viewer delays the stop of the fingers.
         with told(_tell):

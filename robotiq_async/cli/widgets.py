@@ -20,8 +20,12 @@ from ..status import RobotiqStatus
 HISTORY: Final = 60
 """Currents kept: five seconds."""
 FULL: Final = 255
+READING_S: Final = 0.3
+"""Keys that were typed before a question could be read are no answer to it."""
 SMALL_MA: Final = 500
 """Currents below this do not fill their column: the noise of a standing motor is no mountain."""
+STILL: Final = 4
+"""An axis that has not moved for so many paints stands."""
 LEVELS: Final = "▁▂▃▄▅▆▇█"
 FIXED: Final = 47
 """Columns of a line that are not pictures."""
@@ -58,13 +62,17 @@ class Axes(Widget):
         super().__init__(id="axes")
         self._status = RobotiqStatus((0,) * 8)
         self._currents = {axis: deque([0] * HISTORY, maxlen=HISTORY) for axis in AXES}
+        self._still = dict.fromkeys(AXES, STILL)
+        """Paints since an axis was elsewhere."""
         self._stale = False
 
     def show(self, status: RobotiqStatus, peaks_ma: Mapping[Finger, int]) -> None:
-        """A status, and the highest currents since the one before."""
-        self._status = status
+        """A status, and the highest currents since the last time; -1 when nothing has come."""
         for axis in AXES:
             self._currents[axis].append(peaks_ma[axis])
+            same = status.position(axis) == self._status.position(axis)
+            self._still[axis] = self._still[axis] + 1 if same else 0
+        self._status = status
         self.refresh()
 
     def show_age(self, stale: bool) -> None:
@@ -93,14 +101,16 @@ class Axes(Widget):
         line.append(f" {position:3} → {requested:<3} ", "not bold")
         line.append_text(self._does(axis))
         line.append(f" {sparkline(list(currents), bar)} ", "cyan not bold")
-        line.append(f"{currents[-1]:5} mA", "not bold")
+        line.append(f"{max(currents[-1], 0):5} mA", "not bold")
         return line
 
     def _does(self, axis: Finger) -> Text:
         seen = self._status.finger_status(axis)
-        # The gripper also says "in motion" of an axis that was never told to go.
-        idle = seen is ObjectStatus.IN_MOTION and not axis & self._status.moving
-        words, style = ("-", "dim") if idle else _OBJECT[seen]
+        # The gripper says "in motion" also of an axis that was never told to go, and moves axes in an
+        # activation and in a release without saying so.
+        if seen is ObjectStatus.IN_MOTION and not axis & self._status.moving and self._still[axis] >= STILL:
+            return Text(f"{'-':15}", "dim")
+        words, style = _OBJECT[seen]
         return Text(f"{words:15}", style)
 
 
@@ -116,11 +126,16 @@ def position_bar(position: int, requested: int, width: int) -> Text:
 
 
 def sparkline(values: Sequence[int], width: int) -> str:
-    """Currents in mA, their peaks in so many columns; the top is the highest, or half an ampere."""
+    """Currents in mA, their peaks in so many columns; the top is the highest, or half an ampere.
+
+    Where there was none (-1) nothing is drawn.
+    """
     count, top = len(values), max(SMALL_MA, *values)
     columns = min(width, count)
     peaks = (max(values[n * count // columns : (n + 1) * count // columns]) for n in range(columns))
-    return "".join(LEVELS[peak * (len(LEVELS) - 1) // top] for peak in peaks).rjust(width)
+    return "".join(LEVELS[peak * (len(LEVELS) - 1) // top] if peak >= 0 else " " for peak in peaks).rjust(
+        width
+    )
 
 
 def state_text(address: str, state: State, status: RobotiqStatus, age: float) -> Text:
@@ -138,8 +153,7 @@ def state_text(address: str, state: State, status: RobotiqStatus, age: float) ->
     if lost:
         text.append(f"  no gripper answers: what you see is {age:.1f} s old")
     else:
-        activation = "active" if status.is_activated else "reset" if status.is_reset else "activating"
-        text.append(f"  {activation}, {'moving' if status.is_moving else 'not moving'}")
+        text.append(f"  {_doing(state, status)}")
     text.append(f"  {address}\n", "dim")
     fault = status.fault
     if fault is Fault.NONE:
@@ -148,6 +162,16 @@ def state_text(address: str, state: State, status: RobotiqStatus, age: float) ->
         severe = "dim" if lost else "bold red" if fault.severity is Severity.MAJOR else "yellow"
         text.append(f"{fault.severity.value} fault 0x{int(fault):02X}: {fault.description}", severe)
     return text
+
+
+def _doing(state: State, status: RobotiqStatus) -> str:
+    if state in (State.DO_ATR, State.WF_ATR) or status.fault is Fault.AUTOMATIC_RELEASE:
+        return "releasing: the fingers OPEN"
+    if status.is_activated:
+        return f"active, {'moving' if status.is_moving else 'not moving'}"
+    if status.is_reset:
+        return "reset"
+    return "activating: the fingers MOVE"
 
 
 def link_text(figures: Statistics, rate: float, held_up: bool, speed: int, force: int) -> Text:
@@ -179,6 +203,8 @@ class Question(ModalScreen[bool]):
     def __init__(self, question: str, warning: str) -> None:
         """Prepare the question."""
         super().__init__()
+        self.is_open = False
+        """Whether a yes counts: not before somebody can have read the question."""
         self._question = question
         self._warning = warning
 
@@ -189,6 +215,14 @@ class Question(ModalScreen[bool]):
         text.append("\n\ny yes    n no    space halt")
         yield Static(text, id="question")
 
+    def on_mount(self) -> None:
+        """Begin to listen in a moment."""
+        self.set_timer(READING_S, self._open)
+
+    def _open(self) -> None:
+        self.is_open = True
+
     def action_answer(self, answer: bool) -> None:
         """Yes or no."""
-        self.dismiss(answer)
+        if self.is_open or not answer:
+            self.dismiss(answer)

@@ -37,7 +37,9 @@ def command_line(fields: Fields) -> str:
 
 
 def event_line(fields: Fields) -> str:
-    """The state at the beginning, a transition, or a fault."""
+    """The state at the beginning, a transition, a fault, or what the library has to say."""
+    if fields["kind"] == "remark":
+        return f"remark   {fields['words']}"
     if fields["kind"] == "state":
         return f"state    {fields['target']}"
     if fields["kind"] == "fault":

@@ -15,6 +15,7 @@ from robotiq_async import Fault, Finger, RobotiqHand, RobotiqStatus, State
 from robotiq_async.actions import Operator
 from robotiq_async.cli.screen import Monitor
 from robotiq_async.cli.widgets import Axes, Question, position_bar, sparkline
+from robotiq_async.enums import AXES
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
 if TYPE_CHECKING:
@@ -76,6 +77,7 @@ async def test_it_shows_the_gripper_before_anything_happens(operator: Operator) 
         assert [line.split()[0] for line in axes(pilot)] == ["A", "B", "C", "SCISSOR"]
         assert "6 → 0" in axes(pilot)[0]
         await until(pilot, lambda: "reconnects 0" in text(pilot, "#link"))
+        await until(pilot, lambda: 15 < float(text(pilot, "#link").split()[0]) < 25)
         assert "speed 128  force 64" in text(pilot, "#link")
     assert not operator.has_moved
 
@@ -112,7 +114,7 @@ async def test_a_lost_gripper_is_a_state_and_comes_back(active: Operator, server
         server.refuse()
         server.cut()
         await until(pilot, lambda: "DISCONNECTED" in text(pilot, "#state"))
-        assert "no gripper answers: what you see is" in text(pilot, "#state")
+        await until(pilot, lambda: "no gripper answers: what you see is 0.3 s old" in text(pilot, "#state"))
         assert all(span.style == "dim" for span in pilot.app.query_one(Axes).render().spans[-1:])
         await pilot.press("o")
         await until(pilot, lambda: "open: the link is down" in log(pilot))
@@ -127,6 +129,30 @@ async def test_what_the_library_remarks_comes_into_the_log(operator: Operator) -
         assert isinstance(pilot.app, Monitor)
         pilot.app.remark("polling is late")
         await until(pilot, lambda: "polling is late" in log(pilot))
+
+
+async def test_an_activation_is_shown_as_a_motion() -> None:
+    async with SimulatorServer(SimulatedGripper(speedup=2)) as slow:
+        hand = RobotiqHand(slow.address, poll_interval=SLOWLY)
+        await hand.start(activate=False)
+        async with shown(Operator(hand)) as pilot:
+            await confirmed(pilot, "a")
+            await until(pilot, lambda: "the fingers MOVE" in text(pilot, "#state"))
+            await until(pilot, lambda: " moving " in axes(pilot)[0])
+            await until(pilot, lambda: "active, not moving" in text(pilot, "#state"))
+            await until(pilot, lambda: " moving " not in axes(pilot)[0])
+        await hand.stop()
+
+
+async def test_of_the_currents_between_two_paints_the_highest_is_shown(active: Operator) -> None:
+    async with shown(active) as pilot:
+        assert isinstance(pilot.app, Monitor)
+        still = active.hand.status.registers
+        strong = RobotiqStatus((*still[:2], still[2] & 0xFF00 | 9, *still[3:]))
+        peaks = [strong.current_ma(axis) for axis in AXES]
+        assert max(peaks) == 90
+        pilot.app._look([strong, active.hand.status])
+        assert "   90 mA" in pilot.app.query_one(Axes).render().plain
 
 
 async def test_another_client_is_told(active: Operator, gripper: SimulatedGripper) -> None:
@@ -221,7 +247,7 @@ async def test_what_is_dangerous_asks_first(
 
 async def confirmed(pilot: Screen, key: str) -> None:
     await pilot.press(key)
-    await until(pilot, lambda: isinstance(pilot.app.screen, Question))
+    await until(pilot, lambda: isinstance(pilot.app.screen, Question) and pilot.app.screen.is_open)
     await pilot.press("y")
 
 

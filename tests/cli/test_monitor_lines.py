@@ -15,6 +15,7 @@ import pytest
 from robotiq_async import Fault, Finger, RobotiqHand
 from robotiq_async.cli import main
 from robotiq_async.cli.lines import print_objects
+from robotiq_async.cli.words import event_line
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.conftest import ROOT
 
@@ -69,12 +70,32 @@ async def test_watch_prints_what_changes(
         lines = []
         while "A=100 AT_POSITION" not in (line := await shell.read_line(process)):
             lines.append(line)
-        assert all(" status   A=" in line for line in lines)
+        assert {line[13:].split()[0] for line in lines} <= {"status", "remark"}
+        assert any("another client commands" in line for line in lines), "this test is that client"
         gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
-        told = {(await shell.read_line(process))[13:].split()[0] for _ in range(2)}
-        assert told == {"state", "fault"}
+        told: set[str] = set()
+        while not told >= {"state", "fault"}:
+            told.add((await shell.read_line(process))[13:].split()[0])
         process.send_signal(signal.SIGTERM)
         assert (await shell.finish(process)).code == 0
+
+
+async def test_a_hand_that_has_ended_ends_it(
+    server: SimulatorServer, capfd: pytest.CaptureFixture[str]
+) -> None:
+    hand = RobotiqHand(server.address)
+    await hand.start(activate=False)
+    printing = asyncio.create_task(print_objects(hand))
+    for _ in range(5):
+        await anext(hand.statuses())
+    await hand.stop()
+    async with asyncio.timeout(5):
+        await printing
+    assert '"target":"SHUTDOWN"' in capfd.readouterr().out
+
+
+def test_what_the_library_says_is_an_object_too() -> None:
+    assert event_line({"kind": "remark", "words": "polling is late"}) == "remark   polling is late"
 
 
 async def test_it_only_looks(shell: Shell, server: SimulatorServer, gripper: SimulatedGripper) -> None:

@@ -13,7 +13,7 @@ import termios
 
 import pytest
 
-from robotiq_async import RobotiqHand
+from robotiq_async import RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.conftest import ROOT, WITHOUT
 
@@ -49,6 +49,12 @@ class Terminal:
 
     def kill(self, number: signal.Signals) -> None:
         os.kill(self._process, number)
+
+    def stop_reading(self) -> None:
+        asyncio.get_running_loop().remove_reader(self._fd)
+
+    def read_on(self) -> None:
+        asyncio.get_running_loop().add_reader(self._fd, self._read)
 
     def hang_up(self) -> None:
         asyncio.get_running_loop().remove_reader(self._fd)
@@ -110,6 +116,62 @@ async def test_a_terminal_that_is_closed_stops_what_was_moved() -> None:
         terminal.hang_up()
         assert await terminal.end() == 0
         assert not gripper.request_registers[0] & 0x0800
+
+
+@pytest.mark.parametrize("first", [signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("second", [signal.SIGTERM, signal.SIGHUP])
+async def test_two_signals_do_not_keep_each_other_from_stopping(
+    first: signal.Signals, second: signal.Signals
+) -> None:
+    """Closing a terminal sends two: one from the system, one from the shell."""
+    gripper = SimulatedGripper(speedup=4)
+    async with SimulatorServer(gripper) as server:
+        async with RobotiqHand(server.address):
+            pass
+        terminal = Terminal("-m", "robotiq_async", "monitor", server.address)
+        await terminal.shows(b"RUNNING_IDLE")
+        terminal.press("c")
+        await told_to_go(gripper)
+        terminal.kill(first)
+        terminal.kill(second)
+        await terminal.shows(b"The fingers were stopped")
+        assert await terminal.end() == 0
+        assert not gripper.request_registers[0] & 0x0800
+
+
+async def test_a_terminal_that_stops_reading_holds_nothing_up() -> None:
+    gripper = SimulatedGripper()
+    async with SimulatorServer(gripper) as server:
+        async with RobotiqHand(server.address):
+            pass
+        terminal = Terminal("-m", "robotiq_async", "monitor", "--speed", "0", server.address)
+        await terminal.shows(b"RUNNING_IDLE")
+        terminal.press("c")
+        await told_to_go(gripper)
+        terminal.stop_reading()
+        for _ in range(20):  # what fills the terminal, and textual's queue behind it, many times
+            terminal.press("+-")
+            await asyncio.sleep(0.2)  # the speed of a person's hands
+        terminal.press(" ")
+        async with asyncio.timeout(5):
+            while gripper.request_registers[0] & 0x0800:  # noqa: ASYNC110
+                await asyncio.sleep(0.01)
+        assert not gripper.is_moving
+        terminal.kill(signal.SIGTERM)
+        terminal.read_on()
+        assert await terminal.end() == 0
+
+
+async def test_keys_of_before_the_screen_are_no_commands(server: SimulatorServer) -> None:
+    async with RobotiqHand(server.address) as hand:
+        terminal = Terminal("-m", "robotiq_async", "monitor", server.address)
+        terminal.press("ryryry")
+        await terminal.shows(b"RUNNING_IDLE")
+        for _ in range(100):
+            await anext(hand.statuses())
+        assert hand.state is State.RUNNING_IDLE
+        terminal.press("nqnq")
+        assert await terminal.end() == 0
 
 
 async def test_without_textual_one_line_names_the_extra_and_another_way() -> None:

@@ -1,0 +1,74 @@
+"""A driver of textual's that never waits for the terminal.
+
+Textual's own hands its output to a thread, and waits when that is behind: a terminal that does not read any
+more (a stalled ssh, a window that is gone) would hold up the loop that polls the gripper, and the end.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import queue
+import threading
+from typing import Any, Final
+
+from textual.app import App
+from textual.drivers.linux_driver import LinuxDriver
+
+BACKLOG: Final = 30
+"""Writes that may wait for the terminal; what comes then is dropped."""
+CLOSING_S: Final = 0.5
+"""What the terminal may take for the last of them."""
+
+
+class UnhurriedDriver(LinuxDriver):
+    """Drops what the terminal does not take.
+
+    Attributes:
+        is_behind: whether something was dropped; the screen is to be painted anew when :meth:`has_caught_up`.
+    """
+
+    def __init__(
+        self,
+        app: App[Any],
+        *,
+        debug: bool = False,
+        mouse: bool = True,
+        size: tuple[int, int] | None = None,
+    ) -> None:
+        """As textual's."""
+        super().__init__(app, debug=debug, mouse=mouse, size=size)
+        self.is_behind = False
+        self._waiting: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._run, name="robotiq_async screen", daemon=True)
+
+    @property
+    def has_caught_up(self) -> bool:
+        """Whether nothing waits."""
+        return self._waiting.empty()
+
+    def write(self, data: str) -> None:
+        """Hand over to the terminal."""
+        if not self._thread.is_alive() and self._thread.ident is None:
+            self._thread.start()
+        if self._waiting.qsize() >= BACKLOG:
+            self.is_behind = True
+        else:
+            self._waiting.put(data.encode())
+
+    def close(self) -> None:
+        """Hand over the last of it, if the terminal takes it."""
+        super().close()  # its thread has nothing to do and ends at once
+        self._waiting.put(None)
+        if self._thread.is_alive():
+            self._thread.join(CLOSING_S)
+
+    def _run(self) -> None:
+        # Below Python's buffers: at its end the interpreter would wait for whoever writes to one of those.
+        assert self._file is not None
+        terminal = self._file.fileno()
+        with contextlib.suppress(OSError):  # it is gone
+            while (data := self._waiting.get()) is not None:
+                left = memoryview(data)
+                while left:
+                    left = left[os.write(terminal, left) :]
