@@ -24,7 +24,6 @@ from .enums import (
 from .errors import InvalidStateError, MoveSupersededError, NotStartedError
 from .hand import RobotiqHand
 from .motion import MoveResult
-from .streams import SentRequest
 
 SPEED: Final = 128
 FORCE: Final = 64
@@ -73,7 +72,6 @@ class Operator:
         self.speed = speed
         self.force = force
         self._requests = hand.requests(1)
-        self._last: SentRequest | None = None
         self._asking = 0
         """Motions asked for that have not ended."""
         self._moved = False
@@ -194,8 +192,7 @@ class Operator:
             self._asking -= 1
 
     def _listen(self) -> None:
-        for sent in self._requests.drain():
-            self._last = sent
+        for _ in self._requests.drain():
             self._moved |= self._asking > 0
 
     def _stands_still(self, since: float) -> bool:
