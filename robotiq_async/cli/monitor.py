@@ -11,6 +11,7 @@ from typing import Annotated, Final
 from cyclopts import Parameter
 
 from .arguments import USUAL, Address, Byte, CommandError, Link, UsageError, need
+from .remarks import forget, told
 
 SCREEN_S: Final = 1.0
 """What the screen may take to leave the terminal as it was."""
@@ -80,7 +81,6 @@ async def _look(address: str, link: Link, *, as_json: bool) -> None:
 async def _screen(address: str, link: Link, speed: int, force: int) -> None:
     from ..actions import Operator
     from .connection import make_hand
-    from .remarks import told
     from .screen import Monitor
 
     operator = Operator(make_hand(address, link, speed=speed, force=force), speed=speed, force=force)
@@ -112,5 +112,7 @@ def _forget_keys() -> None:
 
 
 def _say(words: str) -> None:
-    with suppress(OSError):  # the terminal may be gone
+    try:
         print(words, flush=True)
+    except OSError:  # the terminal is gone
+        forget(sys.stdout)

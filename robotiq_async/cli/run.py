@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import inspect
-import os
 import signal
 import socket
 import sys
@@ -18,7 +17,7 @@ from cyclopts import CycloptsError
 from ..errors import RobotiqError
 from .app import build
 from .arguments import CommandError, UsageError
-from .remarks import collected
+from .remarks import collected, forget
 
 _ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 SUCCESS, FAILURE, WRONG_USAGE, SIGNALLED = 0, 1, 2, 128
@@ -30,8 +29,11 @@ def run(arguments: Sequence[str]) -> int:
         code, problem = _outcome(arguments, signals)
     # A failure is one line, whatever it holds: it is read in logs and by scripts.
     lines = remarks if problem is None else ["; ".join((problem, *remarks))]
-    for line in lines:
-        print("robotiq-async:", " ".join(line.split()), file=sys.stderr)
+    try:
+        for line in lines:
+            print("robotiq-async:", " ".join(line.split()), file=sys.stderr, flush=True)
+    except OSError:  # the terminal is gone
+        forget(sys.stderr)
     return code
 
 
@@ -50,7 +52,7 @@ def _outcome(arguments: Sequence[str], signals: _Signals) -> tuple[int, str | No
         return FAILURE, str(error)
     except BrokenPipeError:
         # Whoever read the output has had enough (status | head); the flush at exit must not fail over it.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        forget(sys.stdout)
         return FAILURE, None
     except OSError as error:
         # The environment's doing: a full disk behind standard output, say.

@@ -10,6 +10,8 @@ import signal
 import struct
 import sys
 import termios
+from collections.abc import Iterator
+from typing import ClassVar
 
 import pytest
 
@@ -18,8 +20,19 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.conftest import ROOT, WITHOUT
 
 
+@pytest.fixture(autouse=True)
+def nothing_is_left() -> Iterator[None]:
+    yield
+    for process in Terminal.running:
+        os.kill(process, signal.SIGKILL)
+        os.waitpid(process, 0)
+    Terminal.running.clear()
+
+
 class Terminal:
     """Python on a terminal of its own (Linux, macOS)."""
+
+    running: ClassVar[set[int]] = set()
 
     def __init__(self, *arguments: str) -> None:
         self.out = b""
@@ -28,6 +41,7 @@ class Terminal:
             fcntl.ioctl(0, termios.TIOCSWINSZ, struct.pack("HHHH", 30, 100, 0, 0))
             os.environ |= {"TERM": "xterm-256color", "PYTHONPATH": str(ROOT)}
             os.execv(sys.executable, [sys.executable, *arguments])
+        self.running.add(self._process)
         asyncio.get_running_loop().add_reader(self._fd, self._read)
         self._read_something = asyncio.Event()
 
@@ -63,6 +77,7 @@ class Terminal:
     async def end(self) -> int:
         async with asyncio.timeout(30):
             _, status = await asyncio.to_thread(os.waitpid, self._process, 0)
+        self.running.discard(self._process)
         return os.waitstatus_to_exitcode(status)
 
 
