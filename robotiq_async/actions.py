@@ -80,9 +80,10 @@ class Operator:
 
     @property
     def has_moved(self) -> bool:
-        """Whether anything was written while something that moves was asked for."""
+        """Whether anything was written while something that moves was asked for, or may be right now."""
         self._listen()
-        return self._moved
+        # A request that is on its way is told of only when its fate is known.
+        return self._moved or self._asking > 0
 
     async def act(self, action: Action) -> str:
         """Carry out an action; gives how it ended, in words.

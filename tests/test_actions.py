@@ -281,3 +281,18 @@ async def test_a_release_that_is_done_is_at_rest(new: Someone, gripper: Simulate
     await operator.hand.wait_for_state(State.FAULT)
     await operator.act(ACTIONS["release"])
     assert STOPPED in await operator.leave()
+
+
+async def test_a_motion_that_is_on_its_way_counts(new: Someone, gripper: SimulatedGripper) -> None:
+    """Its request has arrived, and its acknowledgement has not."""
+    operator, server = new
+    server.replies.delay(0.05)
+    closing = asyncio.create_task(operator.act(ACTIONS["close"]))
+    async with asyncio.timeout(20):
+        while not gripper.request_registers[0] & 0x0800:  # noqa: ASYNC110
+            await asyncio.sleep(0)
+    assert operator.has_moved
+    assert STOPPED in await operator.leave()
+    assert not gripper.is_moving
+    with pytest.raises(NotStartedError):
+        await closing
