@@ -11,6 +11,7 @@ Angles are what a mechanism without load and play would have; nothing here has b
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from math import radians
 from typing import Final
 
@@ -62,7 +63,12 @@ def finger_angles(position: int) -> tuple[float, float, float]:
         TypeError: position is not an int.
         ValueError: position is outside 0..255.
     """
-    counts = check_byte("position", position)
+    return _finger_angles(check_byte("position", position))
+
+
+@cache
+def _finger_angles(counts: int) -> tuple[float, float, float]:
+    # Kept, 256 of them: a recording asks for nine fingers at every poll.
     base, middle, tip = (radians(_between(counts, points)) for points in (BASE, MIDDLE, TIP))
     return base, middle, tip
 

@@ -12,6 +12,9 @@ import pytest
 import pytest_asyncio
 from hypothesis import settings
 
+from robotiq_async import RobotiqHand
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+
 # The suite tries the same examples every time; HYPOTHESIS_PROFILE=explore tries new ones, and more.
 settings.register_profile("suite", derandomize=True, deadline=None)
 settings.register_profile("explore", max_examples=1000, deadline=None, print_blob=True)
@@ -37,3 +40,23 @@ async def nothing_left_running(caplog: pytest.LogCaptureFixture) -> AsyncIterato
     assert not left, f"tasks left running: {left}"
     complaints = [record.getMessage() for record in caplog.get_records("call") if record.name == "asyncio"]
     assert not complaints, f"the event loop complained: {complaints}"
+
+
+@pytest.fixture
+async def gripper() -> SimulatedGripper:
+    """A fast one."""
+    return SimulatedGripper(speedup=20)
+
+
+@pytest.fixture
+async def server(gripper: SimulatedGripper) -> AsyncIterator[SimulatorServer]:
+    """It, behind Modbus TCP."""
+    async with SimulatorServer(gripper) as server:
+        yield server
+
+
+@pytest.fixture
+async def hand(server: SimulatorServer) -> AsyncIterator[RobotiqHand]:
+    """A hand at it, active."""
+    async with RobotiqHand(server.address) as hand:
+        yield hand

@@ -27,11 +27,6 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
 
 @pytest.fixture
-async def gripper() -> SimulatedGripper:
-    return SimulatedGripper(speedup=20)
-
-
-@pytest.fixture
 async def operator(gripper: SimulatedGripper) -> AsyncIterator[Operator]:
     async with SimulatorServer(gripper) as server:
         hand = RobotiqHand(server.address)

@@ -4,27 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import urllib.request
-from collections.abc import AsyncIterator
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from robotiq_async import Finger, GripperFaultError, MoveSupersededError, RobotiqHand, State
 from robotiq_async.metrics import serve_metrics
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.simulator import SimulatedGripper
 
 Samples = dict[tuple[str, str], float]
-
-
-@pytest.fixture
-async def gripper() -> SimulatedGripper:
-    return SimulatedGripper(speedup=20)
-
-
-@pytest.fixture
-async def hand(gripper: SimulatedGripper) -> AsyncIterator[RobotiqHand]:
-    async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
-        yield hand
 
 
 async def page(where: tuple[str, int]) -> str:

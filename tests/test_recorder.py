@@ -10,7 +10,6 @@ import signal
 import sys
 import threading
 from asyncio.subprocess import PIPE
-from collections.abc import AsyncIterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -27,17 +26,6 @@ from robotiq_async.recording import read_recording, recover
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 
 ROOT = Path(__file__).parents[1]
-
-
-@pytest.fixture
-async def gripper() -> SimulatedGripper:
-    return SimulatedGripper(speedup=20)
-
-
-@pytest.fixture
-async def hand(gripper: SimulatedGripper) -> AsyncIterator[RobotiqHand]:
-    async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
-        yield hand
 
 
 @pytest.fixture

@@ -100,17 +100,6 @@ class Client:
 
 
 @pytest.fixture
-async def gripper() -> SimulatedGripper:
-    return SimulatedGripper(speedup=20)
-
-
-@pytest.fixture
-async def server(gripper: SimulatedGripper) -> AsyncIterator[SimulatorServer]:
-    async with SimulatorServer(gripper) as server:
-        yield server
-
-
-@pytest.fixture
 async def operator(server: SimulatorServer) -> AsyncIterator[Operator]:
     async with RobotiqHand(server.address) as hand:
         yield Operator(hand)

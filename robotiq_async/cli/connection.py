@@ -32,6 +32,18 @@ def make_hand(address: str, link: Link = USUAL, *, speed: int = 128, force: int 
         )
 
 
+def make_operator(address: str, link: Link, *, speed: int, force: int) -> Operator:
+    """Somebody at a hand that is not started.
+
+    Raises:
+        UsageError: a malformed address.
+    """
+    from ..actions import Operator
+
+    hand = make_hand(address, link, speed=speed, force=force)
+    return Operator(hand, speed=speed, force=force)
+
+
 @asynccontextmanager
 async def connected(address: str, link: Link = USUAL, *, halt: bool) -> AsyncIterator[RobotiqHand]:
     """A hand that has been read and not yet written to.

@@ -79,11 +79,10 @@ async def _look(address: str, link: Link, *, as_json: bool) -> None:
 
 
 async def _screen(address: str, link: Link, speed: int, force: int) -> None:
-    from ..actions import Operator
-    from .connection import make_hand
+    from .connection import make_operator
     from .screen import Monitor
 
-    operator = Operator(make_hand(address, link, speed=speed, force=force), speed=speed, force=force)
+    operator = make_operator(address, link, speed=speed, force=force)
     await operator.hand.start(activate=False)
     screen, words = None, ""
     try:

@@ -54,16 +54,15 @@ async def view(
         _write(layout)
         return
     need("foxglove", "view")
-    from ..actions import Operator
     from ..viewer import Viewer
-    from .connection import make_hand, operated
+    from .connection import make_operator, operated
     from .remarks import told
 
     if not is_loopback(host):
         what = "see this gripper" if read_only else "see this gripper and COMMAND it"
         _tell(f"anyone who reaches {host} can {what}: there is no password")
     try:
-        operator = Operator(make_hand(address, link, speed=speed, force=force))
+        operator = make_operator(address, link, speed=speed, force=force)
         viewer = Viewer(operator.hand, host=host, port=port, operator=None if read_only else operator)
         # In this order no viewer delays the stop of the fingers.
         with told(_tell):

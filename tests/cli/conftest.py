@@ -13,8 +13,6 @@ from pathlib import Path
 
 import pytest
 
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-
 ROOT = Path(__file__).parents[2]
 WITHOUT = """
 import importlib.util, sys
@@ -95,14 +93,3 @@ async def shell() -> AsyncIterator[Shell]:
         with contextlib.suppress(ProcessLookupError):
             process.kill()
         await process.communicate()
-
-
-@pytest.fixture
-async def gripper() -> SimulatedGripper:
-    return SimulatedGripper(speedup=20)
-
-
-@pytest.fixture
-async def server(gripper: SimulatedGripper) -> AsyncIterator[SimulatorServer]:
-    async with SimulatorServer(gripper) as server:
-        yield server

@@ -10,7 +10,8 @@ import signal
 import struct
 import sys
 import termios
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager
 from typing import ClassVar
 
 import pytest
@@ -88,6 +89,21 @@ async def told_to_go(gripper: SimulatedGripper) -> None:
             await asyncio.sleep(0.01)
 
 
+@asynccontextmanager
+async def closing(
+    gripper: SimulatedGripper, *options: str
+) -> AsyncIterator[tuple[Terminal, SimulatedGripper]]:
+    """A monitor that has told an active gripper to close."""
+    async with SimulatorServer(gripper) as server:
+        async with RobotiqHand(server.address):
+            pass
+        terminal = Terminal("-m", "robotiq_async", "monitor", *options, server.address)
+        await terminal.shows(b"RUNNING_IDLE")
+        terminal.press("c")
+        await told_to_go(gripper)
+        yield terminal, gripper
+
+
 async def test_quitting_without_having_moved_leaves_the_fingers_alone(
     server: SimulatorServer, gripper: SimulatedGripper
 ) -> None:
@@ -104,14 +120,7 @@ async def test_quitting_without_having_moved_leaves_the_fingers_alone(
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 async def test_a_signal_stops_what_was_moved(number: signal.Signals) -> None:
-    gripper = SimulatedGripper(speedup=4)
-    async with SimulatorServer(gripper) as server:
-        async with RobotiqHand(server.address):
-            pass
-        terminal = Terminal("-m", "robotiq_async", "monitor", server.address)
-        await terminal.shows(b"RUNNING_IDLE")
-        terminal.press("c")
-        await told_to_go(gripper)
+    async with closing(SimulatedGripper(speedup=4)) as (terminal, gripper):
         terminal.kill(number)
         await terminal.shows(b"The fingers were stopped")
         assert await terminal.end() == 0
@@ -120,14 +129,7 @@ async def test_a_signal_stops_what_was_moved(number: signal.Signals) -> None:
 
 
 async def test_a_terminal_that_is_closed_stops_what_was_moved() -> None:
-    gripper = SimulatedGripper(speedup=4)
-    async with SimulatorServer(gripper) as server:
-        async with RobotiqHand(server.address):
-            pass
-        terminal = Terminal("-m", "robotiq_async", "monitor", server.address)
-        await terminal.shows(b"RUNNING_IDLE")
-        terminal.press("c")
-        await told_to_go(gripper)
+    async with closing(SimulatedGripper(speedup=4)) as (terminal, gripper):
         terminal.hang_up()
         assert await terminal.end() == 0
         assert not gripper.request_registers[0] & 0x0800
@@ -139,14 +141,7 @@ async def test_two_signals_do_not_keep_each_other_from_stopping(
     first: signal.Signals, second: signal.Signals
 ) -> None:
     """Closing a terminal sends two: one from the system, one from the shell."""
-    gripper = SimulatedGripper(speedup=4)
-    async with SimulatorServer(gripper) as server:
-        async with RobotiqHand(server.address):
-            pass
-        terminal = Terminal("-m", "robotiq_async", "monitor", server.address)
-        await terminal.shows(b"RUNNING_IDLE")
-        terminal.press("c")
-        await told_to_go(gripper)
+    async with closing(SimulatedGripper(speedup=4)) as (terminal, gripper):
         terminal.kill(first)
         terminal.kill(second)
         await terminal.shows(b"The fingers were stopped")
@@ -155,14 +150,7 @@ async def test_two_signals_do_not_keep_each_other_from_stopping(
 
 
 async def test_a_terminal_that_stops_reading_holds_nothing_up() -> None:
-    gripper = SimulatedGripper()
-    async with SimulatorServer(gripper) as server:
-        async with RobotiqHand(server.address):
-            pass
-        terminal = Terminal("-m", "robotiq_async", "monitor", "--speed", "0", server.address)
-        await terminal.shows(b"RUNNING_IDLE")
-        terminal.press("c")
-        await told_to_go(gripper)
+    async with closing(SimulatedGripper(), "--speed", "0") as (terminal, gripper):
         terminal.stop_reading()
         for _ in range(20):  # what fills the terminal, and textual's queue behind it, many times
             terminal.press("+-")
