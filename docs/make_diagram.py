@@ -23,7 +23,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
 
 from robotiq_async.enums import State  # noqa: E402
-from robotiq_async.machine import TRANSITIONS, Trigger, states_allowing  # noqa: E402
+from robotiq_async.machine import SEQUENCES, TRANSITIONS, Trigger, states_allowing  # noqa: E402
 
 PICTURE: Final = ROOT / "docs" / "state-machine.svg"
 
@@ -250,6 +250,8 @@ def in_words(source: State, trigger: Trigger, target: State) -> bool:
         return True
     if any(trigger is each and target is stub.target for stub, each, _ in stubs()):
         return True
+    if trigger is Trigger.ASK_HALT and target is State.DO_RESET:
+        return True  # the third family has it too
     return trigger in SIGHTS and source in following() and target is usual_target(trigger)
 
 
@@ -281,12 +283,17 @@ def notes() -> list[str]:
     """The families in words."""
     stoppable = states_allowing(Trigger.ASK_STOP)
     assert states_allowing(Trigger.LINK_LOST) - stoppable == {State.DO_SHUTDOWN}, "the second note is wrong"
+    resettable = states_allowing(Trigger.ASK_RESET)
+    assert stoppable - resettable == {State.DISCONNECTED}, "the third note is wrong"
+    halting = {state for state in TRANSITIONS if TRANSITIONS[state].get(Trigger.ASK_HALT) is State.DO_RESET}
+    assert halting == SEQUENCES, "the third note is wrong"
+    halt = f"{Trigger.ASK_HALT.value}: from those in which a sequence runs (DO_, WF_)"
     ends = names(frozenset(TRANSITIONS) - stoppable)
     leads = [f"{usual_target(sight).name} ({sight.value.removeprefix('gripper ')})" for sight in SIGHTS]
     return [
         f"¹ {Trigger.ASK_STOP.value}: from the {len(stoppable)} states other than {' and '.join(ends)}.",
         f"² {Trigger.LINK_LOST.value}: from the same states; DO_SHUTDOWN stays what it is.",
-        f"³ {Trigger.ASK_RESET.value}: from " + ", ".join(names(states_allowing(Trigger.ASK_RESET))) + ".",
+        f"³ {Trigger.ASK_RESET.value}: from the same states but {State.DISCONNECTED.name}; {halt}.",
         "A double frame marks a state that follows what every status shows: " + ", ".join(leads[:3]) + ",",
         "    " + ", ".join(leads[3:]) + ". Of these arrows only the usual ones are drawn.",
         "What leaves the state as it is is not drawn. docs/state-machine.md has every entry.",

@@ -29,6 +29,7 @@ The map; each module imports only what stands above it::
     guard        transports of somebody else's, held to what a hand relies on
     simulated    the transport of sim://
     statistics   figures about the polling
+    event_loop   the loop a hand belongs to
     streams      async iterators
     timerfd      Linux's timer that is watched like a socket
     tick         the beat of the polling

@@ -21,7 +21,7 @@ from .enums import (
     Initialization,
     State,
 )
-from .errors import InvalidStateError, MoveSupersededError, NotStartedError
+from .errors import MoveSupersededError, NotStartedError
 from .hand import RobotiqHand
 from .motion import MoveResult
 
@@ -232,12 +232,8 @@ def _width(position: int) -> Callable[[RobotiqHand], Awaitable[str]]:
 
 
 async def _halt(hand: RobotiqHand) -> str:
-    try:
-        await hand.halt()
-    except InvalidStateError as error:
-        what = "a halt does not stop an activation or a release; a reset does"
-        raise InvalidStateError(what, error.state, error.allowed) from error
-    return "every axis stands still"
+    await hand.halt()
+    return "every axis stands still" + (": the gripper is reset" if hand.state is State.RESET else "")
 
 
 async def _activate(hand: RobotiqHand) -> str:

@@ -103,13 +103,13 @@ class Core:
             RobotiqError: the hand takes no command now.
         """
         self.refuse_unless_running(Trigger.ASK_COMMAND)
+        self.machine.happen(Trigger.ASK_COMMAND)
         if position is not None:
             self._end_moves(
                 lambda: MoveSupersededError(f"another command moves {axes}"),
                 lambda move: bool(move.axes & axes),
             )
         self._desk.put(axes, position, speed, force, delivery)
-        self.machine.happen(Trigger.ASK_COMMAND)
 
     def move(self, move: Move, speed: int | None, force: int | None) -> None:
         """Ask for a move; its end is told to the move.
@@ -137,19 +137,19 @@ class Core:
         self.machine.happen(Trigger.ASK_COMMAND)
 
     def halt(self, delivery: Delivery) -> None:
-        """Clear rGTO.
+        """Clear rGTO; where nothing moves, there is nothing to do. A sequence is ended by :meth:`reset`.
 
         Raises:
             RobotiqError: the hand cannot halt now.
         """
-        if self.machine.state is State.RESET:
+        if self.machine.state in (State.RESET, State.ATR_DONE):
             delivery(None)
             return
         self.refuse_unless_running(Trigger.ASK_HALT)
+        self.machine.happen(Trigger.ASK_HALT)
         superseded: Failure = lambda: MoveSupersededError("halt() stopped the fingers")  # noqa: E731
         self._end_moves(superseded)
         self._desk.put_halt(delivery, superseded)
-        self.machine.happen(Trigger.ASK_HALT)
 
     def activate(self) -> None:
         """Begin an activation.
@@ -161,14 +161,20 @@ class Core:
         self._activating = True
         self._begin(activation(self._at_rest()), lambda status: look(status) is Trigger.SEEN_RESET)
 
-    def reset(self) -> None:
-        """Begin a reset.
+    def reset(self, trigger: Trigger = Trigger.ASK_RESET) -> None:
+        """Begin a reset; one that is about to be sent already will do.
+
+        Args:
+            trigger: ASK_HALT for a halt that ends a sequence.
 
         Raises:
             InvalidStateError: not in a state that can be reset.
         """
-        self.machine.happen(Trigger.ASK_RESET)
-        self._drop_all(lambda: MoveSupersededError("reset() took over"))
+        is_about_to = self.machine.state is State.DO_RESET
+        self.machine.happen(trigger)
+        if is_about_to:
+            return
+        self._drop_all(lambda: MoveSupersededError(f"{trigger.value} took over"))
         self._begin(reset(self._at_rest()))
 
     def release(self) -> None:

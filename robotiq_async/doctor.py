@@ -19,7 +19,7 @@ from .errors import ConnectFailedError, ProtocolError, ResponseTimeoutError, Rob
 from .link import ModbusTransport, Transport
 from .procedures import signature_of_status
 from .registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap
-from .simulated import SimulatedTransport
+from .simulated import SimulatedTransport, new_gripper
 from .statistics import percentile
 from .status import RobotiqStatus
 
@@ -169,7 +169,9 @@ def _candidates(address: Address, usual: RegisterMap) -> list[RegisterMap]:
 
 def _link(address: Address, registers: RegisterMap) -> Transport:
     if address.kind == "sim":
-        return SimulatedTransport(registers, connect_timeout=REACH_S, response_timeout=ANSWER_S)
+        return SimulatedTransport(
+            new_gripper(), registers, connect_timeout=REACH_S, response_timeout=ANSWER_S
+        )
     return ModbusTransport(address, registers, connect_timeout=REACH_S, response_timeout=ANSWER_S)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Collection, Mapping
 from types import TracebackType
-from typing import ClassVar, Final, Self
+from typing import Any, ClassVar, Final, Self, TypeVar
 
 import anyio
 
@@ -27,9 +27,10 @@ from .errors import (
     RobotiqError,
     StateTimeoutError,
 )
+from .event_loop import check_loop, running_loop
 from .link import Transport
 from .log import log
-from .machine import RUNNING, Machine, Trigger
+from .machine import RUNNING, SEQUENCES, Machine, Trigger
 from .motion import Move, MoveResult
 from .options import (
     ACTIVATION_TIMEOUT_S,
@@ -44,6 +45,8 @@ from .status import RobotiqStatus
 from .streams import Channel, SentRequest, Stream, Transition
 from .waiting import StateWaiters
 
+T = TypeVar("T")
+
 RESET_TIMEOUT_S: Final = 5.0
 """A reset takes a device cycle or two; this leaves room for a slow one."""
 RELEASE_TIMEOUT_S: Final = 60.0
@@ -51,18 +54,14 @@ RELEASE_TIMEOUT_S: Final = 60.0
 RECOVER_TIMEOUT_S: Final = 90.0
 """Interference counts as minor for 20 s, a release may take a minute, a reset and an activation follow."""
 
-_PASSING: Final = frozenset(
-    {State.DO_ACTIVATION, State.WF_ACTIVATION, State.DO_ATR, State.WF_ATR, State.DO_RESET, State.WF_RESET}
-)
-"""States that lead somewhere by themselves."""
-
 
 class RobotiqHand:
     """A Robotiq 3-Finger gripper behind Modbus TCP, a serial line, or simulated.
 
     Use it as ``async with RobotiqHand(address) as hand:``, or call :meth:`start` and :meth:`stop`. One
     task polls the gripper; every call here leaves its wish with that task and never blocks the loop.
-    Calls may come from any task of the loop the hand was started in.
+    Calls may come from any task of the loop the hand was started in. From another thread, or another
+    loop, every call is a RuntimeError that says what to do, and nothing has been asked then.
 
     Nothing of this has run on real hardware yet.
     """
@@ -132,6 +131,8 @@ class RobotiqHand:
         self._statuses: Channel[RobotiqStatus] = Channel()
         self._transitions: Channel[Transition] = Channel()
         self._requests: Channel[SentRequest] = Channel()
+        self._until_link_lost: set[Stream[RobotiqStatus]] = set()
+        """Streams of those who wait for what the gripper does next: they end when the link goes down."""
         self._waiters = StateWaiters()
         self._owner: Owner | None = None
         self._task: asyncio.Task[None] | None = None
@@ -162,6 +163,7 @@ class RobotiqHand:
             activate: False leaves a reset gripper in RESET.
 
         Raises:
+            RuntimeError: not in a running asyncio event loop.
             InvalidStateError: this hand is started already, or another one runs on the same address.
             NotStartedError: stop() was called meanwhile.
             ConnectFailedError: nobody answers within the connect time-out.
@@ -172,15 +174,16 @@ class RobotiqHand:
         """
         if not isinstance(activate, bool):
             raise TypeError(f"activate must be True or False, got {activate!r}")
+        loop = running_loop()
+        self._abandon_if_loop_closed()
         self._claim()
         self._core = self._new_core()
         self._counters = Counters()
-        self._statuses.reopen()
-        self._transitions.reopen()
-        self._requests.reopen()
+        for channel in self._channels:
+            channel.reopen(loop)
         sequence = self._owner.sequence if self._owner is not None else 0
         owner = self._owner = Owner(
-            self._options.transport,
+            self._options.make_transport(),
             self._core,
             self._counters,
             address=self._options.address,
@@ -192,7 +195,7 @@ class RobotiqHand:
             publish_request=self._requests.push,
         )
         self._machine.happen(Trigger.ASK_START)
-        self._task = asyncio.get_running_loop().create_task(owner.run(), name="robotiq_async owner")
+        self._task = loop.create_task(owner.run(), name="robotiq_async owner")
         self._task.add_done_callback(self._on_owner_done)
         try:
             await owner.connected
@@ -211,12 +214,19 @@ class RobotiqHand:
 
         Args:
             halt: False disconnects and leaves the fingers to what they do; for programs that only look.
+
+        Raises:
+            RuntimeError: called in another event loop than the hand runs in; it goes on. (When that loop
+                has been closed, nothing can reach the gripper any more: the hand counts as stopped, and
+                the fingers go on with what they do.)
         """
         if not isinstance(halt, bool):
             raise TypeError(f"halt must be True or False, got {halt!r}")
+        self._abandon_if_loop_closed()
         task, owner = self._task, self._owner
         if task is None or owner is None:
             return
+        check_loop(task.get_loop(), "hand.stop()")
         owner.request_stop(halt=halt)
         try:
             await to_the_end(task)
@@ -398,17 +408,21 @@ class RobotiqHand:
 
         Returns when the gripper shows that it has stopped, at most half a second after its
         acknowledgement. Awaited moves end with MoveSupersededError. When cancelled, the halt is sent all
-        the same. In RESET nothing moves and nothing is sent.
+        the same. In RESET and ATR_DONE nothing moves and nothing is sent.
+
+        rGTO does not stop an activation or an automatic release. During these, halt() takes rACT back, as
+        :meth:`reset` does, and returns in RESET.
 
         Raises:
-            GripperFaultError: in ATR_DONE; nothing moves.
-            InvalidStateError: in a sequence that rGTO does not stop (activation, automatic release: there
-                :meth:`reset` does).
             MoveSupersededError: reset() took over before it was sent.
+            StateTimeoutError: an activation or a release was not seen to end within 5 s.
             RobotiqError: not connected, or the link went down before the acknowledgement.
         """
         core = self._connected()
-        await self._told(core.halt)
+        if self.state in SEQUENCES:
+            await self._reset(Trigger.ASK_HALT)
+        else:
+            await self._told(core.halt)
 
     # -- activation, faults ----------------------------------------------------------------------------
 
@@ -434,17 +448,21 @@ class RobotiqHand:
     async def reset(self) -> None:
         """Reset the gripper (rACT = 0): clears faults, and lets go of what it holds.
 
-        Returns in RESET. Awaited moves end with MoveSupersededError. When cancelled, the reset goes on.
+        Returns in RESET. Ends an activation or a release under way, too. Awaited moves end with
+        MoveSupersededError. When cancelled, the reset goes on.
 
         Raises:
             StateTimeoutError: the gripper did not report the reset within 5 s.
             RobotiqError: not possible now, or the link went down.
         """
+        await self._reset(Trigger.ASK_RESET)
+
+    async def _reset(self, trigger: Trigger) -> None:
         core = self._connected()
         await self._reach(
             {State.RESET},
             RESET_TIMEOUT_S,
-            ask=core.reset,
+            ask=lambda: core.reset(trigger),
             failing={State.DISCONNECTED: self._link_lost},
             what="the gripper did not report the reset",
         )
@@ -469,7 +487,7 @@ class RobotiqHand:
             failing={
                 State.DISCONNECTED: self._link_lost,
                 State.RESET: lambda: NotActivatedError("the gripper was reset during the automatic release"),
-                State.DO_RESET: lambda: InvalidStateError("reset() took over", State.DO_RESET),
+                State.DO_RESET: lambda: InvalidStateError("reset() or halt() took over", State.DO_RESET),
             },
             what="the automatic release was not finished",
         )
@@ -512,10 +530,13 @@ class RobotiqHand:
             # A minor fault, or a sequence under way: the next status may tell more.
             self._started()
             stream = self.statuses()
+            self._until_link_lost.add(stream)
             try:
                 await anext(stream)
             except StopAsyncIteration:
                 raise NotStartedError("the hand was stopped") from None
+            finally:
+                self._until_link_lost.remove(stream)
 
     # -- what is going on ------------------------------------------------------------------------------
 
@@ -588,11 +609,11 @@ class RobotiqHand:
             TypeError: buffer is not an int.
             ValueError: buffer is outside its range.
         """
-        return self._statuses.open(check_int("buffer", buffer, 1, 1_000_000))
+        return self._open(self._statuses, check_int("buffer", buffer, 1, 1_000_000))
 
     def transitions(self) -> Stream[Transition]:
         """Every change of state from now on, for one reader, none lost. Ends after :meth:`stop`."""
-        return self._transitions.open(None)
+        return self._open(self._transitions, None)
 
     def requests(self, buffer: int | None = None) -> Stream[SentRequest]:
         """Every request written from now on, for one reader. Ends after :meth:`stop`.
@@ -604,7 +625,8 @@ class RobotiqHand:
             TypeError: buffer is not an int.
             ValueError: buffer is outside its range.
         """
-        return self._requests.open(None if buffer is None else check_int("buffer", buffer, 1, 1_000_000))
+        kept = None if buffer is None else check_int("buffer", buffer, 1, 1_000_000)
+        return self._open(self._requests, kept)
 
     async def wait_for_state(self, *states: State, timeout: float | None = None) -> State:
         """Wait until the hand is, if only for a moment, in one of these states, and return it.
@@ -650,7 +672,7 @@ class RobotiqHand:
         """
         key = self._options.key
         owner = self._running.get(key)
-        if owner is not None and owner._task is not None and not owner._task.get_loop().is_closed():  # noqa: SLF001
+        if owner is not None and not owner._lost_its_loop():  # noqa: SLF001
             who = "this hand" if owner is self else "another hand"
             raise InvalidStateError(
                 f"{who} runs on {key} already: stop() it first",
@@ -673,27 +695,65 @@ class RobotiqHand:
         elif self._owner is not None and self._owner.failure is not None:
             failure = self._link_lost
         self._waiters.fail(failure or (lambda: NotStartedError("the hand was stopped")))
-        self._statuses.end(failure)
-        self._transitions.end(failure)
-        self._requests.end(failure)
+        for channel in self._channels:
+            channel.end(failure)
+
+    @property
+    def _channels(self) -> tuple[Channel[Any], ...]:
+        return self._statuses, self._transitions, self._requests
+
+    def _open(self, channel: Channel[T], buffer: int | None) -> Stream[T]:
+        """A stream; not from another thread while the hand runs, for the streams are not locked."""
+        if self._task is not None and not self._lost_its_loop():
+            check_loop(self._task.get_loop(), "a stream of the hand")
+        return channel.open(buffer)
+
+    def _lost_its_loop(self) -> bool:
+        """Whether the loop that the hand ran in was closed without stopping the hand."""
+        return self._task is None or self._task.get_loop().is_closed()
+
+    def _abandon_if_loop_closed(self) -> None:
+        """Count as stopped when the hand's loop was closed under it: its task can never end any more.
+
+        Nobody in that loop can be told. What they wait with belongs to it and is left to it.
+        """
+        if self._task is None or not self._lost_its_loop():
+            return
+        log.warning("%s: its event loop was closed before stop(); the fingers may still move", self.address)
+        if self._running.get(self._options.key) is self:
+            del self._running[self._options.key]
+        self._task = self._owner = None
+        self._waiters = StateWaiters()
+        for channel in self._channels:
+            channel.end()
+        self._machine.happen(Trigger.ASK_STOP)
+        self._machine.happen(Trigger.STOPPED)
 
     def _on_transition(self, source: State, target: State, trigger: Trigger) -> None:
         now = asyncio.get_running_loop().time()
         self._transitions.push(Transition(source, target, trigger, now))
         self._counters.faults += target is State.FAULT
         self._waiters.reached(target)
+        if target is State.DISCONNECTED:
+            for stream in self._until_link_lost:
+                stream.end(self._link_lost)
 
-    def _started(self) -> Core:
-        """The core of a hand that runs.
+    def _started(self, *, reading: bool = False) -> Core:
+        """The core of a hand that runs; whoever only reads may do so from anywhere.
 
         Raises:
             NotStartedError: not started, or stopped.
             ConnectionLostError: the hand gave up on its link.
+            RuntimeError: called from another thread or event loop.
         """
         if self._task is None:
             if self._owner is not None and self._owner.failure is not None:
                 raise self._link_lost()
             raise NotStartedError("the hand is not started: use 'async with' or start()")
+        if self._lost_its_loop():
+            raise NotStartedError("the event loop that the hand ran in was closed: start() it again")
+        if not reading:
+            check_loop(self._task.get_loop(), "the hand")
         return self._core
 
     def _connected(self) -> Core:
@@ -709,7 +769,7 @@ class RobotiqHand:
         return core
 
     def _current_status(self) -> RobotiqStatus:
-        self._started()
+        self._started(reading=True)
         status = self.status
         if self.state is State.DISCONNECTED:
             raise ConnectionLostError("the link is down: what the gripper does is not known")
@@ -744,14 +804,14 @@ class RobotiqHand:
 
     async def _wait_until_active(self, ask: Callable[[], None] | None = None) -> None:
         """Wait for the end of an activation; one that this hand began must not end in a fault."""
-        if ask is None and self.state not in _PASSING:
+        if ask is None and self.state not in SEQUENCES:
             return
         ours = ask is not None or self.state is State.DO_ACTIVATION or self._core.is_busy
         states = set(RUNNING) if ours else {*RUNNING, State.FAULT, State.ATR_DONE}
         failing: Mapping[State, Callable[[], RobotiqError]] = {
             State.DISCONNECTED: self._link_lost,
             State.RESET: lambda: NotActivatedError("the gripper was reset during the activation"),
-            State.DO_RESET: lambda: NotActivatedError("reset() took over"),
+            State.DO_RESET: lambda: NotActivatedError("reset() or halt() took over"),
             State.FAULT: lambda: GripperFaultError(self.status.fault),
             State.ATR_DONE: lambda: GripperFaultError(self.status.fault),
         }

@@ -87,6 +87,11 @@ _CONNECTED: Final = {
     Trigger.ASK_STOP: State.DO_SHUTDOWN,
     Trigger.LINK_LOST: State.DISCONNECTED,
 }
+# An emergency is heard in every sequence; rACT = 0 is the only request that ends one.
+_EMERGENCY: Final = {
+    Trigger.ASK_HALT: State.DO_RESET,
+    Trigger.ASK_RESET: State.DO_RESET,
+}
 _SIGHTS: Final = {
     Trigger.SEEN_READY: State.RUNNING_IDLE,
     Trigger.SEEN_BUSY: State.WF_ACTIVATION,
@@ -104,8 +109,8 @@ TRANSITIONS: Final[dict[State, dict[Trigger, State]]] = {
         Trigger.ASK_STOP: State.DO_SHUTDOWN,
         Trigger.LINK_LOST: State.DISCONNECTED,
     },
-    State.DO_ACTIVATION: {**_CONNECTED, Trigger.DELIVERED: State.WF_ACTIVATION},
-    State.WF_ACTIVATION: {**_CONNECTED, **_SIGHTS, Trigger.ASK_RESET: State.DO_RESET},
+    State.DO_ACTIVATION: {**_CONNECTED, **_EMERGENCY, Trigger.DELIVERED: State.WF_ACTIVATION},
+    State.WF_ACTIVATION: {**_CONNECTED, **_EMERGENCY, **_SIGHTS},
     State.RUNNING_IDLE: {
         **_CONNECTED,
         **_SIGHTS,
@@ -129,17 +134,22 @@ TRANSITIONS: Final[dict[State, dict[Trigger, State]]] = {
         Trigger.ASK_RELEASE: State.DO_ATR,
         Trigger.ASK_RESET: State.DO_RESET,
     },
-    State.DO_ATR: {**_CONNECTED, Trigger.DELIVERED: State.WF_ATR},
+    State.DO_ATR: {**_CONNECTED, **_EMERGENCY, Trigger.DELIVERED: State.WF_ATR},
     State.WF_ATR: {
         **_CONNECTED,
+        **_EMERGENCY,
         Trigger.SEEN_RELEASED: State.ATR_DONE,
         Trigger.SEEN_RESET: State.RESET,
+    },
+    State.ATR_DONE: {
+        **_CONNECTED,
+        **_SIGHTS,
+        Trigger.ASK_HALT: State.ATR_DONE,
         Trigger.ASK_RESET: State.DO_RESET,
     },
-    State.ATR_DONE: {**_CONNECTED, **_SIGHTS, Trigger.ASK_RESET: State.DO_RESET},
-    State.DO_RESET: {**_CONNECTED, Trigger.DELIVERED: State.WF_RESET},
+    State.DO_RESET: {**_CONNECTED, **_EMERGENCY, Trigger.DELIVERED: State.WF_RESET},
     # A fault may outlast the request that clears it by a device cycle: only the reset itself counts.
-    State.WF_RESET: {**_CONNECTED, Trigger.SEEN_RESET: State.RESET, Trigger.ASK_RESET: State.DO_RESET},
+    State.WF_RESET: {**_CONNECTED, **_EMERGENCY, Trigger.SEEN_RESET: State.RESET},
     State.RESET: {
         **_CONNECTED,
         **_SIGHTS,
@@ -153,6 +163,12 @@ TRANSITIONS: Final[dict[State, dict[Trigger, State]]] = {
 
 RUNNING: Final = frozenset({State.RUNNING_IDLE, State.RUNNING_CC})
 """The states in which the gripper is active and takes commands."""
+
+
+SEQUENCES: Final = frozenset(
+    {State.DO_ACTIVATION, State.WF_ACTIVATION, State.DO_ATR, State.WF_ATR, State.DO_RESET, State.WF_RESET}
+)
+"""Activation, release and reset: they lead somewhere by themselves, and clearing rGTO ends none of them."""
 
 
 def states_allowing(trigger: Trigger) -> frozenset[State]:

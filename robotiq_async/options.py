@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 from .address import parse_address
@@ -14,7 +15,7 @@ from .guard import GuardedTransport
 from .link import ModbusTransport, Transport
 from .owner import ReconnectPolicy
 from .registers import REGISTER_COUNT, RTU_REGISTERS, TCP_REGISTERS
-from .simulated import SimulatedTransport
+from .simulated import SimulatedTransport, new_gripper
 
 POLL_INTERVAL_S: Final = 0.005
 """200 Hz, as the thesis polled; the manual names 200 Hz for RTU and 100 Hz for TCP."""
@@ -29,7 +30,8 @@ ACTIVATION_TIMEOUT_S: Final = 20.0
 class Options:
     """Everything a hand is constructed with, checked."""
 
-    transport: Transport
+    make_transport: Callable[[], Transport]
+    """A transport for one start of the hand."""
     address: str
     key: str
     """The same for every address of this gripper."""
@@ -75,22 +77,21 @@ def check_options(
             registers = replace(registers, request=check_int("request_address", request_address, 0, last))
         if status_address is not None:
             registers = replace(registers, status=check_int("status_address", status_address, 0, last))
-        transport: Transport
+        make: Callable[..., Transport]
         if parsed.kind == "sim":
-            transport = SimulatedTransport(registers, connect_timeout=connect_s, response_timeout=response_s)
-            name = key = f"sim://#{id(transport):x}"  # every sim:// is a gripper of its own
+            gripper = new_gripper()
+            make = partial(SimulatedTransport, gripper, registers)
+            name = key = f"sim://#{id(gripper):x}"  # every sim:// is a gripper of its own
         else:
-            transport = ModbusTransport(
-                parsed, registers, connect_timeout=connect_s, response_timeout=response_s
-            )
+            make = partial(ModbusTransport, parsed, registers)
             name, key = str(parsed), parsed.key
     elif isinstance(address, Transport):
         name = key = f"<{type(address).__name__} at {id(address):#x}>"
-        transport = GuardedTransport(address, name, connect_timeout=connect_s, response_timeout=response_s)
+        make = partial(GuardedTransport, address, name)
     else:
         raise TypeError(f"address must be a string or a Transport, got {address!r}")
     return Options(
-        transport=transport,
+        make_transport=partial(make, connect_timeout=connect_s, response_timeout=response_s),
         address=name,
         key=key,
         poll_interval=check_seconds("poll_interval", poll_interval, 0.001, 0.1),

@@ -355,12 +355,14 @@ class Owner:
             await asyncio.sleep(SHUTDOWN_PAUSE_S)
 
     async def _stop_fingers_once(self) -> None:
-        is_new = not self._transport.is_open
-        if is_new:
+        if not self._transport.is_open:
             # A gripper that lost its client goes on moving.
             await self._transport.open()
-        if is_new or self._is_stale():
-            self._core.look_again(*await self._read())
+        # Whether there is anything to stop is decided on what the gripper does now; and whoever asks
+        # afterwards whether the fingers stand still finds a status that is newer than the stop.
+        status, asked = await self._read()
+        self._core.look_again(status, asked)
+        self._publish(status)
         self._core.shut_down()
         while self._core.is_busy:
             await self._cycle()

@@ -3,23 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from .address import parse_address
 from .link import ModbusTransport
 from .registers import RegisterMap, Registers
 
+if TYPE_CHECKING:
+    from .simulator import SimulatedGripper
+
+
+def new_gripper() -> SimulatedGripper:
+    """A gripper for a hand at ``sim://``.
+
+    The simulator is imported here, and so only for sim:// and when the hand is made: it takes tens of
+    milliseconds, for which a loop that runs already would be held up.
+    """
+    from .simulator import SimulatedGripper  # noqa: PLC0415
+
+    return SimulatedGripper()
+
 
 class SimulatedTransport:
     """Starts a simulator on loopback when opened. The gripper outlives the connection, as a real one."""
 
-    def __init__(self, registers: RegisterMap, *, connect_timeout: float, response_timeout: float) -> None:
+    def __init__(
+        self,
+        gripper: SimulatedGripper,
+        registers: RegisterMap,
+        *,
+        connect_timeout: float,
+        response_timeout: float,
+    ) -> None:
         """Keep what is needed to connect; starts nothing."""
-        # The only place that imports the simulator at run time, and only for sim://. Here and not in open():
-        # it takes tens of milliseconds, for which a loop that runs already would be held up.
-        from .simulator import SimulatedGripper, SimulatorServer  # noqa: PLC0415
+        from .simulator import SimulatorServer  # noqa: PLC0415
 
-        self._gripper = SimulatedGripper()
-        self._server = SimulatorServer(self._gripper)
+        self._server = SimulatorServer(gripper)
         self._map = registers
         self._connect_timeout = connect_timeout
         self._response_timeout = response_timeout

@@ -7,6 +7,7 @@ in another task.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import weakref
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -15,6 +16,7 @@ from typing import Generic, Self, TypeVar
 
 from .enums import State
 from .errors import RobotiqError
+from .event_loop import check_loop
 from .machine import Trigger
 from .request import Request
 
@@ -66,6 +68,8 @@ class Stream(Generic[T]):
         While somebody waits the stream is in ``kept``: the task of that reader may be held by nothing else.
         """
         self._kept = kept
+        self._loop: asyncio.AbstractEventLoop | None = None
+        """The loop of the hand, while it runs: only there an item can wake the reader."""
         self.missed = 0
         self._items: deque[T] = deque(maxlen=buffer)
         self._waiting: asyncio.Future[None] | None = None
@@ -82,9 +86,11 @@ class Stream(Generic[T]):
         Raises:
             StopAsyncIteration: the hand was stopped, or the stream was closed.
             RobotiqConnectionError: the hand gave up on its link.
-            RuntimeError: another task is waiting on the same stream.
+            RuntimeError: another task is waiting on the same stream, or the hand runs in another event loop.
         """
         while not self._items and not self._ended:
+            if self._loop is not None:
+                check_loop(self._loop, "a stream of the hand")
             if self._waiting is not None:
                 raise RuntimeError("a stream has one reader; open another with statuses() or transitions()")
             self._waiting = asyncio.get_running_loop().create_future()
@@ -125,13 +131,29 @@ class Stream(Generic[T]):
 
     def end(self, failure: Callable[[], RobotiqError] | None) -> None:
         """No more items: the reader gets what is left, then the end or the failure."""
-        if not self._ended:
-            self._ended, self._failure = True, failure
-            self._wake()
+        if self._ended:
+            return
+        self._ended, self._failure = True, failure
+        if self._waiting is not None and self._waiting.get_loop().is_closed():
+            self._waiting = None  # whoever waited there can not be told any more
+        self._wake()
+
+    def belong_to(self, loop: asyncio.AbstractEventLoop) -> None:
+        """The hand runs in this loop. A reader that waits in another one finds that out now."""
+        self._loop, waiting = loop, self._waiting
+        if waiting is not None and waiting.get_loop() is not loop:
+            self._waiting = None
+            with contextlib.suppress(RuntimeError):  # that loop has been closed
+                waiting.get_loop().call_soon_threadsafe(_finish, waiting)
 
     def _wake(self) -> None:
         if self._waiting is not None and not self._waiting.done():
             self._waiting.set_result(None)
+
+
+def _finish(waiting: asyncio.Future[None]) -> None:
+    if not waiting.done():
+        waiting.set_result(None)
 
 
 class Channel(Generic[T]):
@@ -143,6 +165,7 @@ class Channel(Generic[T]):
         self._streams: list[weakref.ref[Stream[T]]] = []
         self._waited_for: set[Stream[T]] = set()
         self._failure: Callable[[], RobotiqError] | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
 
     def open(self, buffer: int | None) -> Stream[T]:
         """A new stream. Before a start it waits; after the hand gave up it raises the reason."""
@@ -150,12 +173,18 @@ class Channel(Generic[T]):
         if self._failure is not None:
             stream.end(self._failure)
         else:
+            if self._loop is not None:
+                stream.belong_to(self._loop)
             self._streams.append(weakref.ref(stream, self._forget))
         return stream
 
-    def reopen(self) -> None:
-        """The hand starts: what it gave up on before does not count any more."""
-        self._failure = None
+    def reopen(self, loop: asyncio.AbstractEventLoop) -> None:
+        """The hand starts in a loop: what it gave up on before does not count any more."""
+        self._failure, self._loop = None, loop
+        for reference in self._streams:
+            stream = reference()
+            if stream is not None:
+                stream.belong_to(loop)
 
     def push(self, item: T) -> None:
         """Hand an item to every stream."""
@@ -166,7 +195,7 @@ class Channel(Generic[T]):
 
     def end(self, failure: Callable[[], RobotiqError] | None = None) -> None:
         """End every stream, quietly or with a failure."""
-        self._failure = failure
+        self._failure, self._loop = failure, None
         streams, self._streams = self._streams, []
         for reference in streams:
             stream = reference()

@@ -15,7 +15,6 @@ from robotiq_async import (
     Fault,
     Finger,
     GripperFaultError,
-    InvalidStateError,
     MoveSupersededError,
     NotActivatedError,
     NotStartedError,
@@ -248,12 +247,28 @@ async def test_a_recovery_does_not_go_on_after_a_halt_or_a_reset(
     assert operator.hand.state is State.RESET
 
 
-async def test_a_halt_says_what_stops_an_activation(operator: Operator) -> None:
+async def test_a_halt_ends_an_activation_and_says_how(operator: Operator, gripper: SimulatedGripper) -> None:
     activating = asyncio.create_task(operator.act(ACTIONS["activate"]))
     await operator.hand.wait_for_state(State.WF_ACTIVATION)
-    with pytest.raises(InvalidStateError, match="a reset does"):
-        await operator.act(ACTIONS["halt"])
-    await activating
+    assert await operator.act(ACTIONS["halt"]) == "every axis stands still: the gripper is reset"
+    with pytest.raises(NotActivatedError):
+        await activating
+    assert not gripper.is_moving
+
+
+@pytest.mark.parametrize("pause", [0.0, 0.1])
+async def test_fingers_that_a_halt_has_stopped_are_seen_to_stand_still(new: Someone, pause: float) -> None:
+    """Nothing is left to write then, and nothing was read: that was taken for a gripper that is not seen."""
+    operator, _ = new
+    moving = asyncio.create_task(operator.move(255, Finger.ABC))
+    async for status in operator.hand.statuses():
+        if status.is_moving:
+            break
+    await operator.hand.halt()
+    with pytest.raises(MoveSupersededError):
+        await moving
+    await asyncio.sleep(pause)
+    assert await operator.leave() == "The fingers were stopped: they had been moved from here."
 
 
 async def test_an_old_halt_is_no_stop(new: Someone, gripper: SimulatedGripper) -> None:

@@ -10,7 +10,16 @@ import pytest
 
 from robotiq_async.enums import State
 from robotiq_async.errors import InvalidStateError
-from robotiq_async.machine import RUNNING, TRANSITIONS, Machine, Trigger, look, refusal, states_allowing
+from robotiq_async.machine import (
+    RUNNING,
+    SEQUENCES,
+    TRANSITIONS,
+    Machine,
+    Trigger,
+    look,
+    refusal,
+    states_allowing,
+)
 from tests.words import status_of
 
 SIGHTS = [trigger for trigger in Trigger if trigger.name.startswith("SEEN_")]
@@ -81,7 +90,13 @@ def test_the_states_that_take_an_activation_a_command_a_release_are_those_of_the
     assert states_allowing(Trigger.ASK_COMMAND) == RUNNING == {State.RUNNING_IDLE, State.RUNNING_CC}
     assert states_allowing(Trigger.ASK_RELEASE) == {State.FAULT}
     assert states_allowing(Trigger.ASK_START) == {State.DISCONNECTED, State.SHUTDOWN}
-    assert states_allowing(Trigger.ASK_HALT) == {*RUNNING, State.FAULT, State.RESET}
+
+
+def test_an_emergency_is_heard_in_every_state_of_a_hand_that_has_its_link() -> None:
+    connected = states_allowing(Trigger.ASK_STOP) - {State.DISCONNECTED}
+    assert states_allowing(Trigger.ASK_HALT) == states_allowing(Trigger.ASK_RESET) == connected
+    for state in SEQUENCES:
+        assert TRANSITIONS[state][Trigger.ASK_HALT] is State.DO_RESET
 
 
 def test_a_sight_is_what_its_name_says() -> None:

@@ -192,7 +192,7 @@ async def test_the_first_end_counts() -> None:
 
 async def test_a_stream_that_is_opened_before_a_start_waits(channel: Channel[int]) -> None:
     task = await reading(channel.open(1))
-    channel.reopen()
+    channel.reopen(asyncio.get_running_loop())
     await steps()
     assert not task.done()
     channel.push(1)
@@ -217,7 +217,7 @@ async def test_after_a_quiet_end_the_next_stream_waits_for_the_next_start(channe
 async def test_a_new_start_forgets_what_the_hand_gave_up_on(channel: Channel[int]) -> None:
     before = channel.open(1)
     channel.end(lost)
-    channel.reopen()
+    channel.reopen(asyncio.get_running_loop())
     stream = channel.open(1)
     channel.push(1)
     assert await anext(stream) == 1

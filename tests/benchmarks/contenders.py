@@ -15,6 +15,7 @@ import os
 import sys
 import time
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -117,7 +118,8 @@ async def hand_with_readers(seconds: float, ports: list[int], count: int) -> Fig
 async def latency(seconds: float, ports: list[int]) -> Figures:
     """From command() to the write, from a reply to its reader, from the last reply to move()'s return."""
     it = RobotiqHand(f"127.0.0.1:{ports[0]}")
-    link: Any = it._options.transport
+    link: Any = it._options.make_transport()
+    it._options = replace(it._options, make_transport=lambda: link)
     arrived = written = 0.0
     hear, write = link._trace_packet, link.write
 

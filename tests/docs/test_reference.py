@@ -54,8 +54,8 @@ def test_every_public_attribute_is_there(kind: type) -> None:
 
 
 def test_what_a_stream_is_for_is_there() -> None:
-    # push() and end() are the hand's side of it.
-    assert {*public(Stream)} - {"push", "end"} <= WORDS
+    # push(), end() and belong_to() are the hand's side of it.
+    assert {*public(Stream)} - {"push", "end", "belong_to"} <= WORDS
 
 
 @pytest.mark.parametrize(

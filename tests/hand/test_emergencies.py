@@ -1,0 +1,157 @@
+"""halt() and reset() are heard in every state of a hand that has its link."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from robotiq_async import (
+    ConnectionLostError,
+    Fault,
+    InvalidStateError,
+    NotActivatedError,
+    RobotiqHand,
+    State,
+)
+from robotiq_async.machine import SEQUENCES
+from robotiq_async.request import Request
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+
+
+@pytest.fixture
+def gripper(server: SimulatorServer) -> SimulatedGripper:
+    return server.gripper
+
+
+async def reach(hand: RobotiqHand, state: State) -> asyncio.Task[None]:
+    """Begin what leads to a state, and return the task that does it once the hand is there."""
+    gripper = {State.DO_ACTIVATION: hand.activate, State.WF_ACTIVATION: hand.activate}
+    release = {State.DO_ATR: hand.atr, State.WF_ATR: hand.atr}
+    ask = (gripper | release).get(state, hand.reset)
+    transitions = hand.transitions()
+    task = asyncio.create_task(ask())
+    async for transition in transitions:
+        if transition.target is state:
+            return task
+    raise AssertionError("the hand ended")
+
+
+@pytest.mark.parametrize("emergency", ["halt", "reset"])
+@pytest.mark.parametrize("state", sorted(SEQUENCES, key=str), ids=str)
+@pytest.mark.parametrize("delay", [0.0, 0.02], ids=["quick", "slow"])
+async def test_an_emergency_ends_every_sequence(
+    server: SimulatorServer, gripper: SimulatedGripper, state: State, emergency: str, delay: float
+) -> None:
+    """In DO_ACTIVATION and DO_ATR both were refused, and the fingers went on to move."""
+    hand = RobotiqHand(server.address)
+    releasing = state in (State.DO_ATR, State.WF_ATR)
+    await hand.start(activate=releasing)
+    if releasing:
+        gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+        await hand.wait_for_state(State.FAULT)
+    server.replies.delay(delay)
+    asking = await reach(hand, state)
+    await getattr(hand, emergency)()
+    assert hand.state is State.RESET
+    assert not gripper.is_moving
+    assert not Request.from_registers(gripper.request_registers).activate
+    if state in (State.DO_RESET, State.WF_RESET):
+        await asking
+    else:
+        with pytest.raises((NotActivatedError, InvalidStateError)):
+            await asking
+    await hand.stop()
+
+
+async def test_three_resets_at_once_are_one(hand: RobotiqHand, server: SimulatorServer) -> None:
+    """Two of them were refused."""
+    writes = len(server.gripper.writes)
+    await asyncio.gather(hand.reset(), hand.reset(), hand.reset())
+    assert hand.state is State.RESET
+    assert len(server.gripper.writes) == writes + 1
+
+
+async def test_halts_and_resets_at_once_all_end(hand: RobotiqHand, gripper: SimulatedGripper) -> None:
+    await hand.set_position(255)
+    await asyncio.gather(hand.reset(), hand.halt(), hand.reset(), hand.halt())
+    assert hand.state is State.RESET
+    assert not gripper.is_moving
+
+
+async def test_after_a_release_a_halt_has_nothing_to_do(
+    hand: RobotiqHand, gripper: SimulatedGripper, server: SimulatorServer
+) -> None:
+    gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    await hand.wait_for_state(State.FAULT)
+    await hand.atr()
+    writes = len(server.gripper.writes)
+    await hand.halt()
+    assert hand.state is State.ATR_DONE
+    assert len(server.gripper.writes) == writes
+
+
+async def test_a_halt_in_the_first_activation_ends_the_start(
+    server: SimulatorServer, gripper: SimulatedGripper
+) -> None:
+    hand = RobotiqHand(server.address)
+    transitions = hand.transitions()
+    starting = asyncio.create_task(hand.start())
+    async for transition in transitions:
+        if transition.target is State.DO_ACTIVATION:
+            break
+    await hand.halt()
+    with pytest.raises(NotActivatedError):
+        await starting
+    assert not gripper.is_moving
+    await hand.stop()
+
+
+# -- recover() ends with the link ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "fault", [Fault.COMMUNICATION_NOT_READY, Fault.SCISSOR_INTERFERENCE], ids=lambda f: f.name
+)
+async def test_a_recovery_that_waits_for_a_minor_fault_ends_with_the_link(
+    hand: RobotiqHand, server: SimulatorServer, gripper: SimulatedGripper, fault: Fault
+) -> None:
+    """It waited up to its 90 s: the stream it listened to waits out a lost link."""
+    gripper.inject_fault(fault)
+    await hand.wait_for_state(State.FAULT)
+    recovering = asyncio.create_task(hand.recover())
+    await anext(hand.statuses())
+    assert not recovering.done()
+    server.refuse()
+    server.cut()
+    async with asyncio.timeout(2):
+        with pytest.raises(ConnectionLostError):
+            await recovering
+
+
+async def test_a_recovery_that_waits_for_a_sequence_ends_with_the_link(
+    hand: RobotiqHand, server: SimulatorServer, gripper: SimulatedGripper
+) -> None:
+    await hand.reset()
+    activating = asyncio.create_task(hand.activate())
+    await hand.wait_for_state(State.WF_ACTIVATION)
+    recovering = asyncio.create_task(hand.recover())
+    await anext(hand.statuses())
+    server.refuse()
+    server.cut()
+    async with asyncio.timeout(2):
+        for task in (activating, recovering):
+            with pytest.raises(ConnectionLostError):
+                await task
+
+
+async def test_a_recovery_goes_on_when_the_minor_fault_clears(
+    hand: RobotiqHand, gripper: SimulatedGripper
+) -> None:
+    gripper.inject_fault(Fault.SCISSOR_INTERFERENCE)
+    await hand.wait_for_state(State.FAULT)
+    recovering = asyncio.create_task(hand.recover())
+    await anext(hand.statuses())
+    gripper.clear_faults()
+    await recovering
+    assert hand.state is State.RUNNING_IDLE

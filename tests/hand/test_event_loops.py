@@ -1,0 +1,269 @@
+"""A hand belongs to the event loop it was started in: what happens from other threads, loops, frameworks."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import threading
+from collections.abc import Callable, Coroutine, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import pytest
+
+from robotiq_async import Finger, NotStartedError, RobotiqHand, State
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+
+ADVICE = "call_soon_threadsafe|run_coroutine_threadsafe"
+
+
+@pytest.fixture
+def gripper(server: SimulatorServer) -> SimulatedGripper:
+    return server.gripper
+
+
+async def in_a_thread(work: Callable[[], object]) -> BaseException | None:
+    """What a call from another thread raises, or None."""
+
+    def run() -> BaseException | None:
+        try:
+            work()
+        except Exception as error:  # noqa: BLE001  # it is looked at in the test
+            return error
+        return None
+
+    with ThreadPoolExecutor(1) as pool:
+        return await asyncio.get_running_loop().run_in_executor(pool, run)
+
+
+CALLS: dict[str, Callable[[RobotiqHand], Coroutine[Any, Any, object]]] = {
+    "set_position": lambda hand: hand.set_position(200),
+    "set_speed": lambda hand: hand.set_speed(3),
+    "set_force": lambda hand: hand.set_force(3),
+    "move": lambda hand: hand.move(200),
+    "close": lambda hand: hand.close(),
+    "halt": lambda hand: hand.halt(),
+    "reset": lambda hand: hand.reset(),
+    "activate": lambda hand: hand.activate(),
+    "atr": lambda hand: hand.atr(),
+    "recover": lambda hand: hand.recover(),
+    "wait_for_state": lambda hand: hand.wait_for_state(State.FAULT),
+    "stop": lambda hand: hand.stop(),
+}
+
+
+async def assert_nothing_happened(hand: RobotiqHand, gripper: SimulatedGripper, writes: int) -> None:
+    for _ in range(3):
+        await anext(hand.statuses())
+    assert len(gripper.writes) == writes
+    assert hand.state is State.RUNNING_IDLE
+    await hand.move(20, Finger.A)
+
+
+@pytest.mark.parametrize("debug", [False, True], ids=["", "debug"])
+async def test_a_command_from_another_thread_is_an_error_and_asks_for_nothing(
+    hand: RobotiqHand, gripper: SimulatedGripper, debug: bool
+) -> None:
+    """It raised an error, and the fingers went: the request was merged before the state changed."""
+    asyncio.get_running_loop().set_debug(debug)
+    writes = len(gripper.writes)
+    error = await in_a_thread(lambda: hand.command(position=255))
+    assert isinstance(error, RuntimeError)
+    assert "call_soon_threadsafe" in str(error)
+    await assert_nothing_happened(hand, gripper, writes)
+
+
+@pytest.mark.parametrize("debug", [False, True], ids=["", "debug"])
+@pytest.mark.parametrize("name", CALLS)
+async def test_a_call_from_another_loop_is_refused_at_once(
+    hand: RobotiqHand, gripper: SimulatedGripper, name: str, debug: bool
+) -> None:
+    """It was carried out and never returned; in debug mode the task that owns the link died of it."""
+    asyncio.get_running_loop().set_debug(debug)
+    writes = len(gripper.writes)
+    async with asyncio.timeout(5):
+        error = await in_a_thread(lambda: asyncio.run(CALLS[name](hand)))
+    assert isinstance(error, RuntimeError), error
+    assert "run_coroutine_threadsafe" in str(error)
+    await assert_nothing_happened(hand, gripper, writes)
+
+
+async def test_the_advice_works(hand: RobotiqHand, gripper: SimulatedGripper) -> None:
+    loop = asyncio.get_running_loop()
+
+    def elsewhere() -> None:
+        result = asyncio.run_coroutine_threadsafe(hand.move(60, Finger.A), loop).result(timeout=10)
+        assert result.positions[Finger.A] == pytest.approx(60, abs=3)
+        loop.call_soon_threadsafe(lambda: hand.command(Finger.B, position=33))
+
+    assert await in_a_thread(elsewhere) is None
+    async for status in hand.statuses():
+        if status.requested_position(Finger.B) == 33:
+            break
+
+
+async def test_what_is_going_on_may_be_read_from_another_thread(hand: RobotiqHand) -> None:
+    def read() -> None:
+        assert hand.is_activated
+        assert not hand.is_reset
+        assert hand.is_moving in (True, False)
+        assert hand.status.registers
+        assert hand.statistics.polls
+        assert hand.state in State
+
+    assert await in_a_thread(read) is None
+
+
+@pytest.mark.parametrize("name", ["statuses", "transitions", "requests"])
+async def test_a_stream_is_neither_opened_nor_read_in_another_loop(hand: RobotiqHand, name: str) -> None:
+    async def read() -> object:
+        return await anext(stream)
+
+    stream = getattr(hand, name)()
+    for call in (getattr(hand, name), lambda: asyncio.run(read())):
+        async with asyncio.timeout(5):
+            error = await in_a_thread(call)
+        assert isinstance(error, RuntimeError)
+        assert "event loop" in str(error)
+
+
+async def test_who_waits_in_another_loop_for_a_start_is_told(server: SimulatorServer) -> None:
+    hand = RobotiqHand(server.address)
+    stream = hand.statuses()
+    waiting = threading.Event()
+
+    async def read() -> object:
+        asyncio.get_running_loop().call_soon(waiting.set)
+        return await anext(stream)
+
+    other = asyncio.create_task(in_a_thread(lambda: asyncio.run(read())))
+    await asyncio.to_thread(waiting.wait)
+    async with hand:
+        async with asyncio.timeout(5):
+            error = await other
+        assert isinstance(error, RuntimeError)
+        await anext(hand.statuses())
+
+
+def test_without_an_asyncio_loop_a_start_says_what_is_needed() -> None:
+    """As under trio, which drives coroutines itself."""
+    hand = RobotiqHand("127.0.0.1:9")
+    with pytest.raises(RuntimeError, match="trio is not supported"):
+        hand.start().send(None)
+    with pytest.raises(NotStartedError):
+        hand.command(position=3)
+    assert hand.state is State.DISCONNECTED
+
+
+# -- a loop that is closed under a hand ---------------------------------------------------------------------
+
+
+@pytest.fixture
+def address() -> Iterator[str]:
+    """A simulated gripper whose server has a loop and a thread of its own."""
+    ready: dict[str, Any] = {}
+    listens = threading.Event()
+
+    async def serve() -> None:
+        ready["loop"], ready["end"] = asyncio.get_running_loop(), asyncio.Event()
+        async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
+            ready["address"] = server.address
+            listens.set()
+            await ready["end"].wait()
+
+    thread = threading.Thread(target=lambda: asyncio.run(serve()))
+    thread.start()
+    listens.wait()
+    yield ready["address"]
+    ready["loop"].call_soon_threadsafe(ready["end"].set)
+    thread.join()
+
+
+@pytest.fixture(params=["tcp", "sim"])
+def abandoned(request: pytest.FixtureRequest, address: str) -> Iterator[RobotiqHand]:
+    """A hand whose loop has been closed while it ran."""
+    hand = RobotiqHand(address if request.param == "tcp" else "sim://")
+    loop = asyncio.new_event_loop()
+    loop.run_until_complete(hand.start(activate=False))
+    assert hand.state is State.RESET
+    loop.close()
+    yield hand
+    # What was left open in that loop is closed, with a warning of Python's, when nobody holds it any more.
+    gc.collect()
+
+
+OPEN_IN_A_CLOSED_LOOP = [
+    pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning"),
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
+
+
+class TestClosedLoop:
+    pytestmark = OPEN_IN_A_CLOSED_LOOP
+
+    def test_stop_ends(self, abandoned: RobotiqHand) -> None:
+        """It waited for ever, and swallowed its own cancellation."""
+
+        async def stop() -> None:
+            async with asyncio.timeout(3):
+                await abandoned.stop()
+
+        asyncio.run(stop())
+        assert abandoned.state is State.SHUTDOWN
+
+    @pytest.mark.parametrize("stop_first", [False, True], ids=["", "stopped"])
+    def test_start_begins_anew(self, abandoned: RobotiqHand, stop_first: bool) -> None:
+        """It refused for ever."""
+
+        async def again() -> None:
+            if stop_first:
+                await abandoned.stop()
+            async with asyncio.timeout(10):
+                await abandoned.start(activate=False)
+                assert abandoned.state is State.RESET
+                await anext(abandoned.statuses())
+                await abandoned.stop()
+
+        asyncio.run(again())
+        assert abandoned.state is State.SHUTDOWN
+
+    def test_every_other_call_says_so(self, abandoned: RobotiqHand) -> None:
+        for name, call in CALLS.items():
+            if name != "stop":
+                with pytest.raises(NotStartedError, match="closed"):
+                    asyncio.run(call(abandoned))
+        with pytest.raises(NotStartedError, match="closed"):
+            abandoned.command(position=3)
+        with pytest.raises(NotStartedError, match="closed"):
+            abandoned.is_moving  # noqa: B018
+
+    def test_its_streams_end(self, address: str) -> None:
+        hand = RobotiqHand(address)
+        stream = hand.statuses()
+        loop = asyncio.new_event_loop()
+        loop.run_until_complete(hand.start(activate=False))
+        waiting = loop.create_task(anext(stream))
+        loop.run_until_complete(asyncio.sleep(0))
+        loop.close()
+
+        async def end() -> None:
+            await hand.stop()
+            async with asyncio.timeout(2):
+                async for _ in stream:
+                    pass
+
+        asyncio.run(end())
+        del waiting
+        gc.collect()
+
+    def test_another_hand_takes_the_address_over(self, abandoned: RobotiqHand) -> None:
+        if abandoned.address.startswith("sim"):
+            pytest.skip("every sim:// is a gripper of its own")
+
+        async def other() -> None:
+            async with asyncio.timeout(5):
+                hand = RobotiqHand(abandoned.address)
+                await hand.start(activate=False)
+                await hand.stop()
+
+        asyncio.run(other())
