@@ -61,17 +61,24 @@ class Controller:
         self._drive(time)
 
     def apply(self, time: float, request: Request) -> None:
-        """Put an image into force."""
+        """Put an image into force; the same again changes nothing."""
+        if request == self.request:
+            return
         was_active, self.request = self.request.activate, request
-        if not request.activate:
+        if was_active and not request.activate:
             self.reset(time)
-        elif not was_active:
+        elif request.activate and not was_active:
             self._set_mode(self._requested_mode)
             self._begin(time, Initialization.ACTIVATING, control.activation(self._mode))
         if request.release:
             self.release(time)
         self._follow_mode(time)
         self._drive(time)
+
+    def power_off(self, time: float) -> None:
+        """Forget the request and everything that came of it; the axes stay where they are."""
+        self.request = REST
+        self.reset(time)
 
     def reset(self, time: float) -> None:
         """Stop at once and forget faults, sequences and what was touched; nothing moves after it."""

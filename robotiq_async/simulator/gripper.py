@@ -236,7 +236,7 @@ class SimulatedGripper:
         self._off_until = math.inf
         self._pending.clear()
         self._written = list(REST.registers)
-        self._controller.apply(self._time, REST)
+        self._controller.power_off(self._time)
 
     def power_on(self) -> None:
         """Switch on; without effect when it is on."""

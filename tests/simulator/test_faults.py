@@ -75,6 +75,27 @@ def test_a_major_fault_needs_a_reset(active: Bench) -> None:
     active.activate()
 
 
+@pytest.mark.parametrize("fault", [Fault.COMMUNICATION_NOT_READY, Fault.SCISSOR_INTERFERENCE])
+def test_writing_to_a_gripper_that_is_reset_clears_no_fault(bench: Bench, fault: Fault) -> None:
+    """A reset is rACT falling from 1 to 0, not every image in which it is 0."""
+    bench.gripper.inject_fault(fault, 3)
+    bench.gripper.write(0, [0] * 8)
+    bench.wait(0.1)
+    assert bench.fault is fault
+    bench.write(mode=1)
+    assert bench.fault is fault
+    bench.wait(3)
+    assert bench.fault is Fault.NONE
+
+
+def test_rewriting_the_image_clears_no_fault_and_releases_nothing(releasing: Bench) -> None:
+    releasing.settle()
+    before = releasing.gripper.status_registers()
+    releasing.write()
+    releasing.wait(1)
+    assert releasing.gripper.status_registers() == before
+
+
 def test_clear_faults(individual: Bench) -> None:
     individual.go(255)
     individual.gripper.inject_fault(Fault.ACTIVATION_FAULT)
