@@ -145,11 +145,11 @@ class Axis:
     def _plan(self, time: float) -> None:
         """Begin the motion from here to the goal."""
         assert self._goal is not None, "only a motion with a goal is planned"
-        here = self.position(time)
-        self._rest(time, here)
+        here, before, due = self.position(time), self._way, self.ends_at
         self._way = self._way_to(here, self._goal)
-        if self._has_reached(here, self._goal):
-            self._rest(time, float(round(here)))
+        reached = self._has_reached(here, self._goal)
+        self._rest(time, here)
+        if reached:
             self.status = ObjectStatus.AT_POSITION
             return
         self.status = ObjectStatus.IN_MOTION
@@ -158,7 +158,9 @@ class Axis:
         self._peak = peak(self._goal.force)
         self.ends_at = time + abs(self._way.end - here) / self._rate
         if self._way.outcome.is_contact:
-            self.ends_at += PRESSING
+            # A new request while it presses already does not begin the pressing anew.
+            presses = due < math.inf and here == before.end and self._way == before
+            self.ends_at = due if presses else self.ends_at + PRESSING
 
     def _way_to(self, here: float, goal: Goal) -> _Way:
         """The way from here to the goal.
@@ -172,7 +174,8 @@ class Axis:
         if obstacle is None:
             return _Way(end, ObjectStatus.AT_POSITION)
         surface = obstacle.position + self._spread.contact(obstacle.position)
-        if way * here > way * surface + obstacle.soft:
+        far_side = max(way * obstacle.position, way * surface) + obstacle.soft + self._spread.tolerance
+        if way * here > far_side:
             return _Way(end, ObjectStatus.AT_POSITION)
         stopped = way * max(way * here, way * surface + _dent(obstacle, goal.force))
         if way * stopped < way * target:
@@ -187,10 +190,10 @@ class Axis:
         return self._spread.overshoot(goal.position)
 
     def _has_reached(self, here: float, goal: Goal) -> bool:
-        """Whether the way that is planned need not be gone."""
+        """Whether the way that is planned need not be gone: an axis that stands close by is there."""
         if self._way.outcome is not ObjectStatus.AT_POSITION:
             return False
-        tolerance = 0 if goal.is_reading else self._spread.tolerance
+        tolerance = 0 if goal.is_reading or self.is_moving else self._spread.tolerance
         return self._way.end == here or abs(goal.position - here) <= tolerance
 
     def _is_latched_against(self, goal: Goal) -> bool:

@@ -190,6 +190,20 @@ def test_a_second_try_at_something_rigid_is_a_motion_before_it_is_a_contact(hold
     assert holding.gripper.travel(Finger.A) == before
 
 
+def test_requests_in_every_cycle_do_not_put_off_the_contact(individual: Bench) -> None:
+    individual.gripper.place_object(Finger.A, 50)
+    touched = None
+    for cycle in range(200):
+        individual.go({Finger.A: 100 + cycle % 100})
+        if individual.status.finger_status(Finger.A) is CLOSING:
+            break
+        if touched is None and individual.gripper.position(Finger.A) == 50:
+            touched = individual.now
+    assert touched is not None
+    assert individual.now - touched == pytest.approx(PRESSING, abs=2 * CYCLE)
+    assert where(individual, Finger.A) == (50, CLOSING)
+
+
 def test_a_thin_object_is_never_flagged(individual: Bench) -> None:
     individual.gripper.place_object(Finger.ABC, 220, thin=True)
     individual.close()

@@ -87,6 +87,25 @@ def test_what_is_asked_to_stay_stays(real: Bench) -> None:
     assert set(real.outcomes) == {ObjectStatus.AT_POSITION}
 
 
+def test_a_finger_follows_requests_that_come_step_by_step(real: Bench) -> None:
+    real.close(20)
+    for step in range(200):
+        real.go({Finger.A: 20 + step // 2})
+        assert real.gripper.position(Finger.A) == pytest.approx(20 + step / 2, abs=3)
+
+
+def test_an_object_where_a_finger_stands_is_felt_there(real: Bench) -> None:
+    for position in range(40, 200, 10):
+        real.go(position)
+        real.settle()
+        here = real.positions[:3]
+        real.gripper.place_object(Finger.ABC, position)
+        real.close()
+        assert all(abs(felt - stood) <= 3 for felt, stood in zip(real.positions[:3], here, strict=True))
+        assert real.words == (0xB9, 0xEA | 0xC0)
+        real.gripper.remove_object()
+
+
 def test_near_its_stop_a_finger_still_goes_there(real: Bench) -> None:
     real.close(8)
     real.close(0)
