@@ -59,15 +59,15 @@ def requested(request: Request, readings: Sequence[int]) -> Goals:
     """What a request asks of the axes while rGTO = 1.
 
     Simple control (rICF = 0, rICS = 0) lets A's registers drive all fingers, or in the scissor mode the
-    scissor alone while the fingers stay at their readings.
+    scissor alone while the fingers stay at their readings, rICF = 1 or not (manual).
     """
     own = tuple(_asked(axis) for axis in request.axes)
     grip = own[0]
     scissor_grips = not request.individual_scissor and request.mode is Mode.SCISSOR
-    if request.individual_fingers:
-        fingers = own[:3]
-    elif scissor_grips:
+    if scissor_grips:
         fingers = tuple(Goal(reading, grip.speed, grip.force, is_reading=True) for reading in readings[:3])
+    elif request.individual_fingers:
+        fingers = own[:3]
     else:
         fingers = (grip, grip, grip)
     if request.individual_scissor:

@@ -136,14 +136,16 @@ def test_scissor_mode_grips_with_the_scissor_alone(active: Bench) -> None:
     assert [active.gripper.travel(axis) for axis in AXES[:3]] == fingers
 
 
-def test_scissor_mode_leaves_the_fingers_where_they_are(active: Bench) -> None:
+def test_scissor_mode_leaves_the_fingers_where_they_are_also_under_individual_control(active: Bench) -> None:
+    """Individual control of the fingers, except in the scissor mode without that of the scissor (manual)."""
     active.write(mode=Mode.SCISSOR)
     active.settle()
     active.go({Finger.A: 50, Finger.B: 100, Finger.C: 150}, individual_fingers=True)
     active.settle()
-    active.go(255, individual_fingers=False)
+    assert active.positions == (6, 6, 6, 50)
+    active.write(individual_scissor=True)
     active.settle()
-    assert active.positions == (50, 100, 150, 232)
+    assert active.positions[:3] == (50, 100, 150)
 
 
 def test_scissor_mode_feels_an_object(active: Bench) -> None:
