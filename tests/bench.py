@@ -1,4 +1,4 @@
-"""A bench without I/O: the core on one side, a simulated gripper on the other, one clock by hand."""
+"""A bench without I/O: the core on one side, an exact simulated gripper on the other, one clock by hand."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Bench:
 
     def __init__(self, *, device_cycle: float = 0.005, gripper: SimulatedGripper | None = None) -> None:
         self.now = 100.0
-        self.gripper = gripper or SimulatedGripper(lambda: self.now, device_cycle=device_cycle)
+        self.gripper = gripper or SimulatedGripper(lambda: self.now, device_cycle=device_cycle, spread=False)
         self.transitions: list[tuple[State, State, Trigger]] = []
         self.machine = Machine(lambda *change: self.transitions.append(change))
         self.core = Core(self.machine, 128, 64)

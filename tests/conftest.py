@@ -44,8 +44,8 @@ async def nothing_left_running(caplog: pytest.LogCaptureFixture) -> AsyncIterato
 
 @pytest.fixture
 async def gripper() -> SimulatedGripper:
-    """A fast one."""
-    return SimulatedGripper(speedup=20)
+    """A fast one that stops where it is told to."""
+    return SimulatedGripper(speedup=20, spread=False)
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from statistics import mean
 
 import pytest
 
-from robotiq_async import RobotiqHand
+from robotiq_async import Finger, RobotiqHand
 from robotiq_async.calibration import (
     ForceCalibration,
     SpeedCalibration,
@@ -106,12 +106,11 @@ def test_a_table_that_says_nothing_is_refused(
 async def test_the_default_time_out_of_a_move_comes_from_the_calibration(tmp_path: Path) -> None:
     write_table(tmp_path / "slow.csv", SPEED, {0: (90_000,), 255: (60_000,)})
     slow = SpeedCalibration.from_csv(tmp_path / "slow.csv")
-    timeouts = []
-    for calibration in (None, slow):
+    for calibration, seconds in ((None, 2.119), (slow, 60)):
         async with RobotiqHand(calibration=calibration) as hand:
-            timeouts.append(hand._core.move_timeout(255, hand.status.moving | 1, 255))
-    assert timeouts[0] == pytest.approx(2 * 249 / 235 * 2.119 + 2, abs=0.05)
-    assert timeouts[1] == pytest.approx(2 * 249 / 235 * 60 + 2, abs=0.5)
+            timeout = hand._core.move_timeout(255, hand.status.moving | 1, 255)
+            way = 255 - hand.status.position(Finger.A)
+        assert timeout == pytest.approx(2 * way / 235 * seconds + 2, rel=0.005)
 
 
 def test_a_calibration_that_does_not_reach_over_all_speeds_is_refused(tmp_path: Path) -> None:

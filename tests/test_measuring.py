@@ -27,6 +27,8 @@ from robotiq_async.measuring import (
 )
 from robotiq_async.runs import FORCE, SPEED, TableError, read_table, thesis_table
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.simulator.axis import PRESSING
+from robotiq_async.simulator.motor import peak
 from robotiq_async.simulator.scale import SimulatedScale
 from tests.virtual import VirtualLoop, run
 
@@ -158,12 +160,10 @@ def test_the_currents_of_a_grasp() -> None:
             assert times == sorted(times)
             assert times[0] < 50
             moving = 1000 * closing_time(255) * (150 - 6) / 235
-            assert times[-1] == pytest.approx(moving + 1000 * GRASP_S, abs=50)
+            assert times[-1] == pytest.approx(moving + 1000 * (PRESSING + GRASP_S), abs=50)
             assert len(samples) == pytest.approx(times[-1] / 1000 / POLL_S, rel=0.02)  # every poll
-            last = hand.status
-            assert peak_currents([samples]) == tuple(
-                last.current_ma(f) for f in (Finger.A, Finger.B, Finger.C)
-            )
+            assert peak_currents([samples]) == (10 * round(peak(200)),) * 3
+            assert samples[-1][1:] == (0, 0, 0), "what is held draws nothing"
 
     run(main)
 

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import AsyncIterator
 
 import pytest
 
 from robotiq_async import Finger, RobotiqHand, State
 from robotiq_async.actions import ACTIONS, Operator
 from robotiq_async.services import SERVICES
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
 
 @pytest.fixture
-async def operator() -> AsyncIterator[Operator]:
-    async with SimulatorServer(SimulatedGripper(speedup=20)) as server, RobotiqHand(server.address) as hand:
-        yield Operator(hand)
+async def operator(hand: RobotiqHand) -> Operator:
+    return Operator(hand)
 
 
 async def call(operator: Operator, name: str, **arguments: object) -> str:

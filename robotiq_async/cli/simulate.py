@@ -20,6 +20,7 @@ async def simulate(
     port: Port = 5020,
     host: str = "127.0.0.1",
     speedup: Annotated[float, Parameter(metavar="FACTOR")] = 1.0,
+    exact: Annotated[bool, Parameter(negative=())] = False,
     serial: Annotated[str | None, Parameter(metavar="DEVICE")] = None,
     trouble: Annotated[list[str] | None, Parameter(metavar="WORDS", negative=())] = None,
     troubles: Annotated[bool, Parameter(negative=())] = False,
@@ -48,6 +49,7 @@ async def simulate(
         port: TCP port; 0 takes a free one.
         host: Interface to listen on. Modbus knows no password: whoever reaches the port is in command.
         speedup: How many times faster than the clock the simulated time runs.
+        exact: Stop exactly where it is told to, which no real gripper does.
         serial: Serve Modbus RTU on this serial device in place of TCP (extra serial).
         trouble: What goes wrong, and when; may be given again.
         troubles: List what can go wrong, and end.
@@ -59,7 +61,7 @@ async def simulate(
         return
     with usage():
         plan = parse_troubles("\n".join(trouble or ()))
-        gripper = SimulatedGripper(speedup=speedup)
+        gripper = SimulatedGripper(speedup=speedup, spread=not exact)
         server: SimulatorServer | SerialSimulatorServer
         if serial is None:
             server = SimulatorServer(gripper, port=port, host=host)

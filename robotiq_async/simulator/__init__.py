@@ -6,7 +6,9 @@ module                 what it holds
 ``gripper``            :class:`SimulatedGripper`: clock, registers, objects, faults, power
 ``controller``         the firmware: activation, modes, release, faults, who drives which axis
 ``control``            what a request asks of the axes, and the fixed sequences, as data
-``axis``               one axis: motion, stops, contacts, current
+``axis``               one axis: motion, stops, contacts
+``motor``              what its motor draws
+``spread``             what is not exact about it
 ``faults``             the faults that are present, and when they end
 ``report``             the status registers
 ``server``             :class:`SimulatorServer`: Modbus TCP
@@ -20,7 +22,7 @@ module                 what it holds
 ``damage``             what troubles do to the bytes of a reply
 =====================  ====================================================================
 
-The physics (the first six) import neither pymodbus nor asyncio.
+The physics (the first eight) import neither pymodbus nor asyncio.
 """
 
 from .gripper import SimulatedGripper

@@ -12,14 +12,15 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from robotiq_async.closing_time import STROKE_COUNTS, closing_time
 from robotiq_async.enums import ObjectStatus
 
-if TYPE_CHECKING:
-    from robotiq_async.request import AxisRequest
+from .motor import Motor, peak
 
-# Plausible figures in counts of 10 mA. The only published one is the manual's example of a reading, 0x0F.
-_MOVING_CURRENT: Final = 8.0
-_MOVING_CURRENT_PER_RATE: Final = 0.1
-_GRIPPING_CURRENT: Final = 20.0
-_GRIPPING_CURRENT_PER_FORCE: Final = 0.3
+if TYPE_CHECKING:
+    from .control import Goal
+    from .spread import Spread
+
+PRESSING: Final = 0.05
+"""Seconds for which an axis presses, still reported as motion, before it reports the contact. No source tells
+how long it is; this is ten polls."""
 
 
 class Obstacle(NamedTuple):
@@ -34,6 +35,14 @@ class Obstacle(NamedTuple):
     soft: int = 0
 
 
+class _Way(NamedTuple):
+    """A way that is planned: where it ends and why, and where the obstacle that ends it begins."""
+
+    end: float
+    outcome: ObjectStatus
+    surface: float = math.nan
+
+
 class Axis:
     """A finger or the scissor.
 
@@ -41,33 +50,35 @@ class Axis:
     not decrease and never jump over :attr:`ends_at`; the end of a motion is told by :meth:`arrive`.
 
     Attributes:
-        low: where the opening motion ends mechanically, in counts.
-        high: where the closing motion ends mechanically, in counts.
+        low: where the opening motion ends, in counts.
+        high: where the closing motion ends, in counts; :meth:`confine` changes it.
         status: what gDT says about the axis while gGTO = 1.
         ends_at: when the present motion ends; infinite at rest.
         in_closing: the obstacle met while closing, if there is one.
         in_opening: the obstacle met while opening, if there is one.
     """
 
-    def __init__(self, position: int, low: int, high: int) -> None:
-        """An axis at rest."""
+    def __init__(self, position: int, low: int, high: int, motor: Motor, spread: Spread) -> None:
+        """An axis at rest between its mechanical stops."""
         self.low = low
         self.high = high
         self.status = ObjectStatus.IN_MOTION
         self.ends_at = math.inf
         self.in_closing: Obstacle | None = None
         self.in_opening: Obstacle | None = None
-        self._goal: AxisRequest | None = None
+        self._motor = motor
+        self._spread = spread
+        self._closed = high
+        self._goal: Goal | None = None
         self._origin = float(position)
         self._since = 0.0
-        self._stop = float(position)
-        self._rate = 0.0
-        self._outcome = ObjectStatus.IN_MOTION
+        self._way = _Way(self._origin, ObjectStatus.IN_MOTION)
+        self._rate = self._running = self._peak = 0.0
         self._travelled = 0.0
 
     @property
     def is_moving(self) -> bool:
-        """Whether the axis moves."""
+        """Whether the axis moves, or presses against something before it reports the contact."""
         return self.ends_at < math.inf
 
     @property
@@ -79,30 +90,31 @@ class Axis:
         """Where the axis is."""
         if not self.is_moving:
             return self._origin
-        return self._origin + math.copysign(self._rate * (time - self._since), self._stop - self._origin)
+        way = self._way.end - self._origin
+        return self._origin + math.copysign(min(self._rate * (time - self._since), abs(way)), way)
 
     def travel(self, time: float) -> float:
         """The way the axis has gone since it was made, in counts, forth and back added up."""
         return self._travelled + abs(self.position(time) - self._origin)
 
-    @property
-    def current(self) -> int:
-        """Motor current in counts. It grows with the speed of a motion and with the force of a contact."""
-        if self.is_moving:
-            return round(_MOVING_CURRENT + _MOVING_CURRENT_PER_RATE * self._rate)
-        if self.status.is_contact and self._goal is not None:
-            return round(_GRIPPING_CURRENT + _GRIPPING_CURRENT_PER_FORCE * self._goal.force)
-        return 0
+    def current(self, time: float) -> int:
+        """Motor current in counts: that of the motion, up to the peak of a contact, and 0 at rest."""
+        if not self.is_moving:
+            return 0
+        return round(self._running + (self._peak - self._running) * self._pressed(time))
 
-    def command(self, time: float, goal: AxisRequest) -> None:
+    def command(self, time: float, goal: Goal) -> None:
         """Go to a position; repeating a goal changes nothing.
 
-        A contact latches, for the obstacle is still there: a goal beyond it leaves the axis where it is, or
-        with more force presses it deeper into something soft.
+        A contact latches: a goal beyond it with no more force leaves the axis where it is. With more force it
+        tries again, and presses deeper into something soft.
         """
-        if goal != self._goal:
-            self._goal = goal
-            self.plan(time)
+        if goal == self._goal:
+            return
+        is_latched = self._is_latched_against(goal)
+        self._goal = goal
+        if not is_latched:
+            self._plan(time)
 
     def hold(self, time: float) -> None:
         """Stop on the count the axis reads now, and forget the goal."""
@@ -116,38 +128,91 @@ class Axis:
 
     def arrive(self) -> None:
         """End the present motion; to be called at :attr:`ends_at`."""
-        self._rest(self.ends_at, self._stop)
-        self.status = self._outcome
+        self._rest(self.ends_at, self._way.end)
+        self.status = self._way.outcome
 
-    def plan(self, time: float) -> None:
-        """Begin the motion from here to the goal, if there is one; to be called when obstacles change."""
-        if self._goal is None:
-            return
-        here = self.position(time)
+    def confine(self, time: float, high: int | None) -> None:
+        """Let the closing motion end at a software limit, or with None at the mechanical stop."""
+        before, self.high = self.high, self._closed if high is None else high
+        if self.high != before and self._goal is not None and not self._is_latched_against(self._goal):
+            self._plan(time)
+
+    def look_again(self, time: float) -> None:
+        """Tell the axis that obstacles have changed. At rest it feels nothing of it: a contact latches."""
+        if self.is_moving:
+            self._plan(time)
+
+    def _plan(self, time: float) -> None:
+        """Begin the motion from here to the goal."""
+        assert self._goal is not None, "only a motion with a goal is planned"
+        here, before, due = self.position(time), self._way, self.ends_at
+        self._way = self._way_to(here, self._goal)
+        reached = self._has_reached(here, self._goal)
         self._rest(time, here)
-        self._stop, self._outcome = self._end_of_the_way(here, self._goal)
-        if self._stop == here:
-            self.status = self._outcome
+        if reached:
+            self.status = ObjectStatus.AT_POSITION
             return
         self.status = ObjectStatus.IN_MOTION
         self._rate = STROKE_COUNTS / closing_time(self._goal.speed)
-        self.ends_at = time + abs(self._stop - here) / self._rate
+        self._running = self._motor.running(self._rate, closing=self._way.end > here)
+        self._peak = peak(self._goal.force)
+        self.ends_at = time + abs(self._way.end - here) / self._rate
+        if self._way.outcome.is_contact:
+            # A new request while it presses already does not begin the pressing anew.
+            presses = due < math.inf and here == before.end and self._way == before
+            self.ends_at = due if presses else self.ends_at + PRESSING
 
-    def _end_of_the_way(self, here: float, goal: AxisRequest) -> tuple[float, ObjectStatus]:
-        """Where the motion from here to the goal ends, and why.
+    def _way_to(self, here: float, goal: Goal) -> _Way:
+        """The way from here to the goal.
 
         An obstacle that the axis has passed already is behind it and no contact.
         """
         target = self._within_stops(goal.position)
-        if self.in_closing is not None and here <= self.in_closing.position + self.in_closing.soft:
-            touching = max(here, self.in_closing.position + _dent(self.in_closing, goal.force))
-            if touching < target:
-                return touching, ObjectStatus.CONTACT_CLOSING
-        if self.in_opening is not None and here >= self.in_opening.position - self.in_opening.soft:
-            touching = min(here, self.in_opening.position - _dent(self.in_opening, goal.force))
-            if touching > target:
-                return touching, ObjectStatus.CONTACT_OPENING
-        return target, ObjectStatus.AT_POSITION
+        way = 1 if target > here else -1
+        end = self._within_stops(target + way * self._overshoot(goal))
+        obstacle = self.in_closing if way > 0 else self.in_opening
+        if obstacle is None:
+            return _Way(end, ObjectStatus.AT_POSITION)
+        surface = obstacle.position + self._spread.contact(obstacle.position)
+        far_side = max(way * obstacle.position, way * surface) + obstacle.soft + self._spread.tolerance
+        if way * here > far_side:
+            return _Way(end, ObjectStatus.AT_POSITION)
+        stopped = way * max(way * here, way * surface + _dent(obstacle, goal.force))
+        if way * stopped < way * target:
+            contact = ObjectStatus.CONTACT_CLOSING if way > 0 else ObjectStatus.CONTACT_OPENING
+            return _Way(stopped, contact, surface)
+        return _Way(way * min(way * end, way * stopped), ObjectStatus.AT_POSITION)
+
+    def _overshoot(self, goal: Goal) -> int:
+        """Counts by which the axis will go too far: none at a stop, nor where a reading is what is asked."""
+        if goal.is_reading or not self.low < goal.position < self.high:
+            return 0
+        return self._spread.overshoot(goal.position)
+
+    def _has_reached(self, here: float, goal: Goal) -> bool:
+        """Whether the way that is planned need not be gone: an axis that stands close by is there."""
+        if self._way.outcome is not ObjectStatus.AT_POSITION:
+            return False
+        tolerance = 0 if goal.is_reading or self.is_moving else self._spread.tolerance
+        return self._way.end == here or abs(goal.position - here) <= tolerance
+
+    def _is_latched_against(self, goal: Goal) -> bool:
+        """Whether the contact that the axis stands in holds against a goal beyond it with no more force."""
+        if self._goal is None or self.is_moving or goal.force > self._goal.force:
+            return False
+        beyond = self._within_stops(goal.position) - self._origin
+        return (self.status is ObjectStatus.CONTACT_CLOSING and beyond > 0) or (
+            self.status is ObjectStatus.CONTACT_OPENING and beyond < 0
+        )
+
+    def _pressed(self, time: float) -> float:
+        """How far the axis has been pressed into what stops it, from 0 to 1."""
+        way, position = self._way, self.position(time)
+        if not way.outcome.is_contact:
+            return 0.0
+        if position == way.end:
+            return 1.0
+        return 0.0 if way.end == way.surface else max(0.0, (position - way.surface) / (way.end - way.surface))
 
     def _within_stops(self, position: int) -> int:
         return max(self.low, min(self.high, position))

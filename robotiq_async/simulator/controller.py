@@ -17,6 +17,8 @@ from robotiq_async.request import Request
 from . import control
 from .axis import Axis
 from .faults import PresentFaults
+from .motor import MOTORS, Motor
+from .spread import Spread
 
 REST: Final = Request.from_registers((0,) * reg.REGISTER_COUNT)
 """The image of a gripper that was just switched on: all zero."""
@@ -35,10 +37,13 @@ class Controller:
         fail_activation: the next activation ends in fault 0x0D; reset to False when it does.
     """
 
-    def __init__(self, scissor_limit: tuple[int, int]) -> None:
-        """An open gripper in the basic mode's shape, reset."""
-        fingers = (Axis(OPEN_READING, OPEN_READING, CLOSED_READING) for _ in range(3))
-        self.axes = (*fingers, Axis(control.MODE_POSITION[Mode.BASIC], *scissor_limit))
+    def __init__(self, scissor_limit: tuple[int, int], seed: int | None) -> None:
+        """An open gripper in the basic mode's shape, reset; without a seed one that is exact."""
+        *fingers, scissor = (Spread(seed, axis) for axis in AXES)
+        self.axes = (
+            *(_finger(motor, spread) for motor, spread in zip(MOTORS[:3], fingers, strict=True)),
+            Axis(control.MODE_POSITION[Mode.BASIC], *scissor_limit, MOTORS[3], scissor),
+        )
         self.request = REST
         self.progress = Initialization.RESET
         self.faults = PresentFaults()
@@ -61,17 +66,24 @@ class Controller:
         self._drive(time)
 
     def apply(self, time: float, request: Request) -> None:
-        """Put an image into force."""
+        """Put an image into force; the same again changes nothing."""
+        if request == self.request:
+            return
         was_active, self.request = self.request.activate, request
-        if not request.activate:
+        if was_active and not request.activate:
             self.reset(time)
-        elif not was_active:
-            self._set_mode(self._requested_mode)
+        elif request.activate and not was_active:
+            self._set_mode(time, self._requested_mode)
             self._begin(time, Initialization.ACTIVATING, control.activation(self._mode))
         if request.release:
             self.release(time)
         self._follow_mode(time)
         self._drive(time)
+
+    def power_off(self, time: float) -> None:
+        """Forget the request and everything that came of it; the axes stay where they are."""
+        self.request = REST
+        self.reset(time)
 
     def reset(self, time: float) -> None:
         """Stop at once and forget faults, sequences and what was touched; nothing moves after it."""
@@ -114,16 +126,16 @@ class Controller:
         mode = self._requested_mode
         if mode == self._mode or self.progress not in (Initialization.COMPLETE, Initialization.CHANGING_MODE):
             return
-        self._set_mode(mode)
+        self._set_mode(time, mode)
         if mode is not None:
             self._begin(time, Initialization.CHANGING_MODE, control.mode_change(mode))
         elif self.progress is Initialization.CHANGING_MODE:
             self._begin(time, Initialization.COMPLETE, ())
 
-    def _set_mode(self, mode: Mode | None) -> None:
+    def _set_mode(self, time: float, mode: Mode | None) -> None:
         self._mode = mode
         for finger in self.axes[:3]:
-            finger.high = control.finger_stop(mode)
+            finger.confine(time, control.finger_limit(mode))
 
     def _begin(self, time: float, progress: Initialization, steps: tuple[control.Goals, ...]) -> None:
         self.progress = progress
@@ -181,3 +193,8 @@ class Controller:
         else:
             self.progress = Initialization.COMPLETE
             self._follow_mode(time)
+
+
+def _finger(motor: Motor, spread: Spread) -> Axis:
+    low = OPEN_READING + spread.open_reading
+    return Axis(low, low, CLOSED_READING + spread.closed_reading, motor, spread)

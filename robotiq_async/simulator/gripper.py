@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 from collections import deque
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -16,6 +17,7 @@ from .axis import Axis, Obstacle
 from .control import SCISSOR_HIGH, SCISSOR_LOW
 from .controller import REST, Controller
 from .report import status_registers
+from .spread import SEED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -44,15 +46,19 @@ class SimulatedGripper:
     depend on how often anybody looks. Use one from one thread only.
 
     A write takes effect one device cycle later, as on the device. Speeds are the measured ones of
-    :mod:`robotiq_async.closing_time`; the scissor moves the same counts a second, as none are published.
+    :mod:`robotiq_async.closing_time`; the scissor moves the same counts a second, as none are published. What
+    the motors draw stands in :mod:`.motor`, and by how much axes miss what they are asked in :mod:`.spread`:
+    as with a real gripper, who waits for gPO = rPR waits for ever.
 
     Choices where no source settles the behaviour:
 
+    * An axis that meets something, or tries again, presses for 50 ms with gDT 0 before it reports a contact.
+    * An axis that stands within 2 counts of a new request has reached it, and does not move.
     * Activation closes and opens at full speed (4.2 s); a failed one stays at gIMC = 1 with fault 0x0D.
     * gMOD, gGTO and the position echoes follow the request also while reset.
     * A minor or major fault stops the axes where they are, with gDT 0; interference below 20 s stops the
       scissor only. When a minor fault ends, a request with rGTO = 1 goes on by itself.
-    * The scissor takes its requests as counts, within 24..232.
+    * The scissor takes its requests as counts, within 6..232.
     """
 
     def __init__(
@@ -63,6 +69,8 @@ class SimulatedGripper:
         speedup: float = 1.0,
         scissor_limit: tuple[int, int] = (SCISSOR_LOW, SCISSOR_HIGH),
         powered: bool = True,
+        spread: bool = True,
+        seed: int = SEED,
     ) -> None:
         """A gripper that was just switched on: open, reset, all registers 0.
 
@@ -73,15 +81,19 @@ class SimulatedGripper:
             scissor_limit: a software limit of the scissor in counts. A request beyond it is replaced by the
                 limit and reported as reached while the echo keeps the request.
             powered: whether the gripper is switched on; :meth:`power_on` does it later.
+            spread: whether axes stop a count or two beside what was asked, and feel an object some counts
+                early or late. Without it they are exact: an open finger reads 6, a closed one 241.
+            seed: which gripper it is, 0 or more: another seed, other counts; the same seed, the same.
 
         Raises:
-            TypeError: an argument is not a number.
-            ValueError: device_cycle is negative, speedup is not above 0, or scissor_limit is not a range
-                within 24..232.
+            TypeError: an argument is of the wrong type.
+            ValueError: device_cycle or seed is negative, speedup is not above 0, or scissor_limit is not a
+                range within 6..232.
         """
         self._cycle = check_seconds("device_cycle", device_cycle, 0, _LONGEST)
         self._speedup = _check_speedup(speedup)
-        self._controller = Controller(_check_limit(scissor_limit))
+        check_int("seed", seed, 0, sys.maxsize)
+        self._controller = Controller(_check_limit(scissor_limit), seed if spread else None)
         self._clock = clock
         self._began = clock()
         self._time = 0.0
@@ -140,33 +152,46 @@ class SimulatedGripper:
     # The world around.
 
     def place_object(
-        self, fingers: Finger | int, position: int, *, opening: bool = False, soft: int = 0
+        self,
+        fingers: Finger | int,
+        position: int,
+        *,
+        opening: bool = False,
+        soft: int = 0,
+        thin: bool = False,
     ) -> None:
         """Put something in the way of some axes.
 
         An axis that has passed the position already has the object behind it: no contact until it comes
         from the other side. Each axis has room for one object per direction; a second replaces the first.
+        An axis that stands in a contact stays there, wherever the object is now.
 
         Args:
             fingers: the axes it is in the way of.
             position: count at which an axis touches it, 0..255.
             opening: it is met when opening (gDT = 1) instead of closing (gDT = 2).
             soft: counts by which a force of 255 presses the axis into it, 0..255.
+            thin: it is a thin object between fingertips, which the gripper may hold without ever reporting a
+                contact (manual). Here it never does: the axes go on to their request or their stops.
 
         Raises:
             TypeError: an argument is not an int.
             ValueError: fingers is not a mask of axes, or another argument is outside 0..255.
         """
-        obstacle = Obstacle(check_byte("position", position), check_byte("soft", soft))
+        met = Obstacle(check_byte("position", position), check_byte("soft", soft))
+        obstacle = None if thin else met
         for axis in self._axes(check_mask(fingers)):
             if opening:
                 axis.in_opening = obstacle
             else:
                 axis.in_closing = obstacle
-            axis.plan(self._time)
+            axis.look_again(self._time)
 
     def remove_object(self, fingers: Finger | int = Finger.ALL) -> None:
-        """Take away what is in the way of some axes; those it stopped go on to their request while rGTO = 1.
+        """Take away what is in the way of some axes.
+
+        Those it has stopped stay in their contact until a position on the other side is requested, the force
+        is raised or rGTO goes from 0 to 1 (manual).
 
         Raises:
             TypeError: fingers is not an int.
@@ -174,7 +199,7 @@ class SimulatedGripper:
         """
         for axis in self._axes(check_mask(fingers)):
             axis.in_closing = axis.in_opening = None
-            axis.plan(self._time)
+            axis.look_again(self._time)
 
     def inject_fault(self, fault: Fault | int, duration: float | None = None) -> None:
         """Make a fault appear. A minor or major one stops the axes; interference, see :meth:`interfere`.
@@ -236,7 +261,7 @@ class SimulatedGripper:
         self._off_until = math.inf
         self._pending.clear()
         self._written = list(REST.registers)
-        self._controller.apply(self._time, REST)
+        self._controller.power_off(self._time)
 
     def power_on(self) -> None:
         """Switch on; without effect when it is on."""

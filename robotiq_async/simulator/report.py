@@ -32,7 +32,7 @@ def status_registers(controller: Controller, time: float) -> reg.Registers:
         # The echo is the axis's own register even where simple control drives the axis by another.
         reg.gPR[index].write(block, own.position)
         reg.gPO[index].write(block, round(axis.position(time)))
-        reg.gCU[index].write(block, axis.current)
+        reg.gCU[index].write(block, axis.current(time))
     if controller.progress is Initialization.COMPLETE:
         statuses = [axis.status for axis in controller.axes]
         reg.gSTA.write(block, _summary(statuses[:3]))

@@ -83,12 +83,12 @@ async def test_it_shows_the_gripper_before_anything_happens(operator: Operator) 
 
 
 async def test_it_follows_the_axes(active: Operator, gripper: SimulatedGripper) -> None:
-    gripper.place_object(Finger.A, 120)
+    gripper.place_object(Finger.A, 60, soft=60)
     async with shown(active) as pilot:
-        await active.hand.close()
+        await active.hand.close(speed=0, force=255)
         await until(pilot, lambda: "241 → 255 there" in axes(pilot)[1])
         assert "120 → 255 CONTACT closing" in axes(pilot)[0]
-        assert set(sparkline_of(axes(pilot)[0])) & set("▅▆▇"), "390 mA while it grips"
+        assert set(sparkline_of(axes(pilot)[0])) & set("▅▆▇█"), "half an ampere before it grips"
         assert set(sparkline_of(axes(pilot)[3])) == {"▁"}
 
 

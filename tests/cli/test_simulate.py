@@ -39,6 +39,13 @@ async def test_it_prints_its_address_serves_and_ends_cleanly(shell: Shell, numbe
     assert (outcome.code, outcome.out, outcome.err) == (0, "", "")
 
 
+@pytest.mark.parametrize(("options", "position"), [((), 7), (("--exact",), 6)])
+async def test_it_is_exact_only_on_request(shell: Shell, options: tuple[str, ...], position: int) -> None:
+    address = await shell.read_line(await shell.start("simulate", "--port", "0", *options))
+    reading = json.loads((await shell.run("status", "--json", address)).out)
+    assert reading["axes"]["A"]["position"] == position
+
+
 async def test_it_keeps_the_gripper_between_two_clients(shell: Shell) -> None:
     process = await shell.start("simulate", "--port", "0", "--speedup", "20")
     address = await shell.read_line(process)

@@ -1,4 +1,4 @@
-"""A bench for the simulated gripper: a clock turned by hand, and requests in words."""
+"""A bench for the simulated gripper, without a spread: a clock turned by hand, and requests in words."""
 
 from __future__ import annotations
 
@@ -22,7 +22,9 @@ class Bench:
 
     def __init__(self, **options: Any) -> None:
         self.now = 1000.0
-        self.gripper = SimulatedGripper(lambda: self.now, **{"device_cycle": CYCLE, **options})
+        self.gripper = SimulatedGripper(
+            lambda: self.now, **{"device_cycle": CYCLE, "spread": False, **options}
+        )
         self.request = Request(individual_fingers=False, individual_scissor=False)
 
     def wait(self, seconds: float) -> None:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from robotiq_async.enums import AXES, Finger, ObjectStatus
+from robotiq_async.simulator.axis import PRESSING
+from tests.simulator.conftest import CYCLE
 
 if TYPE_CHECKING:
     from tests.simulator.conftest import Bench
@@ -65,23 +67,44 @@ def test_a_contact_latches_against_requests_on_the_same_side(holding: Bench, tar
     assert holding.gripper.travel(Finger.A) == before
 
 
-def test_an_object_that_gives_way_lets_the_axis_follow(holding: Bench) -> None:
+def test_a_contact_latches_when_its_object_gives_way_or_is_gone(holding: Bench) -> None:
+    """A finger that locks itself does not follow; gDT says so until somebody asks for more."""
     holding.gripper.place_object(Finger.A, 170)
-    holding.settle()
-    assert where(holding, Finger.A) == (170, CLOSING)
-
-
-def test_removing_the_object_lets_the_axis_go_on(holding: Bench) -> None:
+    holding.wait(5)
+    assert where(holding, Finger.A) == (150, CLOSING)
     holding.gripper.remove_object(Finger.A)
+    holding.go({Finger.A: 255}, force=100)
+    holding.wait(5)
+    assert where(holding, Finger.A) == (150, CLOSING)
+
+
+@pytest.mark.parametrize("how", ["more force", "rGTO", "the other side and back"])
+def test_what_ends_a_contact_lets_the_axis_go_on_when_the_object_is_gone(holding: Bench, how: str) -> None:
+    holding.gripper.remove_object(Finger.A)
+    if how == "more force":
+        holding.go({Finger.A: 200}, force=101)
+    elif how == "rGTO":
+        holding.write(go=False)
+        holding.write(go=True)
+    else:
+        holding.go({Finger.A: 100}, force=100)
+        holding.settle()
+        assert where(holding, Finger.A) == (100, ARRIVED)
+        holding.go({Finger.A: 200}, force=100)
     assert holding.status.finger_status(Finger.A) is MOVING
     holding.settle()
     assert where(holding, Finger.A) == (200, ARRIVED)
 
 
-def test_removing_another_axis_object_changes_nothing(holding: Bench) -> None:
-    holding.gripper.remove_object(Finger.B | Finger.C)
-    holding.wait(5)
-    assert holding.status.finger_status(Finger.A) is CLOSING
+def test_an_object_that_goes_while_the_axis_presses_lets_it_go_on(individual: Bench) -> None:
+    individual.gripper.place_object(Finger.A, 60)
+    individual.go({Finger.A: 200})
+    while individual.gripper.position(Finger.A) < 60:
+        individual.wait(CYCLE)
+    assert individual.status.finger_status(Finger.A) is MOVING
+    individual.gripper.remove_object()
+    individual.settle()
+    assert where(individual, Finger.A) == (200, ARRIVED)
 
 
 def test_removing_the_object_while_halted_moves_nothing(holding: Bench) -> None:
@@ -101,11 +124,9 @@ def test_a_position_on_the_other_side_releases(holding: Bench) -> None:
     assert where(holding, Finger.A) == (100, ARRIVED)
 
 
-def test_retargeting_to_the_reading_relaxes_the_grip(holding: Bench) -> None:
-    assert holding.status.current(Finger.A) > 0
+def test_retargeting_to_the_reading_ends_the_contact(holding: Bench) -> None:
     holding.go({Finger.A: 150}, force=100)
-    assert holding.status.finger_status(Finger.A) is ARRIVED
-    assert holding.status.current(Finger.A) == 0
+    assert where(holding, Finger.A) == (150, ARRIVED)
 
 
 @pytest.fixture(params=[CLOSING, OPENING], ids=["closing", "opening"])
@@ -153,6 +174,50 @@ def test_going_again_with_less_force_stays_in_a_soft_object(pressing: Bench) -> 
     assert pressing.status.finger_status(Finger.A).is_contact
 
 
+@pytest.mark.parametrize("how", ["rGTO", "more force"])
+def test_a_second_try_at_something_rigid_is_a_motion_before_it_is_a_contact(holding: Bench, how: str) -> None:
+    before = holding.gripper.travel(Finger.A)
+    if how == "rGTO":
+        holding.write(go=False)
+        assert where(holding, Finger.A) == (150, CLOSING)
+        holding.write(go=True)
+    else:
+        again(holding, force=200)
+    assert where(holding, Finger.A) == (150, MOVING)
+    assert holding.status.is_moving
+    holding.wait(PRESSING)
+    assert where(holding, Finger.A) == (150, CLOSING)
+    assert holding.gripper.travel(Finger.A) == before
+
+
+def test_requests_in_every_cycle_do_not_put_off_the_contact(individual: Bench) -> None:
+    individual.gripper.place_object(Finger.A, 50)
+    touched = None
+    for cycle in range(200):
+        individual.go({Finger.A: 100 + cycle % 100})
+        if individual.status.finger_status(Finger.A) is CLOSING:
+            break
+        if touched is None and individual.gripper.position(Finger.A) == 50:
+            touched = individual.now
+    assert touched is not None
+    assert individual.now - touched == pytest.approx(PRESSING, abs=2 * CYCLE)
+    assert where(individual, Finger.A) == (50, CLOSING)
+
+
+def test_a_thin_object_is_never_flagged(individual: Bench) -> None:
+    individual.gripper.place_object(Finger.ABC, 220, thin=True)
+    individual.close()
+    assert individual.positions[:3] == (241, 241, 241)
+    assert individual.words == (0xF9, 0xFF)
+
+
+def test_a_thin_object_takes_the_place_of_another(individual: Bench) -> None:
+    individual.gripper.place_object(Finger.ABC, 150)
+    individual.gripper.place_object(Finger.A, 150, thin=True)
+    individual.close()
+    assert individual.outcomes[:3] == (ARRIVED, CLOSING, CLOSING)
+
+
 def test_going_again_tries_again(holding: Bench) -> None:
     holding.write(go=False)
     holding.gripper.place_object(Finger.A, 160)
@@ -194,6 +259,7 @@ def test_activation_with_an_object_in_the_way_succeeds(bench: Bench) -> None:
         ({"fingers": 16, "position": 1}, "fingers"),
         ({"fingers": 1, "position": 256}, "position"),
         ({"fingers": 1, "position": 1, "soft": -1}, "soft"),
+        ({"fingers": 1, "position": 256, "thin": True}, "position"),
     ],
 )
 def test_bad_arguments(bench: Bench, arguments: dict[str, Any], message: str) -> None:

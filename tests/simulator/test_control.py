@@ -62,7 +62,7 @@ def test_individual_axes_go_their_own_ways(individual: Bench) -> None:
     assert individual.positions == (50, 100, 150, 200)
 
 
-@pytest.mark.parametrize(("mode", "scissor"), [(Mode.PINCH, 219), (Mode.WIDE, 24), (Mode.SCISSOR, 24)])
+@pytest.mark.parametrize(("mode", "scissor"), [(Mode.PINCH, 219), (Mode.WIDE, 24), (Mode.SCISSOR, 6)])
 def test_mode_change_opens_first_and_returns(active: Bench, mode: Mode, scissor: int) -> None:
     active.close(100)
     active.write(mode=mode)
@@ -99,6 +99,31 @@ def test_pinch_mode_closes_to_113(active: Bench) -> None:
     assert active.outcomes == (ObjectStatus.AT_POSITION,) * 4
 
 
+def test_the_limit_of_the_pinch_mode_ends_with_the_mode(active: Bench) -> None:
+    active.write(mode=Mode.PINCH)
+    active.settle()
+    active.close(120)
+    assert active.positions == (113, 113, 113, 219)
+    active.write(individual_fingers=True)
+    active.settle()
+    assert active.positions == (113, 113, 113, 219), "fingers of their own in the pinch mode"
+    active.write(individual_scissor=True)
+    assert active.outcomes == (ObjectStatus.IN_MOTION,) * 4
+    active.settle()
+    assert active.positions == (120, 120, 120, 120)
+
+
+def test_a_contact_outlasts_the_limit_of_the_pinch_mode(active: Bench) -> None:
+    active.write(mode=Mode.PINCH)
+    active.settle()
+    active.gripper.place_object(Finger.B, 100)
+    active.close(120)
+    active.write(individual_fingers=True, individual_scissor=True)
+    active.settle()
+    assert active.positions == (120, 100, 120, 120)
+    assert active.outcomes[1] is ObjectStatus.CONTACT_CLOSING
+
+
 def test_scissor_mode_grips_with_the_scissor_alone(active: Bench) -> None:
     active.write(mode=Mode.SCISSOR)
     active.settle()
@@ -107,18 +132,20 @@ def test_scissor_mode_grips_with_the_scissor_alone(active: Bench) -> None:
     assert active.positions == (6, 6, 6, 232)
     assert active.outcomes == (ObjectStatus.AT_POSITION,) * 4
     active.close(0)
-    assert active.positions == (6, 6, 6, 24)
+    assert active.positions == (6, 6, 6, 6)
     assert [active.gripper.travel(axis) for axis in AXES[:3]] == fingers
 
 
-def test_scissor_mode_leaves_the_fingers_where_they_are(active: Bench) -> None:
+def test_scissor_mode_leaves_the_fingers_where_they_are_also_under_individual_control(active: Bench) -> None:
+    """Individual control of the fingers, except in the scissor mode without that of the scissor (manual)."""
     active.write(mode=Mode.SCISSOR)
     active.settle()
     active.go({Finger.A: 50, Finger.B: 100, Finger.C: 150}, individual_fingers=True)
     active.settle()
-    active.go(255, individual_fingers=False)
+    assert active.positions == (6, 6, 6, 50)
+    active.write(individual_scissor=True)
     active.settle()
-    assert active.positions == (50, 100, 150, 232)
+    assert active.positions[:3] == (50, 100, 150)
 
 
 def test_scissor_mode_feels_an_object(active: Bench) -> None:

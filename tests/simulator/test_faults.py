@@ -75,6 +75,27 @@ def test_a_major_fault_needs_a_reset(active: Bench) -> None:
     active.activate()
 
 
+@pytest.mark.parametrize("fault", [Fault.COMMUNICATION_NOT_READY, Fault.SCISSOR_INTERFERENCE])
+def test_writing_to_a_gripper_that_is_reset_clears_no_fault(bench: Bench, fault: Fault) -> None:
+    """A reset is rACT falling from 1 to 0, not every image in which it is 0."""
+    bench.gripper.inject_fault(fault, 3)
+    bench.gripper.write(0, [0] * 8)
+    bench.wait(0.1)
+    assert bench.fault is fault
+    bench.write(mode=1)
+    assert bench.fault is fault
+    bench.wait(3)
+    assert bench.fault is Fault.NONE
+
+
+def test_rewriting_the_image_clears_no_fault_and_releases_nothing(releasing: Bench) -> None:
+    releasing.settle()
+    before = releasing.gripper.status_registers()
+    releasing.write()
+    releasing.wait(1)
+    assert releasing.gripper.status_registers() == before
+
+
 def test_clear_faults(individual: Bench) -> None:
     individual.go(255)
     individual.gripper.inject_fault(Fault.ACTIVATION_FAULT)
@@ -187,7 +208,7 @@ def test_release_opens_all_axes_slowly(releasing: Bench) -> None:
         releasing.wait(0.05)
     assert releasing.now - began == pytest.approx(closing_time(0), rel=0.02)
     assert releasing.fault is Fault.AUTOMATIC_RELEASE_DONE
-    assert releasing.positions == (6, 6, 6, 24)
+    assert releasing.positions == (6, 6, 6, 6)
     assert releasing.status.is_reset
 
 
@@ -195,10 +216,10 @@ def test_release_ignores_everything_but_the_activation_bit(releasing: Bench) -> 
     releasing.go(255, release=False, mode=2, individual_fingers=False)
     releasing.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 1)
     releasing.settle()
-    assert releasing.positions == (6, 6, 6, 24)
+    assert releasing.positions == (6, 6, 6, 6)
     releasing.go(100)
     releasing.wait(10)
-    assert releasing.positions == (6, 6, 6, 24)
+    assert releasing.positions == (6, 6, 6, 6)
     assert releasing.fault is Fault.AUTOMATIC_RELEASE_DONE
 
 
@@ -234,11 +255,11 @@ def test_release_ends_at_an_obstacle_too(active: Bench) -> None:
     active.write(release=True)
     active.settle()
     assert active.fault is Fault.AUTOMATIC_RELEASE_DONE
-    assert active.positions == (100, 6, 6, 24)
+    assert active.positions == (100, 6, 6, 6)
     active.gripper.remove_object()
     active.write()
     active.wait(5)
-    assert active.positions == (100, 6, 6, 24), "one release is all there is"
+    assert active.positions == (100, 6, 6, 6), "one release is all there is"
 
 
 def test_release_while_reset_does_nothing(bench: Bench) -> None:

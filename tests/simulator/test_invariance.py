@@ -87,8 +87,8 @@ def test_every_status_makes_sense(events: list[Event], looks: list[float]) -> No
         if not gripper.is_powered:
             return
         for finger in AXES[:3]:
-            assert 6 <= status.position(finger) <= 241
-        assert 24 <= status.position(AXES[3]) <= 232
+            assert 6 <= status.position(finger) <= 242
+        assert 6 <= status.position(AXES[3]) <= 232
         assert status.activation_echo or status.is_reset
         if status.initialization is Initialization.COMPLETE and gripper.is_moving:
             assert status.is_moving

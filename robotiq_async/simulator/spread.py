@@ -1,0 +1,58 @@
+"""What makes one gripper differ from another, and each of them from the ideal one.
+
+What the sources print: an open hand reads 7, 6, 6, and one object is held at 188, 193 and 189 (manual, worked
+grasp); a closed finger reads 240 or more (manual); 111 and 208 were asked and 112 and 210 reached (poses that
+TAMS recorded); a contact is precise to some millimetres only (manual), of which a count is 0.66.
+
+Nothing is drawn in passing: a figure follows from the seed, the axis and what is asked of it. So it does not
+depend on how often anybody looks, and what is done again ends in the same way.
+"""
+
+from __future__ import annotations
+
+from random import Random
+from typing import Final
+
+from robotiq_async.enums import Finger
+
+SEED: Final = 4
+"""Of this gripper an open hand reads 7, 6, 6, as the manual prints it."""
+_TOLERANCE: Final = 2
+
+
+class Spread:
+    """The figures of one axis. Without a seed there is no spread: the axis is exact."""
+
+    def __init__(self, seed: int | None, axis: Finger) -> None:
+        """The spread of an axis of the gripper with this seed."""
+        self._seed = seed
+        self._axis = axis
+
+    @property
+    def tolerance(self) -> int:
+        """How many counts beside the request an axis may stand, and has still reached it."""
+        return 0 if self._seed is None else _TOLERANCE
+
+    @property
+    def open_reading(self) -> int:
+        """Counts that an open finger reads above the usual 6."""
+        return self._figure("open", 0, 1)
+
+    @property
+    def closed_reading(self) -> int:
+        """Counts that a closed finger reads above or below the usual 241."""
+        return self._figure("closed", -1, 1)
+
+    def overshoot(self, position: int) -> int:
+        """Counts by which the axis goes too far when it is asked for a position between its stops."""
+        return self._figure(f"stop at {position}", 1, _TOLERANCE)
+
+    def contact(self, position: int) -> int:
+        """Counts from where an object is to where the axis feels it."""
+        return self._figure(f"contact at {position}", -2, 3)
+
+    def _figure(self, what: str, low: int, high: int) -> int:
+        """A whole number in low..high for something; 0 without a spread."""
+        if self._seed is None:
+            return 0
+        return low + int(Random(f"{self._seed} {self._axis.value} {what}").random() * (high - low + 1))
