@@ -235,7 +235,6 @@ async def soak(link: str, seed: int, loop: LoopWatch) -> AsyncIterator[Soak]:
             server, address = RtuServer(line.far, gripper), f"rtu://{line.near}"
         else:
             server, address = TcpServer(gripper), ""
-        server.heard = []
         await stack.enter_async_context(server)
         hand = await stack.enter_async_context(RobotiqHand(address or server.address))
         world = World(gripper, server, None, hand)

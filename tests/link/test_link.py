@@ -47,10 +47,13 @@ class Scripted:
         self.asked = asyncio.Event()
         self.connections = 0
         self.writers: list[asyncio.StreamWriter] = []
+        self.left_over = b""
+        """What whoever connects is sent, before anything was asked."""
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self.connections += 1
         self.writers.append(writer)
+        writer.write(self.left_over)
         with contextlib.suppress(ConnectionError, asyncio.IncompleteReadError):
             while True:
                 header = await reader.readexactly(6)
@@ -195,6 +198,77 @@ async def test_what_nobody_asked_for_spoils_the_link() -> None:
         with pytest.raises(ProtocolError, match="nobody asked for"):
             await transport.read()
         assert not transport.is_open
+
+
+async def opened_and_read(transport: ModbusTransport) -> tuple[int, ...]:
+    await transport.open()
+    return await transport.read()
+
+
+@pytest.mark.parametrize("number", [0, 1, 2, 65000])
+async def test_a_reply_from_before_the_connection_is_never_taken(number: int) -> None:
+    """It is on its way as the connection opens, and waits in the socket when the first request is sent."""
+    async with linked() as (transport, scripted):
+        old = number.to_bytes(2, "big") + bytes.fromhex("0000 0013 02 04 10") + bytes(16)
+        scripted.left_over = old
+        with pytest.raises(ProtocolError, match="nobody asked for"):
+            await opened_and_read(transport)
+        assert not transport.is_open
+        assert scripted.requests == [], "what is asked on such a connection would be left over as well"
+        scripted.left_over = b""
+        await transport.open()
+        assert await transport.read() == REGISTERS
+
+
+async def test_a_late_reply_that_comes_after_the_first_request_is_never_taken() -> None:
+    late: list[bytes] = []
+
+    def one_behind(request: bytes) -> list[bytes]:
+        late.append(good(request))
+        return late[-2:-1]
+
+    async with linked(one_behind) as (transport, _):
+        with pytest.raises(ResponseTimeoutError):
+            await transport.read()
+        for _ in range(5):
+            await transport.open()
+            with pytest.raises(ProtocolError, match="not the answer"):
+                await transport.read()
+        assert len(late) == 6
+
+
+def numbers(scripted: Scripted) -> list[int]:
+    return [int.from_bytes(request[:2], "big") for request in scripted.requests]
+
+
+async def test_no_transaction_number_comes_twice_over_all_connections() -> None:
+    async with linked() as (transport, scripted):
+        for _ in range(5):
+            for _ in range(3):
+                await transport.read()
+                await transport.write(IMAGE)
+            await transport.open()
+        used = numbers(scripted)
+        assert len(set(used)) == len(used) == 30
+        assert 0 not in used, "pymodbus takes a reply numbered 0 for an answer to anything"
+
+
+async def test_transaction_numbers_begin_anywhere() -> None:
+    """Or what another program has left over would be taken for an answer to this one."""
+    firsts = set()
+    for _ in range(4):
+        async with linked() as (transport, scripted):
+            await transport.read()
+            firsts.add(numbers(scripted)[0])
+    assert len(firsts) > 1
+
+
+async def test_after_the_last_transaction_number_comes_the_first() -> None:
+    async with linked() as (transport, scripted):
+        transport._number = 0xFFFE
+        for _ in range(3):
+            assert await transport.read() == REGISTERS
+        assert numbers(scripted) == [0xFFFF, 1, 2]
 
 
 async def test_a_cancelled_request_spoils_the_link() -> None:
