@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from robotiq_async.request import AxisRequest, Request
 
-from .damage import Parts, Reply
+from .damage import Damage, Parts, Reply, delay
 from .trouble import KINDS, Trouble
 
 if TYPE_CHECKING:
@@ -143,6 +143,11 @@ class Adversary:
 
     # What the endpoint asks.
 
+    @property
+    def is_multiplexed(self) -> bool:
+        """Whether clients share a connection to the gripper that outlives theirs."""
+        return "multiplexer" in self._kinds
+
     def hears(self) -> bool:
         """Whether the request that came in is heard."""
         return self._first(lambda each: each.kind in _DEAF) is None
@@ -153,8 +158,8 @@ class Adversary:
         if reply.is_exception:
             return None
         write = reply.is_to_a_write
-        trouble = self._first(lambda each: KINDS[each.kind].damage is not None and each.is_about(write=write))
-        damage = None if trouble is None else KINDS[trouble.kind].damage
+        trouble = self._first(lambda each: _damage_of(each) is not None and each.is_about(write=write))
+        damage = None if trouble is None else _damage_of(trouble)
         return None if trouble is None or damage is None else damage(reply, trouble.amount)
 
     def _first(self, fits: Callable[[Trouble], bool]) -> Trouble | None:
@@ -223,3 +228,8 @@ class Adversary:
     @property
     def _kinds(self) -> list[str]:
         return [each.trouble.kind for each in self._ongoing]
+
+
+def _damage_of(trouble: Trouble) -> Damage | None:
+    """What a trouble does to a reply; a multiplexer is late, and that is not all it does."""
+    return delay if trouble.kind == "multiplexer" else KINDS[trouble.kind].damage

@@ -37,6 +37,12 @@ class Endpoint(Protocol):
     def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
         """What to send for a reply, as a reply policy gives it."""
 
+    def undelivered(self, part: bytes) -> None:
+        """Take what was to be sent to a client that is gone."""
+
+    def left_over(self) -> Iterable[bytes]:
+        """What a new client is sent before it has asked for anything."""
+
 
 class Connection(ServerRequestHandler):
     """Hands pymodbus one request at a time and sends its replies as the endpoint's policy says.
@@ -54,6 +60,12 @@ class Connection(ServerRequestHandler):
         self._outbox: deque[tuple[float, bytes]] = deque()
         """What is sent later, and when, in order: no reply overtakes an older one."""
 
+    def callback_connected(self) -> None:
+        """A client is there."""
+        super().callback_connected()
+        for part in self._endpoint.left_over():
+            self.pass_on(part)
+
     def data_received(self, data: bytes) -> None:
         """Take bytes from the client; a gripper without power does not even hear them."""
         if not self._endpoint.answers_nobody:
@@ -70,13 +82,20 @@ class Connection(ServerRequestHandler):
         now = self.loop.time()
         for delay, part in parts:
             if delay <= 0 and not self._outbox:
-                self._write(part)
+                self.pass_on(part)
                 continue
             last = self._outbox[-1][0] if self._outbox else now
             self._outbox.append((max(last, now + delay), part))
             self.loop.call_at(self._outbox[-1][0], self._write_next)
         if self._inbox:
             self.loop.call_soon(self._answer_next)
+
+    def pass_on(self, part: bytes) -> None:
+        """Send bytes now."""
+        if not self.is_active():
+            self._endpoint.undelivered(part)
+        elif part:
+            self.transport.write(part)  # type: ignore[attr-defined]
 
     def hang_up(self, *, reset: bool = False) -> None:
         """Drop the connection at once, with what has not been sent; a reset tells the client so (RST)."""
@@ -112,8 +131,4 @@ class Connection(ServerRequestHandler):
             self._inbox.clear()
 
     def _write_next(self) -> None:
-        self._write(self._outbox.popleft()[1])
-
-    def _write(self, part: bytes) -> None:
-        if self.is_active() and part:
-            self.transport.write(part)  # type: ignore[attr-defined]
+        self.pass_on(self._outbox.popleft()[1])

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, ClassVar, Self
+from collections import deque
+from typing import TYPE_CHECKING, ClassVar, Final, Self
 
 from robotiq_async.checks import check_int
 
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
 
     from .framing import Frame
     from .trouble import Link
+
+
+_MOST_LEFT_OVER: Final = 100
+"""Parts of replies that a multiplexer keeps for its next client."""
 
 
 class SimulatorEndpoint(ABC):
@@ -48,6 +53,7 @@ class SimulatorEndpoint(ABC):
         self.adversary = Adversary(self)
         self._device_id = None if device_id is None else check_int("device_id", device_id, 0, 255)
         self._server: ModbusBaseServer | None = None
+        self._left_over: deque[bytes] = deque(maxlen=_MOST_LEFT_OVER)
 
     async def __aenter__(self) -> Self:
         await self.start()
@@ -89,6 +95,7 @@ class SimulatorEndpoint(ABC):
             return
         hang_up(server)
         server.close()
+        self._left_over.clear()
         # Two turns of the loop: answers that pymodbus was working on end, and transports close their files.
         await asyncio.sleep(0)
         await asyncio.sleep(0)
@@ -134,9 +141,29 @@ class SimulatorEndpoint(ABC):
         damaged = self.adversary.damage(reply)
         return self.policy(reply) if damaged is None else damaged
 
+    def undelivered(self, part: bytes) -> None:
+        """Lose what a client that is gone was to be sent; a multiplexer has it for the newest or the next."""
+        if self._server is None or not self.adversary.is_multiplexed:
+            return
+        present = [each for each in connections(self._server) if each.is_active()]
+        if present:
+            present[-1].pass_on(part)
+        else:
+            self._left_over.append(part)
+
+    def left_over(self) -> Iterable[bytes]:
+        """What a new client is sent before it has asked for anything."""
+        parts = tuple(self._left_over) if self.adversary.is_multiplexed else ()
+        self._left_over.clear()
+        return parts
+
 
 def hang_up(server: ModbusBaseServer, *, reset: bool = False) -> None:
     """Drop all connections of a server."""
-    for connection in list(server.active_connections.values()):
-        assert isinstance(connection, Connection)
+    for connection in connections(server):
         connection.hang_up(reset=reset)
+
+
+def connections(server: ModbusBaseServer) -> list[Connection]:
+    """The connections of a server, oldest first."""
+    return [each for each in server.active_connections.values() if isinstance(each, Connection)]

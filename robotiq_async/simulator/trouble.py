@@ -96,6 +96,11 @@ KINDS: Final[dict[str, Kind]] = {
         "connections are reset; new ones are accepted, not answered", _CONDITION, link="tcp"
     ),
     "refuse": Kind("connections are reset; new ones are refused", _CONDITION, link="tcp"),
+    "multiplexer": Kind(
+        "a gateway keeps its own connection: replies come VALUE seconds later, to whoever is connected then",
+        *(_CONDITION, 0.7, 0, 10),
+        link="tcp",
+    ),
     # The gripper.
     "power-cut": Kind("the gripper has no power, and comes back reset", _CONDITION),
     "foreign": Kind("another client sends all axes to VALUE", _EVENT, 128, 0, 255),

@@ -46,7 +46,8 @@ ON_ANY_LINK = [
     *(Trouble(kind) for kind in ("silence", "pieces", "power-cut", "interference")),
 ]
 ON_TCP = [Trouble(kind) for kind in ("reset", "close", "refuse", "accept-silence", "exception")] + [
-    Trouble(kind) for kind in ("wrong-transaction", "wrong-protocol")
+    *(Trouble(kind) for kind in ("wrong-transaction", "wrong-protocol")),
+    *(Trouble("multiplexer", seconds) for seconds in (0.02, 0.3, 0.7)),
 ]
 MOVES_EVERYTHING = ("foreign", "release")
 

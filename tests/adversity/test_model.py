@@ -46,6 +46,8 @@ LASTING_TROUBLES = [
     Trouble("slow-device", 0.2),
     Trouble("silence"),
     Trouble("refuse"),
+    Trouble("multiplexer", 0.05),
+    Trouble("multiplexer"),
     Trouble("power-cut"),
     Trouble("interference"),
     Trouble("fault", 9),

@@ -28,7 +28,11 @@ READ = bytes.fromhex("04 0000 0001")
 AXES_ASKED = tuple(AxisRequest(10 * n, 100 + n, 200 + n) for n in range(1, 5))
 ACTIVE = Request(activate=True, axes=AXES_ASKED, individual_fingers=False, individual_scissor=False)
 ONLY_ON = dict.fromkeys(
-    ("wrong-transaction", "wrong-protocol", "exception", "reset", "close", "accept-silence", "refuse"), "tcp"
+    (
+        *("wrong-transaction", "wrong-protocol", "exception", "reset", "close", "accept-silence", "refuse"),
+        "multiplexer",
+    ),
+    "tcp",
 ) | {"wrong-checksum": "rtu"}
 
 Body = Callable[..., Coroutine[Any, Any, None]]
@@ -320,6 +324,67 @@ async def test_silence_goes_on_after_refusal() -> None:
                 pass
             assert not await is_let_in(server)
         assert await is_let_in(server)
+
+
+async def ask_and_go(server: SimulatorServer, pdu: bytes = READ) -> bytes:
+    """Ask, do not wait for the answer, and return what was asked."""
+    async with raw_client(server) as client:
+        request = client.frame(pdu)
+        client.writer.write(request)
+        await asyncio.sleep(0.01)
+    return request
+
+
+@virtual
+async def test_a_multiplexer_hands_late_replies_to_the_next_client() -> None:
+    async with simulator() as server:
+        await server.adversary.begin(Trouble("multiplexer", 0.1))
+        request = await ask_and_go(server)
+        await asyncio.sleep(1)
+        async with raw_client(server) as client:
+            transaction, _, answer = await client.reply()
+            assert (transaction, answer[0]) == (int.from_bytes(request[:2], "big"), request[7])
+            assert await is_answered(client), "its own follow"
+        async with raw_client(server) as client:
+            assert await is_answered(client), "nothing comes twice"
+
+
+@virtual
+async def test_a_multiplexer_hands_a_late_reply_to_whoever_is_connected_then() -> None:
+    async with simulator() as server:
+        loop = asyncio.get_running_loop()
+        await server.adversary.begin(Trouble("multiplexer"))
+        began = loop.time()
+        await ask_and_go(server, write(5))
+        assert server.gripper.request_registers[1] == 5, "it was carried out"
+        async with raw_client(server), raw_client(server) as newest:
+            assert (await newest.reply())[2][0] == 6
+        assert loop.time() - began == pytest.approx(0.7, abs=0.01)
+
+
+@virtual
+@pytest.mark.parametrize("kind", ["multiplexer", "delay"])
+async def test_without_a_multiplexer_replies_of_clients_that_are_gone_are_lost(kind: str) -> None:
+    async with simulator() as server:
+        async with server.adversary.making(Trouble(kind, 0.1)):
+            await ask_and_go(server)
+            await asyncio.sleep(0.2 if kind == "multiplexer" else 0)
+        await asyncio.sleep(0.2)
+        async with raw_client(server) as client:
+            assert await is_answered(client)
+
+
+@virtual
+async def test_a_multiplexer_keeps_no_more_than_a_hundred_replies() -> None:
+    async with simulator() as server:
+        await server.adversary.begin(Trouble("multiplexer", 0.1))
+        async with raw_client(server) as client:
+            client.writer.write(b"".join(client.frame(READ) for _ in range(300)))
+            await asyncio.sleep(0.05)
+        await asyncio.sleep(1)
+        async with raw_client(server) as client:
+            assert [(await client.reply())[0] for _ in range(100)] == list(range(201, 301))
+            assert await is_answered(client)
 
 
 @virtual
