@@ -13,7 +13,7 @@ from pymodbus.server.requesthandler import ServerRequestHandler
 from .framing import BadFrameError, Frame, refusal
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Collection, Iterable
 
     from pymodbus.server.base import ModbusBaseServer
 
@@ -23,6 +23,10 @@ _LINGER_NOT: Final = struct.pack("ii", 1, 0)
 
 class Endpoint(Protocol):
     """What a connection asks of the simulator it belongs to."""
+
+    @property
+    def functions(self) -> Collection[int]:
+        """The Modbus functions that are served."""
 
     @property
     def answers_nobody(self) -> bool:
@@ -121,14 +125,11 @@ class Connection(ServerRequestHandler):
 
     def _answer(self, frame: Frame) -> None:
         self._answering = True
-        if (code := refusal(frame.pdu)) is not None:
+        if (code := refusal(frame.pdu, self._endpoint.functions)) is not None:
             self.pdu_send(ExceptionResponse(frame.pdu[0], code, frame.unit, frame.transaction))
             return
         self.recv_buffer = b""
         super().data_received(frame.raw)
-        if self.last_pdu is None:  # a wrong checksum: no answer, and what follows is suspect too
-            self._answering = False
-            self._inbox.clear()
 
     def _write_next(self) -> None:
         self.pass_on(self._outbox.popleft()[1])

@@ -7,15 +7,13 @@ from abc import ABC, abstractmethod
 from collections import deque
 from typing import TYPE_CHECKING, ClassVar, Final, Self
 
-from robotiq_async.checks import check_int
-
 from .adversary import Adversary
 from .connection import Connection
 from .gripper import SimulatedGripper
 from .replies import Replies, ReplyPolicy
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Collection, Iterable
     from types import TracebackType
 
     from pymodbus.server.base import ModbusBaseServer
@@ -39,19 +37,15 @@ class SimulatorEndpoint(ABC):
     """
 
     link: ClassVar[Link]
+    functions: ClassVar[Collection[int]]
+    """The Modbus functions that are served."""
 
-    def __init__(self, gripper: SimulatedGripper | None, device_id: int | None) -> None:
-        """A server that is not started.
-
-        Raises:
-            TypeError: device_id is not an int.
-            ValueError: device_id is outside 0..255.
-        """
+    def __init__(self, gripper: SimulatedGripper | None) -> None:
+        """A server that is not started."""
         self.gripper = SimulatedGripper() if gripper is None else gripper
         self.replies = Replies()
         self.policy: ReplyPolicy = self.replies
         self.adversary = Adversary(self)
-        self._device_id = None if device_id is None else check_int("device_id", device_id, 0, 255)
         self._server: ModbusBaseServer | None = None
         self._left_over: deque[bytes] = deque(maxlen=_MOST_LEFT_OVER)
 
@@ -113,6 +107,10 @@ class SimulatorEndpoint(ABC):
         self._running()
 
     @abstractmethod
+    def _is_meant(self, unit: int) -> bool:
+        """Whether a request to a unit id is for this gripper."""
+
+    @abstractmethod
     async def _open(self) -> ModbusBaseServer:
         """A pymodbus server that listens."""
 
@@ -133,8 +131,8 @@ class SimulatorEndpoint(ABC):
         """Cut the next request out of what has arrived."""
 
     def hears(self, frame: Frame) -> bool:
-        """Whether a request is heard, and meant for this gripper; units in the field answer any unit id."""
-        return self._device_id in (None, frame.unit) and self.adversary.hears()
+        """Whether a request is heard, and meant for this gripper."""
+        return self._is_meant(frame.unit) and self.adversary.hears()
 
     def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
         """What to send for a reply."""

@@ -1,0 +1,41 @@
+"""The serial line of a simulator: where a frame ends."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from .connection import Connection
+from .framing import take_rtu
+
+SILENCE_S: Final = 0.00175
+"""Modbus RTU ends a frame at a silence of 3.5 characters; at more than 19200 baud of this, whatever a
+character takes (Modbus over Serial Line, 2.5.1.1)."""
+LONGEST_PAUSE_S: Final = 0.02
+"""Longer than this no frame pauses on its way to this program, which does not see the wire: a USB adapter
+keeps what it has for up to 16 ms (the usual latency timer), and who writes half a frame to a pseudo terminal
+was kept from the other half for 1.9 ms (4000 frames on a busy machine). A client that waits in vain for an
+answer waits longer before it asks again, so no more than one request is lost with what was cut off."""
+
+
+class SerialConnection(Connection):
+    """The other end of a serial line, which has no packets."""
+
+    _heard_at = 0.0
+
+    def data_received(self, data: bytes) -> None:
+        """Take bytes from the line; those of a frame that was cut off before are dropped."""
+        now = self.loop.time()
+        pause, self._heard_at = now - self._heard_at, now
+        self._answer_next()  # what is whole is not cut off, even if it has not had its turn
+        if not self._answering and _begins_anew(pause, data):
+            self._inbox.clear()
+        super().data_received(data)
+
+
+def _begins_anew(pause: float, data: bytes) -> bool:
+    """Whether bytes are the beginning of a frame and not the rest of one, judged by the pause before them.
+
+    In between, when it may be the line or the machine that paused, a whole request is a beginning: by
+    chance the rest of a frame has its check sum once in 65,536 times.
+    """
+    return pause > LONGEST_PAUSE_S or (pause > SILENCE_S and take_rtu(bytearray(data)) is not None)
