@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 
     from pymodbus.server.base import ModbusBaseServer
 
+MOST_WAITING: Final = 1000
+"""Replies that wait to be sent later; while there are so many, no more requests are taken."""
+MOST_UNREAD: Final = 65536
+"""Bytes of requests that wait to be answered; beyond, the client is not read from."""
 _LINGER_NOT: Final = struct.pack("ii", 1, 0)
 """SO_LINGER on, for no time at all: closing the socket then resets the connection."""
 
@@ -63,6 +67,10 @@ class Connection(ServerRequestHandler):
         self._answering = False
         self._outbox: deque[tuple[float, bytes]] = deque()
         """What is sent later, and when, in order: no reply overtakes an older one."""
+        self._is_clogged = False
+        """Whether the client does not take what was sent."""
+        self._is_held = False
+        """Whether the client is not read from."""
 
     def callback_connected(self) -> None:
         """A client is there."""
@@ -71,15 +79,23 @@ class Connection(ServerRequestHandler):
             self.pass_on(part)
 
     def data_received(self, data: bytes) -> None:
-        """Take bytes from the client; a gripper without power does not even hear them."""
-        if not self._endpoint.answers_nobody:
-            self._inbox += data
-            self._answer_next()
+        """Take bytes from the client."""
+        self._inbox += data
+        self._answer_next()
+
+    def pause_writing(self) -> None:
+        """The system takes no more for the client, and what is kept here is enough."""
+        self._is_clogged = True
+
+    def resume_writing(self) -> None:
+        """The client has read."""
+        self._is_clogged = False
+        self._answer_next()
 
     def send(self, data: bytes, addr: tuple[Any, ...] | None = None) -> None:  # noqa: ARG002
         """Send a reply, or what the policy makes of it, and go on with the next request."""
         self._answering = False
-        parts = self._endpoint.deliver(data)
+        parts = () if self._endpoint.answers_nobody else self._endpoint.deliver(data)
         if parts is None:
             self.hang_up()
             return
@@ -111,17 +127,38 @@ class Connection(ServerRequestHandler):
             self.close()
 
     def _answer_next(self) -> None:
-        """Hand over requests until one is being worked on or none is complete."""
-        while not self._answering and self.is_active():
+        """Hand over requests until one is being worked on, none is complete, or the client has to wait.
+
+        A gripper without power does not even hear them.
+        """
+        if self._endpoint.answers_nobody:
+            self._inbox.clear()
+        while not self._answering and not self._is_full and self.is_active():
             try:
                 frame = self._endpoint.take(self._inbox)
             except BadFrameError:
                 self.hang_up()
                 return
             if frame is None:
-                return
+                break
             if self._endpoint.hears(frame):
                 self._answer(frame)
+        self._regulate()
+
+    @property
+    def _is_full(self) -> bool:
+        """Whether there are enough replies that the client has not got."""
+        return self._is_clogged or len(self._outbox) >= MOST_WAITING
+
+    def _regulate(self) -> None:
+        """Read only from a client that does not ask faster than it is answered; TCP makes it wait."""
+        hold = len(self._inbox) > MOST_UNREAD
+        if hold != self._is_held and self.is_active():
+            self._is_held = hold
+            if hold:
+                self.transport.pause_reading()  # type: ignore[attr-defined]
+            else:
+                self.transport.resume_reading()  # type: ignore[attr-defined]
 
     def _answer(self, frame: Frame) -> None:
         self._answering = True
@@ -133,3 +170,4 @@ class Connection(ServerRequestHandler):
 
     def _write_next(self) -> None:
         self.pass_on(self._outbox.popleft()[1])
+        self._answer_next()

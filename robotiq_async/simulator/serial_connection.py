@@ -1,10 +1,10 @@
-"""The serial line of a simulator: where a frame ends."""
+"""The serial line of a simulator: where a frame ends, and bytes that nobody takes."""
 
 from __future__ import annotations
 
 from typing import Final
 
-from .connection import Connection
+from .connection import MOST_UNREAD, Connection
 from .framing import take_rtu
 
 SILENCE_S: Final = 0.00175
@@ -16,11 +16,16 @@ keeps what it has for up to 16 ms (the usual latency timer), and who writes half
 was kept from the other half for 1.9 ms (4000 frames on a busy machine). A client that waits in vain for an
 answer waits longer before it asks again, so no more than one request is lost with what was cut off."""
 
+MOST_UNSENT: Final = 4096
+"""Bytes that nobody has taken from the line; beyond, replies are lost."""
+
 
 class SerialConnection(Connection):
-    """The other end of a serial line, which has no packets."""
+    """The other end of a serial line, which has no connections, no packets and no flow control."""
 
     _heard_at = 0.0
+    _unsent = 0
+    """Bytes sent since the line had taken all of them."""
 
     def data_received(self, data: bytes) -> None:
         """Take bytes from the line; those of a frame that was cut off before are dropped."""
@@ -30,6 +35,19 @@ class SerialConnection(Connection):
         if not self._answering and _begins_anew(pause, data):
             self._inbox.clear()
         super().data_received(data)
+
+    def pass_on(self, part: bytes) -> None:
+        """Send bytes now, unless nobody has taken those before."""
+        if self.is_active() and not self.transport.get_write_buffer_size():  # type: ignore[attr-defined]
+            self._unsent = 0
+        if self._unsent + len(part) <= MOST_UNSENT:
+            self._unsent += len(part)
+            super().pass_on(part)
+
+    def _regulate(self) -> None:
+        """Lose requests that come faster than they are answered: nobody can be made to wait."""
+        if len(self._inbox) > MOST_UNREAD:
+            self._inbox.clear()
 
 
 def _begins_anew(pause: float, data: bytes) -> bool:

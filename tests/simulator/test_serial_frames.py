@@ -10,6 +10,7 @@ import pytest
 import serial
 
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
+from robotiq_async.simulator.framing import Frame
 from tests.simulator.test_adversary import virtual
 from tests.simulator.test_serial_server import with_crc
 from tests.virtual_line import VirtualLine
@@ -150,3 +151,25 @@ async def test_a_broadcast_is_carried_out_and_not_answered(
 def test_a_unit_id_that_no_unit_can_have(unit: int) -> None:
     with pytest.raises(ValueError, match=f"device_id must be in 1..247, got {unit}"):
         SerialSimulatorServer("/dev/ttyFAR", device_id=unit)
+
+
+# Without power.
+
+
+@virtual
+async def test_a_request_that_came_just_before_a_power_cut_is_not_answered(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async with line(monkeypatch) as (server, client):
+        asked = asyncio.Event()
+        take = server.take
+
+        def taken(inbox: bytearray) -> Frame | None:
+            asked.set()
+            return take(inbox)
+
+        monkeypatch.setattr(server, "take", taken)
+        await client.say(READ + READ)
+        await asked.wait()
+        server.gripper.power_off()
+        assert await client.hear() == b""
