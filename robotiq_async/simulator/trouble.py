@@ -103,6 +103,9 @@ KINDS: Final[dict[str, Kind]] = {
     ),
     # The gripper.
     "power-cut": Kind("the gripper has no power, and comes back reset", _CONDITION),
+    "idle-reset": Kind(
+        "the gripper loses its activation when no request comes for VALUE seconds", _CONDITION, 5.0, 0, 3600
+    ),
     "foreign": Kind("another client sends all axes to VALUE", _EVENT, 128, 0, 255),
     "slow-device": Kind("requests take effect VALUE seconds after they came", _CONDITION, 0.2, 0, 10),
     "interference": Kind("the scissor is blocked: fault 0x0A, after 20 s 0x0E", _CONDITION),

@@ -470,6 +470,59 @@ async def test_the_gripper_releases() -> None:
         assert status(server).fault is Fault.AUTOMATIC_RELEASE_DONE
 
 
+@virtual
+async def test_an_idle_gripper_loses_its_activation() -> None:
+    async with simulator() as server, raw_client(server) as client:
+        await activate(server)
+        async with server.adversary.making(Trouble("idle-reset", 2)):
+            await asyncio.sleep(1.9)
+            for _ in range(5):
+                assert await is_answered(client), "a request, whatever it asks"
+                await asyncio.sleep(1.9)
+                assert status(server).is_activated
+            await asyncio.sleep(0.2)
+            assert status(server).is_reset
+            assert server.gripper.request_registers == (0,) * 8
+            assert await is_answered(client), "the connection stays"
+        await activate(server)
+        await asyncio.sleep(100)
+        assert status(server).is_activated, "it is over"
+
+
+@virtual
+@pytest.mark.parametrize(
+    ("silent", "is_reset"), [(Trouble("silence"), True), (Trouble("drop", lasts=9), False)]
+)
+async def test_what_is_not_heard_is_no_request(silent: Trouble, is_reset: bool) -> None:
+    async with simulator() as server, raw_client(server) as client:
+        await activate(server)
+        async with server.adversary.making(Trouble("idle-reset", 2)), server.adversary.making(silent):
+            for _ in range(5):
+                assert not await is_answered(client)
+            assert status(server).is_reset is is_reset
+
+
+@virtual
+async def test_an_idle_gripper_without_power_stays_without() -> None:
+    async with simulator() as server, server.adversary.making(Trouble("power-cut")):
+        async with server.adversary.making(Trouble("idle-reset", 1)):
+            await asyncio.sleep(5)
+        assert not server.gripper.is_powered
+
+
+@virtual
+async def test_the_least_patient_of_two_counts() -> None:
+    async with simulator() as server:
+        await activate(server)
+        async with server.adversary.making(Trouble("idle-reset", 9)):
+            async with server.adversary.making(Trouble("idle-reset", 2)):
+                await asyncio.sleep(1)
+            await asyncio.sleep(8)
+            assert status(server).is_activated
+            await asyncio.sleep(2)
+            assert status(server).is_reset
+
+
 # Beginning and ending.
 
 
