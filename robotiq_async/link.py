@@ -155,10 +155,9 @@ class ModbusTransport:
 
         Raises:
             ConnectFailedError: refused, unreachable, no such port, or no pyserial.
-            ProtocolError: a serial device answers, but not what was asked; or bytes come that nobody asked
-                for.
+            ProtocolError: somebody answers, but not what was asked; or bytes come that nobody asked for.
             ConnectionLostError: it was closed again at once.
-            ResponseTimeoutError: a serial port can be opened, but nobody answers.
+            ResponseTimeoutError: it can be opened, but nobody answers.
         """
         await self.close()
         self._loop = asyncio.get_running_loop()
@@ -187,10 +186,9 @@ class ModbusTransport:
         # several times what a reply does. Undocumented: where it is called otherwise, nothing is saved.
         with contextlib.suppress(AttributeError):
             client.ctx.transport.max_size = LARGEST_READ  # type: ignore[attr-defined]
-        if self._serial:
-            await self._resynchronise()
-        else:
+        if not self._serial:
             await self._settle()
+        await self._resynchronise()
 
     async def read(self) -> Registers:
         """The eight status registers.
@@ -372,9 +370,10 @@ class ModbusTransport:
     async def _resynchronise(self) -> None:
         """Make sure that no answer to an earlier request is still on its way.
 
-        Serial replies carry no number. So after opening, one to seven registers are read instead of
-        eight, a different count each time: a late answer has another length and is found out, and the
-        gripper answers in order, so that once the right length is back nothing older can follow.
+        Serial replies carry no number, and a gateway from TCP to a serial line gives a late one the number
+        of what it is asked next. So after opening, one to seven registers are read instead of eight, a
+        different count each time: a late answer has another length and is found out, and the gripper
+        answers in order, so that once the right length is back nothing older can follow.
         """
         self._probe = self._probe % (REGISTER_COUNT - 1) + 1
         await self._exchange(ReadRequest(self._map, self._probe))

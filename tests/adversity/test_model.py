@@ -49,6 +49,7 @@ LASTING_TROUBLES = [
     Trouble("multiplexer", 0.05),
     Trouble("multiplexer"),
     Trouble("power-cut"),
+    Trouble("idle-reset", 0.5),
     Trouble("interference"),
     Trouble("fault", 9),
     Trouble("fault", 12),

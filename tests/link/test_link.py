@@ -32,9 +32,10 @@ Answer = Callable[[bytes], list[bytes] | None]
 """Gets a request frame; gives the pieces to send, each in a segment of its own; None closes."""
 
 
-def good(request: bytes) -> bytes:
+def good(request: bytes, status: bytes = STATUS) -> bytes:
     """The right answer to a request of function 4 or 16."""
-    pdu = bytes((4, 16)) + STATUS if request[7] == 4 else request[7:12]
+    size = 2 * request[11]
+    pdu = bytes((4, size)) + status[:size] if request[7] == 4 else request[7:12]
     return request[:4] + (len(pdu) + 1).to_bytes(2, "big") + request[6:7] + pdu
 
 
@@ -73,15 +74,17 @@ class Scripted:
 
 @asynccontextmanager
 async def linked(answer: Answer | None = None) -> AsyncIterator[tuple[ModbusTransport, Scripted]]:
+    """A transport that is open, at a server that was well-behaved while it was opened."""
     scripted = Scripted()
-    if answer is not None:
-        scripted.answer = answer
     server = await asyncio.start_server(scripted.serve, "127.0.0.1", 0)
     port = server.sockets[0].getsockname()[1]
     transport = ModbusTransport(
         parse_address(f"127.0.0.1:{port}"), TCP_REGISTERS, connect_timeout=1.0, response_timeout=0.1
     )
     await transport.open()
+    scripted.requests.clear()
+    scripted.asked.clear()
+    scripted.answer = answer or scripted.answer
     try:
         yield transport, scripted
     finally:
@@ -183,10 +186,10 @@ async def test_an_unanswered_write_is_sent_once() -> None:
     async with linked(lambda _: []) as (transport, scripted):
         with pytest.raises(ResponseTimeoutError):
             await transport.write(IMAGE)
-        await transport.open()
         scripted.answer = lambda request: [good(request)]
+        await transport.open()
         await transport.read()
-        assert [request[7] for request in scripted.requests] == [16, 4]
+        assert [request[7] for request in scripted.requests] == [16, 4, 4]
 
 
 async def test_what_nobody_asked_for_spoils_the_link() -> None:
@@ -230,11 +233,36 @@ async def test_a_late_reply_that_comes_after_the_first_request_is_never_taken() 
     async with linked(one_behind) as (transport, _):
         with pytest.raises(ResponseTimeoutError):
             await transport.read()
-        for _ in range(5):
-            await transport.open()
+        for _ in range(20):
             with pytest.raises(ProtocolError, match="not the answer"):
-                await transport.read()
-        assert len(late) == 6
+                await transport.open()
+        assert len(late) == 21
+
+
+@pytest.mark.parametrize("late", [1, 2, 5])
+async def test_a_late_reply_that_a_gateway_numbers_anew_is_never_taken(late: int) -> None:
+    """Behind a gateway to a serial line, whose replies carry no number, is a slow device.
+
+    The gateway takes what comes for the answer to what it is asked next.
+    """
+    asked: list[bytes] = []
+    kept: list[bytes] = []
+
+    def gateway(request: bytes) -> list[bytes]:
+        asked.append(request)
+        kept.append(good(request, len(asked).to_bytes(2, "big") * 8)[4:])
+        return [request[:4] + kept.pop(0)] if len(kept) > late else []
+
+    async with linked(gateway) as (transport, _):
+        with pytest.raises(ResponseTimeoutError):
+            await transport.read()
+        for _ in range(20):
+            with pytest.raises(RobotiqConnectionError):
+                await transport.open()
+        late = 0
+        kept.clear()
+        await transport.open()
+        assert await transport.read() == (len(asked),) * 8
 
 
 def numbers(scripted: Scripted) -> list[int]:
@@ -249,7 +277,7 @@ async def test_no_transaction_number_comes_twice_over_all_connections() -> None:
                 await transport.write(IMAGE)
             await transport.open()
         used = numbers(scripted)
-        assert len(set(used)) == len(used) == 30
+        assert len(set(used)) == len(used) == 35
         assert 0 not in used, "pymodbus takes a reply numbered 0 for an answer to anything"
 
 
