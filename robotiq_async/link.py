@@ -22,6 +22,7 @@ import asyncio
 import contextlib
 import logging
 import secrets
+import sys
 from collections.abc import Sequence
 from typing import Any, Final, Protocol, runtime_checkable
 
@@ -163,6 +164,8 @@ class ModbusTransport:
         self._loop = asyncio.get_running_loop()
         self._failure = self._expected = None
         client = self._make_client()
+        # What does not fit is dropped by pymodbus without a word; whatever comes is for reply.py to judge.
+        client.ctx.max_buffer_size = sys.maxsize
         try:
             with anyio.fail_after(self._connect_timeout):
                 connected = await client.connect()

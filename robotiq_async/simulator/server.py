@@ -27,7 +27,8 @@ class SimulatorServer(SimulatorEndpoint):
 
     Answers FC03, FC04, FC06 and FC16 at the addresses of :class:`~robotiq_async.simulator.bank.RegisterBank`;
     other functions, addresses and counts get the Modbus exceptions 1, 2 and 3. Bytes that are no Modbus TCP
-    end the connection. Requests of one connection are answered in order.
+    end the connection. Requests of one connection are answered in order; a client that does not take its
+    replies is not read from until it does.
     """
 
     link = "tcp"

@@ -265,6 +265,23 @@ async def test_a_late_reply_that_a_gateway_numbers_anew_is_never_taken(late: int
         assert await transport.read() == (len(asked),) * 8
 
 
+@pytest.mark.parametrize("count", [2, 11, 100, 1000])
+async def test_however_much_is_left_over_it_is_told(count: int) -> None:
+    """On its own, pymodbus drops what does not fit its buffer, and goes on."""
+    async with linked() as (transport, scripted):
+        scripted.left_over = count * good(bytes.fromhex("0001 0000 0006 02 04 0000 0008"))
+        with pytest.raises(ProtocolError, match="nobody asked for"):
+            await transport.open()
+        assert len(scripted.requests) == 0
+
+
+@pytest.mark.parametrize("count", [2, 11, 100, 1000])
+async def test_however_much_comes_it_is_no_answer_and_no_silence(count: int) -> None:
+    async with linked(lambda request: [count * good(request)]) as (transport, _):
+        with pytest.raises(ProtocolError, match="more than the answer"):
+            await transport.read()
+
+
 def numbers(scripted: Scripted) -> list[int]:
     return [int.from_bytes(request[:2], "big") for request in scripted.requests]
 
