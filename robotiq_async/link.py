@@ -7,6 +7,9 @@ pymodbus does the framing and the transport; what it leaves to its user is done 
 * Every byte that arrives is checked before pymodbus sees it (reply.py). Anything but the whole right
   answer, in time, ends the exchange *and* the connection: on a link that is out of step the next reply
   could be the answer to this request.
+* Transaction ids are ours. pymodbus begins at 1 on every connection, so that a reply left over from an
+  earlier one would be taken for an answer. Here they begin anywhere, go on over connections, and come again
+  after 65,535 requests.
 * Time-outs are a watchdog of ours that looks once in a while. pymodbus's own is ``asyncio.wait_for``,
   which on Python 3.11 swallows a cancellation that lands together with the reply, and which a loop that
   was held up takes for silence although the reply is waiting in the socket.
@@ -18,6 +21,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import secrets
+import sys
 from collections.abc import Sequence
 from typing import Any, Final, Protocol, runtime_checkable
 
@@ -47,6 +52,10 @@ if _pymodbus_log.level == logging.NOTSET:
 
 LARGEST_READ: Final = 4096
 """Bytes taken from the socket at a time; the longest Modbus frame has 260."""
+LAST_NUMBER: Final = 0xFFFF
+"""Transaction ids are 1 to this."""
+SETTLE_S: Final = 0.02
+"""From connecting to the first request over TCP: a few round trips of a network in a building."""
 HELD_S: Final = 0.01
 """A timer, or a tick, that comes so late was kept from coming: the loop was held up."""
 GRACE_S: Final = 0.02
@@ -125,6 +134,10 @@ class ModbusTransport:
         self._client: AsyncModbusTcpClient | AsyncModbusSerialClient | None = None
         self._expected: Expected | None = None
         self._failure: RobotiqConnectionError | None = None
+        self._number = secrets.randbelow(LAST_NUMBER)
+        """The transaction id of the last request; another program's are others, most likely."""
+        self._their_number = b""
+        """pymodbus's own transaction id of the request in flight."""
         self._probe = 0
         self._poll = ReadRequest(registers)
         self._loop: asyncio.AbstractEventLoop
@@ -139,17 +152,20 @@ class ModbusTransport:
         return self._client is not None
 
     async def open(self) -> None:
-        """Connect; over a serial line, also make sure that no answer from before is still to come.
+        """Connect, and make sure that no answer to an earlier request is taken for one to come.
 
         Raises:
             ConnectFailedError: refused, unreachable, no such port, or no pyserial.
-            ProtocolError: a serial device answers, but not what was asked.
-            ResponseTimeoutError: a serial port can be opened, but nobody answers.
+            ProtocolError: somebody answers, but not what was asked; or bytes come that nobody asked for.
+            ConnectionLostError: it was closed again at once.
+            ResponseTimeoutError: it can be opened, but nobody answers.
         """
         await self.close()
         self._loop = asyncio.get_running_loop()
         self._failure = self._expected = None
         client = self._make_client()
+        # What does not fit is dropped by pymodbus without a word; whatever comes is for reply.py to judge.
+        client.ctx.max_buffer_size = sys.maxsize
         try:
             with anyio.fail_after(self._connect_timeout):
                 connected = await client.connect()
@@ -173,8 +189,9 @@ class ModbusTransport:
         # several times what a reply does. Undocumented: where it is called otherwise, nothing is saved.
         with contextlib.suppress(AttributeError):
             client.ctx.transport.max_size = LARGEST_READ  # type: ignore[attr-defined]
-        if self._serial:
-            await self._resynchronise()
+        if not self._serial:
+            await self._settle()
+        await self._resynchronise()
 
     async def read(self) -> Registers:
         """The eight status registers.
@@ -264,11 +281,8 @@ class ModbusTransport:
     def _fail(self, error: RobotiqConnectionError) -> None:
         """End the exchange in flight with an error; without one, keep the error for the next."""
         client = self._client
-        if client is None:
-            return
-        future = client.ctx.response_future
-        if self._expected is not None and not future.done():
-            future.set_exception(_ExchangeEndedError(error))
+        if client is not None and self._expected is not None and not client.ctx.response_future.done():
+            client.ctx.response_future.set_exception(_ExchangeEndedError(error))
         elif self._failure is None:
             self._failure = error
 
@@ -283,10 +297,11 @@ class ModbusTransport:
     # -- what pymodbus calls ---------------------------------------------------------------------------
 
     def _trace_packet(self, sending: bool, data: bytes) -> bytes:
-        """Every frame that is sent, and the bytes received so far for one: returns what pymodbus may see."""
+        """Every frame that is sent, and the bytes received so far for one: returns what goes on from here."""
         if sending:
-            self._expected = expected_reply(data, serial=self._serial)
-            return data
+            frame = data if self._serial else self._numbered(data)
+            self._expected = expected_reply(frame, serial=self._serial)
+            return frame
         try:
             if self._expected is None:
                 raise ProtocolError(f"{len(data)} bytes that nobody asked for: {data.hex(' ')}")
@@ -294,7 +309,15 @@ class ModbusTransport:
         except ProtocolError as error:
             self._fail(error)
             return b""
-        return data if complete else b""
+        if not complete:
+            return b""
+        return data if self._serial else self._their_number + data[len(self._their_number) :]
+
+    def _numbered(self, frame: bytes) -> bytes:
+        """The frame with a transaction id of ours; 0 is none, some devices answer it to anything."""
+        self._number = self._number % LAST_NUMBER + 1
+        self._their_number, rest = frame[:2], frame[2:]
+        return self._number.to_bytes(2, "big") + rest
 
     def _trace_connect(self, connected: bool) -> None:
         if not connected:
@@ -333,12 +356,27 @@ class ModbusTransport:
         register(line)
         return line
 
+    async def _settle(self) -> None:
+        """Give what is left over from an earlier connection time to show itself before anything is asked.
+
+        A gateway that keeps its own connection to the gripper may send late replies to whoever connects
+        next. Their numbers tell as well; but by then a request of ours is on its way, whose reply would be
+        left over for the next connection, and so on without end.
+        """
+        try:
+            await asyncio.sleep(SETTLE_S)
+        except BaseException:
+            self._drop()
+            raise
+        self._connected()
+
     async def _resynchronise(self) -> None:
         """Make sure that no answer to an earlier request is still on its way.
 
-        Serial replies carry no number. So after opening, one to seven registers are read instead of
-        eight, a different count each time: a late answer has another length and is found out, and the
-        gripper answers in order, so that once the right length is back nothing older can follow.
+        Serial replies carry no number, and a gateway from TCP to a serial line gives a late one the number
+        of what it is asked next. So after opening, one to seven registers are read instead of eight, a
+        different count each time: a late answer has another length and is found out, and the gripper
+        answers in order, so that once the right length is back nothing older can follow.
         """
         self._probe = self._probe % (REGISTER_COUNT - 1) + 1
         await self._exchange(ReadRequest(self._map, self._probe))

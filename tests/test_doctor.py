@@ -52,6 +52,12 @@ def reply(request: bytes, pdu: bytes) -> bytes:
     return request[:4] + (len(pdu) + 1).to_bytes(2, "big") + request[6:7] + pdu
 
 
+def registers_in(request: bytes, block: bytes) -> bytes:
+    """The first registers of a block, as many as the request asks for."""
+    size = 2 * request[11]
+    return reply(request, bytes((request[7], size)) + block[:size])
+
+
 async def test_a_healthy_connection() -> None:
     gripper = SimulatedGripper()
     async with SimulatorServer(gripper) as server:
@@ -99,7 +105,7 @@ async def test_another_unit_id() -> None:
 def other_unit(request: bytes, unit: int) -> bytes:
     if request[6] != unit:
         return reply(request, bytes((request[7] | 0x80, 11)))
-    return reply(request, bytes((request[7], 16)) + bytes(16))
+    return registers_in(request, bytes(16))
 
 
 def registers_at(function: int, address: bytes) -> Callable[[bytes], bytes]:
@@ -107,7 +113,7 @@ def registers_at(function: int, address: bytes) -> Callable[[bytes], bytes]:
 
     def answer(request: bytes) -> bytes:
         if request[7] == function and request[8:10] == address:
-            return reply(request, bytes((function, 16)) + bytes(15) + b"\x06")
+            return registers_in(request, bytes(15) + b"\x06")
         return reply(request, bytes((request[7] | 0x80, 2)))
 
     return answer
@@ -142,7 +148,7 @@ async def test_one_lost_reply_does_not_make_it_another_unit(words: str) -> None:
 
 @pytest.mark.parametrize("byte", [b"\0", b"\xff"])
 async def test_a_device_that_is_no_gripper(byte: bytes) -> None:
-    async with answering(lambda request: reply(request, bytes((request[7], 16)) + 16 * byte)) as address:
+    async with answering(lambda request: registers_in(request, 16 * byte)) as address:
         found = await findings(address)
     assert found["gripper"].level is Level.DOUBT
 

@@ -169,6 +169,9 @@ class MemoryTransport(asyncio.Transport):
         self._closing = False
         self._resets = False
         self._arriving: deque[bytes | ConnectionResetError | None] = deque()
+        self._is_paused = False
+        self._passed_over = 0
+        """What was due while reading was paused."""
         self.peer: MemoryTransport
         self.protocol: Any = None
 
@@ -185,7 +188,19 @@ class MemoryTransport(asyncio.Transport):
         self._arriving.append(what)
         self._loop.call_later(LATENCY_S, self._arrive)
 
+    def pause_reading(self) -> None:
+        self._is_paused = True
+
+    def resume_reading(self) -> None:
+        self._is_paused = False
+        for _ in range(self._passed_over):
+            self._loop.call_soon(self._arrive)
+        self._passed_over = 0
+
     def _arrive(self) -> None:
+        if self._is_paused:
+            self._passed_over += 1
+            return
         what = self._arriving.popleft()
         if self._closing:
             return

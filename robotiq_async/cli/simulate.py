@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ..errors import RobotiqError
-from .arguments import Port, is_loopback, usage
+from ..registers import RTU_REGISTERS
+from .arguments import Port, Unit, is_loopback, usage
 
 if TYPE_CHECKING:
     from ..simulator import Trouble
@@ -22,6 +23,7 @@ async def simulate(
     speedup: Annotated[float, Parameter(metavar="FACTOR")] = 1.0,
     exact: Annotated[bool, Parameter(negative=())] = False,
     serial: Annotated[str | None, Parameter(metavar="DEVICE")] = None,
+    device_id: Unit | None = None,
     trouble: Annotated[list[str] | None, Parameter(metavar="WORDS", negative=())] = None,
     troubles: Annotated[bool, Parameter(negative=())] = False,
 ) -> None:
@@ -42,6 +44,7 @@ async def simulate(
         robotiq-async simulate
         robotiq-async simulate --port 5021 --speedup 10
         robotiq-async simulate --serial /dev/pts/3
+        robotiq-async simulate --serial /dev/pts/3 --device-id 12
         robotiq-async simulate --trouble "drop at 5 every 10" --trouble "delay 0.02"
         robotiq-async simulate --trouble "power-cut at 20 for 2; foreign 0 at 30"
 
@@ -51,6 +54,7 @@ async def simulate(
         speedup: How many times faster than the clock the simulated time runs.
         exact: Stop exactly where it is told to, which no real gripper does.
         serial: Serve Modbus RTU on this serial device in place of TCP (extra serial).
+        device_id: The only Modbus unit id that is answered (default: 9 serial, any on TCP).
         trouble: What goes wrong, and when; may be given again.
         troubles: List what can go wrong, and end.
     """
@@ -64,9 +68,10 @@ async def simulate(
         gripper = SimulatedGripper(speedup=speedup, spread=not exact)
         server: SimulatorServer | SerialSimulatorServer
         if serial is None:
-            server = SimulatorServer(gripper, port=port, host=host)
+            server = SimulatorServer(gripper, port=port, host=host, device_id=device_id)
         else:
-            server = SerialSimulatorServer(serial, gripper)
+            unit = RTU_REGISTERS.device_id if device_id is None else device_id
+            server = SerialSimulatorServer(serial, gripper, device_id=unit)
         server.adversary.check(plan)
     if serial is None and not is_loopback(host):
         print(f"robotiq-async: anyone who reaches {host} can command this gripper", file=sys.stderr)

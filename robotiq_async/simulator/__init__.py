@@ -13,6 +13,7 @@ module                 what it holds
 ``report``             the status registers
 ``server``             :class:`SimulatorServer`: Modbus TCP
 ``serial_server``      :class:`SerialSimulatorServer`: Modbus RTU on a serial line
+``serial_connection``  where a frame ends on it
 ``endpoint``           what both servers have in common
 ``bank``               which register is found at which address
 ``connection``         one client; ``framing`` cuts its bytes into requests

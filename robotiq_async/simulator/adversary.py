@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from robotiq_async.request import AxisRequest, Request
 
-from .damage import Parts, Reply
+from .damage import Damage, Parts, Reply, delay
 from .trouble import KINDS, Trouble
 
 if TYPE_CHECKING:
@@ -51,6 +51,8 @@ class Adversary:
         self._ongoing: list[Ongoing] = []
         self._device_cycle = endpoint.gripper.device_cycle
         """What the gripper has when nothing makes it slow."""
+        self._idle: asyncio.TimerHandle | None = None
+        """When the gripper loses its activation unless a request comes before."""
 
     @property
     def ongoing(self) -> tuple[Ongoing, ...]:
@@ -79,6 +81,8 @@ class Adversary:
         self._do(trouble)
         if kind.damage is not None or kind.lasts == math.inf:
             self._ongoing.append(ongoing)
+            if trouble.kind == "idle-reset":
+                self._await_request()
         else:
             ongoing.over.set()
         return ongoing
@@ -143,9 +147,17 @@ class Adversary:
 
     # What the endpoint asks.
 
+    @property
+    def is_multiplexed(self) -> bool:
+        """Whether clients share a connection to the gripper that outlives theirs."""
+        return "multiplexer" in self._kinds
+
     def hears(self) -> bool:
         """Whether the request that came in is heard."""
-        return self._first(lambda each: each.kind in _DEAF) is None
+        heard = self._first(lambda each: each.kind in _DEAF) is None
+        if heard:
+            self._await_request()
+        return heard
 
     def damage(self, frame: bytes) -> Parts | None:
         """What is sent in place of a reply; None if nothing is wrong with it. A refusal is left as it is."""
@@ -153,8 +165,8 @@ class Adversary:
         if reply.is_exception:
             return None
         write = reply.is_to_a_write
-        trouble = self._first(lambda each: KINDS[each.kind].damage is not None and each.is_about(write=write))
-        damage = None if trouble is None else KINDS[trouble.kind].damage
+        trouble = self._first(lambda each: _damage_of(each) is not None and each.is_about(write=write))
+        damage = None if trouble is None else _damage_of(trouble)
         return None if trouble is None or damage is None else damage(reply, trouble.amount)
 
     def _first(self, fits: Callable[[Trouble], bool]) -> Trouble | None:
@@ -214,12 +226,33 @@ class Adversary:
             case "slow-device":
                 slow = [each.trouble.amount for each in self._ongoing if each.trouble.kind == "slow-device"]
                 gripper.device_cycle = slow[-1] * gripper.speedup if slow else self._device_cycle
+            case "idle-reset":
+                self._await_request()
             case "interference" | "fault":
                 gripper.clear_faults()
                 for each in self._ongoing:
                     if each.trouble.kind in ("interference", "fault"):
                         self._do(each.trouble)
 
+    def _await_request(self) -> None:
+        """Begin to wait for the next request, as long as the least patient trouble says."""
+        if self._idle is not None:
+            self._idle.cancel()
+        waits = [each.trouble.amount for each in self._ongoing if each.trouble.kind == "idle-reset"]
+        self._idle = asyncio.get_running_loop().call_later(min(waits), self._reset) if waits else None
+
+    def _reset(self) -> None:
+        """The gripper loses its activation, and keeps its power."""
+        gripper = self._endpoint.gripper
+        if gripper.is_powered:
+            gripper.power_off()
+            gripper.power_on()
+
     @property
     def _kinds(self) -> list[str]:
         return [each.trouble.kind for each in self._ongoing]
+
+
+def _damage_of(trouble: Trouble) -> Damage | None:
+    """What a trouble does to a reply; a multiplexer is late, and that is not all it does."""
+    return delay if trouble.kind == "multiplexer" else KINDS[trouble.kind].damage

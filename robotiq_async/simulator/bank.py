@@ -17,20 +17,31 @@ READ_HOLDING: Final = 3
 READ_INPUT: Final = 4
 WRITE_SINGLE: Final = 6
 WRITE_MULTIPLE: Final = 16
-FUNCTIONS: Final = frozenset({READ_HOLDING, READ_INPUT, WRITE_SINGLE, WRITE_MULTIPLE})
-"""The Modbus functions that are served."""
+READ_WRITE: Final = 23
+TCP_FUNCTIONS: Final = frozenset({READ_HOLDING, READ_INPUT, WRITE_SINGLE, WRITE_MULTIPLE})
+"""The Modbus functions that are served over TCP."""
+RTU_FUNCTIONS: Final = TCP_FUNCTIONS | {READ_WRITE}
+"""Those on a serial line. The manual describes function 23 there, with an example, and nowhere else."""
+_STARTS: Final = (0, RTU_REGISTERS.request, RTU_REGISTERS.status)
+
+
+def is_served(address: int, count: int) -> bool:
+    """Whether registers lie within one block."""
+    return any(start <= address and address + count <= start + REGISTER_COUNT for start in _STARTS)
 
 
 class RegisterBank:
     """Where the registers of a gripper are found, on either kind of link.
 
-    ======  ======================  ======================  ===============
-    start   FC03 reads              FC04 reads              FC06, FC16
-    ======  ======================  ======================  ===============
+    ======  ======================  ======================  =================
+    start   FC03, FC23 read         FC04 reads              FC06, FC16, FC23
+    ======  ======================  ======================  =================
     0x0000  request block           status block            request block
     0x03E8  request block           request block           request block
     0x07D0  status block            status block            address refused
-    ======  ======================  ======================  ===============
+    ======  ======================  ======================  =================
+
+    FC23 writes before it reads.
     """
 
     def __init__(self, gripper: SimulatedGripper) -> None:
@@ -41,7 +52,7 @@ class RegisterBank:
         """A device that answers any unit id."""
         blocks = [
             SimData(start, count=REGISTER_COUNT, datatype=DataType.REGISTERS, readonly=readonly)
-            for start, readonly in ((0, False), (RTU_REGISTERS.request, False), (RTU_REGISTERS.status, True))
+            for start, readonly in zip(_STARTS, (False, False, True), strict=True)
         ]
         return SimDevice(id=0, simdata=blocks, action=self._access)
 
@@ -56,11 +67,11 @@ class RegisterBank:
         set_values: list[int] | list[bool] | None,
     ) -> ExcCodes | None:
         """Carry out an access; pymodbus has checked that it lies within one block that allows it."""
-        block = max(start for start in (0, RTU_REGISTERS.request, RTU_REGISTERS.status) if start <= address)
+        block = max(start for start in _STARTS if start <= address)
         offset = address - block
         if set_values is not None:
             self._gripper.write(offset, [int(value) for value in set_values])
-        elif function_code in (READ_HOLDING, READ_INPUT):
+        elif function_code in (READ_HOLDING, READ_INPUT, READ_WRITE):
             is_status = block == RTU_REGISTERS.status or (block == 0 and function_code == READ_INPUT)
             registers = self._gripper.status_registers() if is_status else self._gripper.request_registers
             first = address - start_address

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from pymodbus.framer import FramerRTU
 
-from .bank import READ_HOLDING, READ_INPUT, WRITE_MULTIPLE, WRITE_SINGLE
+from .bank import READ_HOLDING, READ_INPUT, READ_WRITE, WRITE_MULTIPLE, WRITE_SINGLE
 
 Parts = Sequence[tuple[float, bytes]]
 """What to send, in order: (delay in seconds, bytes)."""
@@ -19,6 +19,7 @@ Parts = Sequence[tuple[float, bytes]]
 _ANOTHER = {
     READ_HOLDING: READ_INPUT,
     READ_INPUT: READ_HOLDING,
+    READ_WRITE: READ_HOLDING,
     WRITE_SINGLE: WRITE_MULTIPLE,
     WRITE_MULTIPLE: WRITE_SINGLE,
 }
@@ -48,7 +49,7 @@ class Reply:
 
     @property
     def is_to_a_write(self) -> bool:
-        """Whether it answers a write."""
+        """Whether it answers a write; to FC23, which also writes, the answer is what was read."""
         return self.pdu[0] & 0x7F in (WRITE_SINGLE, WRITE_MULTIPLE)
 
     @property
@@ -95,7 +96,7 @@ def twice(reply: Reply, value: float) -> Parts:
 
 
 def wrong_function(reply: Reply, value: float) -> Parts:
-    """The reply is one to another function: 03 and 04, 06 and 16 stand for each other."""
+    """The reply is one to another function: 03 and 04, 06 and 16 stand for each other, 03 for 23."""
     return reply.changed(pdu=bytes((_ANOTHER[reply.pdu[0]],)) + reply.pdu[1:])
 
 

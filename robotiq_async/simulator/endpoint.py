@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import asyncio
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, ClassVar, Self
-
-from robotiq_async.checks import check_int
+from collections import deque
+from typing import TYPE_CHECKING, ClassVar, Final, Self
 
 from .adversary import Adversary
 from .connection import Connection
@@ -14,13 +13,17 @@ from .gripper import SimulatedGripper
 from .replies import Replies, ReplyPolicy
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Collection, Iterable
     from types import TracebackType
 
     from pymodbus.server.base import ModbusBaseServer
 
     from .framing import Frame
     from .trouble import Link
+
+
+_MOST_LEFT_OVER: Final = 100
+"""Parts of replies that a multiplexer keeps for its next client."""
 
 
 class SimulatorEndpoint(ABC):
@@ -34,20 +37,17 @@ class SimulatorEndpoint(ABC):
     """
 
     link: ClassVar[Link]
+    functions: ClassVar[Collection[int]]
+    """The Modbus functions that are served."""
 
-    def __init__(self, gripper: SimulatedGripper | None, device_id: int | None) -> None:
-        """A server that is not started.
-
-        Raises:
-            TypeError: device_id is not an int.
-            ValueError: device_id is outside 0..255.
-        """
+    def __init__(self, gripper: SimulatedGripper | None) -> None:
+        """A server that is not started."""
         self.gripper = SimulatedGripper() if gripper is None else gripper
         self.replies = Replies()
         self.policy: ReplyPolicy = self.replies
         self.adversary = Adversary(self)
-        self._device_id = None if device_id is None else check_int("device_id", device_id, 0, 255)
         self._server: ModbusBaseServer | None = None
+        self._left_over: deque[bytes] = deque(maxlen=_MOST_LEFT_OVER)
 
     async def __aenter__(self) -> Self:
         await self.start()
@@ -89,6 +89,7 @@ class SimulatorEndpoint(ABC):
             return
         hang_up(server)
         server.close()
+        self._left_over.clear()
         # Two turns of the loop: answers that pymodbus was working on end, and transports close their files.
         await asyncio.sleep(0)
         await asyncio.sleep(0)
@@ -104,6 +105,10 @@ class SimulatorEndpoint(ABC):
     async def accept(self) -> None:
         """Accept connections again. On a serial line there are none."""
         self._running()
+
+    @abstractmethod
+    def _is_meant(self, unit: int) -> bool:
+        """Whether a request to a unit id is for this gripper."""
 
     @abstractmethod
     async def _open(self) -> ModbusBaseServer:
@@ -126,17 +131,37 @@ class SimulatorEndpoint(ABC):
         """Cut the next request out of what has arrived."""
 
     def hears(self, frame: Frame) -> bool:
-        """Whether a request is heard, and meant for this gripper; units in the field answer any unit id."""
-        return self._device_id in (None, frame.unit) and self.adversary.hears()
+        """Whether a request is heard, and meant for this gripper."""
+        return self._is_meant(frame.unit) and self.adversary.hears()
 
     def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
         """What to send for a reply."""
         damaged = self.adversary.damage(reply)
         return self.policy(reply) if damaged is None else damaged
 
+    def undelivered(self, part: bytes) -> None:
+        """Lose what a client that is gone was to be sent; a multiplexer has it for the newest or the next."""
+        if self._server is None or not self.adversary.is_multiplexed:
+            return
+        present = [each for each in connections(self._server) if each.is_active()]
+        if present:
+            present[-1].pass_on(part)
+        else:
+            self._left_over.append(part)
+
+    def left_over(self) -> Iterable[bytes]:
+        """What a new client is sent before it has asked for anything."""
+        parts = tuple(self._left_over) if self.adversary.is_multiplexed else ()
+        self._left_over.clear()
+        return parts
+
 
 def hang_up(server: ModbusBaseServer, *, reset: bool = False) -> None:
     """Drop all connections of a server."""
-    for connection in list(server.active_connections.values()):
-        assert isinstance(connection, Connection)
+    for connection in connections(server):
         connection.hang_up(reset=reset)
+
+
+def connections(server: ModbusBaseServer) -> list[Connection]:
+    """The connections of a server, oldest first."""
+    return [each for each in server.active_connections.values() if isinstance(each, Connection)]

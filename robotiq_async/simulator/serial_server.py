@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import importlib.util
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from pymodbus.server import ModbusSerialServer
 
-from .bank import RegisterBank
-from .connection import Connection
+from robotiq_async.checks import check_int
+from robotiq_async.registers import RTU_REGISTERS
+
+from .bank import RTU_FUNCTIONS, RegisterBank
 from .endpoint import SimulatorEndpoint
 from .framing import Frame, take_rtu
+from .serial_connection import SerialConnection
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -19,30 +22,41 @@ if TYPE_CHECKING:
     from .gripper import SimulatedGripper
 
 
+_BROADCAST: Final = 0
+
+
 class SerialSimulatorServer(SimulatorEndpoint):
     """Serves a simulated gripper over Modbus RTU at 115200 baud, 8N1.
 
-    Serves what :class:`~robotiq_async.simulator.SimulatorServer` serves. The RTU gripper has no exception
-    replies (manual), so a bad request gets no answer.
+    Serves what :class:`~robotiq_async.simulator.SimulatorServer` serves, and FC23, which writes before it
+    reads. The RTU gripper has no exception replies (manual), so a bad request gets no answer. Broadcasts
+    (unit 0) are carried out and not answered, requests to other units are left to them, as Modbus has it;
+    no source says what a real gripper does with a broadcast.
     """
 
     link = "rtu"
+    functions = RTU_FUNCTIONS
 
     def __init__(
-        self, port: str, gripper: SimulatedGripper | None = None, *, device_id: int | None = None
+        self,
+        port: str,
+        gripper: SimulatedGripper | None = None,
+        *,
+        device_id: int = RTU_REGISTERS.device_id,
     ) -> None:
         """A server that is not started; needs no running loop.
 
         Args:
             port: the serial port, such as ``/dev/ttyUSB0``, or one end of a pseudo terminal.
             gripper: what answers; None for a new one.
-            device_id: the only unit id that is answered (shipped grippers: 9); None for all.
+            device_id: the unit id of the gripper.
 
         Raises:
             TypeError: device_id is not an int.
-            ValueError: device_id is outside 0..255.
+            ValueError: device_id is outside 1..247.
         """
-        super().__init__(gripper, device_id)
+        super().__init__(gripper)
+        self._device_id = check_int("device_id", device_id, 1, 247)
         self._port = port
 
     @property
@@ -72,8 +86,11 @@ class SerialSimulatorServer(SimulatorEndpoint):
         return take_rtu(inbox)
 
     def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
-        """What to send for a reply; nothing for an exception."""
-        return () if reply[1] & 0x80 else super().deliver(reply)
+        """What to send for a reply; nothing for an exception, and nothing to a broadcast."""
+        return () if reply[0] == _BROADCAST or reply[1] & 0x80 else super().deliver(reply)
+
+    def _is_meant(self, unit: int) -> bool:
+        return unit in (_BROADCAST, self._device_id)
 
     async def _open(self) -> ModbusSerialServer:
         server = _SerialServer(self)
@@ -98,5 +115,5 @@ class _SerialServer(ModbusSerialServer):
         )
         self._endpoint = endpoint
 
-    def callback_new_connection(self) -> Connection:
-        return Connection(self, self._endpoint)
+    def callback_new_connection(self) -> SerialConnection:
+        return SerialConnection(self, self._endpoint)

@@ -9,7 +9,7 @@ from pymodbus.server import ModbusTcpServer
 
 from robotiq_async.checks import check_int, check_seconds
 
-from .bank import RegisterBank
+from .bank import TCP_FUNCTIONS, RegisterBank
 from .connection import Connection
 from .endpoint import SimulatorEndpoint, hang_up
 from .framing import Frame, take_tcp
@@ -27,10 +27,12 @@ class SimulatorServer(SimulatorEndpoint):
 
     Answers FC03, FC04, FC06 and FC16 at the addresses of :class:`~robotiq_async.simulator.bank.RegisterBank`;
     other functions, addresses and counts get the Modbus exceptions 1, 2 and 3. Bytes that are no Modbus TCP
-    end the connection. Requests of one connection are answered in order.
+    end the connection. Requests of one connection are answered in order; a client that does not take its
+    replies is not read from until it does.
     """
 
     link = "tcp"
+    functions = TCP_FUNCTIONS
 
     def __init__(
         self,
@@ -52,7 +54,8 @@ class SimulatorServer(SimulatorEndpoint):
             TypeError: port or device_id is not an int.
             ValueError: port is outside 0..65535, or device_id outside 0..255.
         """
-        super().__init__(gripper, device_id)
+        super().__init__(gripper)
+        self._device_id = None if device_id is None else check_int("device_id", device_id, 0, 255)
         self._host = host
         self._port = check_int("port", port, 0, 65535)
 
@@ -122,6 +125,9 @@ class SimulatorServer(SimulatorEndpoint):
     def take(self, inbox: bytearray) -> Frame | None:
         """Cut the next request out of what has arrived."""
         return take_tcp(inbox)
+
+    def _is_meant(self, unit: int) -> bool:
+        return self._device_id in (None, unit)
 
     async def _open(self) -> ModbusTcpServer:
         server = _TcpServer(self)

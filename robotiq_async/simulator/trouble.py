@@ -96,8 +96,16 @@ KINDS: Final[dict[str, Kind]] = {
         "connections are reset; new ones are accepted, not answered", _CONDITION, link="tcp"
     ),
     "refuse": Kind("connections are reset; new ones are refused", _CONDITION, link="tcp"),
+    "multiplexer": Kind(
+        "a gateway keeps its own connection: replies come VALUE seconds later, to whoever is connected then",
+        *(_CONDITION, 0.7, 0, 10),
+        link="tcp",
+    ),
     # The gripper.
     "power-cut": Kind("the gripper has no power, and comes back reset", _CONDITION),
+    "idle-reset": Kind(
+        "the gripper loses its activation when no request comes for VALUE seconds", _CONDITION, 5.0, 0, 3600
+    ),
     "foreign": Kind("another client sends all axes to VALUE", _EVENT, 128, 0, 255),
     "slow-device": Kind("requests take effect VALUE seconds after they came", _CONDITION, 0.2, 0, 10),
     "interference": Kind("the scissor is blocked: fault 0x0A, after 20 s 0x0E", _CONDITION),

@@ -104,9 +104,9 @@ async def trouble(
 
 
 async def _begun(world: World, call: Call) -> Call:
-    """Begin a call, and wait until the gripper has heard of it."""
+    """Begin a call, and wait until the gripper has heard of it and not answered yet."""
     task = asyncio.ensure_future(call())
-    await world.until(lambda: bool(world.server.heard))
+    await world.server.asked.wait()
     return lambda: task
 
 

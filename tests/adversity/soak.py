@@ -46,7 +46,8 @@ ON_ANY_LINK = [
     *(Trouble(kind) for kind in ("silence", "pieces", "power-cut", "interference")),
 ]
 ON_TCP = [Trouble(kind) for kind in ("reset", "close", "refuse", "accept-silence", "exception")] + [
-    Trouble(kind) for kind in ("wrong-transaction", "wrong-protocol")
+    *(Trouble(kind) for kind in ("wrong-transaction", "wrong-protocol")),
+    *(Trouble("multiplexer", seconds) for seconds in (0.02, 0.3, 0.7)),
 ]
 MOVES_EVERYTHING = ("foreign", "release")
 
@@ -235,7 +236,6 @@ async def soak(link: str, seed: int, loop: LoopWatch) -> AsyncIterator[Soak]:
             server, address = RtuServer(line.far, gripper), f"rtu://{line.near}"
         else:
             server, address = TcpServer(gripper), ""
-        server.heard = []
         await stack.enter_async_context(server)
         hand = await stack.enter_async_context(RobotiqHand(address or server.address))
         world = World(gripper, server, None, hand)

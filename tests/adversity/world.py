@@ -53,12 +53,17 @@ class StampedGripper(SimulatedGripper):
 class Heard:
     """Notes when each request came in, understood or not."""
 
-    heard: list[float]
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.heard: list[float] = []
+        self.asked = asyncio.Event()
+        """Set as soon as the first has come, before it is answered."""
 
     def take(self, inbox: bytearray) -> Frame | None:
         frame: Frame | None = super().take(inbox)  # type: ignore[misc]
         if frame is not None:
             self.heard.append(asyncio.get_running_loop().time())
+            self.asked.set()
         return frame
 
 
@@ -170,7 +175,6 @@ async def world(
         server, address = RtuServer(line.FAR, gripper), f"rtu://{line.NEAR}"
     else:
         server, address = TcpServer(gripper), ""
-    server.heard = []
     async with server:
         # 100 Hz over TCP and 200 Hz over a serial line, as the manual says.
         options = {"poll_interval": 0.005 if link == "rtu" else 0.01} | options

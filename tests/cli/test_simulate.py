@@ -6,6 +6,7 @@ import asyncio
 import json
 import signal
 import socket
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -13,6 +14,7 @@ import pytest
 from robotiq_async import Fault, RobotiqHand, State
 from robotiq_async.enums import AXES
 from robotiq_async.simulator.trouble import KINDS
+from tests.serial_line import SerialLine
 
 if TYPE_CHECKING:
     from asyncio.subprocess import Process
@@ -62,6 +64,33 @@ async def test_a_port_in_use(shell: Shell) -> None:
 
 async def test_no_such_serial_device(shell: Shell) -> None:
     (await shell.run("simulate", "--serial", "/dev/no-such-port")).assert_failed(1, "/dev/no-such-port")
+
+
+@pytest.mark.parametrize(("said", "unit", "other"), [((), "9", "12"), (("--device-id", "12"), "12", "9")])
+async def test_the_unit_id_on_a_serial_line(
+    shell: Shell, tmp_path: Path, said: tuple[str, ...], unit: str, other: str
+) -> None:
+    with SerialLine(tmp_path) as line:
+        process = await shell.start("simulate", "--serial", line.far, *said)
+        assert await shell.read_line(process) == f"rtu://{line.far}"
+        address = f"rtu://{line.near}"
+        (await shell.run("status", "--device-id", other, address)).assert_failed(1, "nobody answers")
+        (await shell.run("status", "--device-id", unit, address)).assert_succeeded()
+        process.send_signal(signal.SIGINT)
+        (await shell.finish(process)).assert_succeeded()
+
+
+async def test_the_unit_id_over_tcp(shell: Shell) -> None:
+    process = await shell.start("simulate", "--port", "0", "--device-id", "7")
+    address = await shell.read_line(process)
+    (await shell.run("status", "--device-id", "7", address)).assert_succeeded()
+    (await shell.run("status", address)).assert_failed(1, "nobody answers")
+
+
+@pytest.mark.parametrize("unit", ["0", "248", "nine", "9.5"])
+async def test_a_unit_id_that_no_unit_can_have(shell: Shell, unit: str) -> None:
+    outcome = await shell.run("simulate", "--serial", "/dev/no-such-port", "--device-id", unit)
+    outcome.assert_failed(2, f"--device-id must be an integer in 1..247, got '{unit}'")
 
 
 async def test_other_than_loopback_is_warned_about(shell: Shell) -> None:

@@ -32,9 +32,10 @@ Answer = Callable[[bytes], list[bytes] | None]
 """Gets a request frame; gives the pieces to send, each in a segment of its own; None closes."""
 
 
-def good(request: bytes) -> bytes:
+def good(request: bytes, status: bytes = STATUS) -> bytes:
     """The right answer to a request of function 4 or 16."""
-    pdu = bytes((4, 16)) + STATUS if request[7] == 4 else request[7:12]
+    size = 2 * request[11]
+    pdu = bytes((4, size)) + status[:size] if request[7] == 4 else request[7:12]
     return request[:4] + (len(pdu) + 1).to_bytes(2, "big") + request[6:7] + pdu
 
 
@@ -47,10 +48,13 @@ class Scripted:
         self.asked = asyncio.Event()
         self.connections = 0
         self.writers: list[asyncio.StreamWriter] = []
+        self.left_over = b""
+        """What whoever connects is sent, before anything was asked."""
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self.connections += 1
         self.writers.append(writer)
+        writer.write(self.left_over)
         with contextlib.suppress(ConnectionError, asyncio.IncompleteReadError):
             while True:
                 header = await reader.readexactly(6)
@@ -70,15 +74,17 @@ class Scripted:
 
 @asynccontextmanager
 async def linked(answer: Answer | None = None) -> AsyncIterator[tuple[ModbusTransport, Scripted]]:
+    """A transport that is open, at a server that was well-behaved while it was opened."""
     scripted = Scripted()
-    if answer is not None:
-        scripted.answer = answer
     server = await asyncio.start_server(scripted.serve, "127.0.0.1", 0)
     port = server.sockets[0].getsockname()[1]
     transport = ModbusTransport(
         parse_address(f"127.0.0.1:{port}"), TCP_REGISTERS, connect_timeout=1.0, response_timeout=0.1
     )
     await transport.open()
+    scripted.requests.clear()
+    scripted.asked.clear()
+    scripted.answer = answer or scripted.answer
     try:
         yield transport, scripted
     finally:
@@ -180,10 +186,10 @@ async def test_an_unanswered_write_is_sent_once() -> None:
     async with linked(lambda _: []) as (transport, scripted):
         with pytest.raises(ResponseTimeoutError):
             await transport.write(IMAGE)
-        await transport.open()
         scripted.answer = lambda request: [good(request)]
+        await transport.open()
         await transport.read()
-        assert [request[7] for request in scripted.requests] == [16, 4]
+        assert [request[7] for request in scripted.requests] == [16, 4, 4]
 
 
 async def test_what_nobody_asked_for_spoils_the_link() -> None:
@@ -195,6 +201,119 @@ async def test_what_nobody_asked_for_spoils_the_link() -> None:
         with pytest.raises(ProtocolError, match="nobody asked for"):
             await transport.read()
         assert not transport.is_open
+
+
+async def opened_and_read(transport: ModbusTransport) -> tuple[int, ...]:
+    await transport.open()
+    return await transport.read()
+
+
+@pytest.mark.parametrize("number", [0, 1, 2, 65000])
+async def test_a_reply_from_before_the_connection_is_never_taken(number: int) -> None:
+    """It is on its way as the connection opens, and waits in the socket when the first request is sent."""
+    async with linked() as (transport, scripted):
+        old = number.to_bytes(2, "big") + bytes.fromhex("0000 0013 02 04 10") + bytes(16)
+        scripted.left_over = old
+        with pytest.raises(ProtocolError, match="nobody asked for"):
+            await opened_and_read(transport)
+        assert not transport.is_open
+        assert scripted.requests == [], "what is asked on such a connection would be left over as well"
+        scripted.left_over = b""
+        await transport.open()
+        assert await transport.read() == REGISTERS
+
+
+async def test_a_late_reply_that_comes_after_the_first_request_is_never_taken() -> None:
+    late: list[bytes] = []
+
+    def one_behind(request: bytes) -> list[bytes]:
+        late.append(good(request))
+        return late[-2:-1]
+
+    async with linked(one_behind) as (transport, _):
+        with pytest.raises(ResponseTimeoutError):
+            await transport.read()
+        for _ in range(20):
+            with pytest.raises(ProtocolError, match="not the answer"):
+                await transport.open()
+        assert len(late) == 21
+
+
+@pytest.mark.parametrize("late", [1, 2, 5])
+async def test_a_late_reply_that_a_gateway_numbers_anew_is_never_taken(late: int) -> None:
+    """Behind a gateway to a serial line, whose replies carry no number, is a slow device.
+
+    The gateway takes what comes for the answer to what it is asked next.
+    """
+    asked: list[bytes] = []
+    kept: list[bytes] = []
+
+    def gateway(request: bytes) -> list[bytes]:
+        asked.append(request)
+        kept.append(good(request, len(asked).to_bytes(2, "big") * 8)[4:])
+        return [request[:4] + kept.pop(0)] if len(kept) > late else []
+
+    async with linked(gateway) as (transport, _):
+        with pytest.raises(ResponseTimeoutError):
+            await transport.read()
+        for _ in range(20):
+            with pytest.raises(RobotiqConnectionError):
+                await transport.open()
+        late = 0
+        kept.clear()
+        await transport.open()
+        assert await transport.read() == (len(asked),) * 8
+
+
+@pytest.mark.parametrize("count", [2, 11, 100, 1000])
+async def test_however_much_is_left_over_it_is_told(count: int) -> None:
+    """On its own, pymodbus drops what does not fit its buffer, and goes on."""
+    async with linked() as (transport, scripted):
+        scripted.left_over = count * good(bytes.fromhex("0001 0000 0006 02 04 0000 0008"))
+        with pytest.raises(ProtocolError, match="nobody asked for"):
+            await transport.open()
+        assert len(scripted.requests) == 0
+
+
+@pytest.mark.parametrize("count", [2, 11, 100, 1000])
+async def test_however_much_comes_it_is_no_answer_and_no_silence(count: int) -> None:
+    async with linked(lambda request: [count * good(request)]) as (transport, _):
+        with pytest.raises(ProtocolError, match="more than the answer"):
+            await transport.read()
+
+
+def numbers(scripted: Scripted) -> list[int]:
+    return [int.from_bytes(request[:2], "big") for request in scripted.requests]
+
+
+async def test_no_transaction_number_comes_twice_over_all_connections() -> None:
+    async with linked() as (transport, scripted):
+        for _ in range(5):
+            for _ in range(3):
+                await transport.read()
+                await transport.write(IMAGE)
+            await transport.open()
+        used = numbers(scripted)
+        assert len(set(used)) == len(used) == 35
+        assert 0 not in used, "pymodbus takes a reply numbered 0 for an answer to anything"
+
+
+async def test_transaction_numbers_begin_anywhere() -> None:
+    """Or what another program has left over would be taken for an answer to this one."""
+    firsts = set()
+    for _ in range(4):
+        async with linked() as (transport, scripted):
+            await transport.read()
+            firsts.add(numbers(scripted)[0])
+    assert len(firsts) > 1
+
+
+async def test_after_the_last_transaction_number_comes_the_first() -> None:
+    async with linked() as (transport, scripted):
+        transport._number = 0xFFFE
+        for _ in range(3):
+            assert await transport.read() == REGISTERS
+        assert numbers(scripted) == [0xFFFF, 1, 2]
 
 
 async def test_a_cancelled_request_spoils_the_link() -> None:

@@ -28,7 +28,11 @@ READ = bytes.fromhex("04 0000 0001")
 AXES_ASKED = tuple(AxisRequest(10 * n, 100 + n, 200 + n) for n in range(1, 5))
 ACTIVE = Request(activate=True, axes=AXES_ASKED, individual_fingers=False, individual_scissor=False)
 ONLY_ON = dict.fromkeys(
-    ("wrong-transaction", "wrong-protocol", "exception", "reset", "close", "accept-silence", "refuse"), "tcp"
+    (
+        *("wrong-transaction", "wrong-protocol", "exception", "reset", "close", "accept-silence", "refuse"),
+        "multiplexer",
+    ),
+    "tcp",
 ) | {"wrong-checksum": "rtu"}
 
 Body = Callable[..., Coroutine[Any, Any, None]]
@@ -322,6 +326,67 @@ async def test_silence_goes_on_after_refusal() -> None:
         assert await is_let_in(server)
 
 
+async def ask_and_go(server: SimulatorServer, pdu: bytes = READ) -> bytes:
+    """Ask, do not wait for the answer, and return what was asked."""
+    async with raw_client(server) as client:
+        request = client.frame(pdu)
+        client.writer.write(request)
+        await asyncio.sleep(0.01)
+    return request
+
+
+@virtual
+async def test_a_multiplexer_hands_late_replies_to_the_next_client() -> None:
+    async with simulator() as server:
+        await server.adversary.begin(Trouble("multiplexer", 0.1))
+        request = await ask_and_go(server)
+        await asyncio.sleep(1)
+        async with raw_client(server) as client:
+            transaction, _, answer = await client.reply()
+            assert (transaction, answer[0]) == (int.from_bytes(request[:2], "big"), request[7])
+            assert await is_answered(client), "its own follow"
+        async with raw_client(server) as client:
+            assert await is_answered(client), "nothing comes twice"
+
+
+@virtual
+async def test_a_multiplexer_hands_a_late_reply_to_whoever_is_connected_then() -> None:
+    async with simulator() as server:
+        loop = asyncio.get_running_loop()
+        await server.adversary.begin(Trouble("multiplexer"))
+        began = loop.time()
+        await ask_and_go(server, write(5))
+        assert server.gripper.request_registers[1] == 5, "it was carried out"
+        async with raw_client(server), raw_client(server) as newest:
+            assert (await newest.reply())[2][0] == 6
+        assert loop.time() - began == pytest.approx(0.7, abs=0.01)
+
+
+@virtual
+@pytest.mark.parametrize("kind", ["multiplexer", "delay"])
+async def test_without_a_multiplexer_replies_of_clients_that_are_gone_are_lost(kind: str) -> None:
+    async with simulator() as server:
+        async with server.adversary.making(Trouble(kind, 0.1)):
+            await ask_and_go(server)
+            await asyncio.sleep(0.2 if kind == "multiplexer" else 0)
+        await asyncio.sleep(0.2)
+        async with raw_client(server) as client:
+            assert await is_answered(client)
+
+
+@virtual
+async def test_a_multiplexer_keeps_no_more_than_a_hundred_replies() -> None:
+    async with simulator() as server:
+        await server.adversary.begin(Trouble("multiplexer", 0.1))
+        async with raw_client(server) as client:
+            client.writer.write(b"".join(client.frame(READ) for _ in range(300)))
+            await asyncio.sleep(0.05)
+        await asyncio.sleep(1)
+        async with raw_client(server) as client:
+            assert [(await client.reply())[0] for _ in range(100)] == list(range(201, 301))
+            assert await is_answered(client)
+
+
 @virtual
 @pytest.mark.parametrize("kind", ["refuse", "power-cut"])
 async def test_ending_it_does_not_start_a_server_that_was_stopped(kind: str) -> None:
@@ -403,6 +468,59 @@ async def test_the_gripper_releases() -> None:
         assert status(server).fault is Fault.AUTOMATIC_RELEASE
         await asyncio.sleep(60)
         assert status(server).fault is Fault.AUTOMATIC_RELEASE_DONE
+
+
+@virtual
+async def test_an_idle_gripper_loses_its_activation() -> None:
+    async with simulator() as server, raw_client(server) as client:
+        await activate(server)
+        async with server.adversary.making(Trouble("idle-reset", 2)):
+            await asyncio.sleep(1.9)
+            for _ in range(5):
+                assert await is_answered(client), "a request, whatever it asks"
+                await asyncio.sleep(1.9)
+                assert status(server).is_activated
+            await asyncio.sleep(0.2)
+            assert status(server).is_reset
+            assert server.gripper.request_registers == (0,) * 8
+            assert await is_answered(client), "the connection stays"
+        await activate(server)
+        await asyncio.sleep(100)
+        assert status(server).is_activated, "it is over"
+
+
+@virtual
+@pytest.mark.parametrize(
+    ("silent", "is_reset"), [(Trouble("silence"), True), (Trouble("drop", lasts=9), False)]
+)
+async def test_what_is_not_heard_is_no_request(silent: Trouble, is_reset: bool) -> None:
+    async with simulator() as server, raw_client(server) as client:
+        await activate(server)
+        async with server.adversary.making(Trouble("idle-reset", 2)), server.adversary.making(silent):
+            for _ in range(5):
+                assert not await is_answered(client)
+            assert status(server).is_reset is is_reset
+
+
+@virtual
+async def test_an_idle_gripper_without_power_stays_without() -> None:
+    async with simulator() as server, server.adversary.making(Trouble("power-cut")):
+        async with server.adversary.making(Trouble("idle-reset", 1)):
+            await asyncio.sleep(5)
+        assert not server.gripper.is_powered
+
+
+@virtual
+async def test_the_least_patient_of_two_counts() -> None:
+    async with simulator() as server:
+        await activate(server)
+        async with server.adversary.making(Trouble("idle-reset", 9)):
+            async with server.adversary.making(Trouble("idle-reset", 2)):
+                await asyncio.sleep(1)
+            await asyncio.sleep(8)
+            assert status(server).is_activated
+            await asyncio.sleep(2)
+            assert status(server).is_reset
 
 
 # Beginning and ending.

@@ -13,6 +13,7 @@ READ = "04 04 1234 5678"
 WRITE = "10 03e8 0002"
 """Two registers from 1000 on are written, by FC16."""
 WRITE_ONE = "06 03e9 1234"
+READ_WRITE = "17 04 1234 5678"
 
 
 def tcp(pdu: str, *, transaction: str = "0a0b", protocol: str = "0000", unit: str = "09") -> bytes:
@@ -56,6 +57,7 @@ def test_the_frames_themselves() -> None:
     ("pdu", "is_to_a_write"),
     [
         *((READ, False), ("03 02 1234", False), ("83 02", False), ("84 02", False)),
+        (READ_WRITE, False),
         *((WRITE, True), (WRITE_ONE, True), ("86 02", True), ("90 02", True)),
     ],
 )
@@ -74,6 +76,9 @@ def test_a_reply(pdu: str, is_to_a_write: bool) -> None:
     [
         ("wrong-function", READ, "03 04 1234 5678"),
         ("wrong-function", "03 02 1234", "04 02 1234"),
+        ("wrong-function", READ_WRITE, "03 04 1234 5678"),
+        ("wrong-length", READ_WRITE, "17 02 1234"),
+        ("wrong-count", READ_WRITE, "17 06 1234 5678"),
         ("wrong-function", WRITE, "06 03e8 0002"),
         ("wrong-function", WRITE_ONE, "10 03e9 1234"),
         ("wrong-length", READ, "04 02 1234"),

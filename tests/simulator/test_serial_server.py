@@ -123,6 +123,39 @@ async def test_partial_write_and_read_back(server: AttentiveServer, line: Line) 
     assert await line.ask(bytes.fromhex("03 03ea 0002"), 6) == bytes.fromhex("03 04 aaaa 1234")
 
 
+async def test_reading_and_writing_at_once(server: AttentiveServer, line: Line) -> None:
+    """The manual's example of function 23, but for the check sum it prints under the request."""
+    request = bytes.fromhex("17 07d0 0002 03e9 0002 04 00e6 3cc8")
+    assert with_crc(b"\x09" + bytes.fromhex("17 04 e000 0000"))[-2:] == bytes.fromhex("4727"), "as printed"
+    assert await line.ask(request, 6) == bytes.fromhex("17 04 0000 0000")
+    assert server.gripper.request_registers == (0, 0x00E6, 0x3CC8, 0, 0, 0, 0, 0)
+
+
+async def test_what_is_written_comes_before_what_is_read(server: AttentiveServer, line: Line) -> None:
+    for value in (b"\x12\x34", b"\x56\x78"):
+        request = bytes.fromhex("17 03e9 0001 03e9 0001 02") + value
+        assert await line.ask(request, 4) == bytes.fromhex("17 02") + value
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [
+        *("17 07d0 0000 03e9 0001 02 1234", "17 07d0 007e 03e9 0001 02 1234"),
+        *("17 07d0 0009 03e9 0001 02 1234", "17 07d8 0001 03e9 0001 02 1234"),
+        *("17 07d0 0001 03e9 0000 00", "17 07d0 0001 03e9 0001 04 12345678"),
+        *("17 07d0 0001 03e9 0002 02 1234", "17 07d0 0001 03e9 0001 01 12"),
+        *("17 07d0 0001 07d0 0001 02 1234", "17 07d0 0001 03ef 0002 04 12345678"),
+    ],
+)
+async def test_what_cannot_be_read_and_written_is_neither(
+    server: AttentiveServer, line: Line, request_: str
+) -> None:
+    line.send(with_crc(b"\x09" + bytes.fromhex(request_)))
+    await asyncio.wait_for(server.heard.wait(), 5)
+    assert (await line.read_status()).is_reset
+    assert server.gripper.writes == ()
+
+
 @pytest.mark.parametrize(
     "frame",
     [
@@ -146,7 +179,13 @@ async def test_a_wrong_checksum_takes_along_what_follows(server: AttentiveServer
     assert (await line.read_status()).is_reset
 
 
-@pytest.mark.parametrize("request_", ["09 03 07d0 0008", "09 06 03e8 0100", "09 10 03e8 0001 02 0100"])
+@pytest.mark.parametrize(
+    "request_",
+    [
+        *("09 03 07d0 0008", "09 06 03e8 0100", "09 10 03e8 0001 02 0100"),
+        "09 17 07d0 0001 03e8 0001 02 0100",
+    ],
+)
 def test_a_request_in_single_bytes(request_: str) -> None:
     whole = with_crc(bytes.fromhex(request_))
     inbox = bytearray()

@@ -13,6 +13,7 @@ from pymodbus.client import AsyncModbusTcpClient
 from robotiq_async.enums import Finger
 from robotiq_async.request import AxisRequest, Request
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.simulator.endpoint import connections
 from robotiq_async.status import RobotiqStatus
 
 if TYPE_CHECKING:
@@ -423,3 +424,16 @@ async def test_a_gripper_without_power_answers_nobody(server: SimulatorServer, c
                 await other.reader.readexactly(1)
     server.gripper.power_on()
     assert (await client.ask(b"\x03\x00\x01\x00\x01")) == bytes.fromhex("03 02 0000")
+
+
+async def test_half_a_request_from_before_a_power_cut_is_forgotten(
+    server: SimulatorServer, client: RawClient
+) -> None:
+    await client.read_status()
+    request = client.frame(b"\x04\x00\x00\x00\x08")
+    (connection,) = connections(server._running())
+    connection.data_received(request[:5])
+    server.gripper.power_off()
+    connection.data_received(request[5:])
+    server.gripper.power_on()
+    assert (await client.read_status()).is_reset

@@ -14,7 +14,10 @@ from robotiq_async.simulator import Trouble, parse_troubles
 from robotiq_async.simulator.trouble import KINDS
 
 INF = math.inf
-CONDITIONS = ["accept-silence", "refuse", "power-cut", "slow-device", "interference", "fault"]
+CONDITIONS = [
+    *("accept-silence", "refuse", "multiplexer", "power-cut", "slow-device", "interference", "fault"),
+    "idle-reset",
+]
 """Kinds that cannot be for a single reply or moment."""
 REPLIES = [
     *("delay", "late", "drop", "half", "pieces", "twice", "exception"),
@@ -137,6 +140,8 @@ def test_no_words_are_no_trouble(text: str) -> None:
         ("delay -0.1", "the value of delay must be seconds in 0..10, got -0.1"),
         ("delay nan", "the value of delay must be seconds in 0..10, got nan"),
         ("delay inf", "the value of delay must be seconds in 0..10, got inf"),
+        ("multiplexer 11", "the value of multiplexer must be seconds in 0..10, got 11.0"),
+        ("idle-reset 3601", "the value of idle-reset must be seconds in 0..3600, got 3601.0"),
         ("late 11", "the value of late must be seconds in 0..10, got 11.0"),
         ("pieces 1.1", "the value of pieces must be seconds in 0..1, got 1.1"),
         ("slow-device 11", "the value of slow-device must be seconds in 0..10, got 11.0"),
@@ -247,6 +252,7 @@ def test_nothing_said() -> None:
     ("kind", "amount"),
     [
         *(("delay", 0.05), ("late", 0.7), ("pieces", 0.002), ("exception", 4), ("foreign", 128)),
+        *(("multiplexer", 0.7), ("idle-reset", 5)),
         *(("slow-device", 0.2), ("fault", 9), ("drop", 0), ("silence", 0)),
     ],
 )

@@ -1,0 +1,59 @@
+"""The serial line of a simulator: where a frame ends, and bytes that nobody takes."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from .connection import MOST_UNREAD, Connection
+from .framing import take_rtu
+
+SILENCE_S: Final = 0.00175
+"""Modbus RTU ends a frame at a silence of 3.5 characters; at more than 19200 baud of this, whatever a
+character takes (Modbus over Serial Line, 2.5.1.1)."""
+LONGEST_PAUSE_S: Final = 0.02
+"""Longer than this no frame pauses on its way to this program, which does not see the wire: a USB adapter
+keeps what it has for up to 16 ms (the usual latency timer), and who writes half a frame to a pseudo terminal
+was kept from the other half for 1.9 ms (4000 frames on a busy machine). A client that waits in vain for an
+answer waits longer before it asks again, so no more than one request is lost with what was cut off."""
+
+MOST_UNSENT: Final = 4096
+"""Bytes that nobody has taken from the line; beyond, replies are lost."""
+
+
+class SerialConnection(Connection):
+    """The other end of a serial line, which has no connections, no packets and no flow control."""
+
+    _heard_at = 0.0
+    _unsent = 0
+    """Bytes sent since the line had taken all of them."""
+
+    def data_received(self, data: bytes) -> None:
+        """Take bytes from the line; those of a frame that was cut off before are dropped."""
+        now = self.loop.time()
+        pause, self._heard_at = now - self._heard_at, now
+        self._answer_next()  # what is whole is not cut off, even if it has not had its turn
+        if not self._answering and _begins_anew(pause, data):
+            self._inbox.clear()
+        super().data_received(data)
+
+    def pass_on(self, part: bytes) -> None:
+        """Send bytes now, unless nobody has taken those before."""
+        if self.is_active() and not self.transport.get_write_buffer_size():  # type: ignore[attr-defined]
+            self._unsent = 0
+        if self._unsent + len(part) <= MOST_UNSENT:
+            self._unsent += len(part)
+            super().pass_on(part)
+
+    def _regulate(self) -> None:
+        """Lose requests that come faster than they are answered: nobody can be made to wait."""
+        if len(self._inbox) > MOST_UNREAD:
+            self._inbox.clear()
+
+
+def _begins_anew(pause: float, data: bytes) -> bool:
+    """Whether bytes are the beginning of a frame and not the rest of one, judged by the pause before them.
+
+    In between, when it may be the line or the machine that paused, a whole request is a beginning: by
+    chance the rest of a frame has its check sum once in 65,536 times.
+    """
+    return pause > LONGEST_PAUSE_S or (pause > SILENCE_S and take_rtu(bytearray(data)) is not None)

@@ -1,0 +1,75 @@
+"""A gripper that loses its activation when nobody asks anything for a while: one source says that it does."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from robotiq_async import ConnectionLostError, Finger, NotActivatedError, State
+from robotiq_async.request import Request
+from robotiq_async.simulator import Trouble
+from tests.adversity.world import World, world
+from tests.virtual import run
+
+A, B = Finger.A, Finger.B
+LINKS = ["tcp", "rtu"]
+
+
+async def nothing_is_activated(world: World, since: int) -> None:
+    """Neither at once nor later; and asked for it, the gripper is."""
+    travels = world.travels()
+    for ask in (lambda: world.hand.move(60, B), lambda: world.hand.set_position(60, B)):
+        with pytest.raises(NotActivatedError):
+            await ask()
+    await asyncio.sleep(6)
+    assert world.hand.state is State.RESET
+    assert not any(Request.from_registers(write.registers).activate for write in world.gripper.writes[since:])
+    assert world.travels() == travels
+    await world.hand.recover()
+    assert (await world.hand.move(60, B)).positions[B] == pytest.approx(60, abs=2)
+
+
+@pytest.mark.parametrize("link", LINKS)
+def test_it_is_found_reset_when_the_link_is_back(link: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def main() -> None:
+        async with world(link, patch=monkeypatch) as here:
+            await here.activate_beforehand()
+            await here.hand.start()
+            moving = asyncio.create_task(here.hand.move(200, A, speed=0))
+            await here.until_moving()
+            writes = len(here.gripper.writes)
+            async with here.server.adversary.making(Trouble("idle-reset", 0.5)):
+                async with here.server.adversary.making(Trouble("silence")):
+                    with pytest.raises(ConnectionLostError):
+                        await moving
+                    await asyncio.sleep(1)
+                    assert not here.gripper.is_moving
+                await here.until_state(State.RESET)
+                await nothing_is_activated(here, writes)
+
+    run(main)
+
+
+@pytest.mark.parametrize("link", LINKS)
+@pytest.mark.parametrize("command", [False, True])
+def test_it_loses_its_activation_while_the_loop_is_held_up(
+    link: str, command: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def main() -> None:
+        async with world(link, patch=monkeypatch) as here:
+            await here.activate_beforehand()
+            await here.hand.start()
+            moving = asyncio.create_task(here.hand.move(200, A, speed=0))
+            await here.until_moving()
+            writes = len(here.gripper.writes)
+            async with here.server.adversary.making(Trouble("idle-reset", 0.5)):
+                here.loop.hold_up(1.0)
+                if command:
+                    here.hand.command(B, position=100)
+                with pytest.raises(NotActivatedError):
+                    await moving
+                await nothing_is_activated(here, writes)
+            assert here.hand.statistics.reconnects == 0
+
+    run(main)

@@ -1,0 +1,121 @@
+"""Replies to requests of connections that are gone: what comes of them when somebody else gets them."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Iterator
+
+import pytest
+
+from robotiq_async import ConnectionLostError, Finger, ProtocolError, RobotiqConnectionError, State
+from robotiq_async.request import AxisRequest, Request
+from robotiq_async.simulator import Trouble
+from tests.adversity.world import World, world
+from tests.simulator.test_server import raw_client
+from tests.virtual import run
+
+A, BCS = Finger.A, (Finger.B, Finger.C, Finger.SCISSOR)
+READ_STATUS = bytes.fromhex("04 0000 0008")
+
+
+async def send(world: World, fingers: int, scissor: int) -> None:
+    """Let another client send B, C and the scissor somewhere, and wait until they are there."""
+    axes = tuple(AxisRequest(position, 255, 64) for position in (0, fingers, fingers, scissor))
+    world.gripper.write(0, Request(activate=True, go=True, axes=axes).registers)
+    await asyncio.sleep(10)
+
+
+async def ask_and_go(world: World) -> None:
+    """Ask for the status, as the first request of a connection, and do not wait for the answer."""
+    async with raw_client(world.server) as client:  # type: ignore[arg-type]
+        client.writer.write(client.frame(READ_STATUS))
+        heard = len(world.server.heard)
+        await world.until(lambda: len(world.server.heard) > heard)
+
+
+@contextlib.contextmanager
+def nobody_else_moves(world: World) -> Iterator[None]:
+    before = world.travels()
+    yield
+    after = world.travels()
+    assert {axis: after[axis] - before[axis] for axis in BCS} == dict.fromkeys(BCS, 0)
+
+
+def test_a_reply_that_is_left_over_moves_no_axis_that_nobody_addressed() -> None:
+    async def main() -> None:
+        async with world() as here:
+            await here.activate_beforehand()
+            await send(here, 99, 200)
+            async with here.server.adversary.making(Trouble("multiplexer", 0.03)):
+                await ask_and_go(here)
+                await send(here, 40, 137)
+                with nobody_else_moves(here):
+                    with contextlib.suppress(RobotiqConnectionError):
+                        await here.hand.start(activate=False)
+                        await here.hand.set_position(60, A)
+                    await asyncio.sleep(5)
+                here.check_no_stale_status()
+
+    run(main)
+
+
+def test_after_what_was_left_over_the_next_start_finds_the_gripper() -> None:
+    async def main() -> None:
+        async with world() as here:
+            await here.activate_beforehand()
+            async with here.server.adversary.making(Trouble("multiplexer", 0.03)):
+                await ask_and_go(here)
+                await asyncio.sleep(0.1)
+                with pytest.raises(ProtocolError, match="nobody asked for"):
+                    await here.hand.start(activate=False)
+                await here.hand.start(activate=False)
+                with nobody_else_moves(here):
+                    assert (await here.hand.move(60, A, speed=255)).positions[A] == pytest.approx(60, abs=2)
+                here.check_no_stale_status()
+
+    run(main)
+
+
+@pytest.mark.parametrize("late", [0.03, 0.2, 0.39])
+def test_a_hand_comes_back_through_a_multiplexer(late: float) -> None:
+    """A connection that asked before it knew what was left over would leave its own reply to the next one."""
+
+    async def main() -> None:
+        async with world() as here:
+            await here.activate_beforehand()
+            await here.hand.start()
+            async with here.server.adversary.making(Trouble("multiplexer", late)):
+                await asyncio.sleep(1)
+                for _ in range(5):
+                    await here.server.adversary.begin(Trouble("close"))
+                    await here.until_state(State.DISCONNECTED)
+                    await here.hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
+                    await asyncio.sleep(0.7)
+                here.check_no_stale_status()
+
+    run(main)
+
+
+@pytest.mark.parametrize("late", [0.46, 0.5, 0.55, 0.7])
+def test_no_status_is_older_than_a_reply_may_be(late: float) -> None:
+    """Each reply comes to the connection after the one that asked, which has given up by then."""
+
+    async def main() -> None:
+        async with world() as here:
+            await here.activate_beforehand()
+            await here.hand.start()
+            async with here.server.adversary.making(Trouble("multiplexer", late)):
+                for position in range(20):
+                    with contextlib.suppress(RobotiqConnectionError):
+                        await here.hand.set_position(10 * position, A)
+                    await asyncio.sleep(1)
+                here.check_no_stale_status()
+                with pytest.raises(ConnectionLostError):
+                    await here.hand.set_position(0, A)
+            await here.hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
+            with nobody_else_moves(here):
+                await here.hand.move(60, A, speed=255)
+            here.check_no_stale_status()
+
+    run(main)

@@ -1,0 +1,147 @@
+"""Clients that ask and do not listen: what the simulator keeps for them is bounded, and others are served."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import socket
+import struct
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, suppress
+from typing import Any
+
+import pytest
+
+from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, Trouble
+from robotiq_async.simulator.connection import MOST_UNREAD, MOST_WAITING
+from robotiq_async.simulator.endpoint import connections
+from robotiq_async.simulator.serial_connection import MOST_UNSENT
+from tests.simulator.test_adversary import simulator, virtual
+from tests.simulator.test_serial_server import Line, with_crc
+from tests.simulator.test_server import RawClient, raw_client
+from tests.virtual_line import VirtualLine
+
+REQUESTS = 15_000
+READ = with_crc(bytes.fromhex("09 03 03e8 0008"))
+ANSWER = with_crc(bytes.fromhex("09 03 10") + bytes(16))
+LARGEST_READ = 256 * 1024
+"""What asyncio takes from a socket at a time."""
+
+
+def writes(client: RawClient, count: int) -> bytes:
+    """Requests that write one register each, answered by 12 bytes each."""
+    return b"".join(client.frame(struct.pack(">BHH", 6, 1, value & 0xFFFF)) for value in range(count))
+
+
+@asynccontextmanager
+async def narrow(server: SimulatorServer) -> AsyncIterator[RawClient]:
+    """A client for which the system keeps little on its way, in either direction."""
+    for at in (socket.SO_SNDBUF, socket.SO_RCVBUF):
+        server._listener.sockets[0].setsockopt(socket.SOL_SOCKET, at, 4096)
+    line = socket.create_connection(("127.0.0.1", server.port))
+    line.setblocking(False)
+    line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    reader, writer = await asyncio.open_connection(sock=line, limit=2**12)
+    try:
+        yield RawClient(reader, writer)
+    finally:
+        writer.transport.abort()
+        await asyncio.sleep(0)
+
+
+async def until_held(server: SimulatorServer) -> None:
+    """Wait until a client is not read from any more."""
+    async with asyncio.timeout(20):
+        while all(each.transport.is_reading() for each in connections(server._running())):  # type: ignore[attr-defined]  # noqa: ASYNC110
+            await asyncio.sleep(0.001)
+
+
+async def test_a_client_that_never_reads_has_to_wait() -> None:
+    async with SimulatorServer() as server, narrow(server) as client:
+        client.writer.write(writes(client, REQUESTS))
+        await until_held(server)
+        (connection,) = connections(server._running())
+        assert len(connection._inbox) <= MOST_UNREAD + LARGEST_READ
+        assert connection.transport.get_write_buffer_size() < 100_000  # type: ignore[attr-defined]
+        async with raw_client(server) as other:
+            assert (await other.read_status()).is_reset, "others are served meanwhile"
+        for value in range(REQUESTS):
+            transaction, _, answer = await client.reply()
+            assert transaction == (value + 1) & 0xFFFF
+            assert answer == struct.pack(">BHH", 6, 1, value & 0xFFFF), "nothing is lost, and all in order"
+        assert connection.transport.is_reading()  # type: ignore[attr-defined]
+
+
+async def test_a_client_that_goes_away_while_it_has_to_wait() -> None:
+    async with SimulatorServer() as server:
+        async with narrow(server) as client:
+            client.writer.write(writes(client, REQUESTS))
+            await until_held(server)
+        async with asyncio.timeout(5), raw_client(server) as other:
+            assert (await other.read_status()).is_reset
+            while len(connections(server._running())) > 1:  # noqa: ASYNC110
+                await asyncio.sleep(0)
+
+
+@virtual
+async def test_replies_that_are_sent_later_are_not_kept_without_limit() -> None:
+    async with simulator() as server, raw_client(server) as client:
+        await server.adversary.begin(Trouble("delay", 10))
+        client.writer.write(writes(client, 6_000))
+        await asyncio.sleep(9)
+        assert len(server.gripper.writes) == MOST_WAITING
+        await asyncio.sleep(61)
+        for value in range(6_000):
+            assert (await client.reply())[2] == struct.pack(">BHH", 6, 1, value)
+
+
+# On a serial line nobody can be made to wait.
+
+
+@pytest.fixture
+def line() -> Iterator[Line]:
+    line = Line()
+    yield line
+    line.close()
+
+
+async def test_replies_that_nobody_takes_from_a_serial_line_are_lost(line: Line) -> None:
+    answered = 0
+
+    def policy(reply: bytes) -> list[tuple[float, bytes]]:
+        nonlocal answered
+        answered += 1
+        return [(0.0, reply)]
+
+    async with SerialSimulatorServer(line.port) as server:
+        server.policy = policy
+        (connection,) = connections(server._running())
+        transport: Any = connection.transport
+        for count in range(5000):
+            line.send(READ)
+            while answered == count:  # noqa: ASYNC110
+                await asyncio.sleep(0)
+            assert sum(map(len, transport.intern_write_buffer)) <= MOST_UNSENT
+        received = b""
+        while transport.get_write_buffer_size() or not received.endswith(ANSWER):
+            await asyncio.sleep(0)
+            with suppress(BlockingIOError):
+                received += os.read(line.master, 4096)
+        assert received == ANSWER * (len(received) // len(ANSWER)), "whole ones"
+        assert len(received) < 4000 * len(ANSWER), "not all of them"
+        assert (await line.read_status()).is_reset
+
+
+@virtual
+async def test_requests_that_come_faster_than_they_are_answered_are_lost(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    cable = VirtualLine(monkeypatch)
+    gripper = SimulatedGripper(asyncio.get_running_loop().time)
+    async with SerialSimulatorServer(cable.FAR, gripper) as server:
+        (connection,) = connections(server._running())
+        for _ in range(1000):
+            connection.data_received(100 * READ)
+            assert len(connection._inbox) <= MOST_UNREAD + 100 * len(READ)
+        await asyncio.sleep(60)
+        assert not connection._inbox
