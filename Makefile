@@ -1,7 +1,7 @@
 # Needs Python 3.11 or newer with pip and venv, and make. Everything else goes into .venv.
 #
 # Another interpreter than python3:  make demo PYTHON=python3.12
-# Another gripper than the simulated one:  make demo ADDRESS=tcp://192.168.1.11
+# Another gripper than the simulated one:  make demo ADDRESS=tcp://192.168.1.11   (it asks before it moves)
 
 PYTHON ?= python3
 ADDRESS ?= sim://
@@ -21,7 +21,7 @@ unexport VIRTUAL_ENV CONDA_PREFIX PYTHONHOME PYTHONPATH PYTHONSTARTUP PIP_USER P
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-demo: $(STAMP)  ## Run the demo on a simulated gripper (ADDRESS=... for a real one: it moves)
+demo: $(STAMP)  ## Run the demo on a simulated gripper (ADDRESS=... for a real one: it asks, and moves)
 	@$(BIN)/python -m robotiq_async demo $(ADDRESS)
 
 test: $(STAMP)  ## Run all tests

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from .arguments import USUAL, Address, CommandError, Link, UsageError, need
+from .arguments import USUAL, Address, Link, need
+from .failures import CommandError, UsageError
 from .words import IN_WORDS, clock
 
 if TYPE_CHECKING:

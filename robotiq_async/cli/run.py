@@ -16,7 +16,7 @@ from cyclopts import CycloptsError
 
 from ..errors import RobotiqError
 from .app import build
-from .arguments import CommandError, UsageError
+from .failures import CommandError, UsageError
 from .remarks import collected, forget
 
 _ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]

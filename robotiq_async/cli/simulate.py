@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ..errors import RobotiqError
-from .arguments import Port, is_loopback, usage
+from .arguments import Port, is_loopback
+from .failures import usage
 
 if TYPE_CHECKING:
     from ..simulator import Trouble

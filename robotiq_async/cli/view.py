@@ -10,7 +10,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .arguments import USUAL, Address, Byte, CommandError, Link, Port, is_loopback, need
+from .arguments import USUAL, Address, Byte, Link, Port, is_loopback, need
+from .failures import CommandError
 
 
 async def view(
