@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from ..payloads import printable
 from .arguments import USUAL, Address, Link, need
 from .failures import CommandError, UsageError
 from .words import IN_WORDS, clock
@@ -113,16 +114,19 @@ def replay(
     if as_picture:
         plot(file)
         return
-    shown = ""
+    shown, is_empty = "", True
     for entry in _in_order(entry for entry in read_recording(file) if entry.is_json):
         if entry.topic not in IN_WORDS:
             continue
-        line = IN_WORDS[entry.topic](entry.fields)
+        line = printable(entry.read(IN_WORDS[entry.topic]))
         if entry.topic == "/gripper/status":
             if line == shown:
                 continue
             shown = line
         print(clock(entry.nanoseconds / 1e9), line)
+        is_empty = False
+    if is_empty:
+        raise CommandError(f"{file}: there is nothing in it that this command shows")
 
 
 def _in_order(entries: Iterator[Entry]) -> Iterator[Entry]:
@@ -176,9 +180,8 @@ def plot(file: Path, picture: Path | None = None, /) -> None:
     target = picture or file
     if target.suffix in (".mcap", ".png", ".svg"):
         target = target.with_suffix("")
-    entries = ((each.topic, each.nanoseconds, each.fields) for each in read_recording(file) if each.is_json)
     try:
-        pictures = plot_recording(target, entries)
+        pictures = plot_recording(target, (entry for entry in read_recording(file) if entry.is_json))
     except OSError as error:
         raise CommandError(f"{target}: {error.strerror}") from error
     if not pictures:

@@ -6,6 +6,7 @@ import asyncio
 import json
 import signal
 import socket
+import sys
 import time
 from collections.abc import AsyncIterator, Sequence
 from typing import TYPE_CHECKING
@@ -168,6 +169,13 @@ async def test_a_reader_that_has_had_enough(shell: Shell, server: SimulatorServe
     outcome = await shell.finish(process)
     assert outcome.code == 1
     assert "Error" not in outcome.err
+
+
+@pytest.mark.parametrize("closed", [0, 1, 2])
+async def test_a_closed_stream_is_nobodys(shell: Shell, server: SimulatorServer, closed: int) -> None:
+    command = [sys.executable, "-m", "robotiq_async", "status", server.address]
+    code = f"import os; os.close({closed}); os.execv({sys.executable!r}, {command!r})"
+    (await shell.finish(await shell.python("-c", code))).assert_succeeded()
 
 
 # -- doctor ------------------------------------------------------------------------------------------------
