@@ -32,24 +32,28 @@ async def record(
     /,
     *,
     seconds: Annotated[float | None, Parameter(metavar="SECONDS")] = None,
+    ros2: Annotated[bool, Parameter(negative=())] = False,
     link: Link = USUAL,
 ) -> None:
     """Record every poll, command, transition and fault in an MCAP file, until Ctrl-C.
 
-    It only looks: nothing moves and nothing is written to the gripper. Foxglove,
-    PlotJuggler and ROS 2 tools read the file; joint states are in it as ROS has them.
-    Commands are those of this program, so that a recording made by this command has
-    none: record from your own program with robotiq_async.recorder.Recorder. A
-    killed recording loses at most the last second; recover makes its file whole.
+    It only looks: nothing moves and nothing is written to the gripper. The file is
+    for viewers of MCAP (Foxglove, PlotJuggler), and for replay and plot. Tools of
+    ROS 2 refuse it, but for --ros2. Commands are those of this program, so that a
+    recording made by this command has none: record from your own program with
+    robotiq_async.recorder.Recorder. A killed recording loses at most the last
+    second; recover makes its file whole.
 
     For example:
 
         robotiq-async record grasp.mcap tcp://192.168.1.11
         robotiq-async record --seconds 60 minute.mcap
+        robotiq-async record --ros2 joints.mcap tcp://192.168.1.11
 
     Args:
         file: The recording; it must not be there yet.
         seconds: End by itself after so long.
+        ros2: Record /joint_states alone, in a file with the profile ros2.
     """
     need("mcap", "record")
     from ..recorder import Recorder
@@ -59,7 +63,7 @@ async def record(
         raise UsageError(f"--seconds must be seconds above 0, got {seconds:g}")
     try:
         async with connected(address, link, halt=False) as hand:
-            recorder = Recorder(hand, file)
+            recorder = Recorder(hand, file, ros2=ros2)
             try:
                 async with recorder:
                     print(f"Recording {hand.address} in {file}; Ctrl-C ends it.", flush=True)

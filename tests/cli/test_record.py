@@ -17,6 +17,7 @@ from mcap.data_stream import RecordBuilder
 from mcap.reader import make_reader
 from mcap.records import Chunk, Header
 from mcap.writer import Writer
+from rosbags.highlevel import AnyReader
 
 from robotiq_async import Finger, RobotiqHand, State
 from robotiq_async.cli import main
@@ -74,6 +75,17 @@ async def test_it_ends_by_itself(shell: Shell, tmp_path: Path) -> None:
     assert len(list(read_recording(file))) > 20
     again = await shell.run("record", str(file), "--seconds", "0.5")
     again.assert_failed(1, "it.mcap: File exists")
+
+
+async def test_for_ros_2(shell: Shell, tmp_path: Path) -> None:
+    file = tmp_path / "it.mcap"
+    outcome = await shell.run("record", "--ros2", "--seconds", "0.5", str(file))
+    outcome.assert_succeeded()
+    with AnyReader([file]) as reader:
+        assert [connection.topic for connection in reader.connections] == ["/joint_states"]
+        assert f"\n{reader.message_count} polls, 0 lost" in outcome.out
+    for command in ("replay", "plot"):
+        (await shell.run(command, str(file))).assert_failed(1, "it.mcap: there is no")
 
 
 async def test_no_gripper_no_file(shell: Shell, tmp_path: Path) -> None:
