@@ -36,8 +36,9 @@ from .errors import (
     RobotiqConnectionError,
 )
 from .messages import ReadRequest, WriteRequest, register
+from .names import addresses_of, why_no_socket
 from .registers import REGISTER_COUNT, RegisterMap, Registers
-from .reply import Expected, expected_reply
+from .reply import Expected, expected_reply, show
 
 # pymodbus logs its send and receive history at ERROR on every time-out; what matters of it is said in our
 # exceptions. Whoever sets a level on its logger gets what they ask for.
@@ -47,6 +48,8 @@ if _pymodbus_log.level == logging.NOTSET:
 
 LARGEST_READ: Final = 4096
 """Bytes taken from the socket at a time; the longest Modbus frame has 260."""
+LARGEST_BURST: Final = 2**19
+"""Bytes that pymodbus keeps before it drops them all and says nothing: twice what a loop reads at a time."""
 HELD_S: Final = 0.01
 """A timer, or a tick, that comes so late was kept from coming: the loop was held up."""
 GRACE_S: Final = 0.02
@@ -149,25 +152,13 @@ class ModbusTransport:
         await self.close()
         self._loop = asyncio.get_running_loop()
         self._failure = self._expected = None
-        client = self._make_client()
         try:
             with anyio.fail_after(self._connect_timeout):
-                connected = await client.connect()
+                client = await self._connect()
         except TimeoutError:
-            client.close()
             raise ConnectFailedError(
                 str(self._address), f"no connection within {self._connect_timeout:g} s"
             ) from None
-        except Exception as error:
-            client.close()
-            raise ConnectFailedError(str(self._address), str(error)) from error
-        except BaseException:
-            client.close()
-            raise
-        if not connected:
-            client.close()
-            what = "cannot open the serial port" if self._serial else "connection refused or host unreachable"
-            raise ConnectFailedError(str(self._address), what)
         self._client = client
         # asyncio asks the system for 256 KiB at a time, and taking and giving back that much memory costs
         # several times what a reply does. Undocumented: where it is called otherwise, nothing is saved.
@@ -289,7 +280,7 @@ class ModbusTransport:
             return data
         try:
             if self._expected is None:
-                raise ProtocolError(f"{len(data)} bytes that nobody asked for: {data.hex(' ')}")
+                raise ProtocolError(f"{len(data)} bytes that nobody asked for: {show(data)}")
             complete = self._expected.is_complete(data)
         except ProtocolError as error:
             self._fail(error)
@@ -302,7 +293,35 @@ class ModbusTransport:
 
     # -- connecting ------------------------------------------------------------------------------------
 
-    def _make_client(self) -> AsyncModbusTcpClient | AsyncModbusSerialClient:
+    async def _connect(self) -> AsyncModbusTcpClient | AsyncModbusSerialClient:
+        """A client that is connected, to the first address of the host that can be reached."""
+        for host in await self._hosts():
+            client, connected = self._make_client(host), False
+            client.ctx.max_buffer_size = LARGEST_BURST
+            try:
+                connected = await client.connect()
+            except Exception as error:
+                raise ConnectFailedError(str(self._address), str(error)) from error
+            finally:
+                if not connected:
+                    client.close()
+            if connected:
+                return client
+        # pymodbus keeps the reason to itself.
+        unreachable = why_no_socket() or "connection refused or host unreachable"
+        what = "cannot open the serial port" if self._serial else unreachable
+        raise ConnectFailedError(str(self._address), what)
+
+    async def _hosts(self) -> list[str]:
+        if self._serial:
+            return [self._address.host]
+        try:
+            return await addresses_of(self._address.host, self._address.port)
+        except (OSError, UnicodeError) as error:
+            why = f"the name cannot be resolved: {error}"
+            raise ConnectFailedError(str(self._address), why) from error
+
+    def _make_client(self, host: str) -> AsyncModbusTcpClient | AsyncModbusSerialClient:
         # timeout=None: wait_for becomes a plain await, and the watchdogs above are the only time-outs.
         options: dict[str, Any] = {
             "retries": 0,
@@ -312,7 +331,7 @@ class ModbusTransport:
             "trace_connect": self._trace_connect,
         }
         if not self._serial:
-            tcp = AsyncModbusTcpClient(self._address.host, port=self._address.port, **options)
+            tcp = AsyncModbusTcpClient(host, port=self._address.port, **options)
             register(tcp)
             return tcp
         try:
@@ -322,7 +341,7 @@ class ModbusTransport:
                 str(self._address), "serial ports need pyserial: pip install 'robotiq-async[serial]'"
             ) from None
         line = AsyncModbusSerialClient(
-            self._address.host,
+            host,
             framer=FramerType.RTU,
             baudrate=115200,
             bytesize=8,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from .address import parse_address
+from .errors import ConnectFailedError
 from .link import ModbusTransport
 from .registers import RegisterMap, Registers
 
@@ -37,7 +38,11 @@ class SimulatedTransport:
             RobotiqConnectionError: loopback does not work.
         """
         if self._inner is None:
-            await self._server.start()
+            try:
+                await self._server.start()
+            except OSError as error:
+                why = f"the simulated gripper cannot listen: {error.strerror or error}"
+                raise ConnectFailedError("sim://", why) from error
             self._inner = ModbusTransport(
                 parse_address(self._server.address),
                 self._map,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 from typing import TYPE_CHECKING, Final
 
 from pymodbus.server import ModbusTcpServer
@@ -134,6 +135,11 @@ class SimulatorServer(SimulatorEndpoint):
         self._listener = await loop.create_server(
             server.handle_new_connection, self._host, self._port, reuse_address=True
         )
+        if not self._listener.sockets:
+            # asyncio takes every socket that cannot be made for one of a family that is not known here.
+            self._listener.close()
+            socket.socket().close()  # raises why
+            raise OSError(f"there is no socket for {self._host}")
         self._port = self._listener.sockets[0].getsockname()[1]
         server.transport = self._listener  # type: ignore[assignment]  # as pymodbus does
 
