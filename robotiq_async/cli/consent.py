@@ -50,8 +50,8 @@ def forget_keys() -> None:
 
 
 def read_line() -> str:
-    """The next line of standard input, whatever bytes it has; empty when there is none."""
-    return "" if sys.stdin is None else sys.stdin.buffer.readline().decode(errors="replace")
+    """The next line of standard input, whatever bytes it has, if it is no novel; empty when there is none."""
+    return "" if sys.stdin is None else sys.stdin.buffer.readline(1000).decode(errors="replace")
 
 
 def _screen() -> TextIO | None:

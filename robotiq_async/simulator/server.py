@@ -132,9 +132,12 @@ class SimulatorServer(SimulatorEndpoint):
     async def _listen(self, server: ModbusBaseServer) -> None:
         """Listen. pymodbus's own listen() hides the error and cannot listen again on a port it found."""
         loop = asyncio.get_running_loop()
-        self._listener = await loop.create_server(
-            server.handle_new_connection, self._host, self._port, reuse_address=True
-        )
+        try:
+            self._listener = await loop.create_server(
+                server.handle_new_connection, self._host, self._port, reuse_address=True
+            )
+        except UnicodeError as error:  # of a name that can be none
+            raise OSError(f"{self._host} cannot be resolved: {error}") from error
         if not self._listener.sockets:
             # asyncio takes every socket that cannot be made for one of a family that is not known here.
             self._listener.close()
