@@ -1,7 +1,7 @@
 # Needs Python 3.11 or newer with pip and venv, and make. Everything else goes into .venv.
 #
 # Another interpreter than python3:  make demo PYTHON=python3.12
-# Another gripper than the simulated one:  make demo ADDRESS=tcp://192.168.1.11
+# Another gripper than the simulated one:  make demo ADDRESS=tcp://192.168.1.11   (it asks before it moves)
 
 PYTHON ?= python3
 ADDRESS ?= sim://
@@ -16,16 +16,19 @@ STAMP := $(VENV)/.complete
 unexport VIRTUAL_ENV CONDA_PREFIX PYTHONHOME PYTHONPATH PYTHONSTARTUP PIP_USER PIP_TARGET PIP_PREFIX UV_PYTHON
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test soak fuzz explore bench lint check format constraints clean
+.PHONY: help demo test pages soak fuzz explore bench lint check format constraints clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-demo: $(STAMP)  ## Run the demo on a simulated gripper (ADDRESS=... for a real one: it moves)
+demo: $(STAMP)  ## Run the demo on a simulated gripper (ADDRESS=... for a real one: it asks, and moves)
 	@$(BIN)/python -m robotiq_async demo $(ADDRESS)
 
 test: $(STAMP)  ## Run all tests
 	@$(BIN)/python -m pytest --numprocesses auto --dist worksteal
+
+pages: $(STAMP)  ## Run the code of every page in the environment that the page names (needs the package index)
+	@$(BIN)/python -m pytest --numprocesses auto tests/docs/environments.py
 
 soak: $(STAMP)  ## Move under random faults for MINUTES=30 over LINK=tcp (or rtu), and print figures
 	@$(BIN)/python -m tests.adversity.soak --minutes $(MINUTES) --link $(LINK)
@@ -45,7 +48,7 @@ lint: $(STAMP)  ## Check style and types
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 
-check: lint test  ## Everything CI runs
+check: lint test pages  ## Everything CI runs
 
 format: $(STAMP)  ## Put the sources into shape
 	$(BIN)/ruff check --fix

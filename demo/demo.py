@@ -3,7 +3,8 @@
     python demo/demo.py [ADDRESS] [--yes]
 
 Every step prints the call it makes, as code, and what came back. Without an address the gripper is a
-simulated one, reached over a real Modbus TCP connection, that also gets an object to grasp and a fault.
+simulated one, reached over a real Modbus TCP connection, that also gets an object to grasp and a fault;
+with one it asks before anything moves, and without a terminal it needs --yes.
 Nothing here has run on real hardware yet.
 """
 
@@ -32,13 +33,13 @@ from robotiq_async import (
     State,
     Transition,
 )
+from robotiq_async.cli.consent import consent
+from robotiq_async.cli.failures import CommandError, UsageError
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
-WARNING = """
-This MOVES the gripper at {address}. It activates it (the fingers open and close to their stops),
-then opens and closes fingers and scissor for about half a minute, at full speed and at full force too.
-What the hand holds will drop. Keep hands and cables away; Ctrl-C stops the fingers.
-The library has not run on real hardware yet."""
+WARNING = """ALL its fingers MOVE. It is activated (they open and close to their stops), then
+fingers and scissor open and close for about half a minute, at full speed and at full force too.
+What the hand holds will drop. Keep hands and cables away; Ctrl-C stops the fingers."""
 
 COLUMN = 54
 """Where results begin."""
@@ -245,33 +246,21 @@ def read(expression: str, value: object) -> None:
     print(f"  {expression:<{COLUMN}}{value}", flush=True)
 
 
-def consent(address: str, yes: bool) -> bool:
-    """Whether to go on: a real gripper's owner is told first and, at a terminal, asked."""
-    if address.startswith("sim:"):
-        return True
-    print(WARNING.format(address=address), flush=True)
-    if yes or not sys.stdin.isatty():
-        return True
-    print("Go on? [y/N] ", end="", flush=True)
-    return sys.stdin.readline().strip().lower() in ("y", "yes")
-
-
 def main() -> int:
     """Run from the shell without the extra ``cli``."""
     parser = argparse.ArgumentParser(description="The robotiq_async demo. The fingers move.")
     parser.add_argument("address", nargs="?", default="sim://", help="tcp://HOST, rtu://DEVICE or sim://")
     parser.add_argument("--yes", "-y", action="store_true", help="do not ask before moving")
     options = parser.parse_args()
-    try:
-        RobotiqHand(options.address)  # Opens nothing, but refuses a malformed address.
-    except ValueError as error:
-        parser.error(str(error))
     # As Ctrl-C does: leaving ``async with`` stops the fingers.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        if consent(options.address, options.yes):
-            asyncio.run(run(options.address))
-    except RobotiqError as error:
+        consent(options.address, WARNING, yes=options.yes)
+        asyncio.run(run(options.address))
+    except UsageError as error:
+        print(f"demo: {error}", file=sys.stderr)
+        return 2
+    except (RobotiqError, CommandError) as error:
         print(f"demo: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:

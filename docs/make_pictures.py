@@ -70,10 +70,7 @@ async def recording() -> None:
             await asyncio.gather(opening, return_exceptions=True)
             await hand.wait_for_state(State.RUNNING_IDLE)
             await hand.open()
-        entries = (
-            (each.topic, each.nanoseconds, each.fields) for each in read_recording(file) if each.is_json
-        )
-        plot_recording(FOLDER / "grasp", entries)
+        plot_recording(FOLDER / "grasp", (entry for entry in read_recording(file) if entry.is_json))
     (FOLDER / "grasp.png").unlink()
 
 

@@ -25,6 +25,8 @@ The map; each module imports only what stands above it::
     address      which gripper                                 asyncio from here on
     reply        every byte of a reply, checked
     messages     what is asked and answered, as pymodbus knows it
+    ending       work that ends well
+    names        what the name of a host stands for
     link         transports; the only module, messages aside, that uses pymodbus
     guard        transports of somebody else's, held to what a hand relies on
     simulated    the transport of sim://
@@ -38,7 +40,6 @@ The map; each module imports only what stands above it::
     calibration  what the values 0..255 mean
     options      checked options of a hand
     waiting      callers that wait for a state
-    ending       work that ends well
     hand         RobotiqHand
     actions      what a person asks of a hand
     payloads     what is told of a hand in JSON

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import asyncio
 import math
-import socket
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -17,6 +16,7 @@ from .address import Address
 from .enums import Severity
 from .errors import ConnectFailedError, ProtocolError, ResponseTimeoutError, RobotiqConnectionError
 from .link import ModbusTransport, Transport
+from .names import addresses_of
 from .procedures import signature_of_status
 from .registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap
 from .simulated import SimulatedTransport, new_gripper
@@ -100,20 +100,18 @@ async def examine(address: Address, report: Report, *, device_id: int | None = N
 
 async def _reach(address: Address, report: Report) -> None:
     """Resolve the name and knock at the port."""
-    loop = asyncio.get_running_loop()
     try:
         async with asyncio.timeout(REACH_S):
-            found = await loop.getaddrinfo(address.host, address.port, type=socket.SOCK_STREAM)
+            found = await addresses_of(address.host, address.port)
     except (OSError, UnicodeError, TimeoutError) as error:
         why = "no answer" if isinstance(error, TimeoutError) else str(error)
         advice = "Check the spelling, or use the IP address (shipped as 192.168.1.11)."
         report(Finding(Level.BAD, "name", f"{address.host} cannot be resolved: {why}", advice))
         raise _GiveUpError from error
-    addresses = ", ".join(dict.fromkeys(str(each[4][0]) for each in found))
-    report(Finding(Level.GOOD, "name", f"{address.host} is {addresses}"))
+    report(Finding(Level.GOOD, "name", f"{address.host} is {', '.join(found)}"))
     try:
         async with asyncio.timeout(REACH_S):
-            _, writer = await asyncio.open_connection(address.host, address.port)
+            await _knock(found, address.port)
     except TimeoutError as error:
         advice = "Is it switched on, on this network, in this subnet? A firewall may drop the packets."
         report(Finding(Level.BAD, "port", f"{address.port} does not answer within {REACH_S:g} s", advice))
@@ -124,8 +122,25 @@ async def _reach(address: Address, report: Report) -> None:
             advice = "There is no way to it: check cable, IP address and subnet mask of this computer."
         report(Finding(Level.BAD, "port", f"{address.port}: {error.strerror or error}", advice))
         raise _GiveUpError from error
-    writer.close()
     report(Finding(Level.GOOD, "port", f"{address.port} is open"))
+
+
+async def _knock(hosts: list[str], port: int) -> None:
+    """Connect to the first that can be reached, and hang up.
+
+    Raises:
+        OSError: none can be; why not the last.
+    """
+    failure: OSError | None = None
+    for host in hosts:
+        try:
+            _, writer = await asyncio.open_connection(host, port)
+        except OSError as error:
+            failure = error
+        else:
+            writer.close()
+            return
+    raise failure or OSError("there is no address")
 
 
 async def _answer(address: Address, usual: RegisterMap, report: Report) -> Transport:

@@ -41,8 +41,9 @@ from .errors import (
     RobotiqConnectionError,
 )
 from .messages import ReadRequest, WriteRequest, register
+from .names import addresses_of, why_no_socket
 from .registers import REGISTER_COUNT, RegisterMap, Registers
-from .reply import Expected, expected_reply
+from .reply import Expected, expected_reply, show
 
 # pymodbus logs its send and receive history at ERROR on every time-out; what matters of it is said in our
 # exceptions. Whoever sets a level on its logger gets what they ask for.
@@ -163,27 +164,13 @@ class ModbusTransport:
         await self.close()
         self._loop = asyncio.get_running_loop()
         self._failure = self._expected = None
-        client = self._make_client()
-        # What does not fit is dropped by pymodbus without a word; whatever comes is for reply.py to judge.
-        client.ctx.max_buffer_size = sys.maxsize
         try:
             with anyio.fail_after(self._connect_timeout):
-                connected = await client.connect()
+                client = await self._connect()
         except TimeoutError:
-            client.close()
             raise ConnectFailedError(
                 str(self._address), f"no connection within {self._connect_timeout:g} s"
             ) from None
-        except Exception as error:
-            client.close()
-            raise ConnectFailedError(str(self._address), str(error)) from error
-        except BaseException:
-            client.close()
-            raise
-        if not connected:
-            client.close()
-            what = "cannot open the serial port" if self._serial else "connection refused or host unreachable"
-            raise ConnectFailedError(str(self._address), what)
         self._client = client
         # asyncio asks the system for 256 KiB at a time, and taking and giving back that much memory costs
         # several times what a reply does. Undocumented: where it is called otherwise, nothing is saved.
@@ -304,7 +291,7 @@ class ModbusTransport:
             return frame
         try:
             if self._expected is None:
-                raise ProtocolError(f"{len(data)} bytes that nobody asked for: {data.hex(' ')}")
+                raise ProtocolError(f"{len(data)} bytes that nobody asked for: {show(data)}")
             complete = self._expected.is_complete(data)
         except ProtocolError as error:
             self._fail(error)
@@ -325,7 +312,36 @@ class ModbusTransport:
 
     # -- connecting ------------------------------------------------------------------------------------
 
-    def _make_client(self) -> AsyncModbusTcpClient | AsyncModbusSerialClient:
+    async def _connect(self) -> AsyncModbusTcpClient | AsyncModbusSerialClient:
+        """A client that is connected, to the first address of the host that can be reached."""
+        for host in await self._hosts():
+            client, connected = self._make_client(host), False
+            # pymodbus drops what does not fit without a word; whatever comes is for reply.py to judge.
+            client.ctx.max_buffer_size = sys.maxsize
+            try:
+                connected = await client.connect()
+            except Exception as error:
+                raise ConnectFailedError(str(self._address), str(error)) from error
+            finally:
+                if not connected:
+                    client.close()
+            if connected:
+                return client
+        # pymodbus keeps the reason to itself.
+        unreachable = why_no_socket() or "connection refused or host unreachable"
+        what = "cannot open the serial port" if self._serial else unreachable
+        raise ConnectFailedError(str(self._address), what)
+
+    async def _hosts(self) -> list[str]:
+        if self._serial:
+            return [self._address.host]
+        try:
+            return await addresses_of(self._address.host, self._address.port)
+        except (OSError, UnicodeError) as error:
+            why = f"the name cannot be resolved: {error}"
+            raise ConnectFailedError(str(self._address), why) from error
+
+    def _make_client(self, host: str) -> AsyncModbusTcpClient | AsyncModbusSerialClient:
         # timeout=None: wait_for becomes a plain await, and the watchdogs above are the only time-outs.
         options: dict[str, Any] = {
             "retries": 0,
@@ -335,7 +351,7 @@ class ModbusTransport:
             "trace_connect": self._trace_connect,
         }
         if not self._serial:
-            tcp = AsyncModbusTcpClient(self._address.host, port=self._address.port, **options)
+            tcp = AsyncModbusTcpClient(host, port=self._address.port, **options)
             register(tcp)
             return tcp
         try:
@@ -345,7 +361,7 @@ class ModbusTransport:
                 str(self._address), "serial ports need pyserial: pip install 'robotiq-async[serial]'"
             ) from None
         line = AsyncModbusSerialClient(
-            self._address.host,
+            host,
             framer=FramerType.RTU,
             baudrate=115200,
             bytesize=8,

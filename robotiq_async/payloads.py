@@ -84,6 +84,11 @@ SCHEMAS: Final = {
 """JSON Schemas of what is told."""
 
 
+def printable(text: str) -> str:
+    """A text of others with what steers a terminal written out, as Python does it."""
+    return "".join(each if each.isprintable() else ascii(each)[1:-1] for each in text)
+
+
 def status_fields(status: RobotiqStatus) -> Fields:
     """A status."""
     return {

@@ -17,10 +17,13 @@ except ModuleNotFoundError as error:
 
 from .calibration import ForceCalibration, SpeedCalibration, mean, newton
 from .measuring import Currents, peak_currents
+from .payloads import printable
 from .runs import Table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from .recording import Entry
 
 OURS: Final = "#0b6ea8"
 THEIRS: Final = "#d1731f"
@@ -31,8 +34,13 @@ WIDTHS: Final = {"A": 4.2, "B": 2.6, "C": 1.1, "SCISSOR": 1.4}
 DRAWN: Final = ("position", "requested", "current_ma")
 LABEL: Final = 0.012
 """Width of a label, as a share of the picture's."""
+LONGEST: Final = 80
+"""Characters of a label."""
 SHOWN_FORCES: Final = (0, 125, 250)
 """Whose currents are drawn over time."""
+
+Event = tuple[float, str, bool]
+"""When, what, and whether it is about a fault."""
 
 
 def plot_speed(path: Path, table: Table, label: str) -> list[Path]:
@@ -124,31 +132,37 @@ def plot_current_over_time(path: Path, by_surface: Mapping[str, Currents], label
     return files
 
 
-def plot_recording(path: Path, entries: Iterable[tuple[str, int, dict[str, Any]]]) -> list[Path]:
+def plot_recording(path: Path, entries: Iterable[Entry]) -> list[Path]:
     """Positions, currents and events of a recording over time.
 
     Args:
         path: where to, without suffix.
-        entries: topic, nanoseconds and fields of its JSON messages; only the numbers that are drawn are kept.
+        entries: its JSON messages; only what is drawn of them is kept.
 
     Returns:
         The files; none when there is no status to draw.
 
     Raises:
         OSError: they cannot be written.
+        RecordingError: a message is not as a recorder writes it.
     """
     seconds, began = array("d"), 0
-    events: list[tuple[float, dict[str, Any]]] = []
+    events: list[Event] = []
     drawn = {axis: {what: array("h") for what in DRAWN} for axis in WIDTHS}
-    for topic, at, fields in entries:
-        began = began or at
-        if topic == "/gripper/event":
-            events.append(((at - began) / 1e9, fields))
-        if topic == "/gripper/status":
-            seconds.append((at - began) / 1e9)
-            for axis, columns in drawn.items():
-                for what, column in columns.items():
-                    column.append(fields[axis][what])
+
+    def take(status: dict[str, Any]) -> None:
+        for axis, columns in drawn.items():
+            for what, column in columns.items():
+                column.append(status[axis][what])
+
+    for entry in entries:
+        began = began or entry.nanoseconds
+        at = (entry.nanoseconds - began) / 1e9
+        if entry.topic == "/gripper/event" and (event := entry.read(_event)):
+            events.append((at, *event))
+        if entry.topic == "/gripper/status":
+            entry.read(take)
+            seconds.append(at)
     if not seconds:
         return []
     with _figure(path, path.name, rows=2) as (axes, files):
@@ -170,27 +184,32 @@ def plot_recording(path: Path, entries: Iterable[tuple[str, int, dict[str, Any]]
             for each in axes:
                 each.axvline(when, color="crimson" if is_fault else "0.7", lw=0.8, zorder=0)
             style: Any = {"color": "crimson" if is_fault else "0.4", "fontsize": 7, "rotation": 90}
+            style["in_layout"] = False  # however long it is, it does not push the curves aside
             style["bbox"] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5}
-            positions.annotate(words, (when, 258), va="top", ha="right", **style)
+            positions.annotate(words[:LONGEST], (when, 258), va="top", ha="right", parse_math=False, **style)
     return files
 
 
-def _labels(
-    events: Iterable[tuple[float, dict[str, Any]]], apart: float
-) -> Iterator[tuple[float, str, bool]]:
-    """When, what, and whether it is about a fault; what comes too soon after a label joins it."""
+def _event(fields: dict[str, Any]) -> tuple[str, bool] | None:
+    """What is told of an event, and whether it is a fault."""
+    # A control loop goes to RUNNING_CC and back with every command: that is no event to look at.
+    if "RUNNING_CC" in (fields.get("source"), fields.get("target")):
+        return None
+    is_fault = fields["kind"] == "fault"
+    name = printable(fields["name"] if is_fault else fields["target"])[:LONGEST]
+    return "fault cleared" if name == "NONE" else name, is_fault
+
+
+def _labels(events: Iterable[Event], apart: float) -> Iterator[Event]:
+    """What comes too soon after a label joins it."""
     began, words, is_fault = 0.0, "", False
-    for at, fields in events:
-        # A control loop goes to RUNNING_CC and back with every command: that is no event to look at.
-        if "RUNNING_CC" in (fields.get("source"), fields.get("target")):
-            continue
+    for at, name, of_a_fault in events:
         if words and at - began > apart:
             yield began, words, is_fault
             words, is_fault = "", False
         began = began if words else at
-        name = fields["name"] if fields["kind"] == "fault" else fields["target"]
-        words += (", " if words else "") + ("fault cleared" if name == "NONE" else name)
-        is_fault = is_fault or fields["kind"] == "fault"
+        words += (", " if words else "") + name
+        is_fault = is_fault or of_a_fault
     if words:
         yield began, words, is_fault
 
@@ -210,7 +229,7 @@ def _figure(
     FigureCanvasAgg(figure)
     grid = figure.subplots(rows, 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": ratios})
     axes: list[Axes] = list(grid[:, 0])
-    figure.suptitle(title)
+    figure.suptitle(printable(title), parse_math=False)
     for each in axes:
         each.grid(alpha=0.3)
     files: list[Path] = []

@@ -8,6 +8,7 @@ In this order the start and the stop are in it too, and nothing that concerns th
 
 Four channels: ``/gripper/status`` (every poll), ``/gripper/command`` (every request that was written) and
 ``/gripper/event`` (transitions and faults) as JSON with a JSON Schema; ``/joint_states`` as ROS 2 encodes it.
+Tools of ROS 2 refuse a file with channels that are not ROS's: ``ros2=True`` leaves them out.
 What is recorded reaches the disk twice a second, from a thread: a program that is killed loses no more than
 that, and ``robotiq-async recover`` makes its file whole.
 """
@@ -30,7 +31,7 @@ except ModuleNotFoundError as error:
 
 from .ending import in_a_thread, to_the_end
 from .errors import RobotiqError
-from .feed import STATUS, TOPICS, Feed, Message, Topic
+from .feed import JOINTS, TOPICS, Feed, Message, Topic
 from .hand import RobotiqHand
 from .version import __version__
 
@@ -72,18 +73,21 @@ class Recorder:
 
     Attributes:
         path: the file.
-        recorded: statuses in it so far.
+        recorded: polls in it so far.
     """
 
-    def __init__(self, hand: RobotiqHand, path: Path | str) -> None:
+    def __init__(self, hand: RobotiqHand, path: Path | str, *, ros2: bool = False) -> None:
         """Prepare; opens nothing.
 
         Args:
             hand: started before or while it is recorded.
             path: a file that is not there yet.
+            ros2: write the joint states alone, in the profile ``ros2``: a file that tools of ROS 2 open.
         """
         self.path = Path(path)
         self.recorded = 0
+        self._profile = "ros2" if ros2 else ""
+        self._topics: tuple[Topic, ...] = (JOINTS,) if ros2 else TOPICS
         self._address = hand.address
         self._feed = Feed(hand, self._take)
         self._outbox = _Outbox()
@@ -148,19 +152,19 @@ class Recorder:
 
     def _begin(self) -> None:
         self._writer = writer = Writer(self._outbox, compression=CompressionType.ZSTD)  # type: ignore[arg-type]
-        writer.start(profile="", library=f"robotiq_async {__version__}")
+        writer.start(profile=self._profile, library=f"robotiq_async {__version__}")
         metadata = {"version": __version__, "address": self._address, "note": "never run on real hardware"}
         writer.add_metadata("robotiq_async", metadata)
-        for topic in TOPICS:
+        for topic in self._topics:
             schema = writer.register_schema(topic.schema_name, topic.schema_encoding, topic.schema)
             self._channels[topic] = writer.register_channel(topic.name, topic.encoding, schema)
 
     def _take(self, message: Message) -> None:
-        if self._failed.done():
+        if self._failed.done() or message.topic not in self._channels:
             return
         channel, stamp = self._channels[message.topic], message.nanoseconds
         self._writer.add_message(channel, stamp, message.data, stamp, message.sequence & 0xFFFFFFFF)
-        self.recorded += message.topic is STATUS
+        self.recorded += message.topic is JOINTS  # the last that is told of a poll
 
     # -- the disk --------------------------------------------------------------------------------------
 

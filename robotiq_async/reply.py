@@ -49,10 +49,10 @@ class Expected(NamedTuple):
             return True  # the usual case, quickly
         if _agree(frame, self.start):
             if len(frame) > self.size:
-                raise ProtocolError(f"{len(frame) - self.size} bytes more than the answer: {_show(frame)}")
+                raise ProtocolError(f"{len(frame) - self.size} bytes more than the answer: {show(frame)}")
             return len(frame) == self.size
         if not _agree(frame, self.refusal):
-            raise ProtocolError(f"not the answer: {_show(frame)}, expected {_show(self.start)}...")
+            raise ProtocolError(f"not the answer: {show(frame)}, expected {show(self.start)}...")
         if len(frame) < self.refusal_size:
             return False
         function, code = self.refusal[-1] & 0x7F, frame[len(self.refusal)]
@@ -101,7 +101,7 @@ def _length(size: int) -> bytes:
     return size.to_bytes(2, "big")
 
 
-def _show(frame: bytes) -> str:
+def show(frame: bytes) -> str:
     """Bytes for a message; what talks nonsense often talks a lot."""
     return frame.hex(" ") if len(frame) <= 32 else f"{frame[:32].hex(' ')}... ({len(frame)} bytes)"
 

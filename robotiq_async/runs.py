@@ -15,10 +15,10 @@ import contextlib
 import csv
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, TextIO
 
 Table = dict[int, tuple[int, ...]]
 """The runs of each value."""
@@ -47,6 +47,8 @@ SPEED: Final = Layout("speed_value", "ms", 600_000)
 """Closing times."""
 FORCE: Final = Layout("force_value", "g", 100_000)
 """Readings of a scale between the fingers."""
+LONGEST: Final = 10_000
+"""Characters of a line; a file without line ends is no table."""
 
 
 class TableError(ValueError):
@@ -113,11 +115,18 @@ def read_rows(path: Path | str) -> Iterable[tuple[int, list[str]]]:
     """
     try:
         with open(path, encoding="utf-8-sig", newline="") as file:
-            lines = csv.reader(file, strict=True)
+            lines = csv.reader(_lines(file), strict=True)
             return [(lines.line_num, [cell.strip() for cell in cells]) for cells in lines if cells]
     except (OSError, ValueError, csv.Error) as error:
         why = error.strerror if isinstance(error, OSError) else str(error)
         raise TableError(path, None, f"cannot be read: {why}") from error
+
+
+def _lines(file: TextIO) -> Iterator[str]:
+    while line := file.readline(LONGEST + 1):
+        if len(line) > LONGEST:
+            raise ValueError(f"a line has more than {LONGEST} characters")
+        yield line
 
 
 def integer(path: Path | str, line: int, name: str, text: str, high: int) -> int:

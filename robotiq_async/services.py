@@ -64,7 +64,7 @@ class Service:
     def _checked(self, payload: bytes) -> Arguments:
         try:
             arguments = json.loads(payload.strip() or b"{}")
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise ValueError(f"{self.name} takes a JSON object: {error}") from None
         if not isinstance(arguments, dict):
             raise ValueError(f"{self.name} takes a JSON object, got {reprlib.repr(arguments)}")

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from .address import parse_address
+from .errors import ConnectFailedError
 from .link import ModbusTransport
 from .registers import RegisterMap, Registers
 
@@ -56,7 +57,11 @@ class SimulatedTransport:
             RobotiqConnectionError: loopback does not work.
         """
         if self._inner is None:
-            await self._server.start()
+            try:
+                await self._server.start()
+            except OSError as error:
+                why = f"the simulated gripper cannot listen: {error.strerror or error}"
+                raise ConnectFailedError("sim://", why) from error
             self._inner = ModbusTransport(
                 parse_address(self._server.address),
                 self._map,

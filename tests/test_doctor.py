@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import socket
+import threading
+import time
 from collections.abc import AsyncIterator, Callable
 from typing import Any
 
@@ -78,6 +81,27 @@ async def test_a_name_that_does_not_exist() -> None:
     found = await findings("nowhere.invalid")
     assert list(found) == ["name"]
     assert found["name"].level is Level.BAD
+
+
+def test_a_resolver_that_does_not_answer_does_not_keep_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    answer = threading.Event()
+    monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: answer.wait(30) and [])
+    began = time.monotonic()
+    found = asyncio.run(findings("gripper.example"))
+    assert time.monotonic() - began < 3 + 5, "REACH_S, and no more"
+    assert found["name"].found == "gripper.example cannot be resolved: no answer"
+    answer.set()
+
+
+async def test_a_name_of_several_addresses(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with SimulatorServer() as server:
+        hosts = [
+            (socket.AF_INET, socket.SOCK_STREAM, 6, "", (host, 0)) for host in ("127.0.0.2", "127.0.0.1")
+        ]
+        monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: hosts)
+        found = await findings(f"gripper.example:{server.port}")
+    assert found["name"].found == "gripper.example is 127.0.0.2, 127.0.0.1"
+    assert found["other clients"].level is Level.GOOD
 
 
 async def test_nobody_listens() -> None:

@@ -16,6 +16,7 @@ from typing import Any
 
 import pytest
 from mcap.reader import make_reader
+from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from robotiq_async import ConnectionLostError, Finger, RobotiqHand, RobotiqStatus, State
@@ -142,6 +143,51 @@ async def test_ros_reads_the_joint_states(hand: RobotiqHand, file: Path) -> None
         moving += any(message.velocity)
     assert compared > 10
     assert moving > 5
+
+
+def cut_off(file: Path) -> None:
+    file.write_bytes(file.read_bytes()[:-100])
+
+
+@pytest.fixture(params=["whole", "killed"])
+async def of_ros(
+    request: pytest.FixtureRequest, hand: RobotiqHand, file: Path, tmp_path: Path
+) -> tuple[Path, Recorder]:
+    """A recording for ROS 2, as it was made or as recover made it of what a kill left."""
+    async with Recorder(hand, file, ros2=True) as recorder:
+        await hand.move(180)
+    if request.param == "whole":
+        return file, recorder
+    cut_off(file)
+    recovered = tmp_path / "recovered.mcap"
+    recover(file, recovered)
+    return recovered, recorder
+
+
+async def test_rosbags_opens_a_recording_for_ros_2(of_ros: tuple[Path, Recorder]) -> None:
+    file, recorder = of_ros
+    with AnyReader([file]) as reader:
+        (connection,) = reader.connections
+        assert (connection.topic, connection.msgtype) == ("/joint_states", SCHEMA_NAME)
+        assert reader.message_count == recorder.recorded > 20
+        times, angles = [], set()
+        for each, nanoseconds, data in reader.messages():
+            message: Any = reader.deserialize(data, each.msgtype)
+            assert message.name == list(JOINTS)
+            stamp = message.header.stamp
+            assert stamp.sec * 10**9 + stamp.nanosec == nanoseconds
+            times.append(nanoseconds)
+            angles.add(tuple(message.position))
+    assert times == sorted(times)
+    assert len(angles) > 5
+
+
+async def test_rosbags_does_not_open_another_recording(hand: RobotiqHand, file: Path) -> None:
+    """The pages say so; if it ever does, they are to be changed."""
+    async with Recorder(hand, file):
+        await hand.move(50)
+    with pytest.raises(AnyReaderError, match="Profile is not ros2"), AnyReader([file]):
+        pass
 
 
 def test_the_definition_is_ros_s_own() -> None:

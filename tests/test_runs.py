@@ -84,6 +84,8 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
         read_table(tmp_path / "nowhere.csv", SPEED)
     with pytest.raises(TableError, match="cannot be read: Is a directory"):
         read_table(tmp_path, SPEED)
+    with pytest.raises(TableError, match="cannot be read: a line has more than 10000 characters"):
+        read_table("/dev/zero", SPEED)
     (tmp_path / "latin").write_bytes(b"speed_value,run_1_ms\n0,\xff\n")
     with pytest.raises(TableError, match="cannot be read"):
         read_table(tmp_path / "latin", SPEED)

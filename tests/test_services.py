@@ -73,6 +73,8 @@ async def test_confirmed_it_is_done(operator: Operator) -> None:
         ("open", b"[]", "takes a JSON object"),
         ("open", b"{", "takes a JSON object"),
         ("open", b"\xff\xfe", "takes a JSON object"),
+        ("open", b"[" * 2000, "takes a JSON object"),
+        ("move", b'{"position": ' + b"[" * 2000 + b"]" * 2000 + b"}", "takes a JSON object"),
         ("open", b'{"speed": 1}', "has no argument 'speed'; it has: none"),
         ("move", b"{}", "needs the argument 'position'"),
         ("move", b'{"position": 256}', "0..255"),

@@ -1,12 +1,13 @@
 """The command line ``robotiq-async``; its dependencies come with the extra ``cli``.
 
-One file per sub-command, listed in :mod:`.app`, the only place that knows them all. A sub-command is an
-async function: cyclopts makes its options and its help from signature and docstring, and :mod:`.run`
-runs it, ends it on a signal and turns its errors into exit codes::
+One file per sub-command, listed in :mod:`.app`, the only place that knows them all. A sub-command is a
+function, and gives a coroutine if it talks to a gripper: cyclopts makes its options and its help from
+signature and docstring, and :mod:`.run` runs it, ends it on a signal and turns its errors into exit codes.
+One that moves a gripper asks first (:mod:`.consent`)::
 
     0  success
-    1  the gripper or the link failed: one line on stderr
-    2  wrong usage
+    1  the gripper or the link failed, or the answer was not yes: one line on stderr
+    2  wrong usage; also what moves, without a terminal and without --yes
     128 + N  ended by signal N (130: Ctrl-C)
 """
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from ipaddress import ip_address
@@ -14,14 +13,7 @@ from cyclopts import Parameter, Token
 
 from ..checks import parse_fingers
 from ..enums import Finger
-
-
-class UsageError(Exception):
-    """The command line asks for something that does not exist: exit code 2."""
-
-
-class CommandError(Exception):
-    """A command cannot do what it is asked, and it is not the gripper's fault: exit code 1."""
+from .failures import CommandError, UsageError, usage
 
 
 def need(module: str, extra: str, instead: str = "") -> None:
@@ -40,19 +32,6 @@ def is_loopback(host: str) -> bool:
         return ip_address(host).is_loopback
     except ValueError:
         return host.lower() == "localhost"
-
-
-@contextmanager
-def usage() -> Iterator[None]:
-    """Around the construction of library objects: a value they refuse is wrong usage.
-
-    Raises:
-        UsageError: in place of ValueError and TypeError.
-    """
-    try:
-        yield
-    except (ValueError, TypeError) as error:
-        raise UsageError(str(error)) from error
 
 
 def _integer(name: str, low: int, high: int) -> Callable[[object, Sequence[Token]], int]:
@@ -77,6 +56,7 @@ Address = Annotated[
     str,
     Parameter(help="The gripper: tcp://HOST[:PORT], rtu:///dev/ttyUSB0 or sim:// (a simulated one)."),
 ]
+Yes = Annotated[bool, Parameter(name=("--yes", "-y"), negative=())]
 Position = Annotated[int, Parameter(converter=_integer("POSITION", 0, 255))]
 Byte = Annotated[int, Parameter(converter=_integer("the value", 0, 255), metavar="0..255")]
 Port = Annotated[int, Parameter(converter=_integer("the port", 0, 65535), metavar="0..65535")]

@@ -6,7 +6,8 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING
 
-from .arguments import USUAL, Link, usage
+from .arguments import USUAL, Link
+from .failures import usage
 
 if TYPE_CHECKING:
     from .. import RobotiqHand

@@ -6,24 +6,16 @@ from collections.abc import Coroutine
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
-from typing import Annotated
 
-from cyclopts import Parameter
-
-from ..address import parse_address
-from .arguments import Address, usage
+from .arguments import Address, Yes
+from .consent import consent
 
 
-def demo(
-    address: Address = "sim://",
-    /,
-    *,
-    yes: Annotated[bool, Parameter(name=("--yes", "-y"), negative=())] = False,
-) -> Coroutine[None, None, None] | None:
+def demo(address: Address = "sim://", /, *, yes: Yes = False) -> Coroutine[None, None, None]:
     """Show what the library does, call by call. THE FINGERS MOVE.
 
-    Four parts: movements, speeds, forces, status and faults. With a real gripper it
-    says first what it is about to do and, at a terminal, asks before it moves.
+    Four parts: movements, speeds, forces, status and faults. Unless the gripper is
+    that of sim:// it asks first; without a terminal it needs --yes.
 
     For example:
 
@@ -33,11 +25,10 @@ def demo(
     Args:
         yes: Do not ask.
     """
-    with usage():
-        parse_address(address)  # A malformed one is refused before the question.
     program = _program()
     # Asked here and not in the coroutine: a question would block the event loop.
-    run: Coroutine[None, None, None] | None = program.run(address) if program.consent(address, yes) else None
+    consent(address, program.WARNING, yes=yes)
+    run: Coroutine[None, None, None] = program.run(address)
     return run
 
 

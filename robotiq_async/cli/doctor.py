@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..address import parse_address
-from .arguments import Address, CommandError, Unit, usage
+from .arguments import Address, Unit
+from .failures import CommandError, usage
 
 if TYPE_CHECKING:
     from ..doctor import Finding

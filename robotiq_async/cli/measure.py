@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import App, Parameter
 
 from ..address import parse_address
-from .arguments import CommandError, UsageError, need, usage
+from .arguments import need
+from .consent import read_line
+from .failures import CommandError, UsageError, usage
 
 if TYPE_CHECKING:
     from .. import RobotiqHand
@@ -27,7 +29,6 @@ POLL_S = 0.001
 
 Runs = Annotated[int, Parameter(metavar="N")]
 Speedup = Annotated[float | None, Parameter(metavar="FACTOR")]
-Yes = Annotated[bool, Parameter(name=("--yes", "-y"), negative=())]
 NoPlot = Annotated[bool, Parameter(name="--no-plot", negative=())]
 
 
@@ -70,17 +71,6 @@ def check(address: str, output: Path, speedup: float | None, runs: int, step: in
     if kind != "sim":
         return 1.0
     return SPEEDUP if speedup is None else speedup
-
-
-def consent(address: str, what: str, yes: bool) -> bool:
-    """Whether to go on: the owner of a real gripper is told first and, at a terminal, asked."""
-    if address.startswith("sim:"):
-        return True
-    print(f"{address}: {what}\nNothing here has run on real hardware yet: keep a hand on the emergency stop.")
-    if yes or not sys.stdin.isatty():
-        return True
-    print("Go on? [y/N] ", end="", flush=True)
-    return sys.stdin.readline().strip().lower() in ("y", "yes")
 
 
 @asynccontextmanager
@@ -185,7 +175,7 @@ async def asked(question: str) -> str:
     print(question, end=" ", flush=True)
 
     def read() -> None:
-        line = sys.stdin.readline()
+        line = read_line()
         with suppress(RuntimeError):  # the loop has been closed meanwhile
             loop.call_soon_threadsafe(take, line)
 

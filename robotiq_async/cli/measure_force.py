@@ -11,27 +11,18 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from ..address import parse_address
-from .arguments import Address, Byte, CommandError, UsageError
-from .measure import (
-    NoPlot,
-    Runs,
-    Speedup,
-    Yes,
-    asked,
-    carry_out,
-    check,
-    consent,
-    gripper,
-    load_rich,
-    refused,
-    told,
-)
+from .arguments import Address, Byte, Yes
+from .consent import consent
+from .failures import CommandError, UsageError
+from .measure import NoPlot, Runs, Speedup, asked, carry_out, check, gripper, load_rich, refused, told
 
 if TYPE_CHECKING:
+    from ..measuring import Campaign, Currents
     from ..runs import Table
     from ..simulator import SimulatedGripper
 
-WARNING = "the fingers open and close on what lies between them, some thirty times."
+WARNING = """the fingers MOVE: they open and close on what lies between them, {count} times.
+If it is not active yet it is activated first, and what it holds drops."""
 MOST_GRAMS = 100_000
 
 
@@ -48,14 +39,15 @@ def force(
     speedup: Speedup = None,
     no_plot: NoPlot = False,
     yes: Yes = False,
-) -> Coroutine[None, None, None] | None:
+) -> Coroutine[None, None, None]:
     """Measure force and current of a grasp at each force value. THE FINGERS MOVE.
 
-    As the thesis did (chapter 6): a scale lies between the fingers, every 25th value
-    is set, up by 50 and down by 50, and its reading in grams is typed in, or taken
-    from a table. At sim:// a simulated scale shows what the thesis's showed. The
-    currents of the fingers are recorded at every poll. Both files are written after
-    every row; started again, it goes on where it was.
+    As the thesis did (chapter 6): a scale lies between the fingers, every 25th
+    value is set, up by 50 and down by 50, and its reading in grams is typed in, or
+    taken from a table. At sim:// a simulated scale shows what the thesis's showed.
+    The currents of the fingers are recorded at every poll. Both files are written
+    after every row; started again, it goes on where it was. Unless the gripper is
+    that of sim:// it asks first; without a terminal it needs --yes.
 
     For example:
 
@@ -77,43 +69,42 @@ def force(
     if scale is not None and scale.resolve() == path.resolve():
         raise UsageError("--scale must be another file than --output")
     factor = check(address, path, speedup, runs, step, not no_plot)
-    if not consent(address, WARNING, yes):
-        return None
-    return _measure(address, surface, path, scale, step, runs, speed, factor, not no_plot)
+    from ..measuring import force_campaign
+    from ..runs import FORCE, read_table
+
+    with refused():
+        readings = None if scale is None else read_table(scale, FORCE)
+        origin = {"gripper": str(parse_address(address)), "surface": surface, "speed": str(speed)}
+        campaign = force_campaign(path, step, runs, **origin)
+        currents = _currents_of(campaign)
+    read_scale = _scale(address, surface, readings, campaign.left, runs)
+    typed_in = readings is None and not address.startswith("sim:")
+    if campaign.left:
+        consent(address, WARNING.format(count=runs * len(campaign.left)), yes=yes)
+    return _measure(
+        address, surface, campaign, currents, read_scale, speed, factor, bar=not typed_in, plot=not no_plot
+    )
 
 
 async def _measure(
     address: str,
     surface: Literal["foam", "rigid"],
-    output: Path,
-    scale: Path | None,
-    step: int,
-    runs: int,
+    campaign: Campaign,
+    currents: Currents,
+    read_scale: Callable[[int, int], Awaitable[int]],
     speed: int,
     speedup: float,
+    *,
+    bar: bool,
     plot: bool,
 ) -> None:
     from ..closing_time import closing_time
-    from ..measuring import GRASP_S, force_campaign, grasp, read_currents, write_currents
-    from ..runs import FORCE, read_table
+    from ..measuring import GRASP_S, grasp, write_currents
 
+    output = campaign.path
     currents_file = currents_beside(output)
-    readings: Table | None = None
-    with refused():
-        if scale is not None:
-            readings = read_table(scale, FORCE)
-        origin = {"gripper": str(parse_address(address)), "surface": surface, "speed": str(speed)}
-        campaign = force_campaign(output, step, runs, **origin)
-        currents = read_currents(currents_file) if campaign.table else {}
-        lacking = [value for value in campaign.table if len(currents.get(value, ())) != runs]
-        if lacking:
-            raise CommandError(
-                f"{currents_file} lacks runs of the force values {lacking}; choose another file"
-            )
     if not campaign.left:
         print(f"{output} is complete: nothing is measured again.")
-    typed_in = readings is None and not address.startswith("sim:")
-    read_scale = _scale(address, surface, readings, campaign.left, runs)
     if campaign.left:
         load_rich()
         async with gripper(address, speedup, lambda simulated: _place_scale(simulated, surface)) as hand:
@@ -122,13 +113,13 @@ async def _measure(
                 samples = await grasp(hand, value, speed, speedup)
                 reading = await read_scale(value, number)
                 currents[value] = [*(currents.get(value, []) if number > 1 else []), samples]
-                if number == runs:
+                if number == campaign.runs:
                     # Before the row: a row that is there has its currents.
                     await asyncio.to_thread(write_currents, currents_file, currents)
                 return reading
 
             seconds = (closing_time(speed) + closing_time(255) + GRASP_S) / speedup
-            await carry_out(campaign, run, lambda _: seconds, "force", bar=not typed_in)
+            await carry_out(campaign, run, lambda _: seconds, "force", bar=bar)
     told([output, currents_file])
     if plot:
         _plot(output, surface, campaign.table, "simulated" if address.startswith("sim:") else "measured")
@@ -137,6 +128,23 @@ async def _measure(
 def currents_beside(output: Path) -> Path:
     """Where the currents go."""
     return output.with_name(f"{output.stem}_currents.csv")
+
+
+def _currents_of(campaign: Campaign) -> Currents:
+    """The currents that were recorded so far.
+
+    Raises:
+        TableError: they cannot be read.
+        CommandError: those of some runs are missing.
+    """
+    from ..measuring import read_currents
+
+    file = currents_beside(campaign.path)
+    currents = read_currents(file) if campaign.table else {}
+    lacking = [value for value in campaign.table if len(currents.get(value, ())) != campaign.runs]
+    if lacking:
+        raise CommandError(f"{file} lacks runs of the force values {lacking}; choose another file")
+    return currents
 
 
 def _place_scale(simulated: SimulatedGripper, surface: str) -> None:

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Coroutine
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from ..address import parse_address
 from ..enums import Finger
-from .arguments import Address, Fingers, UsageError
-from .measure import NoPlot, Runs, Speedup, Yes, carry_out, check, consent, gripper, load_rich, refused, told
+from .arguments import Address, Fingers, Yes
+from .consent import consent
+from .failures import UsageError
+from .measure import NoPlot, Runs, Speedup, carry_out, check, gripper, load_rich, refused, told
 
-WARNING = "the fingers open and close fully, some hundred times. Nothing may be between them."
+if TYPE_CHECKING:
+    from ..measuring import Campaign
+
+WARNING = """the fingers MOVE: they open and close fully, {count} times. Nothing may be between them.
+If it is not active yet it is activated first, and what it holds drops."""
 
 
 def speed(
@@ -27,13 +33,14 @@ def speed(
     speedup: Speedup = None,
     no_plot: NoPlot = False,
     yes: Yes = False,
-) -> Coroutine[None, None, None] | None:
+) -> Coroutine[None, None, None]:
     """Measure how long a full closing takes at each speed value. THE FINGERS MOVE.
 
     As the thesis did (table A1.1): every 4th value from 0, and 255, slowest first,
     three runs, from the command until nothing moves. It takes 20 minutes. The file
     is written after every row; started again, it goes on where it was. Beside it a
-    plot is drawn (PNG and SVG) with the thesis's own curve.
+    plot is drawn (PNG and SVG) with the thesis's own curve. Unless the gripper is
+    that of sim:// it asks first; without a terminal it needs --yes.
 
     For example:
 
@@ -52,19 +59,20 @@ def speed(
     if Finger.SCISSOR in fingers:
         raise UsageError("--fingers must be of A, B and C: the stroke of the scissor is another")
     factor = check(address, output, speedup, runs, step, not no_plot)
-    if not consent(address, WARNING, yes):
-        return None
-    return _measure(address, output, step, runs, fingers, factor, not no_plot)
-
-
-async def _measure(
-    address: str, output: Path, step: int, runs: int, fingers: Finger, speedup: float, plot: bool
-) -> None:
-    from ..measuring import expected_seconds, speed_campaign, time_closing
+    from ..measuring import speed_campaign
 
     with refused():
         origin = {"gripper": str(parse_address(address)), "fingers": str(fingers.name)}
         campaign = speed_campaign(output, step, runs, **origin)
+    if campaign.left:
+        consent(address, WARNING.format(count=runs * len(campaign.left)), yes=yes)
+    return _measure(address, campaign, fingers, factor, not no_plot)
+
+
+async def _measure(address: str, campaign: Campaign, fingers: Finger, speedup: float, plot: bool) -> None:
+    from ..measuring import expected_seconds, time_closing
+
+    output = campaign.path
     if not campaign.left:
         print(f"{output} is complete: nothing is measured again.")
     if campaign.left:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import asyncio
 import os
 import sys
-from contextlib import suppress
 from typing import Annotated, Final
 
 from cyclopts import Parameter
 
-from .arguments import USUAL, Address, Byte, CommandError, Link, UsageError, need
+from .arguments import USUAL, Address, Byte, Link, need
+from .consent import forget_keys
+from .failures import CommandError, UsageError
 from .remarks import forget, told
 
 SCREEN_S: Final = 1.0
@@ -87,7 +88,7 @@ async def _screen(address: str, link: Link, speed: int, force: int) -> None:
     screen, words = None, ""
     try:
         screen = Monitor(operator)
-        _forget_keys()
+        forget_keys()
         showing = asyncio.ensure_future(screen.run_async())
         with told(screen.remark):
             await asyncio.wait({showing})
@@ -100,14 +101,6 @@ async def _screen(address: str, link: Link, speed: int, force: int) -> None:
         _say(words)
     if screen.return_code:
         raise CommandError("the screen failed; what it says is above")
-
-
-def _forget_keys() -> None:
-    """What was typed before there was a screen to look at is no command."""
-    with suppress(ImportError, OSError):  # Windows; no terminal
-        import termios
-
-        termios.tcflush(sys.stdin, termios.TCIFLUSH)
 
 
 def _say(words: str) -> None:

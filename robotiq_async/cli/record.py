@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from .arguments import USUAL, Address, CommandError, Link, UsageError, need
+from ..payloads import printable
+from .arguments import USUAL, Address, Link, need
+from .failures import CommandError, UsageError
 from .words import IN_WORDS, clock
 
 if TYPE_CHECKING:
@@ -30,24 +32,28 @@ async def record(
     /,
     *,
     seconds: Annotated[float | None, Parameter(metavar="SECONDS")] = None,
+    ros2: Annotated[bool, Parameter(negative=())] = False,
     link: Link = USUAL,
 ) -> None:
     """Record every poll, command, transition and fault in an MCAP file, until Ctrl-C.
 
-    It only looks: nothing moves and nothing is written to the gripper. Foxglove,
-    PlotJuggler and ROS 2 tools read the file; joint states are in it as ROS has them.
-    Commands are those of this program, so that a recording made by this command has
-    none: record from your own program with robotiq_async.recorder.Recorder. A
-    killed recording loses at most the last second; recover makes its file whole.
+    It only looks: nothing moves and nothing is written to the gripper. The file is
+    for viewers of MCAP (Foxglove, PlotJuggler), and for replay and plot. Tools of
+    ROS 2 refuse it, but for --ros2. Commands are those of this program, so that a
+    recording made by this command has none: record from your own program with
+    robotiq_async.recorder.Recorder. A killed recording loses at most the last
+    second; recover makes its file whole.
 
     For example:
 
         robotiq-async record grasp.mcap tcp://192.168.1.11
         robotiq-async record --seconds 60 minute.mcap
+        robotiq-async record --ros2 joints.mcap tcp://192.168.1.11
 
     Args:
         file: The recording; it must not be there yet.
         seconds: End by itself after so long.
+        ros2: Record /joint_states alone, in a file with the profile ros2.
     """
     need("mcap", "record")
     from ..recorder import Recorder
@@ -57,7 +63,7 @@ async def record(
         raise UsageError(f"--seconds must be seconds above 0, got {seconds:g}")
     try:
         async with connected(address, link, halt=False) as hand:
-            recorder = Recorder(hand, file)
+            recorder = Recorder(hand, file, ros2=ros2)
             try:
                 async with recorder:
                     print(f"Recording {hand.address} in {file}; Ctrl-C ends it.", flush=True)
@@ -112,16 +118,19 @@ def replay(
     if as_picture:
         plot(file)
         return
-    shown = ""
+    shown, is_empty = "", True
     for entry in _in_order(entry for entry in read_recording(file) if entry.is_json):
         if entry.topic not in IN_WORDS:
             continue
-        line = IN_WORDS[entry.topic](entry.fields)
+        line = printable(entry.read(IN_WORDS[entry.topic]))
         if entry.topic == "/gripper/status":
             if line == shown:
                 continue
             shown = line
         print(clock(entry.nanoseconds / 1e9), line)
+        is_empty = False
+    if is_empty:
+        raise CommandError(f"{file}: there is nothing in it that this command shows")
 
 
 def _in_order(entries: Iterator[Entry]) -> Iterator[Entry]:
@@ -175,9 +184,8 @@ def plot(file: Path, picture: Path | None = None, /) -> None:
     target = picture or file
     if target.suffix in (".mcap", ".png", ".svg"):
         target = target.with_suffix("")
-    entries = ((each.topic, each.nanoseconds, each.fields) for each in read_recording(file) if each.is_json)
     try:
-        pictures = plot_recording(target, entries)
+        pictures = plot_recording(target, (entry for entry in read_recording(file) if entry.is_json))
     except OSError as error:
         raise CommandError(f"{target}: {error.strerror}") from error
     if not pictures:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import inspect
+import io
+import os
 import signal
 import socket
 import sys
@@ -15,8 +17,9 @@ from typing import Self
 from cyclopts import CycloptsError
 
 from ..errors import RobotiqError
+from ..payloads import printable
 from .app import build
-from .arguments import CommandError, UsageError
+from .failures import CommandError, UsageError
 from .remarks import collected, forget
 
 _ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
@@ -25,16 +28,27 @@ SUCCESS, FAILURE, WRONG_USAGE, SIGNALLED = 0, 1, 2, 128
 
 def run(arguments: Sequence[str]) -> int:
     """Run the sub-command that the arguments name and return the exit code."""
+    _mend_streams()
     with collected() as remarks, _Signals() as signals:
         code, problem = _outcome(arguments, signals)
     # A failure is one line, whatever it holds: it is read in logs and by scripts.
     lines = remarks if problem is None else ["; ".join((problem, *remarks))]
     try:
         for line in lines:
-            print("robotiq-async:", " ".join(line.split()), file=sys.stderr, flush=True)
+            print("robotiq-async:", printable(" ".join(line.split())), file=sys.stderr, flush=True)
     except OSError:  # the terminal is gone
         forget(sys.stderr)
     return code
+
+
+def _mend_streams() -> None:
+    """One that is closed is nobody's; the others take any text: the name of a file need not even be one."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        stream = getattr(sys, name)
+        if stream is None:  # its number is free, and no socket is to get it
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
+        elif mode == "w" and isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _outcome(arguments: Sequence[str], signals: _Signals) -> tuple[int, str | None]:

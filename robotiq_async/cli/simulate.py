@@ -10,7 +10,8 @@ from cyclopts import Parameter
 
 from ..errors import RobotiqError
 from ..registers import RTU_REGISTERS
-from .arguments import Port, Unit, is_loopback, usage
+from .arguments import Port, Unit, is_loopback
+from .failures import usage
 
 if TYPE_CHECKING:
     from ..simulator import Trouble

@@ -10,7 +10,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .arguments import USUAL, Address, Byte, CommandError, Link, Port, is_loopback, need
+from ..payloads import printable
+from .arguments import USUAL, Address, Byte, Link, Port, is_loopback, need
+from .failures import CommandError
 
 
 async def view(
@@ -74,7 +76,8 @@ async def view(
 
 
 def _tell(words: str) -> None:
-    print("robotiq-async:", words, file=sys.stderr, flush=True)
+    # Some of the server's words are its clients'.
+    print("robotiq-async:", printable(words), file=sys.stderr, flush=True)
 
 
 def _write(layout: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 from typing import TYPE_CHECKING, Final
 
 from pymodbus.server import ModbusTcpServer
@@ -137,9 +138,17 @@ class SimulatorServer(SimulatorEndpoint):
     async def _listen(self, server: ModbusBaseServer) -> None:
         """Listen. pymodbus's own listen() hides the error and cannot listen again on a port it found."""
         loop = asyncio.get_running_loop()
-        self._listener = await loop.create_server(
-            server.handle_new_connection, self._host, self._port, reuse_address=True
-        )
+        try:
+            self._listener = await loop.create_server(
+                server.handle_new_connection, self._host, self._port, reuse_address=True
+            )
+        except UnicodeError as error:  # of a name that can be none
+            raise OSError(f"{self._host} cannot be resolved: {error}") from error
+        if not self._listener.sockets:
+            # asyncio takes every socket that cannot be made for one of a family that is not known here.
+            self._listener.close()
+            socket.socket().close()  # raises why
+            raise OSError(f"there is no socket for {self._host}")
         self._port = self._listener.sockets[0].getsockname()[1]
         server.transport = self._listener  # type: ignore[assignment]  # as pymodbus does
 

@@ -5,15 +5,16 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import signal
 import sys
 from asyncio.subprocess import DEVNULL, PIPE, Process
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from tests.cli.terminal import ROOT, Terminal
+
 WITHOUT = """
 import importlib.util, sys
 find = importlib.util.find_spec
@@ -93,3 +94,12 @@ async def shell() -> AsyncIterator[Shell]:
         with contextlib.suppress(ProcessLookupError):
             process.kill()
         await process.communicate()
+
+
+@pytest.fixture(autouse=True)
+def no_terminal_is_left() -> Iterator[None]:
+    yield
+    for process in Terminal.running:
+        os.kill(process, signal.SIGKILL)
+        os.waitpid(process, 0)
+    Terminal.running.clear()

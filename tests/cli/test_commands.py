@@ -6,6 +6,7 @@ import asyncio
 import json
 import signal
 import socket
+import sys
 import time
 from collections.abc import AsyncIterator, Sequence
 from typing import TYPE_CHECKING
@@ -82,7 +83,7 @@ async def test_status_shows_a_fault(shell: Shell, server: SimulatorServer) -> No
 
 
 async def test_move_activates_and_closes(shell: Shell, server: SimulatorServer) -> None:
-    outcome = await shell.run("move", "255", server.address)
+    outcome = await shell.run("move", "255", "--yes", server.address)
     outcome.assert_succeeded()
     assert outcome.out.startswith("Activating: the fingers open and close.\n")
     assert outcome.out.count("AT_POSITION") == 3
@@ -92,7 +93,7 @@ async def test_move_activates_and_closes(shell: Shell, server: SimulatorServer) 
 
 async def test_move_takes_fingers_speed_and_force(shell: Shell, server: SimulatorServer) -> None:
     arguments = ["--fingers", "a,scissor", "--speed", "200", "--force", "10", "--timeout", "20"]
-    outcome = await shell.run("move", "100", server.address, *arguments)
+    outcome = await shell.run("move", "100", "--yes", server.address, *arguments)
     assert outcome.code == 0
     assert abs(server.gripper.position(Finger.A) - 100) <= 2
     assert abs(server.gripper.position(Finger.SCISSOR) - 100) <= 2
@@ -103,9 +104,9 @@ async def test_move_takes_fingers_speed_and_force(shell: Shell, server: Simulato
 
 async def test_a_contact_is_a_success(shell: Shell, server: SimulatorServer) -> None:
     server.gripper.write(0, ACTIVATE)
-    assert (await shell.run("move", "0", server.address)).code == 0
+    assert (await shell.run("move", "0", "--yes", server.address)).code == 0
     server.gripper.place_object(Finger.B, position=120)
-    outcome = await shell.run("move", "255", server.address)
+    outcome = await shell.run("move", "255", "--yes", server.address)
     assert outcome.code == 0
     assert outcome.out.count("CONTACT_CLOSING") == 1
     assert "an object is in the way" in outcome.out
@@ -113,10 +114,12 @@ async def test_a_contact_is_a_success(shell: Shell, server: SimulatorServer) -> 
 
 async def test_move_in_fault_fails(shell: Shell, server: SimulatorServer) -> None:
     server.gripper.inject_fault(Fault.ACTIVATION_FAULT)
-    (await shell.run("move", "255", server.address)).assert_failed(1, "fault")
+    (await shell.run("move", "255", "--yes", server.address)).assert_failed(1, "fault")
 
 
-@pytest.mark.parametrize("command", [["status"], ["status", "--json"], ["move", "3"], ["demo", "--yes"]])
+@pytest.mark.parametrize(
+    "command", [["status"], ["status", "--json"], ["move", "3", "--yes"], ["demo", "--yes"]]
+)
 async def test_nobody_there(shell: Shell, command: list[str]) -> None:
     # Bound and not listening: connections are refused, and nobody else gets the port.
     with socket.socket() as reserved:
@@ -135,7 +138,7 @@ async def test_a_signal_stops_the_fingers(shell: Shell, number: signal.Signals, 
     gripper = WatchedGripper()
     gripper.activate()
     async with SimulatorServer(gripper) as server:
-        process = await shell.start("move", "255", server.address, "--speed", "0")
+        process = await shell.start("move", "255", "--yes", server.address, "--speed", "0")
         async with asyncio.timeout(20):
             await gripper.went.wait()
         process.send_signal(number)
@@ -151,7 +154,7 @@ async def test_a_link_that_goes_down_under_a_move(shell: Shell) -> None:
     gripper = WatchedGripper()
     gripper.activate()
     async with SimulatorServer(gripper) as server:
-        process = await shell.start("move", "255", server.address, "--speed", "0")
+        process = await shell.start("move", "255", "--yes", server.address, "--speed", "0")
         async with asyncio.timeout(20):
             await gripper.went.wait()
         await server.stop()
@@ -166,6 +169,13 @@ async def test_a_reader_that_has_had_enough(shell: Shell, server: SimulatorServe
     outcome = await shell.finish(process)
     assert outcome.code == 1
     assert "Error" not in outcome.err
+
+
+@pytest.mark.parametrize("closed", [0, 1, 2])
+async def test_a_closed_stream_is_nobodys(shell: Shell, server: SimulatorServer, closed: int) -> None:
+    command = [sys.executable, "-m", "robotiq_async", "status", server.address]
+    code = f"import os; os.close({closed}); os.execv({sys.executable!r}, {command!r})"
+    (await shell.finish(await shell.python("-c", code))).assert_succeeded()
 
 
 # -- doctor ------------------------------------------------------------------------------------------------

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import io
-import sys
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
-from robotiq_async.cli import main
 from robotiq_async.cli.demo import _program
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
@@ -38,36 +35,8 @@ async def test_at_an_address(shell: Shell, form: list[str]) -> None:
     root = Path(__file__).parents[2]
     arguments = [str(root / form[0]) if form[0].endswith(".py") else form[0], *form[1:]]
     async with SimulatorServer(SimulatedGripper(speedup=SPEEDUP)) as server:
-        outcome = await shell.finish(await shell.python(*arguments, server.address))
+        outcome = await shell.finish(await shell.python(*arguments, "--yes", server.address))
     outcome.assert_succeeded()
-    assert "This MOVES the gripper" in outcome.out
     for part in PARTS:
         assert part in outcome.out
     assert "inject_fault" not in outcome.out
-
-
-class Terminal(io.StringIO):
-    """Somebody who types."""
-
-    def isatty(self) -> bool:
-        return True
-
-
-@pytest.mark.parametrize("answer", ["\n", "n\n", "what?\n", ""])
-def test_at_a_terminal_nothing_happens_without_a_yes(
-    answer: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(sys, "stdin", Terminal(answer))
-    # Nobody is asked to connect: TEST-NET-1 (RFC 5737) has no host, so trying would fail.
-    assert main(["demo", "tcp://192.0.2.1"]) == 0
-    out = capsys.readouterr().out
-    assert "This MOVES the gripper at tcp://192.0.2.1" in out
-    assert "async with" not in out
-
-
-@pytest.mark.parametrize(("address", "yes"), [("sim://", False), ("tcp://192.0.2.1", True)])
-def test_no_question_for_a_simulated_gripper_or_after_yes(
-    address: str, yes: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(sys, "stdin", Terminal(""))
-    assert _program().consent(address, yes) is True

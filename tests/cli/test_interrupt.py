@@ -57,7 +57,7 @@ async def test_the_demo(shell: Shell, lines: int) -> None:
 
 async def test_a_move_in_its_activation(shell: Shell) -> None:
     async with SimulatorServer(SimulatedGripper(speedup=2)) as server:
-        process = await shell.start("move", "255", server.address)
+        process = await shell.start("move", "255", "--yes", server.address)
         async with asyncio.timeout(30):
             while not server.gripper.is_moving:  # noqa: ASYNC110  # the gripper tells nobody
                 await asyncio.sleep(0.005)

@@ -73,20 +73,23 @@ async def test_force_writes_readings_currents_and_pictures(shell: Shell, tmp_pat
     assert "foam" in both
 
 
-async def test_the_scale_is_read_by_a_person(shell: Shell, tmp_path: Path) -> None:
+async def test_the_scale_is_read_by_a_person(
+    shell: Shell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONIOENCODING", "utf-8:strict")  # no language is to hide that a byte is none
     gripper = SimulatedGripper(speedup=30)
     gripper.place_object(7, 150)
     async with SimulatorServer(gripper) as server:
         process = await shell.start(
-            *("measure", "force", server.address, "--output", str(tmp_path / "f.csv")),
+            *("measure", "force", "--yes", server.address, "--output", str(tmp_path / "f.csv")),
             *("--step", "250", "--runs", "1", "--speed", "255", "--no-plot"),
             stdin=PIPE,
         )
         assert process.stdin is not None
-        process.stdin.write(b"much\n-5\n1500\n2500\n")
+        process.stdin.write(b"much\n-5\n\xff\n1500\n2500\n")
         outcome = await shell.finish(process)
     outcome.assert_succeeded()
-    assert outcome.out.count("An integer in 0..100000, please.") == 2
+    assert outcome.out.count("An integer in 0..100000, please.") == 3
     assert "Force 250, run 1: what does the scale show, in grams?" in outcome.out
     assert read_table(tmp_path / "f.csv", FORCE) == {0: (1500,), 250: (2500,)}
 
@@ -96,7 +99,7 @@ async def test_nobody_there_to_read_the_scale(shell: Shell, tmp_path: Path) -> N
     gripper.place_object(7, 150)
     async with SimulatorServer(gripper) as server:
         outcome = await shell.run(
-            *("measure", "force", server.address, "--output", str(tmp_path / "f.csv")),
+            *("measure", "force", "--yes", server.address, "--output", str(tmp_path / "f.csv")),
             *("--step", "250", "--runs", "1", "--speed", "255", "--no-plot"),
         )
     assert outcome.code == 1
@@ -130,7 +133,8 @@ async def test_ctrl_c_keeps_the_rows_and_stops_the_fingers(shell: Shell, tmp_pat
     async with SimulatorServer(gripper) as server:
         table = tmp_path / "t.csv"
         process = await shell.start(
-            *("measure", "speed", server.address, "--output", str(table), "--runs", "1", "--no-plot")
+            *("measure", "speed", "--yes", server.address),
+            *("--output", str(table), "--runs", "1", "--no-plot"),
         )
         async with asyncio.timeout(20):
             while not table.exists() or not gripper.is_moving:  # noqa: ASYNC110  # another process writes it
@@ -149,7 +153,7 @@ async def test_fingers_that_meet_something_end_it(shell: Shell, tmp_path: Path) 
     gripper.place_object(7, 150)
     async with SimulatorServer(gripper) as server:
         outcome = await shell.run(
-            "measure", "speed", server.address, "--output", str(tmp_path / "t.csv"), "--no-plot"
+            *("measure", "speed", "--yes", server.address, "--output", str(tmp_path / "t.csv"), "--no-plot")
         )
     assert outcome.code == 1
     assert "the fingers met something" in outcome.err

@@ -17,7 +17,7 @@ from robotiq_async.cli import main
 from robotiq_async.cli.lines import print_objects
 from robotiq_async.cli.words import event_line
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from tests.cli.conftest import ROOT
+from tests.cli.terminal import ROOT
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Shell

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import os
 import signal
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+import zstandard
+from mcap.data_stream import RecordBuilder
+from mcap.reader import make_reader
+from mcap.records import Chunk, Header
+from mcap.writer import Writer
+from rosbags.highlevel import AnyReader
 
 from robotiq_async import Finger, RobotiqHand, State
 from robotiq_async.cli import main
@@ -67,6 +75,17 @@ async def test_it_ends_by_itself(shell: Shell, tmp_path: Path) -> None:
     assert len(list(read_recording(file))) > 20
     again = await shell.run("record", str(file), "--seconds", "0.5")
     again.assert_failed(1, "it.mcap: File exists")
+
+
+async def test_for_ros_2(shell: Shell, tmp_path: Path) -> None:
+    file = tmp_path / "it.mcap"
+    outcome = await shell.run("record", "--ros2", "--seconds", "0.5", str(file))
+    outcome.assert_succeeded()
+    with AnyReader([file]) as reader:
+        assert [connection.topic for connection in reader.connections] == ["/joint_states"]
+        assert f"\n{reader.message_count} polls, 0 lost" in outcome.out
+    for command in ("replay", "plot"):
+        (await shell.run(command, str(file))).assert_failed(1, "it.mcap: there is no")
 
 
 async def test_no_gripper_no_file(shell: Shell, tmp_path: Path) -> None:
@@ -191,3 +210,153 @@ def test_the_name_of_a_picture_may_have_its_suffix(grasp: Path) -> None:
     assert main(["plot", str(grasp), str(grasp.with_name("there.png"))]) == 0
     assert grasp.with_name("there.png").exists()
     assert grasp.with_name("there.svg").exists()
+
+
+# -- recordings of others ----------------------------------------------------------------------------------
+
+
+def event(**fields: object) -> bytes:
+    return json.dumps({"monotonic": 1.0, **fields}).encode()
+
+
+STATE = event(kind="state", target="RESET")
+HOSTILE: dict[str, bytes] = {
+    "not UTF-8": b'{"kind": "\xff"}',
+    "no JSON": b"{",
+    "a list": b"[]",
+    "deeply nested": b"[" * 100_000,
+    "without what it is about": event(kind="transition"),
+    "a code that is no number": event(kind="fault", code="9", name="N", description="D"),
+}
+
+
+@pytest.fixture
+def foreign(tmp_path: Path) -> Callable[..., Path]:
+    """Makes a recording that no recorder has written."""
+
+    def write(*messages: bytes, topic: str = "/gripper/event", channel: int = 1) -> Path:
+        file = tmp_path / "foreign.mcap"
+        with file.open("wb") as stream:
+            writer = Writer(stream)
+            writer.start()
+            writer.register_channel(topic, "json", 0)
+            for data in messages:
+                writer.add_message(channel, 10**18, data, 10**18)
+            writer.finish()  # type: ignore[no-untyped-call]
+        return file
+
+    return write
+
+
+@pytest.mark.parametrize("what", HOSTILE)
+@pytest.mark.parametrize("topic", ["/gripper/event", "/gripper/status", "/gripper/command"])
+def test_replay_refuses_what_is_not_ours_in_one_line(
+    foreign: Callable[..., Path], what: str, topic: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["replay", str(foreign(HOSTILE[what], topic=topic))]) == 1
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert f"foreign.mcap: a message on '{topic}' is no" in err
+
+
+@pytest.mark.parametrize("what", [name for name in HOSTILE if "code" not in name])
+@pytest.mark.parametrize("topic", ["/gripper/event", "/gripper/status"])
+def test_plot_refuses_what_is_not_ours_in_one_line(
+    foreign: Callable[..., Path], what: str, topic: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["plot", str(foreign(HOSTILE[what], topic=topic))]) == 1
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert f"foreign.mcap: a message on '{topic}' is no" in err
+
+
+@pytest.mark.parametrize("command", ["replay", "plot", "recover"])
+def test_a_message_of_no_channel_is_one_line(
+    foreign: Callable[..., Path], command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([command, str(foreign(STATE, channel=7))]) == 1
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert "foreign.mcap: there is no channel 7" in err
+
+
+STEERING = "\x1b[2J\x9b31m\x07\r\nroot# \u202e\ud800"
+
+
+def test_what_steers_a_terminal_is_written_out(
+    foreign: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    fault = event(kind="fault", code=9, name=STEERING, description=STEERING)
+    assert main(["replay", str(foreign(fault))]) == 0
+    out, err = capsys.readouterr()
+    assert out.count("\n") == 1
+    assert r"\x1b[2J\x9b31m\x07\r\nroot# \u202e\ud800" in out
+    assert out.rstrip("\n").isprintable()
+    assert err == ""
+
+
+@pytest.mark.parametrize("command", ["replay", "plot", "recover"])
+def test_an_error_does_not_steer_the_terminal_either(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([command, str(tmp_path / f"{STEERING}.mcap".replace("\ud800", ""))]) == 1
+    err = capsys.readouterr().err
+    assert err.rstrip("\n").isprintable()
+    assert r"\x1b[2J" in err
+
+
+def test_nothing_to_show_is_said(foreign: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", str(foreign(b"{}", topic="/odometry"))]) == 1
+    assert "foreign.mcap: there is nothing in it that this command shows" in capsys.readouterr().err
+
+
+def test_a_name_that_is_no_text_is_shown_all_the_same(
+    grasp: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    there = Path(os.fsdecode(os.fsencode(grasp.parent) + b"/\xff$\\frac{$.mcap"))
+    grasp.rename(there)
+    assert main(["plot", str(there)]) == 0
+    assert capsys.readouterr().out.endswith(".svg\n")
+    assert main(["recover", str(there)]) == 0
+    assert "messages in" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("words", ["$\\frac{", "x" * 100_000, STEERING])
+def test_words_of_others_are_drawn_as_they_are(
+    grasp: Path, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with grasp.open("rb") as stream:
+        first = next(make_reader(stream).iter_messages(topics=["/gripper/status"]))[2]
+    file = grasp.with_name("foreign.mcap")
+    with file.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        for topic in ("/gripper/status", "/gripper/event"):
+            writer.register_channel(topic, "json", 0)
+        for second in range(3):
+            writer.add_message(1, first.log_time + second * 10**9, first.data, 0)
+            writer.add_message(2, first.log_time + second * 10**9, event(kind="state", target=words), 0)
+        writer.finish()  # type: ignore[no-untyped-call]
+    assert main(["plot", str(file)]) == 0, capsys.readouterr().err
+
+
+async def test_two_gigabytes_in_a_small_chunk_are_one_line(shell: Shell, tmp_path: Path) -> None:
+    file = tmp_path / "bomb.mcap"
+    compressor = zstandard.ZstdCompressor().compressobj()
+    data = b"".join(compressor.compress(bytes(2**20)) for _ in range(2048)) + compressor.flush()
+    builder = RecordBuilder()
+    Header("", "").write(builder)
+    Chunk("zstd", data, 0, 0, 0, 2**31).write(builder)
+    file.write_bytes(b"\x89MCAP0\r\n" + builder.end())  # type: ignore[no-untyped-call]
+    for command in ("replay", "recover", "plot"):
+        outcome = await shell.finish(await shell.python("-c", LITTLE_MEMORY.format([command, str(file)])))
+        outcome.assert_failed(1, "bomb.mcap: a chunk of 2147483648 bytes")
+
+
+LITTLE_MEMORY = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_AS, (1_500_000_000, 1_500_000_000))
+from robotiq_async.cli import main
+sys.exit(main({}))
+"""
+"""Of addresses; matplotlib takes most of them."""

@@ -51,9 +51,9 @@ async def test_it_is_exact_only_on_request(shell: Shell, options: tuple[str, ...
 async def test_it_keeps_the_gripper_between_two_clients(shell: Shell) -> None:
     process = await shell.start("simulate", "--port", "0", "--speedup", "20")
     address = await shell.read_line(process)
-    assert (await shell.run("move", "255", address)).code == 0
+    assert (await shell.run("move", "255", "--yes", address)).code == 0
     assert json.loads((await shell.run("status", "--json", address)).out)["axes"]["C"]["position"] >= 240
-    assert "Activating" not in (await shell.run("move", "0", address)).out
+    assert "Activating" not in (await shell.run("move", "0", "--yes", address)).out
 
 
 async def test_a_port_in_use(shell: Shell) -> None:

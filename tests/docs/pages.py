@@ -37,3 +37,8 @@ def blocks(text: str) -> list[Block]:
 def prose(text: str) -> str:
     """A page without its fenced blocks."""
     return re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL)
+
+
+def requirements(text: str) -> str:
+    """What a page has its reader install, as it is typed behind ``pip install``."""
+    return " ".join(re.findall(r"\bpip install ((?!'robotiq-async)[^`\n]+)", text))

@@ -15,7 +15,7 @@ from docs import make_diagram, make_pages
 from robotiq_async.enums import State
 from robotiq_async.machine import TRANSITIONS, Trigger
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from tests.docs.pages import DOCS, PAGES, ROOT, Block, blocks, prose
+from tests.docs.pages import DOCS, PAGES, ROOT, Block, blocks, prose, requirements
 
 FRONT = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]
 TUTORIAL = DOCS / "tutorial.md"
@@ -128,6 +128,23 @@ async def test_code_runs(page: Path, block: Block, restored_logging: None) -> No
             await outcome
         for function in [value for key, value in names.items() if key.startswith("test_")]:
             await function()
+
+
+@pytest.mark.parametrize("page", dict.fromkeys(page for page, _ in CODE), ids=name)
+def test_a_page_with_code_names_its_environment(page: Path) -> None:
+    text = read(page)
+    assert requirements(text).startswith((".", "'.["))
+    code = [block.text for block in blocks(text) if block.language == "python"]
+    assert ("`python -m asyncio`" in text) == any(is_for_the_prompt(each) for each in code)
+
+
+def is_for_the_prompt(code: str) -> bool:
+    """Whether only a prompt that awaits takes it."""
+    try:
+        compile(code, "page", "exec", dont_inherit=True)
+    except SyntaxError:
+        return True
+    return False
 
 
 # -- messages ------------------------------------------------------------------------------------------

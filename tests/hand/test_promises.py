@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
+import os
+import resource
 import sys
 import time
 from asyncio.subprocess import PIPE
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 
 import anyio
@@ -47,6 +50,33 @@ def travels(server: SimulatorServer) -> dict[Finger, float]:
 
 
 # -- 1: never blocks, every await ends ----------------------------------------------------------------------
+
+
+@pytest.fixture(params=[0, 1])
+def few_files(request: pytest.FixtureRequest) -> Iterator[None]:
+    """This process can open no more files, or one more."""
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (256, limits[1]))
+    opened = []
+    try:
+        with contextlib.suppress(OSError):
+            while True:
+                opened.append(os.open(os.devnull, os.O_RDONLY))
+        for _ in range(request.param):
+            os.close(opened.pop())
+        yield
+    finally:
+        for each in opened:
+            os.close(each)
+        resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+
+
+async def test_without_a_free_descriptor_a_simulated_gripper_says_so(few_files: None) -> None:
+    hand = RobotiqHand("sim://")
+    with pytest.raises(ConnectFailedError, match=r"cannot connect to .*: .*Too many open files") as caught:
+        await hand.start()
+    assert caught.value.address
+    assert hand.state is State.SHUTDOWN
 
 
 async def test_a_write_fails_within_a_second_on_a_silent_gripper(

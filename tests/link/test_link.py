@@ -8,6 +8,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import socket
+import threading
+import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
@@ -19,6 +22,7 @@ from robotiq_async import (
     ProtocolError,
     ResponseTimeoutError,
     RobotiqConnectionError,
+    RobotiqHand,
 )
 from robotiq_async.address import parse_address
 from robotiq_async.link import ModbusTransport
@@ -342,6 +346,106 @@ async def test_opening_again_leaves_no_old_connection() -> None:
             await transport.open()
             await transport.read()
         assert scripted.connections == 4
+
+
+# -- names -------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def resolved(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Makes the system resolve every name to these addresses."""
+
+    def resolve(*addresses: str) -> None:
+        def getaddrinfo(_: str, port: int, *__: object, **___: object) -> list[object]:
+            families = {True: socket.AF_INET6, False: socket.AF_INET}
+            kind = socket.SOCK_STREAM
+            return [(families[":" in each], kind, 6, "", (each, port)) for each in addresses]
+
+        monkeypatch.setattr(socket, "getaddrinfo", getaddrinfo)
+
+    return resolve
+
+
+def to_the_host(transport: ModbusTransport) -> ModbusTransport:
+    """A transport to the same port, by a name."""
+    address = f"gripper.example:{transport._address.port}"
+    return ModbusTransport(parse_address(address), TCP_REGISTERS, connect_timeout=1.0, response_timeout=0.1)
+
+
+@pytest.mark.parametrize("others", [[], ["127.0.0.2"], ["::1"], ["127.0.0.2", "::1", "127.0.0.3"]])
+async def test_the_first_address_of_a_name_that_can_be_reached(
+    resolved: Callable[..., None], others: list[str]
+) -> None:
+    async with linked() as (transport, _):
+        resolved(*others, "127.0.0.1")
+        named = to_the_host(transport)
+        await named.open()
+        assert await named.read() == REGISTERS
+        await named.close()
+
+
+async def test_no_address_of_a_name_can_be_reached(resolved: Callable[..., None]) -> None:
+    async with linked() as (transport, _):
+        resolved("127.0.0.2", "127.0.0.3")
+        with pytest.raises(ConnectFailedError, match=r"gripper\.example:\d+: connection refused"):
+            await to_the_host(transport).open()
+
+
+@pytest.mark.parametrize("name", ["nowhere.invalid", "a" * 64])
+async def test_a_name_that_nobody_knows_is_told(name: str) -> None:
+    transport = ModbusTransport(parse_address(name), TCP_REGISTERS, connect_timeout=5.0, response_timeout=0.1)
+    with pytest.raises(ConnectFailedError, match=f"{name}:502: the name cannot be resolved: "):
+        await transport.open()
+
+
+def test_a_resolver_that_does_not_answer_holds_up_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    answer = threading.Event()
+    monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: answer.wait(20) and [])
+
+    async def use() -> None:
+        hand = RobotiqHand("gripper.example", connect_timeout=0.1)
+        with pytest.raises(ConnectFailedError, match=r"gripper\.example:502: no connection within 0\.1 s"):
+            await hand.start()
+        await hand.stop()
+
+    began = time.monotonic()
+    asyncio.run(use())
+    assert time.monotonic() - began < 5
+    answer.set()
+
+
+# -- more than was asked for -------------------------------------------------------------------------------
+
+BURSTS = [517, 5000, 300_000]
+"""Bytes; pymodbus drops what it cannot keep, and says nothing."""
+
+
+@pytest.mark.parametrize("size", BURSTS)
+@pytest.mark.parametrize("begins_well", [True, False])
+async def test_a_burst_is_no_answer_and_no_silence(size: int, begins_well: bool) -> None:
+    def burst(request: bytes) -> list[bytes]:
+        return [(good(request) if begins_well else b"") + bytes(size)]
+
+    async with linked(burst) as (transport, _):
+        began = time.monotonic()
+        with pytest.raises(ProtocolError) as caught:
+            await transport.read()
+        assert time.monotonic() - began < 0.09, "in less than the time-out"
+        assert len(str(caught.value)) < 300
+        assert not transport.is_open
+
+
+@pytest.mark.parametrize("size", BURSTS)
+async def test_a_burst_between_two_requests_spoils_the_link(size: int) -> None:
+    async with linked() as (transport, scripted):
+        assert await transport.read() == REGISTERS
+        scripted.writers[-1].write(bytes(size))
+        await scripted.writers[-1].drain()
+        for _ in range(20):
+            await asyncio.sleep(0)
+        with pytest.raises(ProtocolError, match="nobody asked for") as caught:
+            await transport.read()
+        assert len(str(caught.value)) < 300
 
 
 async def test_nobody_at_the_address() -> None:

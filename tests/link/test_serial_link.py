@@ -136,3 +136,15 @@ async def test_a_wrong_check_sum_is_no_answer(tmp_path: Path) -> None:
         device.spoil = True
         with pytest.raises(ResponseTimeoutError):
             await transport.read()
+
+
+@pytest.mark.parametrize("size", [600, 3000])
+async def test_a_burst_between_two_requests_is_found_out(tmp_path: Path, size: int) -> None:
+    async with linked(tmp_path) as (transport, device):
+        await transport.read()
+        os.write(device.descriptor, bytes(size))
+        for _ in range(20):
+            await asyncio.sleep(0)
+        with pytest.raises(ProtocolError, match=r"nobody asked for|not the answer"):  # as it arrives
+            await transport.read()
+        assert not transport.is_open

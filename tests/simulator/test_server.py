@@ -310,6 +310,11 @@ async def test_a_port_that_is_taken(server: SimulatorServer) -> None:
     assert not other.is_running
 
 
+async def test_a_host_that_can_be_none() -> None:
+    with pytest.raises(OSError, match="cannot be resolved"):
+        await SimulatorServer(host="a" * 64).start()
+
+
 async def test_controls_need_a_running_server() -> None:
     server = SimulatorServer()
     for control in (server.cut, server.refuse):

@@ -1,0 +1,196 @@
+"""What moves a gripper asks at a terminal, and without one needs --yes."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from asyncio.subprocess import PIPE
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from robotiq_async import RobotiqHand
+from robotiq_async.cli.app import COMMANDS
+from robotiq_async.cli.measure_force import force
+from robotiq_async.cli.measure_speed import speed
+from robotiq_async.simulator import SimulatorServer
+from tests.cli.terminal import ROOT, Terminal
+
+if TYPE_CHECKING:
+    from tests.cli.conftest import Shell
+
+COMMAND_LINE = ("-m", "robotiq_async")
+PROGRAM = (str(ROOT / "demo" / "demo.py"),)
+MOVING = {
+    "move": (*COMMAND_LINE, "move", "255"),
+    "demo": (*COMMAND_LINE, "demo"),
+    "demo.py": PROGRAM,
+    "measure speed": (*COMMAND_LINE, "measure", "speed", "--no-plot"),
+    "measure force": (*COMMAND_LINE, "measure", "force", "--no-plot"),
+}
+ELSEWHERE = """
+import os, sys
+os.dup2(os.open({!r}, os.O_WRONLY | os.O_CREAT), {})
+from robotiq_async.cli import main
+sys.exit(main(["move", "30", {!r}]))
+"""
+"""A command whose output goes into a file."""
+
+
+@pytest.fixture
+def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """For what a command would write, in the folder that it runs in."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path / "out.txt"
+
+
+def written(file: Path) -> str:
+    return file.read_text(encoding="utf-8")
+
+
+# -- nobody to ask -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("command", MOVING)
+@pytest.mark.parametrize("typed", [None, b"y\n"])
+async def test_without_a_terminal_nothing_is_sent(
+    shell: Shell, server: SimulatorServer, file: Path, command: str, typed: bytes | None
+) -> None:
+    server.refuse()  # whoever connects would end with 1
+    if typed is None:
+        process = await shell.python(*MOVING[command], server.address)
+    else:
+        process = await shell.python(*MOVING[command], server.address, stdin=PIPE)
+        assert process.stdin is not None
+        process.stdin.write(typed)
+    outcome = await shell.finish(process)
+    assert (outcome.code, outcome.err.count("\n")) == (2, 1), outcome.err
+    assert "--yes" in outcome.err
+    assert server.address in outcome.err
+    assert outcome.out == ""
+    assert not server.gripper.writes
+    assert list(file.parent.iterdir()) == []
+
+
+@pytest.mark.parametrize("closed", [0, 1])
+async def test_a_stream_that_is_closed_is_no_terminal(
+    shell: Shell, server: SimulatorServer, closed: int
+) -> None:
+    code = f"import os; os.close({closed}); os.execv({{0!r}}, [{{0!r}}, '-m', 'robotiq_async', *{{1!r}}])"
+    outcome = await shell.finish(
+        await shell.python("-c", code.format(sys.executable, ["move", "30", server.address]))
+    )
+    outcome.assert_failed(2, "--yes")
+    assert not server.gripper.writes
+
+
+async def test_a_simulated_gripper_inside_the_program_needs_nobody(shell: Shell) -> None:
+    outcome = await shell.run("move", "10", "sim://")
+    outcome.assert_succeeded()
+    assert "[y/N]" not in outcome.out
+
+
+# -- somebody to ask ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("command", "answer"),
+    [(each, "n\n") for each in MOVING] + [("move", each) for each in ("\n", "what?\n", "\x04", "\udcff\n")],
+)
+async def test_at_a_terminal_nothing_happens_without_a_yes(
+    server: SimulatorServer, file: Path, command: str, answer: str
+) -> None:
+    terminal = Terminal(*MOVING[command], server.address)
+    await terminal.shows(b"Go on? [y/N]")
+    assert server.address.encode() in terminal.out
+    assert b"emergency stop" in terminal.out
+    terminal.press(answer)
+    assert await terminal.end() == 1
+    assert b"nothing was sent" in terminal.out
+    assert b"Traceback" not in terminal.out
+    assert not server.gripper.writes
+    assert list(file.parent.iterdir()) == []
+
+
+@pytest.mark.parametrize("answer", ["y", "Y", "yes", " YES "])
+async def test_after_a_yes_it_moves(server: SimulatorServer, answer: str) -> None:
+    terminal = Terminal(*COMMAND_LINE, "move", "30", server.address)
+    await terminal.shows(b"Go on? [y/N]")
+    terminal.press(f"{answer}\n")
+    await terminal.shows(b"AT_POSITION")
+    assert await terminal.end() == 0
+    assert server.gripper.writes
+
+
+async def test_what_was_typed_before_the_question_is_no_answer(server: SimulatorServer) -> None:
+    terminal = Terminal(*COMMAND_LINE, "move", "30", server.address)
+    terminal.press("y\n")
+    await terminal.shows(b"Go on? [y/N]")
+    terminal.press("n\n")
+    assert await terminal.end() == 1
+    assert not server.gripper.writes
+
+
+async def test_ctrl_c_is_no_yes(server: SimulatorServer) -> None:
+    terminal = Terminal(*COMMAND_LINE, "move", "30", server.address)
+    await terminal.shows(b"Go on? [y/N]")
+    terminal.press("\x03")
+    assert await terminal.end() == 130
+    assert not server.gripper.writes
+
+
+@pytest.mark.parametrize("elsewhere", [1, 2])
+async def test_the_question_is_where_it_is_seen(server: SimulatorServer, file: Path, elsewhere: int) -> None:
+    terminal = Terminal("-c", ELSEWHERE.format(str(file), elsewhere, server.address))
+    await terminal.shows(b"Go on? [y/N]")
+    terminal.press("y\n")
+    assert await terminal.end() == 0
+    assert "[y/N]" not in written(file)
+    assert server.gripper.writes
+
+
+async def test_no_question_after_yes(shell: Shell, server: SimulatorServer) -> None:
+    outcome = await shell.run("move", "30", "-y", server.address)
+    outcome.assert_succeeded()
+    assert server.gripper.writes
+
+
+async def test_nothing_is_asked_when_there_is_nothing_left_to_measure(
+    shell: Shell, server: SimulatorServer, file: Path
+) -> None:
+    options = ("--output", "t.csv", "--step", "255", "--runs", "1", "--no-plot", server.address)
+    (await shell.run("measure", "speed", "--yes", *options)).assert_succeeded()
+    outcome = await shell.run("measure", "speed", *options)
+    outcome.assert_succeeded()
+    assert "is complete: nothing is measured again" in outcome.out
+
+
+# -- every command -----------------------------------------------------------------------------------------
+
+
+def test_every_command_that_moves_takes_yes() -> None:
+    commands: list[Callable[..., object]] = [*COMMANDS, speed, force]
+    moving = {each for each in commands if "FINGERS MOVE" in (each.__doc__ or "")}
+    assert {each.__name__ for each in moving} == {"demo", "move", "speed", "force"}
+    assert {each for each in commands if "yes" in inspect.signature(each).parameters} == moving
+
+
+async def test_what_does_not_move_writes_nothing(shell: Shell, server: SimulatorServer, file: Path) -> None:
+    async with RobotiqHand(server.address) as hand:
+        await hand.move(50)
+    writes = len(server.gripper.writes)
+    for command in (["status"], ["doctor"], ["record", str(file), "--seconds", "0.2"]):
+        await shell.run(*command, server.address)
+    assert len(server.gripper.writes) == writes
+
+
+async def test_the_demo_asks_without_the_extra_too(shell: Shell, server: SimulatorServer) -> None:
+    code = f"import runpy, sys; sys.modules['cyclopts'] = None; sys.argv[1:] = [{server.address!r}]"
+    program = f"{code}\nrunpy.run_path({PROGRAM[0]!r}, run_name='__main__')"
+    outcome = await shell.finish(await shell.python("-c", program))
+    assert outcome.code == 2
+    assert outcome.err.startswith("demo: ")
+    assert "--yes" in outcome.err
+    assert not server.gripper.writes

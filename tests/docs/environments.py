@@ -1,0 +1,153 @@
+"""The code of every page, run as the page says and in the environment that it names: ``make pages``.
+
+Not part of the suite, for it installs from the package index. Each environment is a new one that holds what
+the page's own ``pip install`` asks for and nothing else; the gripper is a simulated one of this process.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import functools
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+from asyncio.subprocess import PIPE, STDOUT
+from pathlib import Path
+
+import pytest
+
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from tests.docs.pages import DOCS, PAGES, ROOT, Block, blocks, requirements
+from tests.docs.test_tutorial import PROGRAM, TEST, TYPED, agree
+
+PATIENCE = 60.0
+TUTORIAL = DOCS / "tutorial.md"
+README = ROOT / "README.md"
+
+
+def text_of(page: Path) -> str:
+    return page.read_text(encoding="utf-8")
+
+
+def named(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+def code_of(page: Path) -> list[Block]:
+    return [block for block in blocks(text_of(page)) if block.language == "python"]
+
+
+CODE = {page: code_of(page) for page in PAGES if page != TUTORIAL and code_of(page)}
+WITH_TESTS = [page for page, code in CODE.items() if any("def test_" in block.text for block in code)]
+
+
+@functools.cache
+def environment(wanted: str) -> str:
+    """The interpreter of a new environment with these requirements, a dot being the clone."""
+    # Not in the clone: what Python looks for at home must not be found there.
+    python = str(Path(_folder().name, re.sub(r"\W+", "-", wanted), "bin", "python"))
+    quietly(sys.executable, "-m", "venv", "--without-pip", str(Path(python).parents[1]))
+    packages = [f"{ROOT}{each[1:]}" if each.startswith(".") else each for each in shlex.split(wanted)]
+    constraints = ("-c", str(ROOT / "constraints.txt"))
+    try:
+        uv = ("-m", "uv", "pip", "install", "--refresh-package", "robotiq-async", "--python", python)
+        quietly(sys.executable, *uv, *constraints, *packages)
+    except subprocess.CalledProcessError:
+        quietly(sys.executable, "-m", "pip", "--python", python, "install", *constraints, *packages)
+    return python
+
+
+@functools.cache
+def _folder() -> tempfile.TemporaryDirectory[str]:
+    return tempfile.TemporaryDirectory(prefix="robotiq_async_pages")
+
+
+def quietly(*command: str) -> None:
+    subprocess.run(command, check=True, capture_output=True, text=True)
+
+
+async def run(*command: str, folder: Path, typed: str | None = None) -> str:
+    """What a command prints, in an environment without the variables that would lend it modules."""
+    process = await asyncio.create_subprocess_exec(
+        *command, stdin=PIPE, stdout=PIPE, stderr=STDOUT, cwd=folder, env={"PATH": "/usr/bin:/bin"}
+    )
+    async with asyncio.timeout(PATIENCE):
+        printed, _ = await process.communicate(None if typed is None else typed.encode())
+    words = printed.decode()
+    assert process.returncode == 0, words
+    assert "Traceback (most recent call last)" not in words, words
+    assert "SyntaxError" not in words, words
+    return words
+
+
+async def at_the_prompt(python: str, code: str, folder: Path) -> str:
+    """Type it, and an empty line after it."""
+    async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
+        typed = code.replace("tcp://192.168.1.11", server.address)
+        return await run(python, "-P", "-m", "asyncio", folder=folder, typed=f"{typed}\n")
+
+
+# -- the pages ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("page", "block"),
+    [(page, each) for page, code in CODE.items() for each in code if "def test_" not in each.text],
+    ids=lambda value: named(value) if isinstance(value, Path) else f"line {value.line}",
+)
+async def test_what_is_for_the_prompt(page: Path, block: Block) -> None:
+    # Some name files of the clone.
+    await at_the_prompt(environment(requirements(text_of(page))), block.text, ROOT)
+
+
+@pytest.mark.parametrize("page", WITH_TESTS, ids=named)
+async def test_what_is_for_pytest(page: Path, tmp_path: Path) -> None:
+    tests = [block for block in CODE[page] if "def test_" in block.text]
+    for number, block in enumerate(tests):
+        (tmp_path / f"test_{number}.py").write_text(block.text, encoding="utf-8")
+    (settings,) = [block for block in blocks(text_of(page)) if block.language == "toml"]
+    (tmp_path / "pyproject.toml").write_text(settings.text, encoding="utf-8")
+    printed = await run(environment(requirements(text_of(page))), "-m", "pytest", folder=tmp_path)
+    assert re.search(rf"\b{len(tests)} passed in ", printed), printed
+
+
+async def test_the_readme(tmp_path: Path) -> None:
+    (example,) = code_of(README)
+    program = tmp_path / "example.py"
+    async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
+        server.gripper.place_object(7, position=150)
+        program.write_text(example.text.replace("tcp://192.168.1.11", server.address), encoding="utf-8")
+        printed = await run(environment("."), str(program), folder=tmp_path)
+    assert "holding it with" in printed
+
+
+# -- the tutorial ------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def clone() -> str:
+    return environment(requirements(text_of(TUTORIAL)))
+
+
+async def test_the_tutorial_is_typed(clone: str) -> None:
+    printed = await at_the_prompt(clone, "\n".join(code.text for code, _ in TYPED), ROOT)
+    for line in "".join(output.text for _, output in TYPED).splitlines():
+        assert line.replace("...", "") in printed, line
+
+
+async def test_the_program_of_the_tutorial(clone: str, tmp_path: Path) -> None:
+    (code, output), program = PROGRAM, tmp_path / "grasp.py"
+    program.write_text(code.text, encoding="utf-8")
+    async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
+        assert agree(output.text, await run(clone, str(program), server.address, folder=ROOT))
+
+
+async def test_the_test_of_the_tutorial(clone: str, tmp_path: Path) -> None:
+    """In the clone, by the command on the page."""
+    code, output = TEST
+    (tmp_path / "test_grasp.py").write_text(code.text, encoding="utf-8")
+    (command,) = re.findall(r"^\.venv/bin/python (-m pytest .*)$", text_of(TUTORIAL), re.MULTILINE)
+    arguments = command.replace("../grasp", str(tmp_path)).split()
+    assert agree(output.text, await run(clone, *arguments, folder=ROOT))
