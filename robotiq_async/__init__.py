@@ -22,7 +22,8 @@ The map; each module imports only what stands above it::
     motion       moves and their results
     core         decides what to write, learns from what is read
     ------------------------------------------------------------
-    address      which gripper                                 asyncio from here on
+    clock        the time of what happens                      asyncio from here on
+    address      which gripper
     reply        every byte of a reply, checked
     messages     what is asked and answered, as pymodbus knows it
     link         transports; the only module, messages aside, that uses pymodbus

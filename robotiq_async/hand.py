@@ -11,6 +11,7 @@ import anyio
 
 from .calibration import SpeedCalibration
 from .checks import check_byte, check_int, check_mask, check_timeout
+from .clock import now
 from .core import Core
 from .desk import Delivery
 from .ending import to_the_end
@@ -352,7 +353,7 @@ class RobotiqHand:
             else:
                 ended.set_exception(outcome)
 
-        move = Move(target, axes, loop.time(), resolve)
+        move = Move(target, axes, now(), resolve)
         core.move(move, speed, force)
         with self._counters.move() as note:
             try:
@@ -678,8 +679,7 @@ class RobotiqHand:
         self._requests.end(failure)
 
     def _on_transition(self, source: State, target: State, trigger: Trigger) -> None:
-        now = asyncio.get_running_loop().time()
-        self._transitions.push(Transition(source, target, trigger, now))
+        self._transitions.push(Transition(source, target, trigger, now()))
         self._counters.faults += target is State.FAULT
         self._waiters.reached(target)
 

@@ -29,7 +29,7 @@ class Transition:
         source: the state before.
         target: the state after.
         trigger: what made it happen.
-        timestamp: monotonic seconds (the event loop's clock).
+        timestamp: monotonic seconds, by the clock of the statuses.
     """
 
     source: State
@@ -44,7 +44,7 @@ class SentRequest:
 
     Attributes:
         request: the image.
-        timestamp: monotonic seconds (the clock of the statuses) at which it was sent.
+        timestamp: monotonic seconds, by the clock of the statuses, at which it was sent.
         acknowledged: whether the gripper has acknowledged it; if not, it may have arrived or not.
     """
 

@@ -37,6 +37,7 @@ PURE = [
 ]
 """No I/O, no clock, no event loop."""
 RUNTIME = [
+    "clock",
     "address",
     "reply",
     "messages",
