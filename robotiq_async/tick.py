@@ -94,12 +94,14 @@ class _Bell:
     """Strikes all ticks of one loop, while there are any."""
 
     _bells: ClassVar[dict[asyncio.AbstractEventLoop, _Bell]] = {}
+    """Loops of several threads come and go at once: whoever takes one out gives it back."""
 
     @classmethod
     def of(cls, loop: asyncio.AbstractEventLoop) -> _Bell:
-        """The one of a loop."""
-        for closed in [each for each in cls._bells if each.is_closed()]:
-            cls._bells[closed].abandon()
+        """The one of a loop; what loops have left that were closed without a word is given back."""
+        for each in list(cls._bells):
+            if each.is_closed() and (left := cls._bells.pop(each, None)) is not None:
+                left.give_back()
         bell = cls._bells.get(loop)
         if bell is None:
             bell = cls._bells[loop] = cls(loop)
@@ -168,17 +170,16 @@ class _Bell:
             return timer
         return None
 
-    def abandon(self) -> None:
-        """Give back what is left once the loop is not told any more, or was closed without a word."""
-        del self._bells[self._loop]
-        if self._timerfd is not None:
-            self._timerfd.close()
-
     def _close(self) -> None:
-        if self._bells.get(self._loop) is not self:
-            return  # abandoned
-        if self._timerfd is not None:
+        if self._bells.pop(self._loop, None) is None:
+            return  # given back by another thread
+        if self._timerfd is not None and not self._loop.is_closed():
             self._loop.remove_reader(self._timerfd.descriptor)
         if self._handle is not None:
             self._handle.cancel()
-        self.abandon()
+        self.give_back()
+
+    def give_back(self) -> None:
+        """Close the descriptor; the loop does not watch it any more."""
+        if self._timerfd is not None:
+            self._timerfd.close()
