@@ -27,6 +27,7 @@ The map; each module imports only what stands above it::
     reply        every byte of a reply, checked
     messages     what is asked and answered, as pymodbus knows it
     link         transports; the only module, messages aside, that uses pymodbus
+    worker       calls of somebody else's code, bounded in time
     guard        transports of somebody else's, held to what a hand relies on
     simulated    the transport of sim://
     statistics   figures about the polling

@@ -42,6 +42,7 @@ RUNTIME = [
     "reply",
     "messages",
     "link",
+    "worker",
     "guard",
     "simulated",
     "statistics",
