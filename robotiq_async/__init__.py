@@ -24,6 +24,8 @@ The map; each module imports only what stands above it::
     ------------------------------------------------------------
     clock        the time of what happens                      asyncio from here on
     address      which gripper
+    places       what all ways to write an address have in common
+    claims       who owns which gripper in this process
     reply        every byte of a reply, checked
     messages     what is asked and answered, as pymodbus knows it
     link         transports; the only module, messages aside, that uses pymodbus

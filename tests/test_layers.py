@@ -39,6 +39,8 @@ PURE = [
 RUNTIME = [
     "clock",
     "address",
+    "places",
+    "claims",
     "reply",
     "messages",
     "link",
