@@ -6,6 +6,7 @@ The map; each module imports only what stands above it::
     enums        the names of the field                        no I/O, no clock,
     errors       everything that is raised                     no event loop
     checks       argument checks
+    frozen       a mapping that stays as it is made
     registers    the bit fields, as data
     status       RobotiqStatus, decoded from eight registers
     request      Request, encoded into eight registers

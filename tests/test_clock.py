@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import importlib
 import logging
 import time
 from collections.abc import Callable
+from importlib.util import find_spec
 
 import pytest
-import uvloop
 
 from robotiq_async import Finger, RobotiqHand, RobotiqStatus, SentRequest, Transition
 from robotiq_async.clock import clock_of, now
@@ -35,7 +36,11 @@ def shifted_afterwards() -> asyncio.AbstractEventLoop:
 
 LOOPS = [
     pytest.param(asyncio.new_event_loop, id="asyncio"),
-    pytest.param(uvloop.new_event_loop, id="uvloop"),
+    pytest.param(
+        lambda: importlib.import_module("uvloop").new_event_loop(),
+        id="uvloop",
+        marks=pytest.mark.skipif(find_spec("uvloop") is None, reason="uvloop is not installed"),
+    ),
     *(pytest.param(shifted(by), id=f"{by:+g} s") for by in (0.5, -0.5, 1000.0, -1000.0)),
     pytest.param(shifted_afterwards, id="patched"),
     pytest.param(lambda: shifted(-time.monotonic())(), id="from 0"),

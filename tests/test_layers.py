@@ -19,6 +19,7 @@ PURE = [
     "enums",
     "errors",
     "checks",
+    "frozen",
     "registers",
     "status",
     "request",
