@@ -7,6 +7,7 @@ in another task.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import weakref
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -90,15 +91,19 @@ class Stream(Generic[T]):
             self._waiting = asyncio.get_running_loop().create_future()
             self._kept.add(self)
             try:
-                await self._waiting
-            finally:
-                self._kept.discard(self)
-                self._waiting = None
+                if not self._items and not self._ended:  # looked at again: the hand may run in another thread
+                    await self._waiting
+            except BaseException:
+                self._wait_no_longer()
+                # Whoever keeps the traceback, as a cancelled task does, is not to keep the stream with it.
+                del self
+                raise
+            self._wait_no_longer()
         if self._items:
             return self._items.popleft()
-        if self._failure is not None:
-            raise self._failure()
-        raise StopAsyncIteration
+        failure = self._failure
+        del self  # as above
+        raise StopAsyncIteration if failure is None else failure()
 
     def take_nowait(self) -> T | None:
         """The next item if there is one already."""
@@ -129,9 +134,27 @@ class Stream(Generic[T]):
             self._ended, self._failure = True, failure
             self._wake()
 
+    def _wait_no_longer(self) -> None:
+        self._kept.discard(self)
+        self._waiting = None
+
     def _wake(self) -> None:
-        if self._waiting is not None and not self._waiting.done():
-            self._waiting.set_result(None)
+        waiting = self._waiting
+        if waiting is None or waiting.done():
+            return
+        loop = waiting.get_loop()
+        if loop.is_closed():
+            self._wait_no_longer()  # whoever waited there never wakes up
+        elif loop is asyncio.get_running_loop():
+            waiting.set_result(None)
+        else:
+            with contextlib.suppress(RuntimeError):  # closed at this moment
+                loop.call_soon_threadsafe(_wake, waiting)
+
+
+def _wake(waiting: asyncio.Future[None]) -> None:
+    if not waiting.done():
+        waiting.set_result(None)
 
 
 class Channel(Generic[T]):
