@@ -1,8 +1,8 @@
 """The one clock of everything that happens to a hand.
 
 Timestamps, durations and ages are seconds of ``time.monotonic()``. asyncio's own loops go by it, and so does
-uvloop, whose ``time()`` is the millisecond at which the turn of the loop began. A loop that has been given a
-``time()`` of its own (virtual time, in tests) is believed: there it is that loop's.
+uvloop, whose ``time()`` is the same in whole milliseconds. A loop that has been given a ``time()`` of its own
+(virtual time, in tests) is believed: there it is that loop's.
 """
 
 from __future__ import annotations
@@ -18,8 +18,7 @@ _ASYNCIOS: Final = asyncio.BaseEventLoop.time
 
 def clock_of(loop: asyncio.AbstractEventLoop) -> Callable[[], float]:
     """The clock of what happens in a loop."""
-    # Not told by comparing what both show: they may be close by chance and part later, and uvloop's is as
-    # far behind as its loop is held up.
+    # Not told by comparing what both show: they may be close by chance, and part later.
     method = type(loop).time
     is_own = isinstance(method, FunctionType) and method is not _ASYNCIOS
     return loop.time if is_own or "time" in getattr(loop, "__dict__", ()) else time.monotonic
