@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections import deque
 from collections.abc import Awaitable, Callable
 from typing import Any, Final, TypeVar
 
@@ -30,7 +31,7 @@ class Worker:
         """
         self._name = name
         self._task: asyncio.Task[None] | None = None
-        self._calls: asyncio.Queue[_Call]
+        self._calls: _Calls
 
     async def call(self, what: Callable[[], Awaitable[T]], seconds: float) -> T:
         """Make a call, and wait for it.
@@ -76,21 +77,39 @@ class Worker:
     def _put(self, what: Callable[[], Awaitable[Any]], *, is_last: bool = False) -> _Call:
         loop = asyncio.get_running_loop()
         if self._task is None or self._task.done() or self._task.get_loop() is not loop:
-            self._calls = asyncio.Queue()
+            self._calls = _Calls()
             self._task = loop.create_task(_work(self._calls), name=self._name)
         call = _Call(what, loop.create_future(), is_last)
-        self._calls.put_nowait(call)
+        self._calls.put(call)
         return call
 
 
-async def _work(calls: asyncio.Queue[_Call]) -> None:
+async def _work(calls: _Calls) -> None:
     """Make the calls, until the last one."""
     has_ended = False
-    while not (has_ended and calls.empty()):
+    while calls.waiting or not has_ended:
         call = await calls.get()
         if not call.is_given_up:
             await call.make()
             has_ended = call.is_last
+
+
+class _Calls:
+    """What is still to be made. A queue of asyncio's complains if its loop is closed while somebody waits."""
+
+    def __init__(self) -> None:
+        self.waiting: deque[_Call] = deque()
+        self._more = asyncio.Event()
+
+    def put(self, call: _Call) -> None:
+        self.waiting.append(call)
+        self._more.set()
+
+    async def get(self) -> _Call:
+        while not self.waiting:
+            self._more.clear()
+            await self._more.wait()
+        return self.waiting.popleft()
 
 
 class _Call:
