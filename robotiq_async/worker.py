@@ -76,12 +76,21 @@ class Worker:
 
     def _put(self, what: Callable[[], Awaitable[Any]], *, is_last: bool = False) -> _Call:
         loop = asyncio.get_running_loop()
+        call = _Call(what, loop.create_future(), is_last)
         if self._task is None or self._task.done() or self._task.get_loop() is not loop:
             self._calls = _Calls()
-            self._task = loop.create_task(_work(self._calls), name=self._name)
-        call = _Call(what, loop.create_future(), is_last)
+            self._start(loop)
         self._calls.put(call)
         return call
+
+    def _start(self, loop: asyncio.AbstractEventLoop) -> None:
+        self._task = loop.create_task(_work(self._calls), name=self._name)
+        self._task.add_done_callback(self._on_end)
+
+    def _on_end(self, task: asyncio.Task[None]) -> None:
+        """The task has ended, perhaps by a cancellation that was meant for all (asyncio.run() ends so)."""
+        if task is self._task and self._calls.waiting:
+            self._start(task.get_loop())
 
 
 async def _work(calls: _Calls) -> None:

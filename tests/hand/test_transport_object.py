@@ -452,19 +452,30 @@ def test_a_transport_that_cannot_tell_whether_it_is_open_is_opened_again(
     assert "failed" not in caplog.text
 
 
-def test_the_fingers_are_stopped_over_a_transport_object_when_the_loop_is_torn_down() -> None:
-    """asyncio.run() cancels every task at once, whoever makes the calls among them."""
-    wires = []
+@pytest.mark.parametrize("backwards", [False, True])
+@pytest.mark.parametrize("turns", range(10))
+def test_the_fingers_are_stopped_over_a_transport_object_when_the_loop_is_torn_down(
+    backwards: bool, turns: int
+) -> None:
+    """asyncio.run() cancels every task at once, in any order and wherever it is."""
 
     async def main() -> None:
         wire = Wire()
-        wires.append(wire)
         hand = RobotiqHand(wire)
         await hand.start()
         await hand.set_position(255, Finger.A)
+        await anext(hand.statuses())
+        for _ in range(turns):
+            await asyncio.sleep(0)
+        tasks = asyncio.all_tasks() - {asyncio.current_task()}
+        assert len(tasks) == 2
+        for task in sorted(tasks, key=lambda each: each.get_name(), reverse=backwards):
+            task.cancel()
+        began = now()
+        await asyncio.wait(tasks)
+        assert now() - began < 0.2
+        image = Request.from_registers(wire.gripper.writes[-1].registers)
+        assert (image.activate, image.go) == (True, False)
+        assert not wire.is_open
 
-    with asyncio.Runner(loop_factory=VirtualLoop) as runner:
-        runner.run(main())
-    image = Request.from_registers(wires[0].gripper.writes[-1].registers)
-    assert (image.activate, image.go) == (True, False)
-    assert not wires[0].is_open
+    run(main)
