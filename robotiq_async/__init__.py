@@ -6,6 +6,7 @@ The map; each module imports only what stands above it::
     enums        the names of the field                        no I/O, no clock,
     errors       everything that is raised                     no event loop
     checks       argument checks
+    frozen       a mapping that stays as it is made
     registers    the bit fields, as data
     status       RobotiqStatus, decoded from eight registers
     request      Request, encoded into eight registers
@@ -22,12 +23,16 @@ The map; each module imports only what stands above it::
     motion       moves and their results
     core         decides what to write, learns from what is read
     ------------------------------------------------------------
-    address      which gripper                                 asyncio from here on
+    clock        the time of what happens                      asyncio from here on
+    address      which gripper
+    places       what all ways to write an address have in common
+    claims       who owns which gripper in this process
     reply        every byte of a reply, checked
     messages     what is asked and answered, as pymodbus knows it
     ending       work that ends well
     names        what the name of a host stands for
     link         transports; the only module, messages aside, that uses pymodbus
+    worker       calls of somebody else's code, bounded in time
     guard        transports of somebody else's, held to what a hand relies on
     simulated    the transport of sim://
     statistics   figures about the polling

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
+from .clock import now
 from .enums import (
     AXES,
     FORCE_MAX,
@@ -131,7 +132,7 @@ class Operator:
         Ends as :meth:`RobotiqHand.stop` does.
         """
         has_moved, rests = self.has_moved, self.hand.state in (State.RESET, State.ATR_DONE)
-        began = asyncio.get_running_loop().time()
+        began = now()
         await self.hand.stop(halt=has_moved)
         if not has_moved:
             return "The fingers were left as they are: nothing here has moved them."

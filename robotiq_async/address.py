@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import socket
+import re
 from dataclasses import dataclass
-from ipaddress import IPv6Address
+from ipaddress import IPv4Address, IPv6Address
 from typing import Final, Literal
 
 TCP_PORT: Final = 502
@@ -31,21 +29,6 @@ class Address:
     kind: Literal["tcp", "rtu", "sim"]
     host: str = ""
     port: int = 0
-
-    @property
-    def key(self) -> str:
-        """What all addresses of one gripper have in common, as far as that is known without asking anybody.
-
-        127.1 and localhost are 127.0.0.1, and the links to a serial port are that port.
-        """
-        host = self.host
-        if self.kind == "rtu":
-            host = os.path.realpath(host)
-        elif self.kind == "tcp":
-            host = "127.0.0.1" if host == "localhost" else host.removesuffix(".")
-            with contextlib.suppress(OSError):
-                host = socket.inet_ntoa(socket.inet_aton(host))
-        return f"{self.kind}://{host}:{self.port}"
 
     def __str__(self) -> str:
         """The address in its full form."""
@@ -73,6 +56,9 @@ def parse_address(address: object) -> Address:
         return Address("rtu", rest)
     if scheme == "tcp":
         host, port = _host_and_port(rest)
+        if ":" not in host and _ends_in_a_number(host) and not _is_ipv4(host):
+            what = f"{host} is not an IPv4 address: four numbers in 0..255, without leading zeros"
+            raise ValueError(f"malformed address {address!r}: {what}; accepted: {FORMS}")
         if host and port is not None:
             return Address("tcp", host, port)
     raise ValueError(f"malformed address {address!r}; accepted: {FORMS}")
@@ -95,7 +81,9 @@ def _host_and_port(text: str) -> tuple[str, int | None]:
             return "", None
     else:
         host, separator, port = text.partition(":")
-        if not set(host) <= _HOST_CHARACTERS or host.startswith((".", "-")):
+        if not set(host) <= _HOST_CHARACTERS or host.startswith("-"):
+            return "", None
+        if not all(1 <= len(label) <= 63 for label in host.removesuffix(".").split(".")):
             return "", None
         host = host.lower()
     if not separator:
@@ -106,3 +94,19 @@ def _host_and_port(text: str) -> tuple[str, int | None]:
 
 
 _HOST_CHARACTERS: Final = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-_")
+
+
+def _is_ipv4(host: str) -> bool:
+    try:
+        IPv4Address(host)
+    except ValueError:
+        return False
+    return True
+
+
+def _ends_in_a_number(host: str) -> bool:
+    """Whether resolvers take a host for an IPv4 address, in whatever spelling: 127.1, 0x7f000001.
+
+    They do not agree on all of them: 192.168.1.011 ends in 9 for one and in 11 for another.
+    """
+    return re.fullmatch(r"[0-9]+|0x[0-9a-f]*", host.removesuffix(".").rpartition(".")[2]) is not None

@@ -12,7 +12,7 @@ more than on the value.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -88,6 +88,7 @@ class SpeedCalibration:
             TypeError: a value or a figure of the wrong type.
             ValueError: fewer than two, not rising, or outside 0..255 and 0..600 s.
         """
+        object.__setattr__(self, "points", frozen(self.points))
         check_points(self.points, LONGEST_S)
         if not all(seconds for _, seconds in self.points):
             raise ValueError("points: a closing time must be above 0 s")
@@ -177,6 +178,7 @@ class ForceCalibration:
             TypeError: a value or a figure of the wrong type.
             ValueError: fewer than two, not rising, or outside 0..255 and 0..1000 N.
         """
+        object.__setattr__(self, "points", frozen(self.points))
         check_points(self.points, STRONGEST_N)
 
     @classmethod
@@ -252,6 +254,11 @@ def mean(runs: Sequence[int]) -> float:
 def newton(grams: float) -> float:
     """The force that a scale shows as a mass: F = m g, g = 9.81 m/s2."""
     return grams / 1000 * GRAVITY
+
+
+def frozen(points: Iterable[tuple[int, float]]) -> Points:
+    """Points that stay as they are, from whatever they come in."""
+    return tuple((value, figure) for value, figure in points)
 
 
 def check_points(points: Points, high: float) -> None:

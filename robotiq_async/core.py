@@ -11,6 +11,7 @@ Everything a caller waits for is a callback, told exactly once.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
@@ -79,7 +80,7 @@ class Core:
         """Whether an activation of ours may still be under way: to be taken back if the hand is stopped."""
         self._hold_on_return = NOBODY
         """Axes whose hold was not delivered before the link went down."""
-        self._warned = 0.0
+        self._warned = -math.inf
         self._desk = Desk()
         self._sent: Desk | None = None
         """What is on the line: sent, and not acknowledged yet."""

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
+from .clock import now
 from .enums import Fault
 from .errors import RobotiqConnectionError
 from .hand import RobotiqHand
@@ -155,9 +156,10 @@ class Feed:
     def begin(self) -> None:
         """Listen from now on; :meth:`end` ends it."""
         loop = asyncio.get_running_loop()
-        # Statuses carry the loop's clock; messages are stamped with the world's.
-        self._epoch = time.time() - loop.time()
-        self._tell(EVENT, loop.time(), beginning_fields(self._hand.state, loop.time()))
+        # What happens carries a monotonic clock; messages are stamped with the world's.
+        began = now()
+        self._epoch = time.time() - began
+        self._tell(EVENT, began, beginning_fields(self._hand.state, began))
         for source in self._sources:
             source.open()
         self._tasks = [
@@ -175,7 +177,7 @@ class Feed:
             source.drain()
 
     def nanoseconds(self, timestamp: float) -> int:
-        """A time of the loop's clock, since 1970."""
+        """A timestamp of the hand's, since 1970."""
         return round((timestamp + self._epoch) * 1e9)
 
     def _tell(self, topic: Topic, timestamp: float, fields: Fields, sequence: int = 0) -> None:

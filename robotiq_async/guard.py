@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from typing import TypeVar
 
 import anyio
@@ -18,6 +18,7 @@ from .errors import (
 from .link import Transport
 from .log import log
 from .registers import Registers, check_registers
+from .worker import LateError, Worker
 
 T = TypeVar("T")
 
@@ -41,11 +42,18 @@ class GuardedTransport:
         self._name = name
         self._connect_timeout = connect_timeout
         self._response_timeout = response_timeout
+        self._worker = Worker("robotiq_async transport")
+        self._is_begun = False
+        """Whether it has been asked to open and not to close since."""
 
     @property
     def is_open(self) -> bool:
         """Whether requests can be sent."""
-        return self._is_open and self._inner.is_open
+        try:
+            return self._is_open and bool(self._inner.is_open)
+        except Exception as error:  # noqa: BLE001  # what cannot tell is not open
+            log.warning("%s cannot tell whether it is open: %r", self._name, error)
+            return False
 
     async def open(self) -> None:
         """Connect.
@@ -53,8 +61,9 @@ class GuardedTransport:
         Raises:
             RobotiqConnectionError: that failed, or took too long.
         """
+        self._drop()
         try:
-            await self._bounded(self._inner.open(), self._connect_timeout)
+            await self._bounded(self._open_inner, self._connect_timeout)
         except (ResponseTimeoutError, ConnectionLostError) as error:
             raise ConnectFailedError(self._name, str(error)) from error
         self._is_open = True
@@ -65,11 +74,11 @@ class GuardedTransport:
         Raises:
             RobotiqConnectionError: that failed or took too long, or what came is not eight registers.
         """
-        registers = await self._bounded(self._inner.read(), self._response_timeout)
+        registers = await self._bounded(self._inner.read, self._response_timeout)
         try:
             return check_registers(registers)
-        except (TypeError, ValueError) as error:
-            await self.close()
+        except Exception as error:  # what it gives may be anything that can be iterated over
+            self._drop()
             raise ProtocolError(f"{self._name}: {error}") from error
 
     async def write(self, registers: Sequence[int]) -> None:
@@ -78,32 +87,47 @@ class GuardedTransport:
         Raises:
             RobotiqConnectionError: that failed, or took too long.
         """
-        await self._bounded(self._inner.write(registers), self._response_timeout)
+        await self._bounded(lambda: self._inner.write(registers), self._response_timeout)
 
     async def close(self) -> None:
         """Disconnect; never fails."""
-        # Whatever becomes of this, what comes later from the old connection is no answer to a new request.
+        self._drop()
+        with anyio.CancelScope(shield=True):
+            if not await self._worker.ended(self._response_timeout):
+                log.warning("%s is left to itself: what it was asked last has not ended", self._name)
+
+    def _drop(self) -> None:
+        """Have it closed as soon as it does nothing else; open() waits for that, and nobody else."""
+        # Whatever becomes of it, what comes later from this connection is no answer to a new request.
         self._is_open = False
+        if self._is_begun:
+            self._is_begun = False
+            self._worker.end(self._close_inner)
+
+    async def _open_inner(self) -> None:
+        self._is_begun = True
+        await self._inner.open()
+
+    async def _close_inner(self) -> None:
         try:
-            with anyio.CancelScope(shield=True):
-                async with asyncio.timeout(self._response_timeout):
-                    await self._inner.close()
+            async with asyncio.timeout(self._response_timeout):
+                await self._inner.close()
         except Exception as error:  # noqa: BLE001  # there is nothing left to do about it
             log.warning("%s did not close: %r", self._name, error)
 
-    async def _bounded(self, call: Awaitable[T], seconds: float) -> T:
-        limit = asyncio.timeout(seconds)
+    async def _bounded(self, call: Callable[[], Awaitable[T]], seconds: float) -> T:
         try:
-            async with limit:
-                return await call
+            return await self._worker.call(call, seconds)
         except RobotiqConnectionError:
+            self._drop()
             raise
+        except LateError as error:
+            self._drop()
+            raise ResponseTimeoutError(f"{self._name} did not answer {error}") from None
         except Exception as error:
-            await self.close()
-            if limit.expired():
-                raise ResponseTimeoutError(f"{self._name} did not answer within {seconds:g} s") from None
+            self._drop()
             raise ConnectionLostError(f"{self._name}: {error!r}") from error
         except asyncio.CancelledError:
             # In the middle of an exchange: its answer must not become that of another one.
-            await self.close()
+            self._drop()
             raise

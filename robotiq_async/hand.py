@@ -11,6 +11,8 @@ import anyio
 
 from .calibration import SpeedCalibration
 from .checks import check_byte, check_int, check_mask, check_timeout
+from .claims import Claims
+from .clock import now
 from .core import Core
 from .desk import Delivery
 from .ending import to_the_end
@@ -66,8 +68,8 @@ class RobotiqHand:
     Nothing of this has run on real hardware yet.
     """
 
-    _running: ClassVar[dict[str, RobotiqHand]] = {}
-    """Hands that own an address in this process."""
+    _running: ClassVar[Claims[RobotiqHand]] = Claims()
+    """Hands that own a gripper in this process."""
 
     def __init__(
         self,
@@ -94,7 +96,8 @@ class RobotiqHand:
         Args:
             address: ``tcp://HOST[:502]`` (or HOST, HOST:PORT), ``rtu:///dev/ttyUSB0``, ``sim://``, or a
                 transport object.
-            device_id: Modbus unit id, 1..247; by default 2 over TCP and 9 over RTU.
+            device_id: Modbus unit id, 1..247; by default 2 over TCP and 9 over RTU. Two hands on one TCP
+                address need one each: that of their gripper behind the gateway.
             poll_interval: seconds between polls, 0.001..0.1.
             connect_timeout: seconds for opening the link, 0.01..5.
             response_timeout: seconds for one answer, 0.005..0.5.
@@ -164,7 +167,7 @@ class RobotiqHand:
 
         Raises:
             RuntimeError: not in a running asyncio event loop.
-            InvalidStateError: this hand is started already, or another one runs on the same address.
+            InvalidStateError: this hand is started already, or another one runs on the same gripper.
             NotStartedError: stop() was called meanwhile.
             ConnectFailedError: nobody answers within the connect time-out.
             RobotiqConnectionError: somebody answers, but not a gripper; or the link went down again.
@@ -362,7 +365,7 @@ class RobotiqHand:
             else:
                 ended.set_exception(outcome)
 
-        move = Move(target, axes, loop.time(), resolve)
+        move = Move(target, axes, now(), resolve)
         core.move(move, speed, force)
         with self._counters.move() as note:
             try:
@@ -665,28 +668,26 @@ class RobotiqHand:
         return Core(self._machine, options.speed, options.force, options.closing_time)
 
     def _claim(self) -> None:
-        """Own the address in this process.
+        """Own the gripper in this process.
 
         Raises:
             InvalidStateError: it is owned already.
         """
-        key = self._options.key
-        owner = self._running.get(key)
-        if owner is not None and not owner._lost_its_loop():  # noqa: SLF001
-            who = "this hand" if owner is self else "another hand"
+        gripper = self._options.gripper
+        owner = self._running.claim(gripper, self, lambda each: each._task is None)  # noqa: SLF001
+        if owner is not None:
+            who, hint = ("this hand", "") if owner is self else ("another hand", gripper().hint)
             raise InvalidStateError(
-                f"{who} runs on {key} already: stop() it first",
+                f"{who} runs on {owner.address} already: stop() it first{hint}",
                 self.state,
                 {State.DISCONNECTED, State.SHUTDOWN},
             )
-        self._running[key] = self
 
     def _on_owner_done(self, task: asyncio.Task[None]) -> None:
         """The owner task has ended: nobody may wait for it any longer. Called by whoever sees it first."""
         if self._task is not task:
             return
-        if self._running.get(self._options.key) is self:
-            del self._running[self._options.key]
+        self._running.release(self)
         self._task = None
         failure: Callable[[], RobotiqError] | None = None
         if not task.cancelled() and (bug := task.exception()) is not None:
@@ -720,8 +721,7 @@ class RobotiqHand:
         if self._task is None or not self._lost_its_loop():
             return
         log.warning("%s: its event loop was closed before stop(); the fingers may still move", self.address)
-        if self._running.get(self._options.key) is self:
-            del self._running[self._options.key]
+        self._running.release(self)
         self._task = self._owner = None
         self._waiters = StateWaiters()
         for channel in self._channels:
@@ -730,8 +730,7 @@ class RobotiqHand:
         self._machine.happen(Trigger.STOPPED)
 
     def _on_transition(self, source: State, target: State, trigger: Trigger) -> None:
-        now = asyncio.get_running_loop().time()
-        self._transitions.push(Transition(source, target, trigger, now))
+        self._transitions.push(Transition(source, target, trigger, now()))
         self._counters.faults += target is State.FAULT
         self._waiters.reached(target)
         if target is State.DISCONNECTED:

@@ -7,6 +7,7 @@ written, and an adopted gripper's requests are only known from its status. No I/
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 from .adoption import TOLERANCE, Adoption, agrees
@@ -35,7 +36,7 @@ class Ledger:
         """Set from an adoption until the first write: what the base of that write is made from."""
         self._adopted = self._image
         self._watch = EchoWatch()
-        self._unsure_until = 0.0
+        self._unsure_until = -math.inf
         """Until then a write that was not acknowledged before a reconnect may still show."""
         self._moved = NOBODY
         """Axes that we have given a position since the gripper was found."""
@@ -99,7 +100,7 @@ class Ledger:
         """An image is about to be sent, with new positions for some axes; returns the number it goes by."""
         self._image = image
         self._adoption = None
-        self._unsure_until = 0.0
+        self._unsure_until = -math.inf
         self._moved |= moved
         for axis in AXES:
             if axis in moved:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
+from .clock import now
 from .closing_time import closing_time
 from .enums import Finger
 from .hand import RobotiqHand
@@ -139,7 +140,7 @@ async def grasp(hand: RobotiqHand, force: int, speed: int, speedup: float = 1.0)
         raise MeasuringError(f"something is in the way of opening ({opened.contacts!r})")
     await asyncio.sleep(REST_S / speedup)
     samples: list[Sample] = []
-    began = asyncio.get_running_loop().time()
+    began = now()
     with _watching(hand, lambda time, *milliampere: samples.append((time, *milliampere)), began, speedup):
         result = await hand.close(speed=speed, force=force)
         await asyncio.sleep(GRASP_S / speedup)

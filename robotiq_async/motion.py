@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Final
 
 from .closing_time import STROKE_COUNTS, closing_time
 from .enums import AXES, Finger, ObjectStatus
 from .errors import ConnectionLostError, RobotiqError
+from .frozen import FrozenMapping
 from .status import RobotiqStatus
 
 MARGIN_S: Final = 2.0
 """Added to twice the expected time for the default time-out of a move."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class MoveResult:
-    """How a move ended. A contact is a result, not an error.
+    """How a move ended. A contact is a result, not an error. A value: compared, hashed, copied, pickled.
 
     Attributes:
         outcomes: for each addressed axis, how it ended.
@@ -36,10 +36,23 @@ class MoveResult:
     peak_current_ma: Mapping[Finger, int]
     status: RobotiqStatus
 
+    def __post_init__(self) -> None:
+        """Keep mappings of our own."""
+        for name in ("outcomes", "positions", "peak_current_ma"):
+            object.__setattr__(self, name, FrozenMapping(getattr(self, name)))
+
     @property
     def object_detected(self) -> bool:
         """Whether a contact stopped at least one addressed axis."""
         return bool(self.contacts)
+
+    def __repr__(self) -> str:
+        """The words a person looks for first."""
+        axes = ", ".join(
+            f"{axis}={self.positions.get(axis)} {how.name} {self.peak_current_ma.get(axis)}mA"
+            for axis, how in self.outcomes.items()
+        )
+        return f"<MoveResult {axes} in {self.duration:.3f} s>"
 
 
 class Move:
@@ -98,11 +111,11 @@ class Move:
     def result(self, status: RobotiqStatus) -> MoveResult:
         """The result, from the status that ended the move."""
         return MoveResult(
-            outcomes=MappingProxyType({axis: status.finger_status(axis) for axis in self._peak}),
-            positions=MappingProxyType({axis: status.position(axis) for axis in self._peak}),
+            outcomes={axis: status.finger_status(axis) for axis in self._peak},
+            positions={axis: status.position(axis) for axis in self._peak},
             contacts=status.contacts & self.axes,
             duration=status.timestamp - self._started,
-            peak_current_ma=MappingProxyType(dict(self._peak)),
+            peak_current_ma=self._peak,
             status=status,
         )
 

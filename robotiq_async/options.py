@@ -10,10 +10,12 @@ from typing import Final
 from .address import parse_address
 from .calibration import SpeedCalibration
 from .checks import check_byte, check_int, check_seconds
+from .claims import Gripper
 from .closing_time import closing_time
 from .guard import GuardedTransport
 from .link import ModbusTransport, Transport
 from .owner import ReconnectPolicy
+from .places import place_of
 from .registers import REGISTER_COUNT, RTU_REGISTERS, TCP_REGISTERS
 from .simulated import SimulatedTransport, new_gripper
 
@@ -24,6 +26,12 @@ RESPONSE_TIMEOUT_S: Final = 0.4
 """Two of these, a read in flight and a write, still end within the second that a write may take."""
 ACTIVATION_TIMEOUT_S: Final = 20.0
 """What clients of the real gripper wait for (registers.md of the project's sources)."""
+HINTS: Final = {
+    "tcp": " (two grippers behind one gateway: give each of the hands its device_id)",
+    "rtu": " (a serial port has one owner, whatever the device_id: two would read each other's replies)",
+}
+"""For people who meant two grippers. A gateway takes several connections; on a serial line replies carry no
+number, and whoever has it open gets part of what arrives."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +41,8 @@ class Options:
     make_transport: Callable[[], Transport]
     """A transport for one start of the hand."""
     address: str
-    key: str
-    """The same for every address of this gripper."""
+    gripper: Callable[[], Gripper]
+    """Which one it is, at this moment: a serial port may have been plugged in meanwhile."""
     poll_interval: float
     activation_timeout: float
     policy: ReconnectPolicy | None
@@ -78,22 +86,27 @@ def check_options(
         if status_address is not None:
             registers = replace(registers, status=check_int("status_address", status_address, 0, last))
         make: Callable[..., Transport]
+        gripper: Callable[[], Gripper]
         if parsed.kind == "sim":
-            gripper = new_gripper()
-            make = partial(SimulatedTransport, gripper, registers)
-            name = key = f"sim://#{id(gripper):x}"  # every sim:// is a gripper of its own
+            simulated = new_gripper()
+            make = partial(SimulatedTransport, simulated, registers)
+            name = f"sim://#{id(simulated):x}"  # every sim:// is a gripper of its own
+            gripper = partial(Gripper, name)
         else:
             make = partial(ModbusTransport, parsed, registers)
-            name, key = str(parsed), parsed.key
+            name = str(parsed)
+            unit = registers.device_id if device_id is not None and parsed.kind == "tcp" else None
+            gripper = lambda: Gripper(place_of(parsed), unit, HINTS[parsed.kind])  # noqa: E731
     elif isinstance(address, Transport):
-        name = key = f"<{type(address).__name__} at {id(address):#x}>"
+        name = f"<{type(address).__name__} at {id(address):#x}>"
+        gripper = partial(Gripper, name)
         make = partial(GuardedTransport, address, name)
     else:
         raise TypeError(f"address must be a string or a Transport, got {address!r}")
     return Options(
         make_transport=partial(make, connect_timeout=connect_s, response_timeout=response_s),
         address=name,
-        key=key,
+        gripper=gripper,
         poll_interval=check_seconds("poll_interval", poll_interval, 0.001, 0.1),
         activation_timeout=check_seconds("activation_timeout", activation_timeout, 0.01, 120.0),
         policy=_check_reconnect(reconnect),

@@ -142,7 +142,7 @@ class Owner:
         self._last_poll = 0.0
         self._read_at = 0.0
         """When the newest status came in."""
-        self._warned = 0.0
+        self._warned = -math.inf
 
     def request_stop(self, *, halt: bool) -> None:
         """Ask the task to end; with ``halt`` it stops the fingers first. Never blocks."""

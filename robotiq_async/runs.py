@@ -55,8 +55,13 @@ class TableError(ValueError):
     """A file that is not such a table; tells file, line and reason."""
 
     def __init__(self, path: Path | str, line: int | None, reason: str) -> None:
-        """Compose the message; the line counts from 1."""
-        super().__init__(f"{path}{'' if line is None else f', line {line}'}: {reason}")
+        """Keep what the message is made of; the line counts from 1."""
+        super().__init__(str(path), line, reason)
+
+    def __str__(self) -> str:
+        """File, line and reason."""
+        path, line, reason = self.args
+        return f"{path}{'' if line is None else f', line {line}'}: {reason}"
 
 
 def read_table(path: Path | str, layout: Layout) -> Table:

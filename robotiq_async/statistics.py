@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from .errors import RobotiqError
+from .frozen import FrozenMapping
 from .motion import MoveResult
 
 SAMPLES: Final = 2000
@@ -50,6 +51,10 @@ class Statistics:
     tick: str
     faults: int
     moves: Mapping[str, int]
+
+    def __post_init__(self) -> None:
+        """Keep a mapping of our own."""
+        object.__setattr__(self, "moves", FrozenMapping(self.moves))
 
 
 class Counters:
@@ -114,7 +119,7 @@ class Counters:
             foreign_commands=foreign_commands,
             tick=self.tick,
             faults=self.faults,
-            moves=dict(self.moves),
+            moves=self.moves,
         )
 
 

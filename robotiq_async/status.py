@@ -74,7 +74,7 @@ class RobotiqStatus:
 
     @property
     def timestamp(self) -> float:
-        """Monotonic seconds (the event loop's clock) at which the reply arrived."""
+        """Monotonic seconds (``time.monotonic()``) at which the reply arrived."""
         return self._timestamp
 
     @property

@@ -31,7 +31,7 @@ class Transition:
         source: the state before.
         target: the state after.
         trigger: what made it happen.
-        timestamp: monotonic seconds (the event loop's clock).
+        timestamp: monotonic seconds, by the clock of the statuses.
     """
 
     source: State
@@ -46,7 +46,7 @@ class SentRequest:
 
     Attributes:
         request: the image.
-        timestamp: monotonic seconds (the clock of the statuses) at which it was sent.
+        timestamp: monotonic seconds, by the clock of the statuses, at which it was sent.
         acknowledged: whether the gripper has acknowledged it; if not, it may have arrived or not.
     """
 
@@ -96,15 +96,19 @@ class Stream(Generic[T]):
             self._waiting = asyncio.get_running_loop().create_future()
             self._kept.add(self)
             try:
-                await self._waiting
-            finally:
-                self._kept.discard(self)
-                self._waiting = None
+                if not self._items and not self._ended:  # looked at again: the hand may run in another thread
+                    await self._waiting
+            except BaseException:
+                self._wait_no_longer()
+                # Whoever keeps the traceback, as a cancelled task does, is not to keep the stream with it.
+                del self
+                raise
+            self._wait_no_longer()
         if self._items:
             return self._items.popleft()
-        if self._failure is not None:
-            raise self._failure()
-        raise StopAsyncIteration
+        failure = self._failure
+        del self  # as above
+        raise StopAsyncIteration if failure is None else failure()
 
     def take_nowait(self) -> T | None:
         """The next item if there is one already."""
@@ -146,9 +150,27 @@ class Stream(Generic[T]):
             with contextlib.suppress(RuntimeError):  # that loop has been closed
                 waiting.get_loop().call_soon_threadsafe(_finish, waiting)
 
+    def _wait_no_longer(self) -> None:
+        self._kept.discard(self)
+        self._waiting = None
+
     def _wake(self) -> None:
-        if self._waiting is not None and not self._waiting.done():
-            self._waiting.set_result(None)
+        waiting = self._waiting
+        if waiting is None or waiting.done():
+            return
+        loop = waiting.get_loop()
+        if loop.is_closed():
+            self._wait_no_longer()  # whoever waited there never wakes up
+        elif loop is asyncio.get_running_loop():
+            waiting.set_result(None)
+        else:
+            with contextlib.suppress(RuntimeError):  # closed at this moment
+                loop.call_soon_threadsafe(_wake, waiting)
+
+
+def _wake(waiting: asyncio.Future[None]) -> None:
+    if not waiting.done():
+        waiting.set_result(None)
 
 
 def _finish(waiting: asyncio.Future[None]) -> None:

@@ -2,7 +2,7 @@
 
 A loop's own timers are no good for 200 Hz: epoll rounds their time-outs up to a millisecond, and uvloop's
 clock is one. On Linux the next deadline is therefore kept by the kernel, in a timerfd that the running loop
-watches like a socket; elsewhere, and in a loop that keeps a clock of its own, by the loop's timers. All
+watches like a socket; elsewhere, and in a loop that has a clock of its own, by the loop's timers. All
 hands of a loop share one: whoever is due is woken together, and a busy loop is not woken more often for it.
 
 A tick that nobody waits for is counted and not caught up with. How late a tick came tells for how long the
@@ -16,15 +16,13 @@ import contextlib
 import heapq
 import math
 import time
-from collections.abc import Callable
 from typing import ClassVar, Final, Literal
 
+from .clock import clock_of
 from .timerfd import TimerFd
 
 Source = Literal["timerfd", "loop timer"]
 
-OWN_CLOCK_S: Final = 1.0
-"""A loop whose time is further than this from the system's monotonic clock keeps a clock of its own."""
 _GOLDEN: Final = (math.sqrt(5) - 1) / 2
 
 
@@ -40,7 +38,7 @@ class Tick:
         self._loop = asyncio.get_running_loop()
         self._bell: _Bell | None = None
         self.interval: Final = interval
-        self.time: Callable[[], float] = self._loop.time
+        self.time: Final = clock_of(self._loop)
         """The clock that the deadlines are those of."""
         self.due = 0.0
         """The next deadline."""
@@ -55,7 +53,6 @@ class Tick:
         """Begin to beat, or begin anew: the next tick comes within an interval."""
         self.close()
         self._bell = bell = _Bell.of(self._loop)
-        self.time = bell.clock
         phase = self.interval * bell.next_phase()
         self.due = math.ceil((self.time() - phase) / self.interval) * self.interval + phase
         self._passed, self.late = 0, 0.0
@@ -97,12 +94,14 @@ class _Bell:
     """Strikes all ticks of one loop, while there are any."""
 
     _bells: ClassVar[dict[asyncio.AbstractEventLoop, _Bell]] = {}
+    """Loops of several threads come and go at once: whoever takes one out gives it back."""
 
     @classmethod
     def of(cls, loop: asyncio.AbstractEventLoop) -> _Bell:
-        """The one of a loop."""
-        for closed in [each for each in cls._bells if each.is_closed()]:
-            cls._bells[closed].abandon()
+        """The one of a loop; what loops have left that were closed without a word is given back."""
+        for each in list(cls._bells):
+            if each.is_closed() and (left := cls._bells.pop(each, None)) is not None:
+                left.give_back()
         bell = cls._bells.get(loop)
         if bell is None:
             bell = cls._bells[loop] = cls(loop)
@@ -113,8 +112,8 @@ class _Bell:
         self._added = 0
         self._heap: list[tuple[float, int, Tick]] = []
         self._handle: asyncio.TimerHandle | None = None
+        self._clock = clock_of(loop)
         self._timerfd = self._watched_timerfd()
-        self.clock: Callable[[], float] = loop.time if self._timerfd is None else time.monotonic
 
     @property
     def source(self) -> Source:
@@ -140,7 +139,7 @@ class _Bell:
 
     def _ring(self) -> None:
         """Strike whoever is due."""
-        heap, now = self._heap, self.clock()
+        heap, now = self._heap, self._clock()
         while heap and heap[0][0] <= now:
             _, number, tick = heap[0]
             tick.strike(now)
@@ -159,7 +158,7 @@ class _Bell:
 
     def _watched_timerfd(self) -> TimerFd | None:
         """A timerfd that the loop watches; None where there is none, or where it would tell another time."""
-        if abs(self._loop.time() - time.monotonic()) > OWN_CLOCK_S:
+        if self._clock is not time.monotonic:
             return None
         with contextlib.suppress(OSError, NotImplementedError):
             timer = TimerFd()
@@ -171,17 +170,16 @@ class _Bell:
             return timer
         return None
 
-    def abandon(self) -> None:
-        """Give back what is left once the loop is not told any more, or was closed without a word."""
-        del self._bells[self._loop]
-        if self._timerfd is not None:
-            self._timerfd.close()
-
     def _close(self) -> None:
-        if self._bells.get(self._loop) is not self:
-            return  # abandoned
-        if self._timerfd is not None:
+        if self._bells.pop(self._loop, None) is None:
+            return  # given back by another thread
+        if self._timerfd is not None and not self._loop.is_closed():
             self._loop.remove_reader(self._timerfd.descriptor)
         if self._handle is not None:
             self._handle.cancel()
-        self.abandon()
+        self.give_back()
+
+    def give_back(self) -> None:
+        """Close the descriptor; the loop does not watch it any more."""
+        if self._timerfd is not None:
+            self._timerfd.close()

@@ -31,6 +31,7 @@ except ModuleNotFoundError as error:
 
 from .actions import Operator
 from .checks import check_int
+from .clock import now
 from .ending import in_a_thread, to_the_end
 from .enums import State
 from .errors import RobotiqError
@@ -191,9 +192,9 @@ class Viewer:
 
     def _tell_state(self) -> None:
         self._told = self._hand.state
-        now = self._loop.time()
-        data = compact(state_fields(self._hand, now))
-        self._channels[STATE].log(data, log_time=self._feed.nanoseconds(now))
+        at = now()
+        data = compact(state_fields(self._hand, at))
+        self._channels[STATE].log(data, log_time=self._feed.nanoseconds(at))
 
     async def _tell_again_and_again(self) -> None:
         while True:

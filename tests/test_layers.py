@@ -19,6 +19,7 @@ PURE = [
     "enums",
     "errors",
     "checks",
+    "frozen",
     "registers",
     "status",
     "request",
@@ -37,12 +38,16 @@ PURE = [
 ]
 """No I/O, no clock, no event loop."""
 RUNTIME = [
+    "clock",
     "address",
+    "places",
+    "claims",
     "reply",
     "messages",
     "ending",
     "names",
     "link",
+    "worker",
     "guard",
     "simulated",
     "statistics",

@@ -5,9 +5,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import gc
-import weakref
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable, Iterator
 
+import anyio
 import pytest
 
 from robotiq_async.enums import State
@@ -373,15 +373,123 @@ async def test_a_second_reader_that_takes_the_item_does_not_end_the_first(channe
 # -- garbage -----------------------------------------------------------------------------------------------
 
 
-async def test_an_abandoned_stream_is_forgotten(channel: Channel[int]) -> None:
+@pytest.fixture
+def no_collector() -> Iterator[None]:
+    """What goes has to go by itself."""
+    gc.collect()
+    gc.disable()
+    yield
+    gc.enable()
+
+
+async def read(channel: Channel[int], seen: list[int]) -> None:
+    async for item in channel.open(1):
+        seen.append(item)
+        return
+
+
+async def never_begun(channel: Channel[int]) -> object:
+    return channel.open(None).take_nowait()
+
+
+async def left_in_the_middle(channel: Channel[int]) -> object:
     stream = channel.open(None)
     channel.push(1)
-    gone = weakref.ref(stream)
-    del stream
-    gc.collect()
-    assert gone() is None
     channel.push(2)
+    async for _ in stream:
+        break
+    return None
+
+
+async def timed_out(channel: Channel[int]) -> object:
+    with pytest.raises(TimeoutError):
+        async with asyncio.timeout(0):
+            await read(channel, [])
+    return None
+
+
+async def timed_out_and_the_error_is_kept(channel: Channel[int]) -> object:
+    try:
+        async with asyncio.timeout(0):
+            await read(channel, [])
+    except TimeoutError as error:
+        return error
+    return None
+
+
+async def wait_for(channel: Channel[int]) -> object:
+    with pytest.raises(TimeoutError):
+        await asyncio.wait_for(anext(channel.open(1)), 0.001)
+    return None
+
+
+async def moved_on(channel: Channel[int]) -> object:
+    with anyio.move_on_after(0.001):
+        await read(channel, [])
+    return None
+
+
+async def in_a_group(channel: Channel[int]) -> object:
+    async with anyio.create_task_group() as group:
+        group.start_soon(read, channel, [])
+        await steps()
+        group.cancel_scope.cancel()
+    return None
+
+
+async def cancelled_and_the_task_is_kept(channel: Channel[int]) -> object:
+    task = asyncio.create_task(read(channel, []))
+    await steps()
+    task.cancel()
+    await asyncio.wait({task})
+    return task
+
+
+async def cancelled_and_the_outcome_is_kept(channel: Channel[int]) -> object:
+    task = asyncio.create_task(read(channel, []))
+    await steps()
+    task.cancel()
+    return await asyncio.gather(task, return_exceptions=True)
+
+
+async def begun_and_never_awaited(channel: Channel[int]) -> object:
+    coroutine = channel.open(1).__anext__()
+    coroutine.send(None)
+    return None
+
+
+async def closed(channel: Channel[int]) -> object:
+    stream = channel.open(1)
+    task = await reading(stream)
+    await stream.aclose()
+    await asyncio.wait({task})
+    return task.exception()
+
+
+@pytest.mark.usefixtures("no_collector")
+@pytest.mark.parametrize(
+    "leave",
+    [
+        never_begun,
+        left_in_the_middle,
+        timed_out,
+        timed_out_and_the_error_is_kept,
+        wait_for,
+        moved_on,
+        in_a_group,
+        cancelled_and_the_task_is_kept,
+        cancelled_and_the_outcome_is_kept,
+        begun_and_never_awaited,
+        closed,
+    ],
+)
+async def test_a_stream_that_nobody_holds_is_forgotten_at_once(
+    channel: Channel[int], leave: Callable[[Channel[int]], Awaitable[object]]
+) -> None:
+    kept = [await leave(channel) for _ in range(10)]
+    assert len(kept) == 10
     assert not channel._streams
+    assert not channel._waited_for
 
 
 async def test_an_iteration_that_is_left_leaves_nothing_behind(channel: Channel[int]) -> None:
@@ -403,18 +511,48 @@ async def test_a_waiting_reader_is_not_forgotten_though_nobody_keeps_its_task(ch
     # Python complains of a pending task that is destroyed; that is not what is asked here.
     asyncio.get_running_loop().set_exception_handler(lambda *_: None)
     seen: list[int] = []
-
-    async def read() -> None:
-        async for item in channel.open(1):
-            seen.append(item)
-            return
-
-    asyncio.create_task(read())  # noqa: RUF006
+    asyncio.create_task(read(channel, seen))  # noqa: RUF006
     await steps()
     gc.collect()
     channel.push(1)
     await steps()
     assert seen == [1]
+
+
+# -- other loops -------------------------------------------------------------------------------------------
+
+
+async def test_a_reader_whose_loop_was_closed_holds_up_nobody(channel: Channel[int]) -> None:
+    """It waits in a loop that was closed without cancelling its tasks."""
+
+    def leave_one_behind() -> asyncio.Task[None]:
+        loop = asyncio.new_event_loop()
+        task = loop.create_task(read(channel, []))
+        loop.run_until_complete(steps())
+        loop.close()
+        return task
+
+    left = await asyncio.to_thread(leave_one_behind)
+    stream = channel.open(1)
+    channel.push(1)
+    assert await anext(stream) == 1
+    assert not channel._waited_for
+    assert not left.done()
+    left._log_destroy_pending = False  # type: ignore[attr-defined]  # nobody will run it any more
+
+
+@pytest.mark.parametrize("debug", [False, True])
+async def test_a_reader_in_the_loop_of_another_thread_harms_nobody(
+    channel: Channel[int], debug: bool
+) -> None:
+    """In debug mode the loop refuses to be called from another thread."""
+    stream = channel.open(None)
+    reader = asyncio.create_task(asyncio.to_thread(lambda: asyncio.run(rest(stream), debug=debug)))
+    for item in range(100):
+        channel.push(item)
+        await asyncio.sleep(0.0001)
+    channel.end()
+    assert await reader == [*range(100)]
 
 
 # -- transitions -------------------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import sys
+import threading
 from collections.abc import Callable, Coroutine
 from itertools import pairwise
 from typing import Any
@@ -230,17 +231,50 @@ def test_where_no_timerfd_is_to_be_had_the_loop_keeps_them(loop: type[DeafLoop])
     in_loop(main, loop)
 
 
+class Meanwhile(asyncio.SelectorEventLoop):
+    """Lets another thread do something when it is asked whether it is closed."""
+
+    meanwhile: Callable[[], None] | None = None
+
+    def is_closed(self) -> bool:
+        meanwhile, self.meanwhile = self.meanwhile, None
+        if meanwhile is not None:
+            other = threading.Thread(target=meanwhile)
+            other.start()
+            other.join()
+        return super().is_closed()
+
+
+async def begun() -> Tick:
+    tick = Tick(INTERVAL)
+    tick.start()
+    await tick.wait()
+    return tick
+
+
+@pytest.mark.parametrize("what", ["comes", "goes"])
+def test_a_loop_comes_while_others_of_other_threads_come_and_go(what: str) -> None:
+    """In real life that takes luck, or sys.setswitchinterval(1e-6)."""
+    asked, going, coming, late = Meanwhile(), *(asyncio.new_event_loop() for _ in range(3))
+    ticks = [loop.run_until_complete(begun()) for loop in (asked, going)]
+
+    def come() -> None:
+        ticks.append(coming.run_until_complete(begun()))
+
+    asked.meanwhile = come if what == "comes" else ticks[1].close
+    ticks.append(late.run_until_complete(begun()))
+    assert asked.meanwhile is None
+    for tick in ticks:
+        tick.close()
+    for loop in (asked, going, coming, late):
+        loop.close()
+
+
 @pytest.mark.skipif(not LINUX, reason="timerfd is Linux's")
 def test_what_a_loop_leaves_that_is_closed_without_a_word_is_given_back() -> None:
-    async def begin() -> Tick:
-        tick = Tick(INTERVAL)
-        tick.start()
-        await tick.wait()
-        return tick
-
     def abandon() -> Tick:
         loop = asyncio.new_event_loop()
-        tick = loop.run_until_complete(begin())
+        tick = loop.run_until_complete(begun())
         loop.close()
         return tick
 

@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Final
 
+from ..clock import now
 from ..ending import in_a_thread
 from ..enums import Fault, State
 from ..feed import compact
@@ -76,8 +77,8 @@ class _Story:
         self._state = hand.state
         self._fault = Fault.NONE
         self._missed = 0
-        # Happenings carry the loop's clock; people and files go by the world's.
-        self._epoch = time.time() - asyncio.get_running_loop().time()
+        # Happenings carry a monotonic clock; people and files go by the world's.
+        self._epoch = time.time() - now()
 
     @property
     def has_ended(self) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import sys
 import time
 from collections import deque
@@ -17,6 +16,7 @@ from textual.widgets import RichLog, Static
 from textual.worker import Worker
 
 from ..actions import ACTIONS, Operator
+from ..clock import now
 from ..enums import AXES, Fault, State
 from ..errors import RobotiqError
 from ..payloads import fault_fields, transition_fields
@@ -96,7 +96,7 @@ class Monitor(App[None]):
         self._figures = Line(id="link")
         self._history = RichLog(id="log", max_lines=LOG_LINES, wrap=True)
         self._overruns = 0
-        self._polls = (asyncio.get_running_loop().time(), operator.hand.statistics.polls)
+        self._polls = (now(), operator.hand.statistics.polls)
 
     def compose(self) -> ComposeResult:
         """From top to bottom."""
@@ -119,8 +119,8 @@ class Monitor(App[None]):
     # -- what is shown ---------------------------------------------------------------------------------
 
     def remark(self, words: str, style: str = "yellow", when: float | None = None) -> None:
-        """A line for the log, at any time; ``when`` by the loop's clock."""
-        self._lines.append((asyncio.get_running_loop().time() if when is None else when, words, style))
+        """A line for the log, at any time; ``when`` by the hand's clock."""
+        self._lines.append((now() if when is None else when, words, style))
 
     def _paint(self) -> None:
         """Show what has come since the last time; of the statuses, the newest."""
@@ -133,7 +133,7 @@ class Monitor(App[None]):
         self._look(self._statuses.drain())
         for each in self._transitions.drain():
             self.remark(event_line(transition_fields(each)), "", each.timestamp)
-        epoch = time.time() - asyncio.get_running_loop().time()
+        epoch = time.time() - now()
         for when, words, style in sorted(self._lines):
             self._history.write(Text(f"{clock(epoch + when)} {words}", style), expand=True)
         self._lines.clear()
@@ -152,15 +152,15 @@ class Monitor(App[None]):
         self._axes.show(self._newest, peaks)
 
     def _paint_state(self) -> None:
-        state, age = self._hand.state, asyncio.get_running_loop().time() - self._newest.timestamp
+        state, age = self._hand.state, now() - self._newest.timestamp
         self._top.show(state_text(self._hand.address, state, self._newest, age))
         self._axes.show_age(state is State.DISCONNECTED)
 
     def _paint_figures(self) -> None:
-        figures, now = self._hand.statistics, asyncio.get_running_loop().time()
+        figures, at = self._hand.statistics, now()
         before, polls = self._polls
-        self._polls = (now, figures.polls)
-        rate = (figures.polls - polls) / (now - before) if now > before else 0.0
+        self._polls = (at, figures.polls)
+        rate = (figures.polls - polls) / (at - before) if at > before else 0.0
         operator = self._operator
         held_up, self._overruns = figures.overruns > self._overruns, figures.overruns
         self._figures.show(link_text(figures, rate, held_up, operator.speed, operator.force))

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Awaitable, Callable, Sequence
+from typing import Any
 
 import pytest
 
@@ -17,15 +19,18 @@ from robotiq_async import (
     State,
     Transport,
 )
+from robotiq_async.clock import now
 from robotiq_async.registers import Registers
+from robotiq_async.request import Request
 from robotiq_async.simulator import SimulatedGripper
+from tests.virtual import VirtualLoop, run
 
 
 class Wire:
     """A gripper without a network: the link breaks when told to."""
 
     def __init__(self) -> None:
-        self.gripper = SimulatedGripper(speedup=20)
+        self.gripper = SimulatedGripper(asyncio.get_running_loop().time, speedup=20)
         self.is_open = False
         self.fail_opens = 0
         self.opened_at: list[float] = []
@@ -135,82 +140,204 @@ class Rogue(Wire):
         super().__init__()
         self.call, self.what = call, what
         self.is_rogue = False
+        self.released = asyncio.Event()
+        """Set to let go of a call that does not end when it is cancelled."""
+        self.inside = self.most_inside = 0
+        """Calls at once: now, and ever."""
 
-    async def open(self) -> None:
-        await self._misbehave("open")
-        await super().open()
+    # Plain functions: a transport need not be written with async def.
 
-    async def read(self) -> Registers:
-        await self._misbehave("read")
-        registers = await super().read()
-        if self.is_rogue and self.what == "seven":
-            return registers[:7]
-        if self.is_rogue and self.what == "range":
-            return (0x10000, *registers[1:])
-        return registers
+    def open(self) -> Any:
+        return self._misbehave("open") or self._carried_out("open", super().open)
 
-    async def write(self, registers: Sequence[int]) -> None:
-        await self._misbehave("write")
-        await super().write(registers)
+    def read(self) -> Any:
+        return self._misbehave("read") or self._carried_out("read", super().read)
 
-    async def _misbehave(self, call: str) -> None:
-        if not self.is_rogue or call != self.call:
-            return
-        if self.what == "never":
-            await asyncio.Event().wait()
-        if self.what == "raise":
-            raise OSError(5, "input/output error")
+    def write(self, registers: Sequence[int]) -> Any:
+        return self._misbehave("write") or self._carried_out("write", super().write, registers)
+
+    def close(self) -> Any:
+        return self._misbehave("close") or self._carried_out("close", super().close)
+
+    def _is_rogue_in(self, call: str) -> str:
+        return self.what if self.is_rogue and call == self.call else ""
+
+    def _misbehave(self, call: str) -> object:
+        match self._is_rogue_in(call):
+            case "raise at once":
+                raise OSError(5, "input/output error")
+            case "stop iterating":
+                raise StopIteration
+            case "return at once":
+                return (0,) * 8
+        return None
+
+    async def _carried_out(
+        self, call: str, what: Callable[..., Awaitable[Any]], *arguments: object
+    ) -> object:
+        self.inside += 1
+        self.most_inside = max(self.most_inside, self.inside)
+        try:
+            return await self._or_not(call, what, *arguments)
+        finally:
+            self.inside -= 1
+
+    async def _or_not(self, call: str, what: Callable[..., Awaitable[Any]], *arguments: object) -> object:
+        match self._is_rogue_in(call):
+            case "never":
+                await asyncio.Event().wait()
+            case "never, and does not end":
+                while not self.released.is_set():
+                    with contextlib.suppress(asyncio.CancelledError):
+                        await self.released.wait()
+            case "raise":
+                raise OSError(5, "input/output error")
+            case "raise ours":
+                raise ConnectionLostError("unplugged")
+            case "cancel itself":
+                raise asyncio.CancelledError
+            case "seven":
+                return (await what(*arguments))[:7]
+            case "range":
+                return (0x10000, *(await what(*arguments))[1:])
+            case "bad iterator":
+                return map(int, ["x"])
+            case "nothing":
+                return None
+        return await what(*arguments)
 
 
-WAYS = [
-    ("open", "never"),
-    ("open", "raise"),
-    ("read", "never"),
-    ("read", "raise"),
-    ("read", "seven"),
-    ("read", "range"),
+IN_ANY_CALL = [
+    "never",
+    "never, and does not end",
+    "raise",
+    "raise ours",
+    "raise at once",
+    "return at once",
+    "stop iterating",
+    "cancel itself",
 ]
+WAYS = [
+    *((call, what) for call in ("open", "read") for what in IN_ANY_CALL),
+    *(("read", what) for what in ("seven", "range", "bad iterator", "nothing")),
+]
+WAYS.remove(("open", "return at once"))
 
 
 @pytest.mark.parametrize(("call", "what"), WAYS)
-async def test_a_rogue_transport_fails_the_start(call: str, what: str) -> None:
-    wire = Rogue(call, what)
-    wire.is_rogue = True
-    hand = RobotiqHand(wire, connect_timeout=0.2, response_timeout=0.1)
-    async with asyncio.timeout(5):
-        with pytest.raises((ConnectFailedError, ProtocolError)):
-            await hand.start()
-    assert hand.state is State.SHUTDOWN
-    wire.is_rogue = False
-    async with hand:
-        await hand.move(30, Finger.A)
-
-
-@pytest.mark.parametrize(("call", "what"), [*WAYS[2:], ("write", "never"), ("write", "raise")])
-async def test_a_rogue_transport_is_a_lost_link(call: str, what: str) -> None:
-    wire = Rogue(call, what)
-    async with RobotiqHand(wire, connect_timeout=0.2, response_timeout=0.1) as hand:
+def test_a_rogue_transport_fails_the_start(call: str, what: str) -> None:
+    async def main() -> None:
+        wire = Rogue(call, what)
         wire.is_rogue = True
-        hand.command(Finger.A, position=100)
-        await hand.wait_for_state(State.DISCONNECTED, timeout=5)
+        hand = RobotiqHand(wire, connect_timeout=0.2, response_timeout=0.1)
+        async with asyncio.timeout(5):
+            with pytest.raises((ConnectFailedError, ProtocolError, ConnectionLostError)):
+                await hand.start()
+        assert hand.state is State.SHUTDOWN
         wire.is_rogue = False
-        await hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
-        await hand.move(30, Finger.B)
+        wire.released.set()
+        async with hand:
+            await hand.move(30, Finger.A)
+        assert wire.most_inside == 1
+
+    run(main)
 
 
-@pytest.mark.parametrize("what", ["never", "raise"])
-async def test_stop_ends_on_a_rogue_transport(what: str) -> None:
-    wire = Rogue("read", what)
-    hand = RobotiqHand(wire, connect_timeout=0.2)
-    await hand.start()
-    wire.is_rogue = True
-    async with asyncio.timeout(3):
+@pytest.mark.parametrize(
+    ("call", "what"),
+    [
+        *(way for way in WAYS if way[0] == "read"),
+        *(("write", what) for what in IN_ANY_CALL if what != "return at once"),
+    ],
+)
+def test_a_rogue_transport_is_a_lost_link(call: str, what: str) -> None:
+    async def main() -> None:
+        wire = Rogue(call, what)
+        async with RobotiqHand(wire, connect_timeout=0.2, response_timeout=0.1) as hand:
+            wire.is_rogue = True
+            hand.command(Finger.A, position=100)
+            await hand.wait_for_state(State.DISCONNECTED, timeout=5)
+            wire.is_rogue = False
+            wire.released.set()
+            await hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
+            await hand.move(30, Finger.B)
+        assert wire.most_inside == 1
+
+    run(main)
+
+
+@pytest.mark.parametrize("call", ["read", "write", "close"])
+@pytest.mark.parametrize("what", IN_ANY_CALL)
+def test_stop_ends_on_a_rogue_transport(call: str, what: str) -> None:
+    async def main() -> None:
+        before = asyncio.all_tasks()
+        wire = Rogue(call, what)
+        hand = RobotiqHand(wire, response_timeout=0.5)
+        await hand.start()
+        await hand.set_position(255, Finger.A)
+        wire.is_rogue = True
+        began = now()
         await hand.stop()
-    assert hand.state is State.SHUTDOWN
+        assert now() - began < 2.0
+        assert hand.state is State.SHUTDOWN
+        wire.released.set()
+        await asyncio.gather(*asyncio.all_tasks() - before, return_exceptions=True)
+        assert wire.most_inside == 1
+
+    run(main)
+
+
+def test_an_answer_that_comes_after_its_time_is_not_believed() -> None:
+    """A call that swallows its cancellation answers two seconds late."""
+
+    async def main() -> None:
+        wire = Rogue("read", "never, and does not end")
+        async with RobotiqHand(wire, response_timeout=0.1) as hand:
+            statuses = hand.statuses(1000)
+            wire.is_rogue = True
+            asked = now()
+            await hand.wait_for_state(State.DISCONNECTED)
+            assert now() - asked < 0.1 + 0.01
+            known = hand.status
+            with pytest.raises(ConnectionLostError):
+                await hand.set_position(255)
+            await asyncio.sleep(2)
+            assert hand.state is State.DISCONNECTED
+            wire.gripper.write(0, Request(activate=True, go=True).registers)
+            wire.is_rogue = False
+            wire.released.set()
+            await hand.wait_for_state(State.RUNNING_IDLE, timeout=2.5)
+            seen = [each for each in statuses.drain() if each.sequence > known.sequence]
+            assert all(each.timestamp > asked + 2 for each in seen)
+            assert wire.most_inside == 1
+
+    run(main)
+
+
+class HeldUp(Wire):
+    """Its reply takes a millisecond, in which the loop is held up for much longer."""
+
+    async def read(self) -> Registers:
+        loop = asyncio.get_running_loop()
+        assert isinstance(loop, VirtualLoop)
+        loop.call_soon(loop.hold_up, 0.2)
+        await asyncio.sleep(0.001)
+        return await super().read()
+
+
+def test_a_reply_that_waits_while_the_loop_is_held_up_is_in_time() -> None:
+    async def main() -> None:
+        async with RobotiqHand(HeldUp(), response_timeout=0.05) as hand:
+            statuses = hand.statuses()
+            for _ in range(10):
+                await anext(statuses)
+            assert hand.statistics.reconnects == 0
+
+    run(main)
 
 
 class Slow(Wire):
-    """Its answers come in order, and closing it takes a moment, or for ever."""
+    """Its answers come in order, and closing it takes a moment; or all takes for ever."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -231,6 +358,11 @@ class Slow(Wire):
         registers = await super().read()
         asyncio.get_running_loop().call_later(self.answers_after, self.answers.put_nowait, registers)
         return await self.answers.get()
+
+    async def write(self, registers: Sequence[int]) -> None:
+        if self.hangs:
+            await asyncio.Event().wait()
+        await super().write(registers)
 
     async def close(self) -> None:
         if self.hangs:
@@ -257,11 +389,93 @@ async def test_a_read_that_stop_interrupts_leaves_no_answer_to_the_next() -> Non
     assert wire.calls[first : first + 3] == ["read", "close", "open"]
 
 
-async def test_stop_is_bounded_when_a_transport_neither_answers_nor_closes() -> None:
-    wire = Slow()
-    hand = RobotiqHand(wire, response_timeout=0.5)
-    await hand.start()
-    wire.hangs = True
-    began = asyncio.get_running_loop().time()
-    await hand.stop()
-    assert asyncio.get_running_loop().time() - began < 2.0
+def test_stop_is_bounded_when_a_transport_neither_answers_nor_closes() -> None:
+    async def main() -> None:
+        wire = Slow()
+        hand = RobotiqHand(wire, response_timeout=0.5)
+        await hand.start()
+        wire.hangs = True
+        began = now()
+        await hand.stop()
+        assert now() - began < 2.0
+
+    run(main)
+
+
+def test_a_write_fails_within_a_second_though_closing_takes_its_time_too() -> None:
+    async def main() -> None:
+        wire = Slow()
+        async with RobotiqHand(wire, response_timeout=0.5) as hand:
+            wire.hangs = True
+            began = now()
+            with pytest.raises(ConnectionLostError):
+                await hand.set_position(100)
+            assert now() - began < 0.6
+            wire.hangs = False
+
+    run(main)
+
+
+class Mute(Wire):
+    """Cannot tell whether it is open."""
+
+    def __init__(self) -> None:
+        self.is_mute = self._is_open = False
+        super().__init__()
+
+    @property
+    def is_open(self) -> bool:
+        if self.is_mute:
+            raise OSError(5, "input/output error")
+        return self._is_open
+
+    @is_open.setter
+    def is_open(self, value: bool) -> None:
+        self._is_open = value
+
+
+def test_a_transport_that_cannot_tell_whether_it_is_open_is_opened_again(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async def main() -> None:
+        wire = Mute()
+        hand = RobotiqHand(wire)
+        await hand.start()
+        await hand.set_position(255, Finger.A)
+        wire.is_mute = True
+        await hand.stop()
+        assert not Request.from_registers(wire.gripper.writes[-1].registers).go
+        assert len(wire.opened_at) == 2
+
+    run(main)
+    assert "cannot tell whether it is open" in caplog.text
+    assert "failed" not in caplog.text
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+@pytest.mark.parametrize("turns", range(10))
+def test_the_fingers_are_stopped_over_a_transport_object_when_the_loop_is_torn_down(
+    backwards: bool, turns: int
+) -> None:
+    """asyncio.run() cancels every task at once, in any order and wherever it is."""
+
+    async def main() -> None:
+        wire = Wire()
+        hand = RobotiqHand(wire)
+        await hand.start()
+        await hand.set_position(255, Finger.A)
+        await anext(hand.statuses())
+        for _ in range(turns):
+            await asyncio.sleep(0)
+        tasks = asyncio.all_tasks() - {asyncio.current_task()}
+        assert len(tasks) == 2
+        for task in sorted(tasks, key=lambda each: each.get_name(), reverse=backwards):
+            task.cancel()
+        began = now()
+        await asyncio.wait(tasks)
+        assert now() - began < 0.2
+        image = Request.from_registers(wire.gripper.writes[-1].registers)
+        assert (image.activate, image.go) == (True, False)
+        assert not wire.is_open
+
+    run(main)

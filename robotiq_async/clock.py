@@ -1,0 +1,33 @@
+"""The one clock of everything that happens to a hand.
+
+Timestamps, durations and ages are seconds of ``time.monotonic()``. asyncio's own loops go by it, and so does
+uvloop, whose ``time()`` is the same in whole milliseconds. A loop that has been given a ``time()`` of its own
+(virtual time, in tests) is believed: there it is that loop's.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+from types import FunctionType
+from typing import Final
+
+_ASYNCIOS: Final = asyncio.BaseEventLoop.time
+
+
+def clock_of(loop: asyncio.AbstractEventLoop) -> Callable[[], float]:
+    """The clock of what happens in a loop."""
+    # Not told by comparing what both show: they may be close by chance, and part later.
+    method = type(loop).time
+    is_own = isinstance(method, FunctionType) and method is not _ASYNCIOS
+    return loop.time if is_own or "time" in getattr(loop, "__dict__", ()) else time.monotonic
+
+
+def now() -> float:
+    """The time by the clock of the running loop.
+
+    Raises:
+        RuntimeError: no event loop runs here.
+    """
+    return clock_of(asyncio.get_running_loop())()

@@ -1,0 +1,102 @@
+"""Claims: who owns which gripper."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+
+import pytest
+
+from robotiq_async.claims import Claims, Gripper
+
+
+def never(_: object) -> bool:
+    return False
+
+
+@pytest.fixture
+def claims() -> Claims[str]:
+    return Claims()
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "may_be"),
+    [
+        (Gripper("x"), Gripper("x"), True),
+        (Gripper("x"), Gripper("y"), False),
+        (Gripper("x", 2), Gripper("x", 2), True),
+        (Gripper("x", 2), Gripper("x", 3), False),
+        (Gripper("x"), Gripper("x", 3), True),
+        (Gripper("x", 2), Gripper("y", 2), False),
+        (Gripper("x", 2, "one hint"), Gripper("x", 2, "another"), True),
+    ],
+)
+def test_unit_ids_tell_grippers_apart_where_both_are_given(
+    one: Gripper, other: Gripper, may_be: bool
+) -> None:
+    assert one.may_be(other) is other.may_be(one) is may_be
+
+
+async def test_the_first_owns_it_until_it_gives_it_back(claims: Claims[str]) -> None:
+    assert claims.claim(lambda: Gripper("x"), "first", never) is None
+    for who in ("second", "first"):
+        assert claims.claim(lambda: Gripper("x"), who, never) == "first"
+    assert claims.claim(lambda: Gripper("y"), "second", never) is None
+    claims.release("first")
+    assert claims.claim(lambda: Gripper("x"), "third", never) is None
+
+
+async def test_where_a_gripper_is_is_asked_again(claims: Claims[str]) -> None:
+    places = {"by-id": "ttyUSB0"}
+    claims.claim(lambda: Gripper(places["by-id"]), "first", never)
+    assert claims.claim(lambda: Gripper("ttyUSB0"), "second", never) == "first"
+    places["by-id"] = "ttyUSB1"
+    assert claims.claim(lambda: Gripper("ttyUSB1"), "second", never) == "first"
+    assert claims.claim(lambda: Gripper("ttyUSB0"), "second", never) is None
+
+
+async def test_an_owner_that_is_over_owns_nothing(claims: Claims[str]) -> None:
+    claims.claim(lambda: Gripper("x"), "first", never)
+    assert claims.claim(lambda: Gripper("x"), "second", lambda who: who == "first") is None
+    assert claims.claim(lambda: Gripper("x"), "third", never) == "second"
+
+
+def test_an_owner_whose_loop_was_closed_owns_nothing(claims: Claims[str]) -> None:
+    async def claim(who: str) -> str | None:
+        return claims.claim(lambda: Gripper("x"), who, never)
+
+    assert asyncio.run(claim("first")) is None
+    assert asyncio.run(claim("second")) is None
+
+
+async def test_an_owner_of_another_loop_is_not_asked_whether_it_is_over(claims: Claims[str]) -> None:
+    """It may be about to begin."""
+    claims.claim(lambda: Gripper("x"), "first", never)
+
+    async def claim() -> str | None:
+        return claims.claim(lambda: Gripper("x"), "second", lambda _: True)
+
+    assert await asyncio.to_thread(asyncio.run, claim()) == "first"
+
+
+async def test_of_many_threads_one_gets_it(claims: Claims[str]) -> None:
+    def slowly() -> Gripper:
+        time.sleep(0.001)  # somebody else's turn, in the middle of a claim
+        return Gripper("another")
+
+    claims.claim(slowly, "somebody", never)
+    together = threading.Barrier(4)
+
+    async def claim(who: str) -> bool:
+        together.wait()
+        got_it = claims.claim(lambda: Gripper("x"), who, never) is None
+        together.wait()  # whose loop is closed owns nothing any more
+        return got_it
+
+    def in_its_loop(number: int) -> bool:
+        return asyncio.run(claim(f"thread {number}"))
+
+    for _ in range(3):
+        got = await asyncio.gather(*(asyncio.to_thread(in_its_loop, number) for number in range(4)))
+        assert sum(got) == 1

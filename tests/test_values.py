@@ -1,0 +1,281 @@
+"""What the library hands out are values: they can be compared, hashed, copied and sent to other processes."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import importlib
+import inspect
+import json
+import pickle
+import pkgutil
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import pytest
+
+import robotiq_async
+from robotiq_async import (
+    ConnectFailedError,
+    Fault,
+    Finger,
+    GripperFaultError,
+    InvalidStateError,
+    Mode,
+    MoveResult,
+    MoveTimeoutError,
+    ObjectStatus,
+    ReconnectPolicy,
+    SentRequest,
+    Severity,
+    State,
+    Statistics,
+    Transition,
+    Trigger,
+)
+from robotiq_async.address import parse_address
+from robotiq_async.calibration import ForceCalibration, SpeedCalibration
+from robotiq_async.doctor import Finding, Level
+from robotiq_async.frozen import FrozenMapping
+from robotiq_async.motion import Move
+from robotiq_async.registers import TCP_REGISTERS, gDT
+from robotiq_async.request import AxisRequest, Request
+from robotiq_async.runs import SPEED, TableError
+from robotiq_async.simulator import Trouble
+from robotiq_async.statistics import Counters
+from tests.words import status_of
+
+A, B = Finger.A, Finger.B
+
+
+def result(**changes: object) -> MoveResult:
+    fields: dict[str, Any] = {
+        "outcomes": {A: ObjectStatus.CONTACT_CLOSING, B: ObjectStatus.AT_POSITION},
+        "positions": {A: 150, B: 200},
+        "contacts": A,
+        "duration": 1.25,
+        "peak_current_ma": {A: 310, B: 150},
+        "status": status_of(0xB9, 0xEA, at=12.5, sequence=7),
+    }
+    return MoveResult(**fields | changes)
+
+
+def statistics() -> Statistics:
+    counters = Counters()
+    counters.moves["reached"] = 3
+    return counters.snapshot(0)
+
+
+def real_result() -> MoveResult:
+    move = Move(255, A | B, 10.0, lambda _: None)
+    move.observe(status_of(0x39, 0xC0, current=15))
+    return move.result(status_of(0xB9, 0xEA, at=12.5))
+
+
+VALUES: list[object] = [
+    real_result(),
+    result(),
+    statistics(),
+    status_of(0xB9, 0xEA, at=12.5, sequence=7),
+    Transition(State.RESET, State.DO_ACTIVATION, Trigger.ASK_ACTIVATE, 12.5),
+    SentRequest(Request(activate=True, axes=(AxisRequest(1, 2, 3),) * 4), 12.5, acknowledged=True),
+    AxisRequest(1, 2, 3),
+    ReconnectPolicy(give_up_after=3.0),
+    SpeedCalibration.thesis(),
+    SpeedCalibration("mine", [[0, 9.0], [255, 2.0]]),  # type: ignore[arg-type]
+    ForceCalibration.nominal(),
+    Request(activate=True, mode=Mode.PINCH),
+    parse_address("tcp://gripper"),
+    TCP_REGISTERS,
+    gDT[0],
+    SPEED,
+    Finding(Level.GOOD, "port", "open"),
+    Trouble("late", at=1.0),
+    Fault.SCISSOR_BLOCKED,
+    Fault(0x0C),
+    Severity.MAJOR,
+    Finger.A | Finger.SCISSOR,
+    FrozenMapping({A: 1}),
+]
+ERRORS: list[Exception] = [
+    InvalidStateError("not now", State.RESET, [State.FAULT]),
+    GripperFaultError(Fault.SCISSOR_BLOCKED),
+    GripperFaultError(Fault(0x0C), "as told"),
+    MoveTimeoutError("too slow", status_of(0x39, 0xC0)),
+    ConnectFailedError("tcp://192.168.1.11:502", "refused"),
+    TableError("table.csv", 3, "no number"),
+    TableError("table.csv", None, "the file is empty"),
+]
+
+
+def kinds() -> Iterator[type]:
+    """Every class that is defined in the package and has a public name."""
+    for found in pkgutil.walk_packages(robotiq_async.__path__, "robotiq_async."):
+        if found.name.endswith("__main__"):
+            continue
+        try:
+            module = importlib.import_module(found.name)
+        except ImportError:
+            continue  # of an extra that is not installed
+        for name, kind in vars(module).items():
+            if inspect.isclass(kind) and kind.__module__ == found.name and not name.startswith("_"):
+                yield kind
+
+
+def named(each: list[Any]) -> list[Any]:
+    """As parameters."""
+    return [pytest.param(one, id=f"{type(one).__name__}-{number}") for number, one in enumerate(each)]
+
+
+def copies(value: Any) -> Iterator[Any]:
+    yield copy.copy(value)
+    yield copy.deepcopy(value)
+    for protocol in range(2, pickle.HIGHEST_PROTOCOL + 1):
+        yield pickle.loads(pickle.dumps(value, protocol))
+
+
+@pytest.mark.parametrize("value", named(VALUES))
+def test_a_value_is_equal_to_its_copies_and_hashes_like_them(value: object) -> None:
+    for again in copies(value):
+        assert type(again) is type(value)
+        assert again == value
+        assert hash(again) == hash(value)
+        assert repr(again) == repr(value)
+
+
+@pytest.mark.parametrize("value", named(VALUES))
+def test_a_value_is_told_in_one_line(value: object) -> None:
+    assert "\n" not in repr(value)
+    assert " object at 0x" not in repr(value)
+
+
+@pytest.mark.parametrize("value", named([*filter(dataclasses.is_dataclass, VALUES)]))
+def test_a_value_can_be_taken_apart_and_is_not_changed_by_that(value: Any) -> None:
+    fields = dataclasses.asdict(value)
+    assert list(fields) == [field.name for field in dataclasses.fields(value)]
+    assert dataclasses.replace(value) == value
+    for name in fields:
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            setattr(value, name, None)
+
+
+NO_VALUES = {
+    "Action": "what a person may ask, with the function that does it",
+    "Campaign": "work in progress",
+    "Desk": "work in progress",
+    "Gripper": "internal",
+    "Link": "arguments of a command",
+    "Message": "bytes on their way",
+    "Ongoing": "work in progress",
+    "Options": "internal: holds the transport",
+    "Recovered": "work in progress",
+    "Reply": "internal",
+    "Entry": "bytes on their way",
+    "Service": "what may be asked by name, with the function that does it",
+    "Topic": "bytes on their way",
+}
+
+
+def test_no_value_is_forgotten() -> None:
+    there = {kind.__name__ for kind in kinds() if dataclasses.is_dataclass(kind)}
+    tried = {type(value).__name__ for value in VALUES if dataclasses.is_dataclass(value)}
+    assert there - tried - set(NO_VALUES) == set()
+
+
+# -- the result of a move ----------------------------------------------------------------------------------
+
+
+def test_a_result_tells_each_axis_in_its_words() -> None:
+    assert repr(result()) == ("<MoveResult A=150 CONTACT_CLOSING 310mA, B=200 AT_POSITION 150mA in 1.250 s>")
+
+
+def test_results_differ_by_what_they_tell() -> None:
+    assert result() != result(positions={A: 151, B: 200})
+    assert len({result(), result(), result(duration=2.0)}) == 2
+
+
+def test_a_result_keeps_mappings_of_its_own() -> None:
+    positions = {A: 150}
+    each = result(positions=positions)
+    positions[A] = 0
+    assert each.positions == {A: 150}
+    assert each == result(positions={A: 150})
+
+
+def test_a_result_and_statistics_go_into_json() -> None:
+    fields = dataclasses.asdict(result())
+    assert json.loads(json.dumps(fields["positions"])) == {"1": 150, "2": 200}
+    assert json.loads(json.dumps(dataclasses.asdict(statistics())))["moves"] == {"reached": 3}
+
+
+# -- mappings ----------------------------------------------------------------------------------------------
+
+
+CHANGES: list[Callable[[Any], object]] = [
+    lambda each: each.__setitem__(A, 0),
+    lambda each: each.__delitem__(A),
+    lambda each: each.__ior__({A: 0}),
+    lambda each: each.clear(),
+    lambda each: each.pop(A),
+    lambda each: each.pop(A, None),
+    lambda each: each.popitem(),
+    lambda each: each.setdefault(B, 0),
+    lambda each: each.update({A: 0}),
+    lambda each: each.update(A=0),
+]
+
+
+@pytest.mark.parametrize(
+    "mapping",
+    [result().outcomes, result().positions, result().peak_current_ma, statistics().moves],
+    ids=["outcomes", "positions", "peak_current_ma", "moves"],
+)
+def test_a_mapping_refuses_to_be_changed(mapping: Mapping[Any, Any]) -> None:
+    before = dict(mapping)
+    for change in CHANGES:
+        with pytest.raises(TypeError, match="cannot be changed"):
+            change(mapping)
+    for again in copies(mapping):
+        for change in CHANGES:
+            with pytest.raises(TypeError, match="cannot be changed"):
+                change(again)
+    assert mapping == before
+
+
+def test_every_way_to_change_a_dict_is_refused() -> None:
+    left = {name for name, method in vars(dict).items() if getattr(FrozenMapping, name) is method}
+    assert left & {"__setitem__", "__delitem__", "__ior__"} == set()
+    reading = {"copy", "fromkeys", "get", "items", "keys", "values"}
+    assert {name for name in left if not name.startswith("_")} <= reading
+
+
+def test_a_mapping_hashes_by_what_it_holds_and_not_by_its_order() -> None:
+    assert hash(FrozenMapping({A: 1, B: 2})) == hash(FrozenMapping({B: 2, A: 1}))
+    assert len({FrozenMapping({A: 1}), FrozenMapping({A: 1}), FrozenMapping({A: 2})}) == 2
+    with pytest.raises(TypeError):
+        hash(FrozenMapping({A: []}))
+
+
+# -- errors ------------------------------------------------------------------------------------------------
+
+
+def assert_survives(error: Exception) -> None:
+    error.add_note("noted")
+    for again in copies(error):
+        assert type(again) is type(error)
+        assert (str(again), repr(again), again.args) == (str(error), repr(error), error.args)
+        assert vars(again) == vars(error)
+        with pytest.raises(type(error)):
+            raise again
+
+
+@pytest.mark.parametrize("error", named(ERRORS))
+def test_an_error_survives_copying_and_pickling_with_all_it_carries(error: Exception) -> None:
+    assert_survives(error)
+
+
+def test_so_does_every_other_public_error() -> None:
+    others = {kind for kind in kinds() if issubclass(kind, Exception)} - {type(each) for each in ERRORS}
+    assert len(others) > 10
+    for kind in others:
+        assert_survives(kind("why"))
