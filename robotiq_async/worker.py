@@ -95,12 +95,11 @@ class Worker:
 
 async def _work(calls: _Calls) -> None:
     """Make the calls, until the last one."""
-    has_ended = False
-    while calls.waiting or not has_ended:
+    while calls.waiting or not calls.has_ended:
         call = await calls.get()
         if not call.is_given_up:
+            calls.has_ended = call.is_last
             await call.make()
-            has_ended = call.is_last
 
 
 class _Calls:
@@ -108,6 +107,8 @@ class _Calls:
 
     def __init__(self) -> None:
         self.waiting: deque[_Call] = deque()
+        self.has_ended = False
+        """Whether the last one that was begun is the last one."""
         self._more = asyncio.Event()
 
     def put(self, call: _Call) -> None:
