@@ -722,6 +722,8 @@ class RobotiqHand:
             return
         log.warning("%s: its event loop was closed before stop(); the fingers may still move", self.address)
         self._running.release(self)
+        if self._owner is not None:
+            self._owner.abandon()
         self._task = self._owner = None
         self._waiters = StateWaiters()
         for channel in self._channels:

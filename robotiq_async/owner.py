@@ -152,14 +152,20 @@ class Owner:
         if self._interruptible is not None:
             self._interruptible.cancel()
 
+    def abandon(self) -> None:
+        """The loop was closed: give back what is not its own."""
+        self._tick.close()
+
     async def run(self) -> None:
         """Own the link until asked to stop, or until the policy gives up."""
         try:
             if await self._first_contact():
                 await self._poll()
         finally:
-            await self._finish()
-            self._tell_connected(NotStartedError("the hand was stopped while it connected"))
+            # An abandoned task is ended when it is collected: the hand may have been started again by then.
+            if not self._loop.is_closed():
+                await self._finish()
+                self._tell_connected(NotStartedError("the hand was stopped while it connected"))
 
     # -- connecting ------------------------------------------------------------------------------------
 

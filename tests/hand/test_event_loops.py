@@ -179,17 +179,19 @@ def address() -> Iterator[str]:
     thread.join()
 
 
-@pytest.fixture(params=["tcp", "sim"])
-def abandoned(request: pytest.FixtureRequest, address: str) -> Iterator[RobotiqHand]:
+def abandoned(address: str) -> RobotiqHand:
     """A hand whose loop has been closed while it ran."""
-    hand = RobotiqHand(address if request.param == "tcp" else "sim://")
+    hand = RobotiqHand(address)
     loop = asyncio.new_event_loop()
     loop.run_until_complete(hand.start(activate=False))
     assert hand.state is State.RESET
     loop.close()
-    yield hand
-    # What was left open in that loop is closed, with a warning of Python's, when nobody holds it any more.
-    gc.collect()
+    return hand
+
+
+@pytest.fixture(params=["tcp", "sim"])
+def place(request: pytest.FixtureRequest, address: str) -> str:
+    return address if request.param == "tcp" else "sim://"
 
 
 OPEN_IN_A_CLOSED_LOOP = [
@@ -201,41 +203,64 @@ OPEN_IN_A_CLOSED_LOOP = [
 class TestClosedLoop:
     pytestmark = OPEN_IN_A_CLOSED_LOOP
 
-    def test_stop_ends(self, abandoned: RobotiqHand) -> None:
+    @pytest.fixture(autouse=True)
+    def nothing_kept(self) -> Iterator[None]:
+        """What was left open in that loop is closed, with a warning of Python's, when nobody holds it."""
+        yield
+        gc.collect()
+
+    def test_stop_ends(self, place: str) -> None:
         """It waited for ever, and swallowed its own cancellation."""
+        hand = abandoned(place)
 
         async def stop() -> None:
             async with asyncio.timeout(3):
-                await abandoned.stop()
+                await hand.stop()
 
         asyncio.run(stop())
-        assert abandoned.state is State.SHUTDOWN
+        assert hand.state is State.SHUTDOWN
 
     @pytest.mark.parametrize("stop_first", [False, True], ids=["", "stopped"])
-    def test_start_begins_anew(self, abandoned: RobotiqHand, stop_first: bool) -> None:
+    def test_start_begins_anew(self, place: str, stop_first: bool) -> None:
         """It refused for ever."""
+        hand = abandoned(place)
 
         async def again() -> None:
             if stop_first:
-                await abandoned.stop()
+                await hand.stop()
             async with asyncio.timeout(10):
-                await abandoned.start(activate=False)
-                assert abandoned.state is State.RESET
-                await anext(abandoned.statuses())
-                await abandoned.stop()
+                await hand.start(activate=False)
+                assert hand.state is State.RESET
+                await anext(hand.statuses())
+                await hand.stop()
 
         asyncio.run(again())
-        assert abandoned.state is State.SHUTDOWN
+        assert hand.state is State.SHUTDOWN
 
-    def test_every_other_call_says_so(self, abandoned: RobotiqHand) -> None:
+    def test_what_is_left_of_the_first_start_leaves_the_second_alone(self, address: str) -> None:
+        """The task of the closed loop is ended by the garbage collector, whenever that comes."""
+        hand = abandoned(address)
+
+        async def again() -> None:
+            await hand.start(activate=False)
+            gc.collect()
+            assert hand.state is State.RESET
+            await anext(hand.statuses())
+            await hand.stop()
+
+        asyncio.run(again())
+
+    def test_every_other_call_says_so(self, place: str) -> None:
+        hand = abandoned(place)
         for name, call in CALLS.items():
             if name != "stop":
                 with pytest.raises(NotStartedError, match="closed"):
-                    asyncio.run(call(abandoned))
+                    asyncio.run(call(hand))
         with pytest.raises(NotStartedError, match="closed"):
-            abandoned.command(position=3)
+            hand.command(position=3)
         with pytest.raises(NotStartedError, match="closed"):
-            abandoned.is_moving  # noqa: B018
+            hand.is_moving  # noqa: B018
+        asyncio.run(hand.stop())
 
     def test_its_streams_end(self, address: str) -> None:
         hand = RobotiqHand(address)
@@ -254,16 +279,15 @@ class TestClosedLoop:
 
         asyncio.run(end())
         del waiting
-        gc.collect()
 
-    def test_another_hand_takes_the_address_over(self, abandoned: RobotiqHand) -> None:
-        if abandoned.address.startswith("sim"):
-            pytest.skip("every sim:// is a gripper of its own")
+    def test_another_hand_takes_the_address_over(self, address: str) -> None:
+        left = abandoned(address)
 
         async def other() -> None:
             async with asyncio.timeout(5):
-                hand = RobotiqHand(abandoned.address)
-                await hand.start(activate=False)
-                await hand.stop()
+                another = RobotiqHand(address)
+                await another.start(activate=False)
+                await another.stop()
 
         asyncio.run(other())
+        asyncio.run(left.stop())
