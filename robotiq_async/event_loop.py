@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 
 
 def running_loop() -> asyncio.AbstractEventLoop:
@@ -30,9 +29,10 @@ def check_loop(own: asyncio.AbstractEventLoop, what: str) -> None:
     Raises:
         RuntimeError: called from another thread, another event loop or another framework.
     """
-    running: asyncio.AbstractEventLoop | None = None
-    with contextlib.suppress(RuntimeError):
-        running = asyncio.get_running_loop()
+    try:
+        running: asyncio.AbstractEventLoop | None = asyncio.get_running_loop()
+    except RuntimeError:
+        running = None
     if running is not own:
         raise RuntimeError(
             f"{what} was used outside of the event loop that the hand runs in, and nothing was asked of the "

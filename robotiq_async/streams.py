@@ -88,9 +88,11 @@ class Stream(Generic[T]):
             RobotiqConnectionError: the hand gave up on its link.
             RuntimeError: another task is waiting on the same stream, or the hand runs in another event loop.
         """
-        while not self._items and not self._ended:
+        while True:
             if self._loop is not None:
                 check_loop(self._loop, "a stream of the hand")
+            if self._items or self._ended:
+                break
             if self._waiting is not None:
                 raise RuntimeError("a stream has one reader; open another with statuses() or transitions()")
             self._waiting = asyncio.get_running_loop().create_future()
@@ -137,18 +139,14 @@ class Stream(Generic[T]):
         """No more items: the reader gets what is left, then the end or the failure."""
         if self._ended:
             return
-        self._ended, self._failure = True, failure
-        if self._waiting is not None and self._waiting.get_loop().is_closed():
-            self._waiting = None  # whoever waited there can not be told any more
+        self._ended, self._failure, self._loop = True, failure, None
         self._wake()
 
     def belong_to(self, loop: asyncio.AbstractEventLoop) -> None:
-        """The hand runs in this loop. A reader that waits in another one finds that out now."""
-        self._loop, waiting = loop, self._waiting
-        if waiting is not None and waiting.get_loop() is not loop:
-            self._waiting = None
-            with contextlib.suppress(RuntimeError):  # that loop has been closed
-                waiting.get_loop().call_soon_threadsafe(_finish, waiting)
+        """The hand runs in this loop. A reader that waits in another one wakes up and is refused."""
+        self._loop = loop
+        if self._waiting is not None and self._waiting.get_loop() is not loop:
+            self._wake()
 
     def _wait_no_longer(self) -> None:
         self._kept.discard(self)
@@ -169,11 +167,6 @@ class Stream(Generic[T]):
 
 
 def _wake(waiting: asyncio.Future[None]) -> None:
-    if not waiting.done():
-        waiting.set_result(None)
-
-
-def _finish(waiting: asyncio.Future[None]) -> None:
     if not waiting.done():
         waiting.set_result(None)
 
