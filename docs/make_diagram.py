@@ -1,4 +1,4 @@
-"""Draws docs/state-machine.svg from the table in robotiq_async/machine.py.
+"""Draws docs/state-machine.svg from the table in robotiq_async/control/state_machine.py.
 
     python docs/make_diagram.py
 
@@ -22,8 +22,8 @@ ROOT: Final = Path(__file__).parents[1]
 if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
 
+from robotiq_async.control.state_machine import SEQUENCES, TRANSITIONS, Trigger, states_allowing  # noqa: E402
 from robotiq_async.enums import State  # noqa: E402
-from robotiq_async.machine import SEQUENCES, TRANSITIONS, Trigger, states_allowing  # noqa: E402
 
 PICTURE: Final = ROOT / "docs" / "state-machine.svg"
 
@@ -318,7 +318,7 @@ def draw() -> str:
     parts = [
         head,
         "<title>States of a hand</title>",
-        "<desc>Made by docs/make_diagram.py from the table in robotiq_async/machine.py.</desc>",
+        "<desc>Made by docs/make_diagram.py from the table in robotiq_async/control/state_machine.py.</desc>",
         f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#ffffff"/>',
         "<defs>",
         *(_arrow_head(name, color) for name, color in STROKES.items()),

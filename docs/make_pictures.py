@@ -20,12 +20,12 @@ if __name__ == "__main__":
 
 from robotiq_async import Finger, RobotiqHand, State  # noqa: E402
 from robotiq_async.actions import ACTIONS, Operator  # noqa: E402
-from robotiq_async.cli.remarks import told  # noqa: E402
-from robotiq_async.cli.screen import Monitor  # noqa: E402
-from robotiq_async.plots import plot_recording  # noqa: E402
-from robotiq_async.recorder import Recorder  # noqa: E402
-from robotiq_async.recording import read_recording  # noqa: E402
+from robotiq_async.cli.log_capture import told  # noqa: E402
+from robotiq_async.cli.tui.screen import Monitor  # noqa: E402
+from robotiq_async.measure.plots import plot_recording  # noqa: E402
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer  # noqa: E402
+from robotiq_async.telemetry.recorder import Recorder  # noqa: E402
+from robotiq_async.telemetry.recordings import read_recording  # noqa: E402
 
 FOLDER: Final = ROOT / "docs" / "measured"
 FONT: Final = re.compile(r"@font-face \{.*?\}", re.DOTALL)

@@ -20,11 +20,11 @@ if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
 
 from robotiq_async import ReconnectPolicy, RobotiqHand, registers  # noqa: E402
+from robotiq_async.calibration.csv_tables import SPEED, read_table, thesis_table  # noqa: E402
+from robotiq_async.control.state_machine import TRANSITIONS, Trigger  # noqa: E402
 from robotiq_async.enums import Fault, Initialization, Mode, ObjectStatus, Severity  # noqa: E402
-from robotiq_async.machine import TRANSITIONS, Trigger  # noqa: E402
-from robotiq_async.registers import RTU_REGISTERS, TCP_REGISTERS, Field  # noqa: E402
-from robotiq_async.runs import SPEED, read_table, thesis_table  # noqa: E402
-from robotiq_async.simulator.trouble import KINDS  # noqa: E402
+from robotiq_async.simulator.troubles.trouble import KINDS  # noqa: E402
+from robotiq_async.wire.registers import RTU_REGISTERS, TCP_REGISTERS, Field  # noqa: E402
 
 DOCS: Final = ROOT / "docs"
 

@@ -65,6 +65,8 @@ The map; each module imports only what stands above it::
 Nothing of this has run on real hardware yet.
 """
 
+from .control.motion import MoveResult
+from .control.state_machine import Trigger
 from .enums import (
     CLOSED,
     FORCE_MAX,
@@ -101,14 +103,12 @@ from .errors import (
     StateTimeoutError,
 )
 from .hand import RobotiqHand
-from .link import Transport
-from .machine import Trigger
-from .motion import MoveResult
-from .owner import ReconnectPolicy
-from .statistics import Statistics
-from .status import RobotiqStatus
-from .streams import SentRequest, Stream, Transition
+from .link.modbus import Transport
+from .session.poller import ReconnectPolicy
+from .session.statistics import Statistics
+from .session.streams import SentRequest, Stream, Transition
 from .version import __version__ as __version__
+from .wire.status import RobotiqStatus
 
 __all__ = [
     "CLOSED",

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from .clock import now
+from .control.motion import MoveResult
 from .enums import (
     AXES,
     FORCE_MAX,
@@ -24,7 +24,7 @@ from .enums import (
 )
 from .errors import MoveSupersededError, NotStartedError
 from .hand import RobotiqHand
-from .motion import MoveResult
+from .session.clock import now
 
 SPEED: Final = 128
 FORCE: Final = 64

@@ -12,16 +12,16 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
-from .address import Address
+from .control.sequences import signature_of_status
 from .enums import Severity
 from .errors import ConnectFailedError, ProtocolError, ResponseTimeoutError, RobotiqConnectionError
-from .link import ModbusTransport, Transport
-from .names import addresses_of
-from .procedures import signature_of_status
-from .registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap
-from .simulated import SimulatedTransport, new_gripper
-from .statistics import percentile
-from .status import RobotiqStatus
+from .link.address import Address
+from .link.host_names import addresses_of
+from .link.modbus import ModbusTransport, Transport
+from .link.simulated import SimulatedTransport, new_gripper
+from .session.statistics import percentile
+from .wire.registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap
+from .wire.status import RobotiqStatus
 
 REACH_S: Final = 3.0
 """For a name to be resolved, and for a port to answer."""

@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING
 from .enums import Fault, State
 
 if TYPE_CHECKING:
-    from .status import RobotiqStatus
+    from .wire.status import RobotiqStatus
 
 
 class RobotiqError(Exception):

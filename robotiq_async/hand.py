@@ -9,13 +9,12 @@ from typing import Any, ClassVar, Final, Self, TypeVar
 
 import anyio
 
-from .calibration import SpeedCalibration
-from .checks import check_byte, check_int, check_mask, check_timeout
-from .claims import Claims
-from .clock import now
-from .core import Core
-from .desk import Delivery
-from .ending import to_the_end
+from .calibration.scales import SpeedCalibration
+from .concurrency import to_the_end
+from .control.controller import Core
+from .control.motion import Move, MoveResult
+from .control.pending import Delivery
+from .control.state_machine import RUNNING, SEQUENCES, Machine, Trigger
 from .enums import CLOSED, OPEN, Finger, Severity, State
 from .errors import (
     ActivationTimeoutError,
@@ -29,23 +28,24 @@ from .errors import (
     RobotiqError,
     StateTimeoutError,
 )
-from .event_loop import check_loop, running_loop
-from .link import Transport
+from .link.modbus import Transport
 from .log import log
-from .machine import RUNNING, SEQUENCES, Machine, Trigger
-from .motion import Move, MoveResult
-from .options import (
+from .session.claims import Claims
+from .session.clock import now
+from .session.event_loop import check_loop, running_loop
+from .session.options import (
     ACTIVATION_TIMEOUT_S,
     CONNECT_TIMEOUT_S,
     POLL_INTERVAL_S,
     RESPONSE_TIMEOUT_S,
     check_options,
 )
-from .owner import Owner, ReconnectPolicy
-from .statistics import Counters, Statistics
-from .status import RobotiqStatus
-from .streams import Channel, SentRequest, Stream, Transition
-from .waiting import StateWaiters
+from .session.poller import Owner, ReconnectPolicy
+from .session.state_waiters import StateWaiters
+from .session.statistics import Counters, Statistics
+from .session.streams import Channel, SentRequest, Stream, Transition
+from .wire.checks import check_byte, check_int, check_mask, check_timeout
+from .wire.status import RobotiqStatus
 
 T = TypeVar("T")
 

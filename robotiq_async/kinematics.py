@@ -15,9 +15,9 @@ from functools import cache
 from math import radians
 from typing import Final
 
-from .checks import check_byte
 from .enums import Finger
-from .status import RobotiqStatus
+from .wire.checks import check_byte
+from .wire.status import RobotiqStatus
 
 Points = tuple[tuple[int, float], ...]
 """Position in counts, rising, and angle in degrees; straight in between, level beyond the ends."""

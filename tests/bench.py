@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from robotiq_async import Finger, MoveResult, RobotiqError, RobotiqStatus, State
-from robotiq_async.core import Core
-from robotiq_async.machine import Machine, Trigger
-from robotiq_async.motion import Move
-from robotiq_async.registers import Registers
+from robotiq_async.control.controller import Core
+from robotiq_async.control.motion import Move
+from robotiq_async.control.state_machine import Machine, Trigger
 from robotiq_async.simulator import SimulatedGripper
+from robotiq_async.wire.registers import Registers
 
 POLL_S = 0.005
 

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.adoption import DIRECTION_WAIT_S, Adoption, agrees
+from robotiq_async.control.adoption import DIRECTION_WAIT_S, Adoption, agrees
 from robotiq_async.enums import AXES, Finger, Mode, ObjectStatus
-from robotiq_async.request import AxisRequest, Request
-from robotiq_async.status import RobotiqStatus
+from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.wire.status import RobotiqStatus
 from tests.words import status_of
 
 A, B, C, S = AXES

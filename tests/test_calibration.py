@@ -14,8 +14,8 @@ from robotiq_async.calibration import (
     opening_mm,
     position_of_opening,
 )
-from robotiq_async.closing_time import closing_time
-from robotiq_async.runs import FORCE, SPEED, TableError, thesis_table, write_table
+from robotiq_async.calibration.closing_time import closing_time
+from robotiq_async.calibration.csv_tables import FORCE, SPEED, TableError, thesis_table, write_table
 
 # -- positions ---------------------------------------------------------------------------------------------
 

@@ -10,8 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.checks import check_axis, check_byte, check_int, check_mask, check_seconds, check_timeout
 from robotiq_async.enums import AXES, Finger
+from robotiq_async.wire.checks import (
+    check_axis,
+    check_byte,
+    check_int,
+    check_mask,
+    check_seconds,
+    check_timeout,
+)
 
 
 class Index:

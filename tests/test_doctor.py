@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 
 from robotiq_async import RobotiqHand
-from robotiq_async.address import parse_address
 from robotiq_async.doctor import Finding, Level, _advice_for_opening, examine
-from robotiq_async.request import AxisRequest, Request
+from robotiq_async.link.address import parse_address
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, Trouble
+from robotiq_async.wire.request import AxisRequest, Request
 from tests.serial_line import SerialLine
 
 HEALTHY = ["name", "port", "Modbus", "unit id", "registers", "round trip", "rate", "activation", "fault"]

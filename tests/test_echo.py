@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robotiq_async.echo import SILENT_S, WINDOW_S, EchoWatch
-from robotiq_async.procedures import signature_of
-from robotiq_async.request import AxisRequest, Request
-from robotiq_async.status import RobotiqStatus
+from robotiq_async.control.sequences import signature_of
+from robotiq_async.control.writes import SILENT_S, WINDOW_S, EchoWatch
+from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.wire.status import RobotiqStatus
 from tests.words import status_of
 
 EPSILON = 0.001

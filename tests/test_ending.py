@@ -8,7 +8,7 @@ import threading
 import anyio
 import pytest
 
-from robotiq_async.ending import in_a_thread, to_the_end
+from robotiq_async.concurrency import in_a_thread, to_the_end
 
 
 async def test_a_cancellation_waits_for_the_end() -> None:

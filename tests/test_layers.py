@@ -216,12 +216,12 @@ def test_the_physics_of_the_simulator_know_neither_pymodbus_nor_an_event_loop(mo
 
 
 def test_the_runtime_needs_the_simulator_only_when_a_simulated_gripper_is_opened() -> None:
-    path = modules()["robotiq_async.simulated"]
+    path = modules()["robotiq_async.link.simulated"]
     tree = ast.parse(path.read_text(encoding="utf-8"))
     lazy = (ast.ClassDef, ast.FunctionDef)
     outside = ast.Module([node for node in tree.body if not isinstance(node, lazy)], [])
     assert not [
-        name for name in imported(ast.unparse(outside), "robotiq_async.simulated") if "simulator" in name
+        name for name in imported(ast.unparse(outside), "robotiq_async.link.simulated") if "simulator" in name
     ]
 
 
@@ -234,8 +234,8 @@ def test_the_runtime_needs_the_simulator_only_when_a_simulated_gripper_is_opened
         ("status", "from .machine import look"),
         ("status", "from . import machine"),
         ("status", "from . import machine as m"),
-        ("status", "import robotiq_async.machine"),
-        ("status", "from robotiq_async.machine import look"),
+        ("status", "import robotiq_async.control.state_machine"),
+        ("status", "from robotiq_async.control.state_machine import look"),
         ("status", "from robotiq_async import RobotiqHand"),
         ("status", "from . import RobotiqHand"),
         ("status", "def f():\n    from .hand import RobotiqHand"),
@@ -259,7 +259,7 @@ def test_the_runtime_needs_the_simulator_only_when_a_simulated_gripper_is_opened
         ("hand", "from .simulator import SimulatorServer"),
         ("options", "def f():\n    from .simulator.server import SimulatorServer"),
         ("link", "from .hand import RobotiqHand"),
-        ("simulator.axis", "from robotiq_async.machine import Machine"),
+        ("simulator.axis", "from robotiq_async.control.state_machine import Machine"),
         ("simulator.axis", "from robotiq_async import echo"),
         ("simulator.axis", "from .. import RobotiqHand"),
         ("simulator.axis", "from ..hand import RobotiqHand"),

@@ -8,9 +8,7 @@ from collections import deque
 
 import pytest
 
-from robotiq_async.enums import State
-from robotiq_async.errors import InvalidStateError
-from robotiq_async.machine import (
+from robotiq_async.control.state_machine import (
     RUNNING,
     SEQUENCES,
     TRANSITIONS,
@@ -20,6 +18,8 @@ from robotiq_async.machine import (
     refusal,
     states_allowing,
 )
+from robotiq_async.enums import State
+from robotiq_async.errors import InvalidStateError
 from tests.words import status_of
 
 SIGHTS = [trigger for trigger in Trigger if trigger.name.startswith("SEEN_")]

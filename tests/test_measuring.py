@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from robotiq_async import Finger, RobotiqHand
-from robotiq_async.closing_time import closing_time
-from robotiq_async.measuring import (
+from robotiq_async.calibration.closing_time import closing_time
+from robotiq_async.calibration.csv_tables import FORCE, SPEED, TableError, read_table, thesis_table
+from robotiq_async.measure.campaigns import (
     GRASP_S,
     Campaign,
     MeasuringError,
@@ -25,11 +26,10 @@ from robotiq_async.measuring import (
     time_closing,
     write_currents,
 )
-from robotiq_async.runs import FORCE, SPEED, TableError, read_table, thesis_table
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.simulator.axis import PRESSING
-from robotiq_async.simulator.motor import peak
-from robotiq_async.simulator.scale import SimulatedScale
+from robotiq_async.simulator.physics.axis import PRESSING
+from robotiq_async.simulator.physics.motor import peak
+from robotiq_async.simulator.physics.scale import SimulatedScale
 from tests.virtual import VirtualLoop, run
 
 POLL_S = 0.005

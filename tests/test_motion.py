@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robotiq_async.control.motion import MARGIN_S, Move, MoveResult, default_timeout
 from robotiq_async.enums import AXES, Finger, ObjectStatus
 from robotiq_async.errors import MoveSupersededError, RobotiqError
-from robotiq_async.motion import MARGIN_S, Move, MoveResult, default_timeout
 from tests.words import status_of
 
 A, B, C, S = AXES

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.address import parse_address
-from robotiq_async.places import place_of
+from robotiq_async.link.address import parse_address
+from robotiq_async.link.places import place_of
 
 LOOPBACK = "lo" if os.path.exists("/sys/class/net/lo") else "lo0"
 

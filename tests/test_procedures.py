@@ -6,9 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.enums import AXES, Fault, Mode
-from robotiq_async.errors import GripperFaultError, NotActivatedError
-from robotiq_async.procedures import (
+from robotiq_async.control.sequences import (
     Procedure,
     activation,
     automatic_release,
@@ -18,8 +16,10 @@ from robotiq_async.procedures import (
     signature_of,
     signature_of_status,
 )
-from robotiq_async.request import AxisRequest, Request
-from robotiq_async.status import RobotiqStatus
+from robotiq_async.enums import AXES, Fault, Mode
+from robotiq_async.errors import GripperFaultError, NotActivatedError
+from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.wire.status import RobotiqStatus
 from tests.words import status_of
 
 IMAGE = Request(

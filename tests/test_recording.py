@@ -16,8 +16,8 @@ import zstandard
 from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, Chunk, Header, McapRecord, Message, Schema
 
-from robotiq_async.recorder import RecordingError
-from robotiq_async.recording import LARGEST, Entry, read_recording, recover
+from robotiq_async.telemetry.recorder import RecordingError
+from robotiq_async.telemetry.recordings import LARGEST, Entry, read_recording, recover
 
 MAGIC = b"\x89MCAP0\r\n"
 EVENT = {"monotonic": 1.0, "kind": "state", "target": "RESET"}

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async.enums import AXES, Finger, Mode
-from robotiq_async.request import AxisRequest, Request
+from robotiq_async.wire.request import AxisRequest, Request
 from tests.words import REQUEST_RESERVED, bytes_of, registers_of
 
 BYTES = st.integers(0, 255)

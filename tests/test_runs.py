@@ -8,7 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.runs import FORCE, SPEED, Layout, TableError, read_table, thesis_table, write_table
+from robotiq_async.calibration.csv_tables import (
+    FORCE,
+    SPEED,
+    Layout,
+    TableError,
+    read_table,
+    thesis_table,
+    write_table,
+)
 
 HEADER = "speed_value,run_1_ms,run_2_ms"
 

@@ -8,7 +8,7 @@ import pytest
 
 from robotiq_async import Finger, RobotiqHand, State
 from robotiq_async.actions import ACTIONS, Operator
-from robotiq_async.services import SERVICES
+from robotiq_async.telemetry.services import SERVICES
 
 
 @pytest.fixture

@@ -33,16 +33,16 @@ from robotiq_async import (
     Transition,
     Trigger,
 )
-from robotiq_async.address import parse_address
 from robotiq_async.calibration import ForceCalibration, SpeedCalibration
+from robotiq_async.calibration.csv_tables import SPEED, TableError
+from robotiq_async.control.motion import Move
 from robotiq_async.doctor import Finding, Level
-from robotiq_async.frozen import FrozenMapping
-from robotiq_async.motion import Move
-from robotiq_async.registers import TCP_REGISTERS, gDT
-from robotiq_async.request import AxisRequest, Request
-from robotiq_async.runs import SPEED, TableError
+from robotiq_async.link.address import parse_address
+from robotiq_async.session.statistics import Counters
 from robotiq_async.simulator import Trouble
-from robotiq_async.statistics import Counters
+from robotiq_async.values import FrozenMapping
+from robotiq_async.wire.registers import TCP_REGISTERS, gDT
+from robotiq_async.wire.request import AxisRequest, Request
 from tests.words import status_of
 
 A, B = Finger.A, Finger.B

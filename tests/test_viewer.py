@@ -20,10 +20,10 @@ from docs import make_layout
 from robotiq_async import Fault, Finger, RobotiqHand, RobotiqStatus, State
 from robotiq_async.actions import Operator
 from robotiq_async.kinematics import JOINTS, joint_angles
-from robotiq_async.payloads import SCHEMAS
-from robotiq_async.services import SERVICES
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.viewer import Viewer, ViewerError
+from robotiq_async.telemetry.payloads import SCHEMAS
+from robotiq_async.telemetry.services import SERVICES
+from robotiq_async.telemetry.viewer import Viewer, ViewerError
 
 SOCKETS = Path("/proc/net/tcp")
 LINUX = SOCKETS.exists()

@@ -9,7 +9,7 @@ import pytest
 
 from robotiq_async.enums import Fault, State
 from robotiq_async.errors import ConnectionLostError, GripperFaultError, RobotiqError
-from robotiq_async.waiting import StateWaiters
+from robotiq_async.session.state_waiters import StateWaiters
 
 
 def lost() -> RobotiqError:

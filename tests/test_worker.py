@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from robotiq_async.clock import now
-from robotiq_async.worker import LateError, Worker
+from robotiq_async.link.worker import LateError, Worker
+from robotiq_async.session.clock import now
 from tests.virtual import run
 
 

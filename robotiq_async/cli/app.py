@@ -7,15 +7,15 @@ from typing import Final
 from cyclopts import App
 
 from .. import __version__
-from .demo import demo
-from .doctor import doctor
-from .measure import measure_app
-from .monitor import monitor
-from .move import move
-from .record import plot, record, recover, replay
-from .simulate import simulate
-from .status import status
-from .view import view
+from .commands.demo import demo
+from .commands.doctor import doctor
+from .commands.measure import measure_app
+from .commands.monitor import monitor
+from .commands.move import move
+from .commands.record import plot, record, recover, replay
+from .commands.simulate import simulate
+from .commands.status import status
+from .commands.view import view
 
 COMMANDS: Final = (demo, simulate, status, move, monitor, view, doctor, record, replay, recover, plot)
 """A new sub-command is a module with a function of its name, and an entry here."""

@@ -11,8 +11,8 @@ from typing import Annotated, Final
 
 from cyclopts import Parameter, Token
 
-from ..checks import parse_fingers
 from ..enums import Finger
+from ..wire.checks import parse_fingers
 from .failures import CommandError, UsageError, usage
 
 

@@ -10,7 +10,7 @@ import sys
 from contextlib import suppress
 from typing import TextIO
 
-from ..address import parse_address
+from ..link.address import parse_address
 from .failures import CommandError, UsageError, usage
 
 NOTE = "Nothing here has run on real hardware yet: keep a hand on the emergency stop."

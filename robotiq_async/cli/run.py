@@ -17,10 +17,10 @@ from typing import Self
 from cyclopts import CycloptsError
 
 from ..errors import RobotiqError
-from ..payloads import printable
+from ..telemetry.payloads import printable
 from .app import build
 from .failures import CommandError, UsageError
-from .remarks import collected, forget
+from .log_capture import collected, forget
 
 _ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 SUCCESS, FAILURE, WRONG_USAGE, SIGNALLED = 0, 1, 2, 128

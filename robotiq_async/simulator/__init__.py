@@ -26,9 +26,9 @@ module                 what it holds
 The physics (the first eight) import neither pymodbus nor asyncio.
 """
 
-from .gripper import SimulatedGripper
-from .serial_server import SerialSimulatorServer
-from .server import SimulatorServer
-from .trouble import Trouble, parse_troubles
+from .physics.gripper import SimulatedGripper
+from .server.serial_server import SerialSimulatorServer
+from .server.tcp_server import SimulatorServer
+from .troubles.trouble import Trouble, parse_troubles
 
 __all__ = ["SerialSimulatorServer", "SimulatedGripper", "SimulatorServer", "Trouble", "parse_troubles"]

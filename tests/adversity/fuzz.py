@@ -23,7 +23,7 @@ from pymodbus.framer import FramerRTU
 
 from robotiq_async import ReconnectPolicy, RobotiqError, RobotiqHand, RobotiqStatus, State
 from robotiq_async.errors import ProtocolError
-from robotiq_async.reply import expected_reply
+from robotiq_async.link.frames import expected_reply
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
 
 READ, WRITE = 4, 16

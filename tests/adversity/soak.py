@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from robotiq_async import Finger, MoveResult, RobotiqError, RobotiqHand, State
-from robotiq_async.machine import RUNNING
+from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.simulator import Trouble
 from tests.adversity.fuzz import resident
 from tests.adversity.watch import LoopWatch, WriteWatch, check

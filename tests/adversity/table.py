@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from robotiq_async.simulator import parse_troubles
-from robotiq_async.simulator.trouble import KINDS
+from robotiq_async.simulator.troubles.trouble import KINDS
 from tests.adversity.cell import LINE_PULLED
 from tests.adversity.phases import PHASES, Phase
 

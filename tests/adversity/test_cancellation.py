@@ -12,7 +12,7 @@ import anyio
 import pytest
 
 from robotiq_async import Fault, Finger, RobotiqHand, State, StateTimeoutError
-from robotiq_async.machine import RUNNING
+from robotiq_async.control.state_machine import RUNNING
 from tests.adversity.world import World, world
 from tests.virtual import run
 

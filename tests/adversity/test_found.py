@@ -17,8 +17,8 @@ from robotiq_async import (
     RobotiqError,
     State,
 )
-from robotiq_async.request import AxisRequest, Request
 from robotiq_async.simulator import Trouble
+from robotiq_async.wire.request import AxisRequest, Request
 from tests.adversity.world import World, world
 from tests.virtual import run
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from robotiq_async.simulator.trouble import KINDS
+from robotiq_async.simulator.troubles.trouble import KINDS
 from tests.adversity.cell import outcome
 from tests.adversity.table import Cell, cells
 from tests.adversity.world import world

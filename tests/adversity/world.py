@@ -13,10 +13,10 @@ import pytest
 
 from robotiq_async import Finger, RobotiqConnectionError, RobotiqHand, RobotiqStatus, State
 from robotiq_async.enums import AXES
-from robotiq_async.registers import Registers
-from robotiq_async.request import AxisRequest, Request
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
-from robotiq_async.simulator.framing import Frame
+from robotiq_async.simulator.server.framing import Frame
+from robotiq_async.wire.registers import Registers
+from robotiq_async.wire.request import AxisRequest, Request
 from tests.virtual import VirtualLoop
 from tests.virtual_line import VirtualLine
 

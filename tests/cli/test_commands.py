@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from robotiq_async import Fault, Finger
-from robotiq_async import registers as reg
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.wire import registers as reg
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Shell

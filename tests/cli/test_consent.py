@@ -13,8 +13,8 @@ import pytest
 
 from robotiq_async import RobotiqHand
 from robotiq_async.cli.app import COMMANDS
-from robotiq_async.cli.measure_force import force
-from robotiq_async.cli.measure_speed import speed
+from robotiq_async.cli.commands.measure_force import force
+from robotiq_async.cli.commands.measure_speed import speed
 from robotiq_async.simulator import SimulatorServer
 from tests.cli.terminal import ROOT, Terminal
 

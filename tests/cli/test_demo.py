@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from robotiq_async.cli.demo import _program
+from robotiq_async.cli.commands.demo import _program
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from robotiq_async.request import Request
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.wire.request import Request
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Shell

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from robotiq_async.calibration.csv_tables import FORCE, SPEED, read_table, thesis_table
 from robotiq_async.cli import main
-from robotiq_async.measuring import read_currents
-from robotiq_async.runs import FORCE, SPEED, read_table, thesis_table
+from robotiq_async.measure.campaigns import read_currents
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
 if TYPE_CHECKING:

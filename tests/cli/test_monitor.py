@@ -13,8 +13,8 @@ from textual.widgets import RichLog, Static
 
 from robotiq_async import Fault, Finger, RobotiqHand, RobotiqStatus, State
 from robotiq_async.actions import Operator
-from robotiq_async.cli.screen import Monitor
-from robotiq_async.cli.widgets import Axes, Question, position_bar, sparkline
+from robotiq_async.cli.tui.screen import Monitor
+from robotiq_async.cli.tui.widgets import Axes, Question, position_bar, sparkline
 from robotiq_async.enums import AXES
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 

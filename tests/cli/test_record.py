@@ -21,9 +21,9 @@ from rosbags.highlevel import AnyReader
 
 from robotiq_async import Finger, RobotiqHand, State
 from robotiq_async.cli import main
-from robotiq_async.recorder import Recorder
-from robotiq_async.recording import read_recording
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.telemetry.recorder import Recorder
+from robotiq_async.telemetry.recordings import read_recording
 from tests.cli.conftest import WITHOUT
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ import pytest
 
 from robotiq_async import Fault, RobotiqHand, State
 from robotiq_async.enums import AXES
-from robotiq_async.simulator.trouble import KINDS
+from robotiq_async.simulator.troubles.trouble import KINDS
 from tests.serial_line import SerialLine
 
 if TYPE_CHECKING:

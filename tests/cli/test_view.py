@@ -16,8 +16,8 @@ from websockets.typing import Subprotocol
 from docs import make_layout
 from robotiq_async import RobotiqHand
 from robotiq_async.cli.arguments import is_loopback
-from robotiq_async.services import SERVICES
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.telemetry.services import SERVICES
 from tests.cli.conftest import WITHOUT
 from tests.test_viewer import Client
 

@@ -8,7 +8,7 @@ import pytest
 
 from robotiq_async import ConnectionLostError, Finger, MoveSupersededError, NotActivatedError, State
 from robotiq_async.enums import AXES
-from robotiq_async.request import AxisRequest, Request
+from robotiq_async.wire.request import AxisRequest, Request
 from tests.bench import Bench
 
 A, B, C, S = AXES

@@ -14,7 +14,7 @@ from robotiq_async import (
     NotStartedError,
     State,
 )
-from robotiq_async.request import Request
+from robotiq_async.wire.request import Request
 from tests.bench import POLL_S, Bench
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR

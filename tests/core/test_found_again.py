@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async import Fault, Finger, GripperFaultError, Mode, State
-from robotiq_async.request import AxisRequest, Request
+from robotiq_async.wire.request import AxisRequest, Request
 from tests.bench import POLL_S, Bench
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async import Finger, MoveSupersededError, ObjectStatus, State
-from robotiq_async.request import Request
+from robotiq_async.wire.request import Request
 from tests.bench import POLL_S, Bench
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from robotiq_async import Finger, MoveResult, ObjectStatus, State
+from robotiq_async.control.motion import Move
+from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.enums import AXES
-from robotiq_async.machine import RUNNING
-from robotiq_async.motion import Move
-from robotiq_async.request import Request
+from robotiq_async.wire.request import Request
 from tests.bench import Bench, Outcome
 from tests.words import only_holds
 

@@ -9,7 +9,7 @@ import pytest
 
 from docs import make_diagram, make_tables
 from robotiq_async import State
-from robotiq_async.machine import TRANSITIONS, Trigger
+from robotiq_async.control.state_machine import TRANSITIONS, Trigger
 from tests.docs.pages import DOCS
 
 Box = tuple[float, float, float, float]

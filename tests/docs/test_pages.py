@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from docs import make_diagram, make_pages
+from robotiq_async.control.state_machine import TRANSITIONS, Trigger
 from robotiq_async.enums import State
-from robotiq_async.machine import TRANSITIONS, Trigger
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.docs.pages import DOCS, PAGES, ROOT, Block, blocks, prose, requirements
 

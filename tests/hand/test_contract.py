@@ -28,8 +28,8 @@ from robotiq_async import (
     StateTimeoutError,
     Transition,
 )
-from robotiq_async.request import Request
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.wire.request import Request
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 

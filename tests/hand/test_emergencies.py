@@ -14,9 +14,9 @@ from robotiq_async import (
     RobotiqHand,
     State,
 )
-from robotiq_async.machine import SEQUENCES
-from robotiq_async.request import Request
+from robotiq_async.control.state_machine import SEQUENCES
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.wire.request import Request
 
 
 @pytest.fixture

@@ -31,8 +31,8 @@ from robotiq_async import (
     State,
 )
 from robotiq_async.enums import AXES
-from robotiq_async.request import AxisRequest, Request
 from robotiq_async.simulator import SimulatorServer, parse_troubles
+from robotiq_async.wire.request import AxisRequest, Request
 
 ROOT = Path(__file__).parents[2]
 A, B, C, S = AXES

@@ -19,10 +19,10 @@ from robotiq_async import (
     State,
     Transport,
 )
-from robotiq_async.clock import now
-from robotiq_async.registers import Registers
-from robotiq_async.request import Request
+from robotiq_async.session.clock import now
 from robotiq_async.simulator import SimulatedGripper
+from robotiq_async.wire.registers import Registers
+from robotiq_async.wire.request import Request
 from tests.virtual import VirtualLoop, run
 
 

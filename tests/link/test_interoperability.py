@@ -11,12 +11,12 @@ from pyModbusTCP.client import ModbusClient
 from pyModbusTCP.server import DataBank, ModbusServer
 
 from robotiq_async import Finger, RobotiqHand, State
-from robotiq_async.address import parse_address
-from robotiq_async.link import ModbusTransport
-from robotiq_async.registers import TCP_REGISTERS
-from robotiq_async.request import AxisRequest, Request
+from robotiq_async.link.address import parse_address
+from robotiq_async.link.modbus import ModbusTransport
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.status import RobotiqStatus
+from robotiq_async.wire.registers import TCP_REGISTERS
+from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.wire.status import RobotiqStatus
 
 A = Finger.A
 

@@ -15,9 +15,9 @@ from pathlib import Path
 import pytest
 
 from robotiq_async import ProtocolError, ResponseTimeoutError, RobotiqConnectionError
-from robotiq_async.address import parse_address
-from robotiq_async.link import ModbusTransport
-from robotiq_async.registers import RTU_REGISTERS
+from robotiq_async.link.address import parse_address
+from robotiq_async.link.modbus import ModbusTransport
+from robotiq_async.wire.registers import RTU_REGISTERS
 from tests.serial_line import SerialLine
 
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from robotiq_async.enums import AXES, Fault, Finger, Initialization, Mode, ObjectStatus
-from robotiq_async.request import AxisRequest, Request
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.status import RobotiqStatus
+from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.wire.status import RobotiqStatus
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from robotiq_async.enums import AXES, Finger, ObjectStatus
-from robotiq_async.simulator.axis import PRESSING
+from robotiq_async.simulator.physics.axis import PRESSING
 from tests.simulator.conftest import CYCLE
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from robotiq_async.enums import AXES, Fault, Finger, Initialization, Mode, ObjectStatus
-from robotiq_async.request import AxisRequest
+from robotiq_async.wire.request import AxisRequest
 
 if TYPE_CHECKING:
     from tests.simulator.conftest import Bench

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async.simulator import Trouble
-from robotiq_async.simulator.damage import Parts, Reply
-from robotiq_async.simulator.trouble import KINDS
+from robotiq_async.simulator.troubles.corruption import Parts, Reply
+from robotiq_async.simulator.troubles.trouble import KINDS
 
 READ = "04 04 1234 5678"
 """Two registers, as an answer to FC04."""

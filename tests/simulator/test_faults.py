@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from robotiq_async.closing_time import closing_time
+from robotiq_async.calibration.closing_time import closing_time
 from robotiq_async.enums import Fault, Finger, Initialization, ObjectStatus, Severity
 
 if TYPE_CHECKING:

@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, Trouble
-from robotiq_async.simulator.connection import MOST_UNREAD, MOST_WAITING
-from robotiq_async.simulator.endpoint import connections
-from robotiq_async.simulator.serial_connection import MOST_UNSENT
+from robotiq_async.simulator.server.connection import MOST_UNREAD, MOST_WAITING
+from robotiq_async.simulator.server.endpoint import connections
+from robotiq_async.simulator.server.serial_connection import MOST_UNSENT
 from tests.simulator.test_adversary import simulator, virtual
 from tests.simulator.test_serial_server import Line, with_crc
 from tests.simulator.test_server import RawClient, raw_client

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robotiq_async.enums import AXES, Fault, Initialization, Mode
-from robotiq_async.request import AxisRequest, Request
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.status import RobotiqStatus
+from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.wire.status import RobotiqStatus
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -10,7 +10,7 @@ import pytest
 import serial
 
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
-from robotiq_async.simulator.framing import Frame
+from robotiq_async.simulator.server.framing import Frame
 from tests.simulator.test_adversary import virtual
 from tests.simulator.test_serial_server import with_crc
 from tests.virtual_line import VirtualLine

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
-from robotiq_async.simulator.framing import Frame, take_rtu
-from robotiq_async.status import RobotiqStatus
+from robotiq_async.simulator.server.framing import Frame, take_rtu
+from robotiq_async.wire.status import RobotiqStatus
 
 pytest.importorskip("serial")
 pty = pytest.importorskip("pty")

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async.simulator import Trouble, parse_troubles
-from robotiq_async.simulator.trouble import KINDS
+from robotiq_async.simulator.troubles.trouble import KINDS
 
 INF = math.inf
 CONDITIONS = [

@@ -1,0 +1,212 @@
+"""``robotiq-async measure``: what two kinds of measurements have in common."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+import threading
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+
+from ...link.address import parse_address
+from ..arguments import need
+from ..consent import read_line
+from ..failures import CommandError, UsageError, usage
+
+if TYPE_CHECKING:
+    from ... import RobotiqHand
+    from ...measure.campaigns import Campaign
+    from ...simulator import SimulatedGripper
+
+SPEEDUP = 15.0
+"""How much faster the simulated gripper of sim:// is, unless told otherwise."""
+POLL_S = 0.001
+"""Poll interval with a simulated gripper that is faster: its time is to be told as finely."""
+
+Runs = Annotated[int, Parameter(metavar="N")]
+Speedup = Annotated[float | None, Parameter(metavar="FACTOR")]
+NoPlot = Annotated[bool, Parameter(name="--no-plot", negative=())]
+
+
+def measure_app() -> App:
+    """The sub-command and its two."""
+    from .measure_force import force
+    from .measure_speed import speed
+
+    app = App(
+        name="measure",
+        help="Measure what the values 0..255 mean on your own gripper. THE FINGERS MOVE.",
+        help_format="plaintext",
+    )
+    app.command(speed)
+    app.command(force)
+    return app
+
+
+def check(address: str, output: Path, speedup: float | None, runs: int, step: int, plot: bool) -> float:
+    """Refuse what cannot be measured before anything moves; returns how much faster the gripper's time is.
+
+    Raises:
+        UsageError: an argument is out of range.
+        CommandError: matplotlib is missing.
+    """
+    with usage():
+        kind = parse_address(address).kind
+    if output.suffix != ".csv":
+        raise UsageError(f"--output must be a file named .csv, got {str(output)!r}")
+    if not 1 <= runs <= 100:
+        raise UsageError(f"--runs must be an integer in 1..100, got {runs}")
+    if not 1 <= step <= 255:
+        raise UsageError(f"--step must be an integer in 1..255, got {step}")
+    if speedup is not None and kind != "sim":
+        raise UsageError("--speedup is for sim:// only: the time of a real gripper cannot be changed")
+    if speedup is not None and not 1 <= speedup <= 50:
+        raise UsageError(f"--speedup must be a number in 1..50, got {speedup:g}")
+    if plot:
+        need("matplotlib", "plot", ", or pass --no-plot")
+    if kind != "sim":
+        return 1.0
+    return SPEEDUP if speedup is None else speedup
+
+
+@asynccontextmanager
+async def gripper(
+    address: str, speedup: float, prepare: Callable[[SimulatedGripper], None] = lambda _: None
+) -> AsyncIterator[RobotiqHand]:
+    """An active hand; that of sim:// in a simulated gripper's own, faster time.
+
+    Raises:
+        RobotiqError: no gripper there, or it cannot be activated.
+    """
+    from ... import RobotiqHand
+
+    if not address.startswith("sim:"):
+        async with RobotiqHand(address) as hand:
+            yield hand
+        return
+    from ...simulator import SimulatedGripper, SimulatorServer
+
+    simulated = SimulatedGripper(speedup=speedup)
+    interval = POLL_S if speedup > 1 else 5 * POLL_S
+    async with (
+        SimulatorServer(simulated) as server,
+        RobotiqHand(server.address, poll_interval=interval) as hand,
+    ):
+        prepare(simulated)
+        yield hand
+
+
+def load_rich() -> None:
+    """Import what takes a tenth of a second: not while a hand polls."""
+    import rich.progress  # noqa: F401
+
+
+async def carry_out(
+    campaign: Campaign,
+    measure_run: Callable[[int, int], Awaitable[int]],
+    seconds_of: Callable[[int], float],
+    what: str,
+    *,
+    bar: bool = True,
+) -> None:
+    """Measure what is left, with a progress bar that knows how long each row takes.
+
+    Without ``bar`` there is none: it would paint over what a person types.
+
+    Raises:
+        CommandError: the measurement went wrong, or a file could not be written; what is whole is kept.
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    from ...calibration.csv_tables import TableError
+    from ...measure.campaigns import MeasuringError
+
+    done, left = len(campaign.table), campaign.left
+    if done and left:
+        print(f"Going on with {campaign.path}: {done} rows are there, {len(left)} are left.", flush=True)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:3.0f} %"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    with Progress(
+        *columns, console=Console(stderr=True), disable=not (bar and sys.stderr.isatty())
+    ) as progress:
+        task = progress.add_task(what, total=campaign.runs * sum(seconds_of(value) for value in left))
+
+        readings: list[str] = []
+
+        async def run(value: int, number: int) -> int:
+            progress.update(task, description=f"{what} {value}, run {number}")
+            reading = await measure_run(value, number)
+            progress.advance(task, seconds_of(value))
+            readings.append(str(reading))
+            if number == campaign.runs:
+                row = f"{what} {value}: {', '.join(readings)} {campaign.layout.unit}"
+                if progress.disable:
+                    print(row, flush=True)
+                else:
+                    progress.console.print(row, highlight=False)
+                readings.clear()
+            return reading
+
+        try:
+            await campaign.measure(run)
+        except (MeasuringError, TableError, OSError) as error:
+            raise CommandError(f"{error}; {len(campaign.table)} rows are in {campaign.path}") from error
+
+
+async def asked(question: str) -> str:
+    """A line from the person at the terminal; the event loop goes on meanwhile.
+
+    Raises:
+        CommandError: there is nobody to ask.
+    """
+    loop = asyncio.get_running_loop()
+    answer: asyncio.Future[str] = loop.create_future()
+    print(question, end=" ", flush=True)
+
+    def read() -> None:
+        line = read_line()
+        with suppress(RuntimeError):  # the loop has been closed meanwhile
+            loop.call_soon_threadsafe(take, line)
+
+    def take(line: str) -> None:
+        if not answer.done():
+            answer.set_result(line)
+
+    # A daemon: a program that is interrupted does not wait for the line.
+    threading.Thread(target=read, daemon=True).start()
+    line = await answer
+    if not line:
+        raise CommandError("nobody answers: the input has ended")
+    return line.strip()
+
+
+@contextmanager
+def refused() -> Iterator[None]:
+    """Around tables and pictures: one that cannot be read or written ends the command.
+
+    Raises:
+        CommandError: in place of TableError and OSError.
+    """
+    from ...calibration.csv_tables import TableError
+
+    try:
+        yield
+    except (TableError, OSError) as error:
+        raise CommandError(str(error)) from error
+
+
+def told(files: list[Path]) -> None:
+    """Say what was written."""
+    for file in files:
+        print(file)

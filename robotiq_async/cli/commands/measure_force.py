@@ -1,0 +1,214 @@
+"""``robotiq-async measure force``."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import Awaitable, Callable, Coroutine
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Parameter
+
+from ...link.address import parse_address
+from ..arguments import Address, Byte, Yes
+from ..consent import consent
+from ..failures import CommandError, UsageError
+from .measure import NoPlot, Runs, Speedup, asked, carry_out, check, gripper, load_rich, refused, told
+
+if TYPE_CHECKING:
+    from ...calibration.csv_tables import Table
+    from ...measure.campaigns import Campaign, Currents
+    from ...simulator import SimulatedGripper
+
+WARNING = """the fingers MOVE: they open and close on what lies between them, {count} times.
+If it is not active yet it is activated first, and what it holds drops."""
+MOST_GRAMS = 100_000
+
+
+def force(
+    address: Address = "sim://",
+    /,
+    *,
+    surface: Literal["foam", "rigid"] = "foam",
+    output: Annotated[Path | None, Parameter(metavar="FILE.csv")] = None,
+    scale: Annotated[Path | None, Parameter(metavar="FILE.csv")] = None,
+    step: Annotated[int, Parameter(metavar="N")] = 25,
+    runs: Runs = 3,
+    speed: Byte = 128,
+    speedup: Speedup = None,
+    no_plot: NoPlot = False,
+    yes: Yes = False,
+) -> Coroutine[None, None, None]:
+    """Measure force and current of a grasp at each force value. THE FINGERS MOVE.
+
+    As the thesis did (chapter 6): a scale lies between the fingers, every 25th
+    value is set, up by 50 and down by 50, and its reading in grams is typed in, or
+    taken from a table. At sim:// a simulated scale shows what the thesis's showed.
+    The currents of the fingers are recorded at every poll. Both files are written
+    after every row; started again, it goes on where it was. Unless the gripper is
+    that of sim:// it asks first; without a terminal it needs --yes.
+
+    For example:
+
+        robotiq-async measure force --surface rigid
+        robotiq-async measure force 192.168.1.11 --runs 1
+
+    Args:
+        surface: What the fingers touch: the scale itself, or foam around it.
+        output: The readings (default: force_SURFACE_grams.csv); currents and plots have its name.
+        scale: A table of readings, in place of typing them.
+        step: Every so many force values.
+        runs: So many grasps at each.
+        speed: Of the closing.
+        speedup: How much faster the gripper of sim:// is (default: 15); times are its own.
+        no_plot: Draw nothing.
+        yes: Do not ask.
+    """
+    path = output or Path(f"force_{surface}_grams.csv")
+    if scale is not None and scale.resolve() == path.resolve():
+        raise UsageError("--scale must be another file than --output")
+    factor = check(address, path, speedup, runs, step, not no_plot)
+    from ...calibration.csv_tables import FORCE, read_table
+    from ...measure.campaigns import force_campaign
+
+    with refused():
+        readings = None if scale is None else read_table(scale, FORCE)
+        origin = {"gripper": str(parse_address(address)), "surface": surface, "speed": str(speed)}
+        campaign = force_campaign(path, step, runs, **origin)
+        currents = _currents_of(campaign)
+    read_scale = _scale(address, surface, readings, campaign.left, runs)
+    typed_in = readings is None and not address.startswith("sim:")
+    if campaign.left:
+        consent(address, WARNING.format(count=runs * len(campaign.left)), yes=yes)
+    return _measure(
+        address, surface, campaign, currents, read_scale, speed, factor, bar=not typed_in, plot=not no_plot
+    )
+
+
+async def _measure(
+    address: str,
+    surface: Literal["foam", "rigid"],
+    campaign: Campaign,
+    currents: Currents,
+    read_scale: Callable[[int, int], Awaitable[int]],
+    speed: int,
+    speedup: float,
+    *,
+    bar: bool,
+    plot: bool,
+) -> None:
+    from ...calibration.closing_time import closing_time
+    from ...measure.campaigns import GRASP_S, grasp, write_currents
+
+    output = campaign.path
+    currents_file = currents_beside(output)
+    if not campaign.left:
+        print(f"{output} is complete: nothing is measured again.")
+    if campaign.left:
+        load_rich()
+        async with gripper(address, speedup, lambda simulated: _place_scale(simulated, surface)) as hand:
+
+            async def run(value: int, number: int) -> int:
+                samples = await grasp(hand, value, speed, speedup)
+                reading = await read_scale(value, number)
+                currents[value] = [*(currents.get(value, []) if number > 1 else []), samples]
+                if number == campaign.runs:
+                    # Before the row: a row that is there has its currents.
+                    await asyncio.to_thread(write_currents, currents_file, currents)
+                return reading
+
+            seconds = (closing_time(speed) + closing_time(255) + GRASP_S) / speedup
+            await carry_out(campaign, run, lambda _: seconds, "force", bar=bar)
+    told([output, currents_file])
+    if plot:
+        _plot(output, surface, campaign.table, "simulated" if address.startswith("sim:") else "measured")
+
+
+def currents_beside(output: Path) -> Path:
+    """Where the currents go."""
+    return output.with_name(f"{output.stem}_currents.csv")
+
+
+def _currents_of(campaign: Campaign) -> Currents:
+    """The currents that were recorded so far.
+
+    Raises:
+        TableError: they cannot be read.
+        CommandError: those of some runs are missing.
+    """
+    from ...measure.campaigns import read_currents
+
+    file = currents_beside(campaign.path)
+    currents = read_currents(file) if campaign.table else {}
+    lacking = [value for value in campaign.table if len(currents.get(value, ())) != campaign.runs]
+    if lacking:
+        raise CommandError(f"{file} lacks runs of the force values {lacking}; choose another file")
+    return currents
+
+
+def _place_scale(simulated: SimulatedGripper, surface: str) -> None:
+    from ...enums import Finger
+
+    simulated.place_object(Finger.ABC, position=150, soft=40 if surface == "foam" else 0)
+
+
+def _scale(
+    address: str, surface: Literal["foam", "rigid"], readings: Table | None, values: list[int], runs: int
+) -> Callable[[int, int], Awaitable[int]]:
+    """Where the readings come from.
+
+    Raises:
+        CommandError: the table lacks some that are needed.
+    """
+    if readings is not None:
+        missing = [value for value in values if len(readings.get(value, ())) < runs]
+        if missing:
+            raise CommandError(f"the table of readings has no {runs} runs for the force values {missing}")
+
+    async def from_table(value: int, run: int) -> int:
+        assert readings is not None
+        return readings[value][run - 1]
+
+    async def typed(value: int, run: int) -> int:
+        while True:
+            text = await asked(f"Force {value}, run {run}: what does the scale show, in grams?")
+            if re.fullmatch("[0-9]{1,6}", text) and int(text) <= MOST_GRAMS:
+                return int(text)
+            print(f"An integer in 0..{MOST_GRAMS}, please.")
+
+    if readings is not None:
+        return from_table
+    if not address.startswith("sim:"):
+        return typed
+    from ...simulator.physics.scale import SimulatedScale
+
+    simulated = SimulatedScale(surface)
+
+    async def shown(value: int, _: int) -> int:
+        return simulated.reading(value)
+
+    return shown
+
+
+def _plot(output: Path, surface: str, table: Table, label: str) -> None:
+    from ...measure.campaigns import read_currents
+    from ...measure.plots import plot_current_over_time, plot_force, plot_peak_currents
+
+    with refused():
+        currents = read_currents(currents_beside(output))
+        over_time = {surface: currents}
+        other = "rigid" if surface == "foam" else "foam"
+        beside = output.with_name(output.name.replace(surface, other))
+        if beside != output and currents_beside(beside).exists():
+            over_time[other] = read_currents(currents_beside(beside))
+    stem = output.with_suffix("")
+    base = output.with_name(currents_beside(output).stem)
+    with refused():
+        told(plot_force(stem, table, surface, label))
+        told(plot_peak_currents(base.with_name(f"{base.name}_peak"), currents, surface, label))
+        told(
+            plot_current_over_time(
+                base.with_name(f"{base.name}_over_time"), dict(sorted(over_time.items())), label
+            )
+        )

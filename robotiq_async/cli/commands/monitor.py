@@ -1,0 +1,110 @@
+"""``robotiq-async monitor``."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import sys
+from typing import Annotated, Final
+
+from cyclopts import Parameter
+
+from ..arguments import USUAL, Address, Byte, Link, need
+from ..consent import forget_keys
+from ..failures import CommandError, UsageError
+from ..log_capture import forget, told
+
+SCREEN_S: Final = 1.0
+"""What the screen may take to leave the terminal as it was."""
+
+
+async def monitor(
+    address: Address = "sim://",
+    /,
+    *,
+    watch: Annotated[bool, Parameter(negative=())] = False,
+    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+    speed: Byte = 128,
+    force: Byte = 64,
+    link: Link = USUAL,
+) -> None:
+    """Show a gripper while it works, and move it by keys. Nothing moves until a key is pressed.
+
+    The screen shows the state, the fault in words, and for each axis where it is, where
+    it is asked to go, what it does and its current; how the polling goes; and a log.
+    A lost gripper is shown as lost, and comes back by itself.
+
+    Keys: o open, c close, 1 2 3 the widths of the scissor, SPACE halt, + - speed,
+    ] [ force, v recover, a activate, r reset, l release in a fault, q quit. The last
+    four before q ask first. Quitting stops the fingers only if they were moved from here.
+
+    Without a terminal, in a pipe say, it prints what --json prints, and only looks.
+
+    For example:
+
+        robotiq-async monitor tcp://192.168.1.11
+        robotiq-async monitor --watch 192.168.1.11
+        robotiq-async monitor --json 192.168.1.11 | jq .A.position
+
+    Args:
+        speed: What the axes get with the first command from here: what they have is not known.
+        force: The same. A grip that was made with more is loosened.
+        watch: Only look, and print a line for whatever changes, until Ctrl-C.
+        as_json: Only look, and print every poll and event as a JSON object a line.
+    """
+    if watch and as_json:
+        raise UsageError("--watch and --json exclude each other")
+    try:
+        if watch or as_json or not _is_terminal():
+            await _look(address, link, as_json=not watch)
+            return
+        need("textual", "monitor", ", or pass --watch")
+        await _screen(address, link, speed, force)
+    except asyncio.CancelledError:
+        pass  # Being told to stop is how this command ends well.
+
+
+def _is_terminal() -> bool:
+    """Whether there is somebody to look at a screen (which is drawn on standard error) and to press keys."""
+    streams = (sys.stdin, sys.stdout, sys.stderr)
+    return all(each is not None and each.isatty() for each in streams) and os.environ.get("TERM") != "dumb"
+
+
+async def _look(address: str, link: Link, *, as_json: bool) -> None:
+    from ..connect import connected
+    from ..stream_output import print_objects, watch
+
+    async with connected(address, link, halt=False) as hand:
+        await (print_objects if as_json else watch)(hand)
+    raise CommandError("the hand has ended; what became of it is above")
+
+
+async def _screen(address: str, link: Link, speed: int, force: int) -> None:
+    from ..connect import make_operator
+    from ..tui.screen import Monitor
+
+    operator = make_operator(address, link, speed=speed, force=force)
+    await operator.hand.start(activate=False)
+    screen, words = None, ""
+    try:
+        screen = Monitor(operator)
+        forget_keys()
+        showing = asyncio.ensure_future(screen.run_async())
+        with told(screen.remark):
+            await asyncio.wait({showing})
+    finally:
+        # First the fingers: a screen whose terminal is gone may take its time, or not come back at all.
+        words = await operator.leave()
+        if screen is not None:
+            showing.cancel()
+            await asyncio.wait({showing}, timeout=SCREEN_S)
+        _say(words)
+    if screen.return_code:
+        raise CommandError("the screen failed; what it says is above")
+
+
+def _say(words: str) -> None:
+    try:
+        print(words, flush=True)
+    except OSError:  # the terminal is gone
+        forget(sys.stdout)

@@ -1,0 +1,77 @@
+"""``robotiq-async move``."""
+
+from __future__ import annotations
+
+from collections.abc import Coroutine
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from ...enums import Finger
+from ...wire.checks import check_timeout
+from ..arguments import USUAL, Address, Byte, Fingers, Link, Position, Yes
+from ..consent import consent
+from ..failures import usage
+
+WARNING = """this MOVES {fingers} to {position}.
+If it is not active yet ALL its fingers open and close to their stops first, and what they hold drops."""
+
+
+def move(
+    position: Position,
+    address: Address = "sim://",
+    /,
+    *,
+    fingers: Fingers = Finger.ABC,
+    speed: Byte | None = None,
+    force: Byte | None = None,
+    timeout: Annotated[float | None, Parameter(metavar="SECONDS")] = None,
+    yes: Yes = False,
+    link: Link = USUAL,
+) -> Coroutine[None, None, None]:
+    """Move axes and wait until they have stopped. THE FINGERS MOVE.
+
+    A gripper that is not active yet is activated first: its fingers then open and
+    close to their stops. An axis that meets an object stops there; that is a
+    success, and the table says so. Unless the gripper is that of sim:// it asks
+    first; without a terminal it needs --yes.
+
+    For example:
+
+        robotiq-async move 255
+        robotiq-async move 100 tcp://192.168.1.11 --fingers A,B --speed 64
+        robotiq-async move 255 192.168.1.11 --fingers scissor --force 0 --yes
+
+    Args:
+        position: 0 is open, 255 is closed; for the scissor 0 is wide and 255 is pinch.
+        fingers: The axes that move: ABC, A,B, scissor, all.
+        speed: 0 is the slowest (10 s for a full stroke), 255 the fastest (2 s).
+        force: 0 is the weakest, 255 the strongest.
+        timeout: Give up after so many seconds; by default from distance and speed.
+        yes: Do not ask.
+    """
+    with usage():
+        check_timeout("timeout", timeout)
+    # Asked here and not in the coroutine: a question would block the event loop.
+    consent(address, WARNING.format(fingers=fingers.name, position=position), yes=yes)
+    return _move(position, address, fingers, speed, force, timeout, link)
+
+
+async def _move(
+    position: int,
+    address: str,
+    fingers: Finger,
+    speed: int | None,
+    force: int | None,
+    timeout: float | None,
+    link: Link,
+) -> None:
+    from ..connect import connected
+    from ..tables import print_outcomes
+
+    async with connected(address, link, halt=True) as hand:
+        if not hand.is_activated:
+            print("Activating: the fingers open and close.", flush=True)
+            await hand.activate()
+        result = await hand.move(position, fingers, speed=speed, force=force, timeout=timeout)
+    print_outcomes(result)

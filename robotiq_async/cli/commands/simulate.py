@@ -1,0 +1,104 @@
+"""``robotiq-async simulate``."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from ...errors import RobotiqError
+from ...wire.registers import RTU_REGISTERS
+from ..arguments import Port, Unit, is_loopback
+from ..failures import usage
+
+if TYPE_CHECKING:
+    from ...simulator import Trouble
+
+
+async def simulate(
+    *,
+    port: Port = 5020,
+    host: str = "127.0.0.1",
+    speedup: Annotated[float, Parameter(metavar="FACTOR")] = 1.0,
+    exact: Annotated[bool, Parameter(negative=())] = False,
+    serial: Annotated[str | None, Parameter(metavar="DEVICE")] = None,
+    device_id: Unit | None = None,
+    trouble: Annotated[list[str] | None, Parameter(metavar="WORDS", negative=())] = None,
+    troubles: Annotated[bool, Parameter(negative=())] = False,
+) -> None:
+    """Run a simulated gripper until Ctrl-C or SIGTERM.
+
+    Its address is the only line on standard output, printed once it listens:
+    other programs connect to it as to a real gripper.
+
+    A trouble is
+
+        KIND [VALUE] [on read|write] [at S] [for S|for ever|once] [every S]
+
+    in seconds of the clock, counted from the start. Each is told on standard error
+    as it begins. --troubles lists the kinds.
+
+    For example:
+
+        robotiq-async simulate
+        robotiq-async simulate --port 5021 --speedup 10
+        robotiq-async simulate --serial /dev/pts/3
+        robotiq-async simulate --serial /dev/pts/3 --device-id 12
+        robotiq-async simulate --trouble "drop at 5 every 10" --trouble "delay 0.02"
+        robotiq-async simulate --trouble "power-cut at 20 for 2; foreign 0 at 30"
+
+    Args:
+        port: TCP port; 0 takes a free one.
+        host: Interface to listen on. Modbus knows no password: whoever reaches the port is in command.
+        speedup: How many times faster than the clock the simulated time runs.
+        exact: Stop exactly where it is told to, which no real gripper does.
+        serial: Serve Modbus RTU on this serial device in place of TCP (extra serial).
+        device_id: The only Modbus unit id that is answered (default: 9 serial, any on TCP).
+        trouble: What goes wrong, and when; may be given again.
+        troubles: List what can go wrong, and end.
+    """
+    from ...simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, parse_troubles
+
+    if troubles:
+        _list_troubles()
+        return
+    with usage():
+        plan = parse_troubles("\n".join(trouble or ()))
+        gripper = SimulatedGripper(speedup=speedup, spread=not exact)
+        server: SimulatorServer | SerialSimulatorServer
+        if serial is None:
+            server = SimulatorServer(gripper, port=port, host=host, device_id=device_id)
+        else:
+            unit = RTU_REGISTERS.device_id if device_id is None else device_id
+            server = SerialSimulatorServer(serial, gripper, device_id=unit)
+        server.adversary.check(plan)
+    if serial is None and not is_loopback(host):
+        print(f"robotiq-async: anyone who reaches {host} can command this gripper", file=sys.stderr)
+    try:
+        async with server:
+            print(server.address, flush=True)
+            await server.adversary.run(plan, _tell)
+            await asyncio.Event().wait()
+    except asyncio.CancelledError:
+        pass  # Being told to stop is how this command ends well.
+    except ImportError as error:
+        raise RobotiqError(str(error)) from error
+    except OSError as error:
+        where = f"{host}:{port}" if serial is None else serial
+        raise RobotiqError(f"cannot listen on {where}: {error.strerror or error}") from error
+
+
+def _tell(trouble: Trouble) -> None:
+    print(f"robotiq-async: trouble: {trouble}", file=sys.stderr, flush=True)
+
+
+def _list_troubles() -> None:
+    from ...simulator.troubles.trouble import KINDS
+
+    for name, kind in KINDS.items():
+        usual = "" if kind.value is None else f" (VALUE: {kind.value:g} unless given)"
+        lasts = "" if kind.lasts == 0 else "; goes on unless it is said for how long"
+        link = "" if kind.link is None else f"; {kind.link} only"
+        print(f"{name:18} {kind.meaning}{usual}{lasts}{link}")

@@ -1,0 +1,90 @@
+"""``robotiq-async view``."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from ...telemetry.payloads import printable
+from ..arguments import USUAL, Address, Byte, Link, Port, is_loopback, need
+from ..failures import CommandError
+
+
+async def view(
+    address: Address = "sim://",
+    /,
+    *,
+    port: Port = 8765,
+    host: str = "127.0.0.1",
+    read_only: Annotated[bool, Parameter(negative=())] = False,
+    layout: Annotated[Path | None, Parameter(metavar="FILE")] = None,
+    speed: Byte = 128,
+    force: Byte = 64,
+    link: Link = USUAL,
+) -> None:
+    """Show a gripper in Foxglove or Lichtblick, and let buttons there move it, until Ctrl-C.
+
+    Nothing moves until a service is called. What is printed is the address to open there
+    (Open connection, Foxglove WebSocket). Status, commands, events and joint states are
+    the topics of a recording; /gripper/state tells state, fault and how the polling goes.
+
+    There is no password. Whoever reaches the port may call a service, and so may a web
+    page that is open in a browser on the same machine: --read-only has no services.
+
+    Ending it stops the fingers only if they were moved from here.
+
+    For example:
+
+        robotiq-async view tcp://192.168.1.11
+        robotiq-async view --read-only --port 8766 192.168.1.11
+        robotiq-async view --layout gripper.json
+
+    Args:
+        port: TCP port; 0 takes a free one.
+        host: Interface to listen on. Another one than 127.0.0.1 lets others in.
+        read_only: Show, and take no commands.
+        speed: What the axes get with the first command from here: what they have is not known.
+        force: The same. A grip that was made with more is loosened.
+        layout: Write the layout that goes with it to a file, for Foxglove to import, and end.
+    """
+    if layout is not None:
+        _write(layout)
+        return
+    need("foxglove", "view")
+    from ...telemetry.viewer import Viewer
+    from ..connect import make_operator, operated
+    from ..log_capture import told
+
+    if not is_loopback(host):
+        what = "see this gripper" if read_only else "see this gripper and COMMAND it"
+        _tell(f"anyone who reaches {host} can {what}: there is no password")
+    try:
+        operator = make_operator(address, link, speed=speed, force=force)
+        viewer = Viewer(operator.hand, host=host, port=port, operator=None if read_only else operator)
+        # In this order no viewer delays the stop of the fingers.
+        with told(_tell):
+            async with viewer, operated(operator, _tell):
+                print(viewer.url, flush=True)
+                await asyncio.Event().wait()
+    except asyncio.CancelledError:
+        pass  # Being told to stop is how this command ends well.
+
+
+def _tell(words: str) -> None:
+    # Some of the server's words are its clients'.
+    print("robotiq-async:", printable(words), file=sys.stderr, flush=True)
+
+
+def _write(layout: Path) -> None:
+    text = (files("robotiq_async") / "data" / "foxglove_layout.json").read_text(encoding="utf-8")
+    try:
+        with open(layout, "x", encoding="utf-8") as file:
+            file.write(text)
+    except OSError as error:
+        raise CommandError(f"{layout}: {error.strerror}") from error
+    print(layout)

@@ -1,0 +1,55 @@
+"""What happens to a hand, a line each, for people."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import datetime
+from typing import Final
+
+from ..enums import AXES
+from ..telemetry.payloads import Fields
+
+_NAMES: Final = [str(axis.name) for axis in AXES]
+
+
+def clock(seconds: float) -> str:
+    """A time of the world's clock, as people here read it, to the millisecond."""
+    return f"{datetime.fromtimestamp(seconds).astimezone():%H:%M:%S.%f}"[:-3]
+
+
+def status_line(fields: Fields) -> str:
+    """A status: every axis."""
+    axes = (f"{name}={fields[name]['position']} {_does(fields, name)}" for name in _NAMES)
+    return f"status   {' '.join(axes)}"
+
+
+def _does(fields: Fields, name: str) -> str:
+    # The gripper also says "in motion" of an axis that was never told to go.
+    seen = str(fields[name]["status"])
+    return "-" if seen == "IN_MOTION" and not fields["moving"] else seen
+
+
+def command_line(fields: Fields) -> str:
+    """A request that was written."""
+    axes = (f"{n}={fields[n]['position']}@{fields[n]['speed']}/{fields[n]['force']}" for n in _NAMES)
+    bits = f"act={fields['activate']:d} go={fields['go']:d} release={fields['release']:d}"
+    return f"command  {bits} {' '.join(axes)}{'' if fields['acknowledged'] else ' NOT ACKNOWLEDGED'}"
+
+
+def event_line(fields: Fields) -> str:
+    """The state at the beginning, a transition, a fault, or what the library has to say."""
+    if fields["kind"] == "remark":
+        return f"remark   {fields['words']}"
+    if fields["kind"] == "state":
+        return f"state    {fields['target']}"
+    if fields["kind"] == "fault":
+        return f"fault    0x{fields['code']:02X} {fields['name']}: {fields['description']}"
+    return f"state    {fields['source']} -> {fields['target']} ({fields['trigger']})"
+
+
+IN_WORDS: Final[dict[str, Callable[[Fields], str]]] = {
+    "/gripper/status": status_line,
+    "/gripper/command": command_line,
+    "/gripper/event": event_line,
+}
+"""By topic."""

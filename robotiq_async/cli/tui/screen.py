@@ -1,0 +1,200 @@
+"""The monitor's screen: shows a hand, and does what keys ask. Needs the extra ``monitor`` (textual)."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import deque
+from collections.abc import Awaitable, Callable, Iterable
+from functools import partial
+from typing import ClassVar, Final
+
+from rich.text import Text
+from textual.app import App, ComposeResult
+from textual.binding import BindingType
+from textual.widgets import RichLog, Static
+from textual.worker import Worker
+
+from ...actions import ACTIONS, Operator
+from ...enums import AXES, Fault, State
+from ...errors import RobotiqError
+from ...session.clock import now
+from ...telemetry.payloads import fault_fields, transition_fields
+from ...wire.status import RobotiqStatus
+from ..text import clock, event_line
+from .widgets import Axes, Line, Question, link_text, state_text
+
+if sys.platform == "win32":
+    DRIVER, UNHURRIED = None, ()
+else:
+    from .nonblocking_driver import UnhurriedDriver
+
+    DRIVER, UNHURRIED = UnhurriedDriver, UnhurriedDriver
+
+FRAMES: Final = 12
+"""Paints a second."""
+FIGURES_S: Final = 0.5
+"""Between two looks at the figures of the polling."""
+BUFFER: Final = 400
+"""Statuses kept for the next paint: two seconds."""
+STEP: Final = 16
+"""Of speed and force, for one press of a key."""
+LOG_LINES: Final = 2000
+
+KEYS: Final = """\
+o open  c close  1 wide  2 normal  3 pinch  SPACE halt  + - speed  ] [ force
+a activate  r reset  l release  v recover                             q quit"""
+
+
+class Monitor(App[None]):
+    """The screen."""
+
+    ENABLE_COMMAND_PALETTE = False
+    ALLOW_SELECT = False  # Ctrl-C would copy what is selected, and not quit.
+    CSS = """
+    #state, #link, #keys, #axes { padding: 0 1; text-wrap: nowrap; text-overflow: ellipsis; }
+    #state, #link, #keys { height: 2; }
+    #axes { height: 5; margin: 1 0; }
+    #log { height: 1fr; border: round $surface-lighten-2; }
+    #keys { color: $text-muted; }
+    Question { align: center middle; background: transparent; }
+    #question { width: 60; max-width: 100%; height: auto; padding: 1 2; background: $surface; }
+    #question { border: thick $warning; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        ("o", "act('open')", "open"),
+        ("c", "act('close')", "close"),
+        ("1", "act('wide')", "wide"),
+        ("2", "act('normal')", "normal"),
+        ("3", "act('pinch')", "pinch"),
+        ("space,h", "act('halt')", "halt"),
+        ("a", "act('activate')", "activate"),
+        ("r", "act('reset')", "reset"),
+        ("l", "act('release')", "release"),
+        ("v", "act('recover')", "recover"),
+        ("plus,equals_sign", f"speed({STEP})", "faster"),
+        ("minus", f"speed(-{STEP})", "slower"),
+        ("right_square_bracket", f"force({STEP})", "stronger"),
+        ("left_square_bracket", f"force(-{STEP})", "weaker"),
+        ("q,ctrl+c", "quit", "quit"),
+    ]
+
+    def __init__(self, operator: Operator) -> None:
+        """Prepare a screen for somebody at a hand that has been started."""
+        super().__init__(driver_class=DRIVER)
+        self._operator = operator
+        self._hand = operator.hand
+        self._lines: deque[tuple[float, str, str]] = deque(maxlen=LOG_LINES)
+        """For the log, at the next paint: when, what, how."""
+        self._statuses = operator.hand.statuses(BUFFER)
+        self._transitions = operator.hand.transitions()
+        self._newest = operator.hand.status
+        self._fault = Fault.NONE
+        # Held here and not looked up: a paint may come when the screen is already being taken down.
+        self._top = Line(id="state")
+        self._axes = Axes()
+        self._figures = Line(id="link")
+        self._history = RichLog(id="log", max_lines=LOG_LINES, wrap=True)
+        self._overruns = 0
+        self._polls = (now(), operator.hand.statistics.polls)
+
+    def compose(self) -> ComposeResult:
+        """From top to bottom."""
+        yield self._top
+        yield self._axes
+        yield self._figures
+        self._history.can_focus = False  # It would take keys.
+        yield self._history
+        yield Static(KEYS, id="keys", markup=False)
+
+    def on_mount(self) -> None:
+        """Begin to paint."""
+        self.remark("Watching. Nothing has been written to the gripper.", "")
+        self._look([self._newest])
+        self._paint_state()
+        self._paint_figures()
+        self.set_interval(1 / FRAMES, self._paint)
+        self.set_interval(FIGURES_S, self._paint_figures)
+
+    # -- what is shown ---------------------------------------------------------------------------------
+
+    def remark(self, words: str, style: str = "yellow", when: float | None = None) -> None:
+        """A line for the log, at any time; ``when`` by the hand's clock."""
+        self._lines.append((now() if when is None else when, words, style))
+
+    def _paint(self) -> None:
+        """Show what has come since the last time; of the statuses, the newest."""
+        driver = self._driver
+        if isinstance(driver, UNHURRIED) and driver.is_behind:
+            if not driver.has_caught_up:
+                return  # nobody sees it
+            driver.is_behind = False
+            self.refresh(layout=True)
+        self._look(self._statuses.drain())
+        for each in self._transitions.drain():
+            self.remark(event_line(transition_fields(each)), "", each.timestamp)
+        epoch = time.time() - now()
+        for when, words, style in sorted(self._lines):
+            self._history.write(Text(f"{clock(epoch + when)} {words}", style), expand=True)
+        self._lines.clear()
+        self._paint_state()
+
+    def _look(self, statuses: Iterable[RobotiqStatus]) -> None:
+        peaks = dict.fromkeys(AXES, -1)
+        for status in statuses:
+            self._newest = status
+            for axis in AXES:
+                peaks[axis] = max(peaks[axis], status.current_ma(axis))
+            if status.fault != self._fault:
+                self._fault = status.fault
+                style = "bold" if status.fault else ""
+                self.remark(event_line(fault_fields(status)), style, status.timestamp)
+        self._axes.show(self._newest, peaks)
+
+    def _paint_state(self) -> None:
+        state, age = self._hand.state, now() - self._newest.timestamp
+        self._top.show(state_text(self._hand.address, state, self._newest, age))
+        self._axes.show_age(state is State.DISCONNECTED)
+
+    def _paint_figures(self) -> None:
+        figures, at = self._hand.statistics, now()
+        before, polls = self._polls
+        self._polls = (at, figures.polls)
+        rate = (figures.polls - polls) / (at - before) if at > before else 0.0
+        operator = self._operator
+        held_up, self._overruns = figures.overruns > self._overruns, figures.overruns
+        self._figures.show(link_text(figures, rate, held_up, operator.speed, operator.force))
+
+    # -- what keys do ----------------------------------------------------------------------------------
+
+    def action_act(self, name: str) -> None:
+        """Carry out an action; a dangerous one only after a yes."""
+        action = ACTIONS[name]
+
+        def answered(yes: bool | None) -> None:
+            if yes:
+                self._begin(action.name, partial(self._operator.act, action))
+
+        if action.warning:
+            self.push_screen(Question(f"{action.name}: {action.what}?", action.warning), answered)
+        else:
+            answered(True)
+
+    def action_speed(self, by: int) -> None:
+        """Change the speed of every axis."""
+        self._begin("speed", partial(self._operator.change_speed, by))
+
+    def action_force(self, by: int) -> None:
+        """Change the force of every axis."""
+        self._begin("force", partial(self._operator.change_force, by))
+
+    def _begin(self, name: str, work: Callable[[], Awaitable[str]]) -> None:
+        # A function and not a coroutine: one that is not begun any more would complain.
+        async def carry_out() -> None:
+            # Painted with the next paint: a key that is held would paint thirty times a second.
+            try:
+                self.remark(f"{name}: {await work()}", "bold")
+            except RobotiqError as error:
+                self.remark(f"{name}: {error}", "bold red")
+
+        _: Worker[None] = self.run_worker(carry_out)

@@ -1,0 +1,228 @@
+"""The parts of the monitor's screen; each shows what it is given and knows nothing of a hand's life."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Final
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import BindingType
+from textual.screen import ModalScreen
+from textual.widget import Widget
+from textual.widgets import Static
+
+from ...enums import AXES, Fault, Finger, ObjectStatus, Severity, State
+from ...session.statistics import Statistics
+from ...wire.status import RobotiqStatus
+
+HISTORY: Final = 60
+"""Currents kept: five seconds."""
+FULL: Final = 255
+READING_S: Final = 0.3
+"""Keys that were typed before a question could be read are no answer to it."""
+SMALL_MA: Final = 500
+"""Currents below this do not fill their column: the noise of a standing motor is no mountain."""
+STILL: Final = 4
+"""An axis that has not moved for so many paints stands."""
+LEVELS: Final = "▁▂▃▄▅▆▇█"
+FIXED: Final = 47
+"""Columns of a line that are not pictures."""
+_OBJECT: Final = {
+    ObjectStatus.IN_MOTION: ("moving", "cyan"),
+    ObjectStatus.CONTACT_OPENING: ("CONTACT opening", "bold yellow"),
+    ObjectStatus.CONTACT_CLOSING: ("CONTACT closing", "bold yellow"),
+    ObjectStatus.AT_POSITION: ("there", "green"),
+}
+_CALM: Final = (State.RUNNING_IDLE, State.RUNNING_CC)
+
+
+class Line(Static):
+    """A text of a fixed size that is painted only when it is another one: painting is the dear part."""
+
+    _text = Text()
+
+    def show(self, text: Text) -> None:
+        """Change it."""
+        if text != self._text:
+            self._text = text
+            self.update(text, layout=False)
+
+
+class Axes(Widget):
+    """A line for each axis: position and request, what it does, its current now and in the last seconds.
+
+    One widget that draws all of it: a screen of many takes five times as long to paint, and the loop that
+    paints is the one that polls.
+    """
+
+    def __init__(self) -> None:
+        """Nothing to show yet."""
+        super().__init__(id="axes")
+        self._status = RobotiqStatus((0,) * 8)
+        self._currents = {axis: deque([0] * HISTORY, maxlen=HISTORY) for axis in AXES}
+        self._still = dict.fromkeys(AXES, STILL)
+        """Paints since an axis was elsewhere."""
+        self._stale = False
+
+    def show(self, status: RobotiqStatus, peaks_ma: Mapping[Finger, int]) -> None:
+        """A status, and the highest currents since the last time; -1 when nothing has come."""
+        for axis in AXES:
+            self._currents[axis].append(peaks_ma[axis])
+            same = status.position(axis) == self._status.position(axis)
+            self._still[axis] = self._still[axis] + 1 if same else 0
+        self._status = status
+        self.refresh()
+
+    def show_age(self, stale: bool) -> None:
+        """Whether what is shown is no longer true."""
+        if stale != self._stale:
+            self._stale = stale
+            self.refresh()
+
+    def render(self) -> Text:
+        """The lines."""
+        # What is left of the width goes to the two columns that are pictures.
+        bar = max((self.size.width - FIXED) // 2, 8)
+        where, current = (f"{words:{bar}.{bar}}" for words in ("position, ▼ request", "current, 5 s"))
+        head = Text(f"axis     {where}   counts   {'':15} {current}      now", "dim")
+        lines = [head, *(self._line(axis, bar) for axis in AXES)]
+        text = Text("\n", no_wrap=True, overflow="crop").join(lines)
+        if self._stale:
+            text.stylize("dim")
+        return text
+
+    def _line(self, axis: Finger, bar: int) -> Text:
+        status, currents = self._status, self._currents[axis]
+        position, requested = status.position(axis), status.requested_position(axis)
+        line = Text(f"{axis.name:8} ", "bold")
+        line.append_text(position_bar(position, requested, bar))
+        line.append(f" {position:3} → {requested:<3} ", "not bold")
+        line.append_text(self._does(axis))
+        line.append(f" {sparkline(list(currents), bar)} ", "cyan not bold")
+        line.append(f"{max(currents[-1], 0):5} mA", "not bold")
+        return line
+
+    def _does(self, axis: Finger) -> Text:
+        seen = self._status.finger_status(axis)
+        # The gripper says "in motion" also of an axis that was never told to go, and moves axes in an
+        # activation and in a release without saying so.
+        if seen is ObjectStatus.IN_MOTION and not axis & self._status.moving and self._still[axis] >= STILL:
+            return Text(f"{'-':15}", "dim")
+        words, style = _OBJECT[seen]
+        return Text(f"{words:15}", style)
+
+
+def position_bar(position: int, requested: int, width: int) -> Text:
+    """Where an axis is (the bar) and where it is asked to go (the mark); counts, 0..255."""
+    filled, mark = round(position / FULL * width), round(requested / FULL * (width - 1))
+    cells = ["█"] * filled + ["·"] * (width - filled)
+    cells[mark] = "▼"
+    bar = Text("".join(cells), "blue not bold")
+    bar.stylize("dim", filled)
+    bar.stylize("bold magenta not dim", mark, mark + 1)
+    return bar
+
+
+def sparkline(values: Sequence[int], width: int) -> str:
+    """Currents in mA, their peaks in so many columns; the top is the highest, or half an ampere.
+
+    Where there was none (-1) nothing is drawn.
+    """
+    count, top = len(values), max(SMALL_MA, *values)
+    columns = min(width, count)
+    peaks = (max(values[n * count // columns : (n + 1) * count // columns]) for n in range(columns))
+    return "".join(LEVELS[peak * (len(LEVELS) - 1) // top] if peak >= 0 else " " for peak in peaks).rjust(
+        width
+    )
+
+
+def state_text(address: str, state: State, status: RobotiqStatus, age: float) -> Text:
+    """State and fault, a line each.
+
+    Args:
+        address: of the gripper.
+        state: of the hand.
+        status: the last one.
+        age: its age in seconds.
+    """
+    lost = state is State.DISCONNECTED
+    colours = "white on red" if lost else "black on green" if state in _CALM else "black on yellow"
+    text = Text.assemble((f" {state.name} ", f"bold {colours}"))
+    if lost:
+        text.append(f"  no gripper answers: what you see is {age:.1f} s old")
+    else:
+        text.append(f"  {_doing(state, status)}")
+    text.append(f"  {address}\n", "dim")
+    fault = status.fault
+    if fault is Fault.NONE:
+        text.append("no fault", "dim")
+    else:
+        severe = "dim" if lost else "bold red" if fault.severity is Severity.MAJOR else "yellow"
+        text.append(f"{fault.severity.value} fault 0x{int(fault):02X}: {fault.description}", severe)
+    return text
+
+
+def _doing(state: State, status: RobotiqStatus) -> str:
+    if state in (State.DO_ATR, State.WF_ATR) or status.fault is Fault.AUTOMATIC_RELEASE:
+        return "releasing: the fingers OPEN"
+    if status.is_activated:
+        return f"active, {'moving' if status.is_moving else 'not moving'}"
+    if status.is_reset:
+        return "reset"
+    return "activating: the fingers MOVE"
+
+
+def link_text(figures: Statistics, rate: float, held_up: bool, speed: int, force: int) -> Text:
+    """How the polling goes, whether it was held up lately, and what the next motion is asked to be like."""
+    jitter = 1000 * (figures.period_p99 - figures.period_p50)
+    text = Text(f"{rate:.1f} Hz  jitter {jitter:.2f} ms  ", "dim")
+    text.append(
+        f"round trip {1000 * figures.round_trip_p50:.2f}/{1000 * figures.round_trip_p99:.2f} ms  ", "dim"
+    )
+    text.append(f"overruns {figures.overruns}  ", "yellow" if held_up else "dim")
+    text.append(f"reconnects {figures.reconnects}", "yellow" if figures.reconnects else "dim")
+    text.append(f"\nspeed {speed:<3}  force {force:<3}", "bold")
+    if figures.foreign_commands:
+        text.append(
+            f"  ANOTHER CLIENT commands this gripper ({figures.foreign_commands} times)", "bold yellow"
+        )
+    return text
+
+
+class Question(ModalScreen[bool]):
+    """Asks before something dangerous. Halting goes on working meanwhile."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        ("y", "answer(True)", "yes"),
+        ("n,escape,q,ctrl+c", "answer(False)", "no"),
+        ("space,h", "app.act('halt')", "halt"),
+    ]
+
+    def __init__(self, question: str, warning: str) -> None:
+        """Prepare the question."""
+        super().__init__()
+        self.is_open = False
+        """Whether a yes counts: not before somebody can have read the question."""
+        self._question = question
+        self._warning = warning
+
+    def compose(self) -> ComposeResult:
+        """The question."""
+        text = Text(f"{self._question}\n\n", "bold")
+        text.append(self._warning, "bold yellow")
+        text.append("\n\ny yes    n no    space halt")
+        yield Static(text, id="question")
+
+    def on_mount(self) -> None:
+        """Begin to listen in a moment."""
+        self.set_timer(READING_S, self._open)
+
+    def _open(self) -> None:
+        self.is_open = True
+
+    def action_answer(self, answer: bool) -> None:
+        """Yes or no."""
+        if self.is_open or not answer:
+            self.dismiss(answer)

@@ -1,0 +1,140 @@
+"""Moves: what was asked of which axes, when it has ended, and with what result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from ..calibration.closing_time import STROKE_COUNTS, closing_time
+from ..enums import AXES, Finger, ObjectStatus
+from ..errors import ConnectionLostError, RobotiqError
+from ..values import FrozenMapping
+from ..wire.status import RobotiqStatus
+
+MARGIN_S: Final = 2.0
+"""Added to twice the expected time for the default time-out of a move."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class MoveResult:
+    """How a move ended. A contact is a result, not an error. A value: compared, hashed, copied, pickled.
+
+    Attributes:
+        outcomes: for each addressed axis, how it ended.
+        positions: for each addressed axis, where it ended, in counts.
+        contacts: the addressed axes stopped by a contact.
+        duration: seconds from the call to the status that ended the move.
+        peak_current_ma: for each addressed axis, the highest motor current seen, in milliampere.
+        status: the status that ended the move.
+    """
+
+    outcomes: Mapping[Finger, ObjectStatus]
+    positions: Mapping[Finger, int]
+    contacts: Finger
+    duration: float
+    peak_current_ma: Mapping[Finger, int]
+    status: RobotiqStatus
+
+    def __post_init__(self) -> None:
+        """Keep mappings of our own."""
+        for name in ("outcomes", "positions", "peak_current_ma"):
+            object.__setattr__(self, name, FrozenMapping(getattr(self, name)))
+
+    @property
+    def object_detected(self) -> bool:
+        """Whether a contact stopped at least one addressed axis."""
+        return bool(self.contacts)
+
+    def __repr__(self) -> str:
+        """The words a person looks for first."""
+        axes = ", ".join(
+            f"{axis}={self.positions.get(axis)} {how.name} {self.peak_current_ma.get(axis)}mA"
+            for axis, how in self.outcomes.items()
+        )
+        return f"<MoveResult {axes} in {self.duration:.3f} s>"
+
+
+class Move:
+    """One awaited move. Ends exactly once, with a result or an error."""
+
+    def __init__(
+        self,
+        position: int,
+        axes: Finger,
+        now: float,
+        done: Callable[[MoveResult | RobotiqError], None],
+    ) -> None:
+        """Address axes.
+
+        Args:
+            position: target in counts.
+            axes: the addressed axes.
+            now: monotonic seconds of the call.
+            done: called once, with the result or the error.
+        """
+        self.position = position
+        self.axes = axes
+        self.was_lost = False
+        """Whether the link went down under it."""
+        self._started = now
+        self._peak = dict.fromkeys((axis for axis in AXES if axis in axes), 0)
+        self._done: Callable[[MoveResult | RobotiqError], None] | None = done
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether result or error have been handed over."""
+        return self._done is None
+
+    def end(self, outcome: MoveResult | RobotiqError) -> None:
+        """Hand over the outcome, the first time."""
+        done, self._done = self._done, None
+        if done is not None:
+            self.was_lost = isinstance(outcome, ConnectionLostError)
+            done(outcome)
+
+    def observe(self, status: RobotiqStatus) -> None:
+        """Take in the currents of a status read after the command was sent."""
+        for axis, peak in self._peak.items():
+            self._peak[axis] = max(peak, status.current_ma(axis))
+
+    def is_under(self, status: RobotiqStatus) -> bool:
+        """Whether a status echoes this request for every addressed axis."""
+        return status.go_echo and all(status.requested_position(axis) == self.position for axis in self._peak)
+
+    def has_arrived(self, status: RobotiqStatus) -> bool:
+        """Whether a status shows every addressed axis at rest under this request."""
+        return self.is_under(status) and all(
+            status.finger_status(axis) is not ObjectStatus.IN_MOTION for axis in self._peak
+        )
+
+    def result(self, status: RobotiqStatus) -> MoveResult:
+        """The result, from the status that ended the move."""
+        return MoveResult(
+            outcomes={axis: status.finger_status(axis) for axis in self._peak},
+            positions={axis: status.position(axis) for axis in self._peak},
+            contacts=status.contacts & self.axes,
+            duration=status.timestamp - self._started,
+            peak_current_ma=self._peak,
+            status=status,
+        )
+
+
+def default_timeout(
+    position: int,
+    axes: Finger,
+    status: RobotiqStatus,
+    speeds: Mapping[Finger, int],
+    closing_time: Callable[[int], float] = closing_time,
+) -> float:
+    """Seconds a move may take: twice the expected time plus 2 s.
+
+    The expected time is that of the slowest addressed axis, from the distance in counts and the closing
+    times of the thesis (table A1.1). The scissor has no published figure and is taken for a finger.
+    """
+    expected = max(
+        abs(position - status.position(axis)) / STROKE_COUNTS * closing_time(speeds[axis])
+        for axis in AXES
+        if axis in axes
+    )
+    return 2 * expected + MARGIN_S

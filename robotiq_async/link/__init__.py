@@ -1,0 +1,1 @@
+"""Transports: eight registers in, eight registers out, every byte checked. pymodbus stops here."""

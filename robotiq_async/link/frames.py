@@ -1,0 +1,112 @@
+"""Checks every byte of a reply against the request it should answer.
+
+pymodbus takes a reply with a wrong function code or too few registers for a success, accepts transaction
+id 0 for any request, and lets a lying byte count end in an unhandled exception. So each frame is looked
+at before pymodbus sees it. No I/O here: bytes in, a verdict out.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+from ..errors import ProtocolError
+
+_EXCEPTIONS = {
+    1: "illegal function",
+    2: "illegal data address",
+    3: "illegal data value",
+    4: "device failure",
+    5: "acknowledge",
+    6: "device busy",
+    10: "gateway path unavailable",
+    11: "gateway target does not respond",
+}
+
+
+class Expected(NamedTuple):
+    """The one reply that answers a request.
+
+    Attributes:
+        start: how the good reply begins: header, function code and what must follow it.
+        size: bytes of the good reply, check sum included. (The check sum itself is left to pymodbus.)
+        refusal: how an exception reply begins: header and function code.
+        refusal_size: bytes of an exception reply.
+    """
+
+    start: bytes
+    size: int
+    refusal: bytes
+    refusal_size: int
+
+    def is_complete(self, frame: bytes) -> bool:
+        """Whether the bytes so far are the whole answer; False while more must come.
+
+        Raises:
+            ProtocolError: the bytes can not become the answer, or the device refuses the request.
+        """
+        if len(frame) == self.size and frame.startswith(self.start):
+            return True  # the usual case, quickly
+        if _agree(frame, self.start):
+            if len(frame) > self.size:
+                raise ProtocolError(f"{len(frame) - self.size} bytes more than the answer: {show(frame)}")
+            return len(frame) == self.size
+        if not _agree(frame, self.refusal):
+            raise ProtocolError(f"not the answer: {show(frame)}, expected {show(self.start)}...")
+        if len(frame) < self.refusal_size:
+            return False
+        function, code = self.refusal[-1] & 0x7F, frame[len(self.refusal)]
+        raise ProtocolError(
+            f"the gripper refuses function {function}: exception {code} ({_EXCEPTIONS.get(code, 'unknown')})"
+        )
+
+
+def expected_reply(request: bytes, *, serial: bool) -> Expected:
+    """The reply that answers a request frame of function 3, 4 or 16."""
+    if serial:
+        return _expected(request, 2)
+    # Over TCP a header comes first: transaction and protocol, to be repeated, then the length.
+    start, size, refusal, refusal_size = _expected_over_tcp(request[6:])
+    header = request[:4]
+    return Expected(header + start, size, header + refusal, refusal_size)
+
+
+@lru_cache(maxsize=16)
+def _expected_over_tcp(request: bytes) -> Expected:
+    """The same from the unit on, with the length before it; that of a poll is always the same."""
+    start, size, refusal, refusal_size = _expected(request, 0)
+    return Expected(_length(size) + start, size + 6, _length(refusal_size) + refusal, refusal_size + 6)
+
+
+def _expected(request: bytes, checksum: int) -> Expected:
+    """The same for a frame that begins with the unit and ends with a check sum of so many bytes."""
+    at = 1
+    function = request[at]
+    if function == 16:
+        # The echo of address and count.
+        pdu, payload = request[at : at + 5], 0
+    else:
+        payload = 2 * int.from_bytes(request[at + 3 : at + 5], "big")
+        pdu = bytes((function, payload))
+    return Expected(
+        start=request[:at] + pdu,
+        size=at + len(pdu) + payload + checksum,
+        refusal=request[:at] + bytes((function | 0x80,)),
+        refusal_size=at + 2 + checksum,
+    )
+
+
+def _length(size: int) -> bytes:
+    """The length field: it counts from the unit on."""
+    return size.to_bytes(2, "big")
+
+
+def show(frame: bytes) -> str:
+    """Bytes for a message; what talks nonsense often talks a lot."""
+    return frame.hex(" ") if len(frame) <= 32 else f"{frame[:32].hex(' ')}... ({len(frame)} bytes)"
+
+
+def _agree(frame: bytes, start: bytes) -> bool:
+    """Whether the bytes so far fit the beginning."""
+    size = min(len(frame), len(start))
+    return frame[:size] == start[:size]

@@ -1,0 +1,133 @@
+"""Holds a transport that somebody else has written to what a hand relies on."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Sequence
+from typing import TypeVar
+
+import anyio
+
+from ..errors import (
+    ConnectFailedError,
+    ConnectionLostError,
+    ProtocolError,
+    ResponseTimeoutError,
+    RobotiqConnectionError,
+)
+from ..log import log
+from ..wire.registers import Registers, check_registers
+from .modbus import Transport
+from .worker import LateError, Worker
+
+T = TypeVar("T")
+
+
+class GuardedTransport:
+    """Bounds every call in time, lets no foreign exception through, and closes after a failure."""
+
+    def __init__(
+        self, inner: Transport, name: str, *, connect_timeout: float, response_timeout: float
+    ) -> None:
+        """Wrap a transport.
+
+        Args:
+            inner: the transport.
+            name: how messages call it.
+            connect_timeout: seconds for opening it.
+            response_timeout: seconds for a read or a write.
+        """
+        self._inner = inner
+        self._is_open = False
+        self._name = name
+        self._connect_timeout = connect_timeout
+        self._response_timeout = response_timeout
+        self._worker = Worker("robotiq_async transport")
+        self._is_begun = False
+        """Whether it has been asked to open and not to close since."""
+
+    @property
+    def is_open(self) -> bool:
+        """Whether requests can be sent."""
+        try:
+            return self._is_open and bool(self._inner.is_open)
+        except Exception as error:  # noqa: BLE001  # what cannot tell is not open
+            log.warning("%s cannot tell whether it is open: %r", self._name, error)
+            return False
+
+    async def open(self) -> None:
+        """Connect.
+
+        Raises:
+            RobotiqConnectionError: that failed, or took too long.
+        """
+        self._drop()
+        try:
+            await self._bounded(self._open_inner, self._connect_timeout)
+        except (ResponseTimeoutError, ConnectionLostError) as error:
+            raise ConnectFailedError(self._name, str(error)) from error
+        self._is_open = True
+
+    async def read(self) -> Registers:
+        """The eight status registers.
+
+        Raises:
+            RobotiqConnectionError: that failed or took too long, or what came is not eight registers.
+        """
+        registers = await self._bounded(self._inner.read, self._response_timeout)
+        try:
+            return check_registers(registers)
+        except Exception as error:  # what it gives may be anything that can be iterated over
+            self._drop()
+            raise ProtocolError(f"{self._name}: {error}") from error
+
+    async def write(self, registers: Sequence[int]) -> None:
+        """Write the eight request registers.
+
+        Raises:
+            RobotiqConnectionError: that failed, or took too long.
+        """
+        await self._bounded(lambda: self._inner.write(registers), self._response_timeout)
+
+    async def close(self) -> None:
+        """Disconnect; never fails."""
+        self._drop()
+        with anyio.CancelScope(shield=True):
+            if not await self._worker.ended(self._response_timeout):
+                log.warning("%s is left to itself: what it was asked last has not ended", self._name)
+
+    def _drop(self) -> None:
+        """Have it closed as soon as it does nothing else; open() waits for that, and nobody else."""
+        # Whatever becomes of it, what comes later from this connection is no answer to a new request.
+        self._is_open = False
+        if self._is_begun:
+            self._is_begun = False
+            self._worker.end(self._close_inner)
+
+    async def _open_inner(self) -> None:
+        self._is_begun = True
+        await self._inner.open()
+
+    async def _close_inner(self) -> None:
+        try:
+            async with asyncio.timeout(self._response_timeout):
+                await self._inner.close()
+        except Exception as error:  # noqa: BLE001  # there is nothing left to do about it
+            log.warning("%s did not close: %r", self._name, error)
+
+    async def _bounded(self, call: Callable[[], Awaitable[T]], seconds: float) -> T:
+        try:
+            return await self._worker.call(call, seconds)
+        except RobotiqConnectionError:
+            self._drop()
+            raise
+        except LateError as error:
+            self._drop()
+            raise ResponseTimeoutError(f"{self._name} did not answer {error}") from None
+        except Exception as error:
+            self._drop()
+            raise ConnectionLostError(f"{self._name}: {error!r}") from error
+        except asyncio.CancelledError:
+            # In the middle of an exchange: its answer must not become that of another one.
+            self._drop()
+            raise

@@ -1,0 +1,98 @@
+"""The transport behind ``sim://``: a simulated gripper in this program, reached over real Modbus TCP."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from ..errors import ConnectFailedError
+from ..wire.registers import RegisterMap, Registers
+from .address import parse_address
+from .modbus import ModbusTransport
+
+if TYPE_CHECKING:
+    from ..simulator import SimulatedGripper
+
+
+def new_gripper() -> SimulatedGripper:
+    """A gripper for a hand at ``sim://``.
+
+    The simulator is imported here, and so only for sim:// and when the hand is made: it takes tens of
+    milliseconds, for which a loop that runs already would be held up.
+    """
+    from ..simulator import SimulatedGripper  # noqa: PLC0415
+
+    return SimulatedGripper()
+
+
+class SimulatedTransport:
+    """Starts a simulator on loopback when opened. The gripper outlives the connection, as a real one."""
+
+    def __init__(
+        self,
+        gripper: SimulatedGripper,
+        registers: RegisterMap,
+        *,
+        connect_timeout: float,
+        response_timeout: float,
+    ) -> None:
+        """Keep what is needed to connect; starts nothing."""
+        from ..simulator import SimulatorServer  # noqa: PLC0415
+
+        self._server = SimulatorServer(gripper)
+        self._map = registers
+        self._connect_timeout = connect_timeout
+        self._response_timeout = response_timeout
+        self._inner: ModbusTransport | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether requests can be sent."""
+        return self._inner is not None and self._inner.is_open
+
+    async def open(self) -> None:
+        """Start the simulator if it does not run, and connect to it.
+
+        Raises:
+            RobotiqConnectionError: loopback does not work.
+        """
+        if self._inner is None:
+            try:
+                await self._server.start()
+            except OSError as error:
+                why = f"the simulated gripper cannot listen: {error.strerror or error}"
+                raise ConnectFailedError("sim://", why) from error
+            self._inner = ModbusTransport(
+                parse_address(self._server.address),
+                self._map,
+                connect_timeout=self._connect_timeout,
+                response_timeout=self._response_timeout,
+            )
+        await self._inner.open()
+
+    async def read(self) -> Registers:
+        """The eight status registers.
+
+        Raises:
+            RobotiqConnectionError: no clean answer in time; the connection is closed.
+        """
+        return await self._connected().read()
+
+    async def write(self, registers: Sequence[int]) -> None:
+        """Write the eight request registers, exactly once.
+
+        Raises:
+            RobotiqConnectionError: no clean acknowledgement in time; the connection is closed.
+        """
+        await self._connected().write(registers)
+
+    async def close(self) -> None:
+        """Disconnect and stop the simulator's server; does nothing when closed."""
+        inner, self._inner = self._inner, None
+        if inner is not None:
+            await inner.close()
+        await self._server.stop()
+
+    def _connected(self) -> ModbusTransport:
+        assert self._inner is not None, "opened before it is used"
+        return self._inner

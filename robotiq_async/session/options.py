@@ -1,0 +1,137 @@
+"""The options of a hand, checked, and the transport they describe."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Final
+
+from ..calibration.closing_time import closing_time
+from ..calibration.scales import SpeedCalibration
+from ..link.address import parse_address
+from ..link.guard import GuardedTransport
+from ..link.modbus import ModbusTransport, Transport
+from ..link.places import place_of
+from ..link.simulated import SimulatedTransport, new_gripper
+from ..wire.checks import check_byte, check_int, check_seconds
+from ..wire.registers import REGISTER_COUNT, RTU_REGISTERS, TCP_REGISTERS
+from .claims import Gripper
+from .poller import ReconnectPolicy
+
+POLL_INTERVAL_S: Final = 0.005
+"""200 Hz, as the thesis polled; the manual names 200 Hz for RTU and 100 Hz for TCP."""
+CONNECT_TIMEOUT_S: Final = 2.0
+RESPONSE_TIMEOUT_S: Final = 0.4
+"""Two of these, a read in flight and a write, still end within the second that a write may take."""
+ACTIVATION_TIMEOUT_S: Final = 20.0
+"""What clients of the real gripper wait for (registers.md of the project's sources)."""
+HINTS: Final = {
+    "tcp": " (two grippers behind one gateway: give each of the hands its device_id)",
+    "rtu": " (a serial port has one owner, whatever the device_id: two would read each other's replies)",
+}
+"""For people who meant two grippers. A gateway takes several connections; on a serial line replies carry no
+number, and whoever has it open gets part of what arrives."""
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """Everything a hand is constructed with, checked."""
+
+    make_transport: Callable[[], Transport]
+    """A transport for one start of the hand."""
+    address: str
+    gripper: Callable[[], Gripper]
+    """Which one it is, at this moment: a serial port may have been plugged in meanwhile."""
+    poll_interval: float
+    activation_timeout: float
+    policy: ReconnectPolicy | None
+    speed: int
+    force: int
+    closing_time: Callable[[int], float]
+    """Seconds of a full closing at a speed."""
+
+
+def check_options(
+    address: object,
+    *,
+    device_id: object,
+    poll_interval: object,
+    connect_timeout: object,
+    response_timeout: object,
+    activation_timeout: object,
+    reconnect: object,
+    speed: object,
+    force: object,
+    request_address: object,
+    status_address: object,
+    calibration: object,
+) -> Options:
+    """Check every option and make the transport; opens nothing and needs no running loop.
+
+    Raises:
+        TypeError: an option of the wrong type; named with value and range.
+        ValueError: an option outside its range, or a malformed address.
+    """
+    connect_s = check_seconds("connect_timeout", connect_timeout, 0.01, 5.0)
+    response_s = check_seconds("response_timeout", response_timeout, 0.005, 0.5)
+    if isinstance(address, str):
+        parsed = parse_address(address)
+        registers = RTU_REGISTERS if parsed.kind == "rtu" else TCP_REGISTERS
+        if device_id is not None:
+            registers = replace(registers, device_id=check_int("device_id", device_id, 1, 247))
+        last = 0x10000 - REGISTER_COUNT
+        if request_address is not None:
+            registers = replace(registers, request=check_int("request_address", request_address, 0, last))
+        if status_address is not None:
+            registers = replace(registers, status=check_int("status_address", status_address, 0, last))
+        make: Callable[..., Transport]
+        gripper: Callable[[], Gripper]
+        if parsed.kind == "sim":
+            simulated = new_gripper()
+            make = partial(SimulatedTransport, simulated, registers)
+            name = f"sim://#{id(simulated):x}"  # every sim:// is a gripper of its own
+            gripper = partial(Gripper, name)
+        else:
+            make = partial(ModbusTransport, parsed, registers)
+            name = str(parsed)
+            unit = registers.device_id if device_id is not None and parsed.kind == "tcp" else None
+            gripper = lambda: Gripper(place_of(parsed), unit, HINTS[parsed.kind])  # noqa: E731
+    elif isinstance(address, Transport):
+        name = f"<{type(address).__name__} at {id(address):#x}>"
+        gripper = partial(Gripper, name)
+        make = partial(GuardedTransport, address, name)
+    else:
+        raise TypeError(f"address must be a string or a Transport, got {address!r}")
+    return Options(
+        make_transport=partial(make, connect_timeout=connect_s, response_timeout=response_s),
+        address=name,
+        gripper=gripper,
+        poll_interval=check_seconds("poll_interval", poll_interval, 0.001, 0.1),
+        activation_timeout=check_seconds("activation_timeout", activation_timeout, 0.01, 120.0),
+        policy=_check_reconnect(reconnect),
+        speed=check_byte("speed", speed),
+        force=check_byte("force", force),
+        closing_time=_check_calibration(calibration),
+    )
+
+
+def _check_calibration(calibration: object) -> Callable[[int], float]:
+    if calibration is None:
+        return closing_time
+    if not isinstance(calibration, SpeedCalibration):
+        raise TypeError(f"calibration must be None or a SpeedCalibration, got {calibration!r}")
+    first, last = calibration.points[0][0], calibration.points[-1][0]
+    if (first, last) != (0, 255):
+        raise ValueError(f"calibration must reach over the speed values 0..255, got {first}..{last}")
+    return calibration.closing_time
+
+
+def _check_reconnect(reconnect: object) -> ReconnectPolicy | None:
+    if isinstance(reconnect, ReconnectPolicy):
+        return reconnect
+    if reconnect is True:
+        return ReconnectPolicy()
+    if reconnect is False:
+        return None
+    raise TypeError(f"reconnect must be True, False or a ReconnectPolicy, got {reconnect!r}")

@@ -1,0 +1,375 @@
+"""The one task that owns the link: connects, polls, writes, reconnects and shuts down.
+
+Nobody else touches the transport; callers leave what they want with the core and wait beside it. So no
+request is ever cancelled in flight, the link stays in step, and start() and stop() may be called from
+different tasks.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import importlib
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import anyio
+
+from ..control.controller import Core
+from ..control.state_machine import Trigger
+from ..errors import (
+    ConnectFailedError,
+    ConnectionLostError,
+    NotStartedError,
+    ResponseTimeoutError,
+    RobotiqConnectionError,
+    RobotiqError,
+)
+from ..link.modbus import HELD_S, Transport
+from ..log import log
+from ..wire.checks import check_seconds
+from ..wire.status import RobotiqStatus
+from .statistics import Counters
+from .streams import SentRequest
+from .tick import Tick
+
+# anyio loads its backend when it is first used: some 20 ms that would hold up the loop in which a hand
+# starts. Where it keeps it is not documented; a name that has changed costs those 20 ms and nothing else.
+with contextlib.suppress(ImportError):
+    importlib.import_module("anyio._backends._asyncio")
+
+STOP_S: Final = 1.4
+"""From stop() until disconnecting at the latest, whatever is in flight. Promised are 2 s; a transport object
+may take the last half second to close."""
+SHUTDOWN_S: Final = 1.2
+"""Of that, time to reach the gripper and to see the fingers stop."""
+SHUTDOWN_PAUSE_S: Final = 0.05
+"""Between two attempts at that."""
+LATE_S: Final = 0.05
+"""Later than this a poll is worth a warning; on a busy machine a few milliseconds are usual."""
+LOOKS: Final = 3
+"""At most so often a status that was asked for in a loop that was held up is asked for again."""
+LATE_WARNING_S: Final = 1.0
+"""At most one warning about late polls in this time."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReconnectPolicy:
+    """What becomes of a lost link.
+
+    Attributes:
+        first_delay: seconds before the first try, 0..10.
+        max_delay: the delay doubles up to this, in seconds, 0.01..60.
+        give_up_after: seconds after which the hand gives up; None tries for ever.
+        activate: whether a gripper that comes back without its activation is activated. The fingers
+            MOVE then, without anybody having asked at that moment: leave it off unless nothing can be
+            in their way.
+    """
+
+    first_delay: float = 0.05
+    max_delay: float = 2.0
+    give_up_after: float | None = None
+    activate: bool = False
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            TypeError: not a number, or activate is not a bool.
+            ValueError: outside its range.
+        """
+        check_seconds("first_delay", self.first_delay, 0.0, 10.0)
+        check_seconds("max_delay", self.max_delay, 0.01, 60.0)
+        if self.give_up_after is not None:
+            check_seconds("give_up_after", self.give_up_after, 0.0, 86400.0)
+        if not isinstance(self.activate, bool):
+            raise TypeError(f"activate must be True or False, got {self.activate!r}")
+
+
+class Owner:
+    """Runs one hand's link from start to stop. :meth:`run` is the body of its task."""
+
+    def __init__(
+        self,
+        transport: Transport,
+        core: Core,
+        counters: Counters,
+        *,
+        address: str,
+        activate: bool,
+        poll_interval: float,
+        policy: ReconnectPolicy | None,
+        first_sequence: int,
+        publish: Callable[[RobotiqStatus], None],
+        publish_request: Callable[[SentRequest], None],
+    ) -> None:
+        """Prepare; must be made inside a running event loop.
+
+        Args:
+            transport: the link; nobody else may use it.
+            core: what decides.
+            counters: what is counted.
+            address: for messages.
+            activate: whether a reset gripper is activated after the first read.
+            poll_interval: seconds between polls.
+            policy: what becomes of a lost link; None gives up at once.
+            first_sequence: number of the first status.
+            publish: called with each status, after the core has seen it.
+            publish_request: called with each image that was written.
+        """
+        self._transport = transport
+        self._core = core
+        self._counters = counters
+        self._address = address
+        self._activate = activate
+        self._interval = poll_interval
+        self._policy = policy
+        self.sequence = first_sequence
+        self._publish = publish
+        self._publish_request = publish_request
+        self._loop = asyncio.get_running_loop()
+        self.connected: asyncio.Future[None] = self._loop.create_future()
+        """Done when the first status has been taken in; holds the error when there was none."""
+        self.failure: RobotiqConnectionError | None = None
+        """Why the hand gave up, if it did."""
+        self._stopping = False
+        self._end_by = math.inf
+        self._halt_at_stop = True
+        self._interruptible: anyio.CancelScope | None = None
+        self._tick = Tick(poll_interval)
+        self._last_poll = 0.0
+        self._read_at = 0.0
+        """When the newest status came in."""
+        self._warned = -math.inf
+
+    def request_stop(self, *, halt: bool) -> None:
+        """Ask the task to end; with ``halt`` it stops the fingers first. Never blocks."""
+        if not self._stopping:
+            self._stopping, self._halt_at_stop = True, halt
+            self._end_by = self._loop.time() + STOP_S
+        if self._interruptible is not None:
+            self._interruptible.cancel()
+
+    def abandon(self) -> None:
+        """The loop was closed: give back what is not its own."""
+        self._tick.close()
+
+    async def run(self) -> None:
+        """Own the link until asked to stop, or until the policy gives up."""
+        try:
+            if await self._first_contact():
+                await self._poll()
+        finally:
+            # An abandoned task is ended when it is collected: the hand may have been started again by then.
+            if not self._loop.is_closed():
+                await self._finish()
+                self._tell_connected(NotStartedError("the hand was stopped while it connected"))
+
+    # -- connecting ------------------------------------------------------------------------------------
+
+    async def _first_contact(self) -> bool:
+        try:
+            found = await self._contact()
+        except (ResponseTimeoutError, ConnectionLostError) as error:
+            failed = ConnectFailedError(self._address, f"connected, but nobody answers: {error}")
+            failed.__cause__ = error
+            self._tell_connected(failed)
+            return False
+        except RobotiqConnectionError as error:
+            self._tell_connected(error)
+            return False
+        if found is None:
+            return False
+        self._take_in(*found, self._activate)
+        self._tell_connected(None)
+        return True
+
+    def _tell_connected(self, failure: RobotiqError | None) -> None:
+        """Tell start(), unless it knows already or does not wait any more."""
+        if self.connected.done():
+            return
+        if failure is None:
+            self.connected.set_result(None)
+        else:
+            self.connected.set_exception(failure)
+
+    async def _contact(self) -> tuple[RobotiqStatus, float] | None:
+        """Open the link and read once, see :meth:`_read`; None when asked to stop meanwhile."""
+        with anyio.CancelScope() as self._interruptible:
+            if not self._stopping:
+                await self._transport.open()
+                return await self._read()
+        return None
+
+    def _take_in(self, status: RobotiqStatus, asked: float, activate: bool) -> None:
+        self._core.found(status, activate=activate, asked=asked)
+        self._publish(status)
+        self._last_poll = 0.0
+        self._tick.start()
+        self._counters.tick = self._tick.source
+
+    async def _reconnect(self, why: RobotiqConnectionError) -> bool:
+        """Open the link again; False when that is given up, or when asked to stop."""
+        log.warning("link lost: %s", why)
+        self._core.lost(why)
+        policy = self._policy
+        if policy is None:
+            self.failure = why
+            return False
+        lost_at, delay = self._loop.time(), policy.first_delay
+        while not self._stopping:
+            with anyio.CancelScope() as self._interruptible:
+                await asyncio.sleep(delay)
+            try:
+                found = await self._contact()
+            except RobotiqConnectionError as error:
+                log.debug("still no link: %s", error)
+                if policy.give_up_after is not None and self._loop.time() - lost_at >= policy.give_up_after:
+                    self.failure = error
+                    return False
+                delay = min(max(2 * delay, 0.01), policy.max_delay)
+                continue
+            if found is not None:
+                self._counters.reconnects += 1
+                log.warning("link back after %.2f s", self._loop.time() - lost_at)
+                self._take_in(*found, policy.activate)
+                return True
+        return False
+
+    # -- polling ---------------------------------------------------------------------------------------
+
+    async def _poll(self) -> None:
+        while not self._stopping:
+            await self._wait_for_tick()
+            if self._stopping:
+                return
+            try:
+                await self._cycle()
+            except RobotiqConnectionError as error:
+                if not await self._reconnect(error):
+                    return
+
+    async def _cycle(self) -> None:
+        """Write what has changed, then read."""
+        if self._core.has_request:
+            await self._write()
+        await self._look()
+
+    async def _write(self) -> None:
+        """Write what has changed; look first if what is known is old by now."""
+        core = self._core
+        for _ in range(LOOKS):
+            if not self._is_stale():
+                break
+            await self._look()
+        now = self._tick.time()
+        request = core.take_request(now)
+        if request is None:
+            return
+        try:
+            await self._transport.write(request.registers)
+        except RobotiqConnectionError:
+            self._publish_request(SentRequest(request, now, acknowledged=False))
+            raise
+        self._counters.writes += 1
+        core.acknowledged(self._tick.time())
+        self._publish_request(SentRequest(request, now, acknowledged=True))
+
+    async def _look(self) -> None:
+        """Read, and tell everybody."""
+        counters = self._counters
+        status, asked = await self._read()
+        counters.round_trips.append(status.timestamp - asked)
+        if self._last_poll:
+            counters.periods.append(asked - self._last_poll)
+        self._last_poll = asked
+        self._core.see(status, asked)
+        self._publish(status)
+
+    async def _read(self) -> tuple[RobotiqStatus, float]:
+        """The status, and when it was asked for."""
+        tick = self._tick
+        tick.late = 0.0
+        asked = tick.time()
+        registers = await self._transport.read()
+        status = RobotiqStatus(registers, tick.time(), self.sequence)
+        self.sequence += 1
+        self._counters.polls += 1
+        self._read_at = status.timestamp
+        return status, asked
+
+    def _is_stale(self) -> bool:
+        """Whether the loop was held up since the newest status was asked for.
+
+        Nothing is decided on it then: what another client has done, or where an axis is by now, must be
+        seen before the next write. While a slow gripper is waited for the ticks come in time; when the loop
+        is held up they do not. And the loop may be held up at this moment: no tick tells of that yet.
+        """
+        return self._tick.late > HELD_S or self._tick.time() - self._read_at > self._interval + LATE_S
+
+    async def _wait_for_tick(self) -> None:
+        """Wait for the next tick; one that was missed is counted and skipped."""
+        missed = await self._tick.wait() - 1
+        self._counters.longest_stall = self._tick.longest_late
+        if missed:
+            self._counters.overruns += missed
+            if missed * self._interval >= LATE_S:
+                self._warn_late(missed * self._interval)
+
+    def _warn_late(self, late: float) -> None:
+        now = self._loop.time()
+        if now - self._warned < LATE_WARNING_S:
+            return
+        self._warned = now
+        held = self._tick.late >= late / 2
+        why = "something holds up the event loop" if held else "the gripper answers slowly"
+        missed = self._counters.overruns
+        log.warning("polling is %.0f ms late: %s (%d polls missed so far)", 1000 * late, why, missed)
+
+    # -- the end ---------------------------------------------------------------------------------------
+
+    async def _finish(self) -> None:
+        """Stop the fingers if that is possible in time, then disconnect."""
+        self._stopping = True
+        deadline = min(self._end_by, self._loop.time() + SHUTDOWN_S)
+        try:
+            self._core.stop()
+            with anyio.CancelScope(deadline=deadline, shield=True) as scope:
+                if self._halt_at_stop and self._core.status is not None:
+                    await self._stop_fingers()
+            if scope.cancelled_caught:
+                log.warning("the gripper did not confirm in time that the fingers were stopped")
+        finally:
+            self._tick.close()
+            await self._transport.close()
+            self._core.machine.happen(Trigger.STOPPED)
+
+    async def _stop_fingers(self) -> None:
+        """Clear rGTO and see it; until the time is over. Unlike a motion, a stop may be sent again."""
+        failed = False
+        while True:
+            try:
+                await self._stop_fingers_once()
+                return
+            except RobotiqConnectionError as error:
+                if not failed:
+                    log.warning("the fingers could not be told to stop, trying again: %s", error)
+                failed = True
+                self._core.lost(error)
+            await asyncio.sleep(SHUTDOWN_PAUSE_S)
+
+    async def _stop_fingers_once(self) -> None:
+        if not self._transport.is_open:
+            # A gripper that lost its client goes on moving.
+            await self._transport.open()
+        # Whether there is anything to stop is decided on what the gripper does now; and whoever asks
+        # afterwards whether the fingers stand still finds a status that is newer than the stop.
+        status, asked = await self._read()
+        self._core.look_again(status, asked)
+        self._publish(status)
+        self._core.shut_down()
+        while self._core.is_busy:
+            await self._cycle()
+            await asyncio.sleep(self._interval)

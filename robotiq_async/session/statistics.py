@@ -1,0 +1,128 @@
+"""Statistics: how well the polling goes."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Final
+
+from ..control.motion import MoveResult
+from ..errors import RobotiqError
+from ..values import FrozenMapping
+
+SAMPLES: Final = 2000
+"""Periods and round trips that percentiles are taken from: 10 s at 200 Hz."""
+
+
+@dataclass(frozen=True, slots=True)
+class Statistics:
+    """A snapshot of a hand's polling since its start. Percentiles are of the last 2000 polls.
+
+    Attributes:
+        polls: statuses read.
+        writes: requests acknowledged.
+        overruns: ticks that were missed and skipped.
+        period_p50: median seconds between two polls; 0 before the second poll.
+        period_p99: 99th percentile of the same.
+        round_trip_p50: median seconds from sending a read to its reply; 0 before the first poll.
+        round_trip_p99: 99th percentile of the same.
+        longest_stall: longest time a tick came late, in seconds: the event loop was held up.
+        reconnects: times the link was opened again.
+        foreign_commands: times another client was seen to command the gripper.
+        tick: what the polls are timed by: "timerfd" (Linux), "loop timer", or nothing before the first.
+        faults: times the gripper reported a minor or a major fault.
+        moves: how often :meth:`RobotiqHand.move` ended how: "reached", "contact", "cancelled", or the name
+            of the error.
+    """
+
+    polls: int
+    writes: int
+    overruns: int
+    period_p50: float
+    period_p99: float
+    round_trip_p50: float
+    round_trip_p99: float
+    longest_stall: float
+    reconnects: int
+    foreign_commands: int
+    tick: str
+    faults: int
+    moves: Mapping[str, int]
+
+    def __post_init__(self) -> None:
+        """Keep a mapping of our own."""
+        object.__setattr__(self, "moves", FrozenMapping(self.moves))
+
+
+class Counters:
+    """What the owner task counts."""
+
+    __slots__ = (
+        "faults",
+        "longest_stall",
+        "moves",
+        "overruns",
+        "periods",
+        "polls",
+        "reconnects",
+        "round_trips",
+        "tick",
+        "writes",
+    )
+
+    def __init__(self) -> None:
+        """Begin at zero."""
+        self.polls = 0
+        self.writes = 0
+        self.overruns = 0
+        self.reconnects = 0
+        self.longest_stall = 0.0
+        self.tick = ""
+        self.faults = 0
+        self.moves: Counter[str] = Counter()
+        self.periods: deque[float] = deque(maxlen=SAMPLES)
+        self.round_trips: deque[float] = deque(maxlen=SAMPLES)
+
+    @contextmanager
+    def move(self) -> Iterator[Callable[[MoveResult], None]]:
+        """Count how a move ends; gives what is to be called with its result."""
+        outcome = "cancelled"
+
+        def note(result: MoveResult) -> None:
+            nonlocal outcome
+            outcome = "contact" if result.object_detected else "reached"
+
+        try:
+            yield note
+        except RobotiqError as error:
+            outcome = type(error).__name__
+            raise
+        finally:
+            self.moves[outcome] += 1
+
+    def snapshot(self, foreign_commands: int) -> Statistics:
+        """The figures so far."""
+        periods, round_trips = sorted(self.periods), sorted(self.round_trips)
+        return Statistics(
+            polls=self.polls,
+            writes=self.writes,
+            overruns=self.overruns,
+            period_p50=percentile(periods, 0.50),
+            period_p99=percentile(periods, 0.99),
+            round_trip_p50=percentile(round_trips, 0.50),
+            round_trip_p99=percentile(round_trips, 0.99),
+            longest_stall=self.longest_stall,
+            reconnects=self.reconnects,
+            foreign_commands=foreign_commands,
+            tick=self.tick,
+            faults=self.faults,
+            moves=self.moves,
+        )
+
+
+def percentile(ordered: list[float], share: float) -> float:
+    """The value that this share of an ordered list does not exceed; 0 for an empty list."""
+    return ordered[math.ceil(share * len(ordered)) - 1] if ordered else 0.0

@@ -1,0 +1,222 @@
+"""Async iterators over what happens to a hand.
+
+Plain classes and not async generators: an iterator that is dropped in the middle has nothing to clean up
+in another task.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import weakref
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Generic, Self, TypeVar
+
+from ..control.state_machine import Trigger
+from ..enums import State
+from ..errors import RobotiqError
+from ..wire.request import Request
+from .event_loop import check_loop
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """One change of state.
+
+    Attributes:
+        source: the state before.
+        target: the state after.
+        trigger: what made it happen.
+        timestamp: monotonic seconds, by the clock of the statuses.
+    """
+
+    source: State
+    target: State
+    trigger: Trigger
+    timestamp: float
+
+
+@dataclass(frozen=True, slots=True)
+class SentRequest:
+    """One image that was written.
+
+    Attributes:
+        request: the image.
+        timestamp: monotonic seconds, by the clock of the statuses, at which it was sent.
+        acknowledged: whether the gripper has acknowledged it; if not, it may have arrived or not.
+    """
+
+    request: Request
+    timestamp: float
+    acknowledged: bool
+
+
+class Stream(Generic[T]):
+    """An async iterator with one reader; made by a :class:`Channel`.
+
+    Attributes:
+        missed: items that were dropped because the reader was slow.
+    """
+
+    def __init__(self, buffer: int | None, kept: set[Stream[T]]) -> None:
+        """Keep up to ``buffer`` items, the newest ones; None keeps all.
+
+        While somebody waits the stream is in ``kept``: the task of that reader may be held by nothing else.
+        """
+        self._kept = kept
+        self._loop: asyncio.AbstractEventLoop | None = None
+        """The loop of the hand, while it runs: only there an item can wake the reader."""
+        self.missed = 0
+        self._items: deque[T] = deque(maxlen=buffer)
+        self._waiting: asyncio.Future[None] | None = None
+        self._ended = False
+        self._failure: Callable[[], RobotiqError] | None = None
+
+    def __aiter__(self) -> Self:
+        """The stream itself."""
+        return self
+
+    async def __anext__(self) -> T:
+        """The next item. A cancelled wait loses nothing.
+
+        Raises:
+            StopAsyncIteration: the hand was stopped, or the stream was closed.
+            RobotiqConnectionError: the hand gave up on its link.
+            RuntimeError: another task is waiting on the same stream, or the hand runs in another event loop.
+        """
+        while True:
+            if self._loop is not None:
+                check_loop(self._loop, "a stream of the hand")
+            if self._items or self._ended:
+                break
+            if self._waiting is not None:
+                raise RuntimeError("a stream has one reader; open another with statuses() or transitions()")
+            self._waiting = asyncio.get_running_loop().create_future()
+            self._kept.add(self)
+            try:
+                if not self._items and not self._ended:  # looked at again: the hand may run in another thread
+                    await self._waiting
+            except BaseException:
+                self._wait_no_longer()
+                # Whoever keeps the traceback, as a cancelled task does, is not to keep the stream with it.
+                del self
+                raise
+            self._wait_no_longer()
+        if self._items:
+            return self._items.popleft()
+        failure = self._failure
+        del self  # as above
+        raise StopAsyncIteration if failure is None else failure()
+
+    def take_nowait(self) -> T | None:
+        """The next item if there is one already."""
+        return self._items.popleft() if self._items else None
+
+    def drain(self) -> Iterator[T]:
+        """What is there already, one after the other."""
+        while self._items:
+            yield self._items.popleft()
+
+    async def aclose(self) -> None:
+        """End the stream; a waiting reader ends too. Idempotent."""
+        self._items.clear()
+        self.end(None)
+
+    def push(self, item: T) -> None:
+        """Hand an item to the reader; the oldest one is dropped when the buffer is full."""
+        if self._ended:
+            return
+        if len(self._items) == self._items.maxlen:
+            self.missed += 1
+        self._items.append(item)
+        self._wake()
+
+    def end(self, failure: Callable[[], RobotiqError] | None) -> None:
+        """No more items: the reader gets what is left, then the end or the failure."""
+        if self._ended:
+            return
+        self._ended, self._failure, self._loop = True, failure, None
+        self._wake()
+
+    def belong_to(self, loop: asyncio.AbstractEventLoop) -> None:
+        """The hand runs in this loop. A reader that waits in another one wakes up and is refused."""
+        self._loop = loop
+        if self._waiting is not None and self._waiting.get_loop() is not loop:
+            self._wake()
+
+    def _wait_no_longer(self) -> None:
+        self._kept.discard(self)
+        self._waiting = None
+
+    def _wake(self) -> None:
+        waiting = self._waiting
+        if waiting is None or waiting.done():
+            return
+        loop = waiting.get_loop()
+        if loop.is_closed():
+            self._wait_no_longer()  # whoever waited there never wakes up
+        elif loop is asyncio.get_running_loop():
+            waiting.set_result(None)
+        else:
+            with contextlib.suppress(RuntimeError):  # closed at this moment
+                loop.call_soon_threadsafe(_wake, waiting)
+
+
+def _wake(waiting: asyncio.Future[None]) -> None:
+    if not waiting.done():
+        waiting.set_result(None)
+
+
+class Channel(Generic[T]):
+    """Spreads items over any number of streams. A stream nobody holds any more is forgotten."""
+
+    def __init__(self) -> None:
+        """Begin without readers."""
+        # Plain references: going through a WeakSet takes several times as long, at every poll.
+        self._streams: list[weakref.ref[Stream[T]]] = []
+        self._waited_for: set[Stream[T]] = set()
+        self._failure: Callable[[], RobotiqError] | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+
+    def open(self, buffer: int | None) -> Stream[T]:
+        """A new stream. Before a start it waits; after the hand gave up it raises the reason."""
+        stream: Stream[T] = Stream(buffer, self._waited_for)
+        if self._failure is not None:
+            stream.end(self._failure)
+        else:
+            if self._loop is not None:
+                stream.belong_to(self._loop)
+            self._streams.append(weakref.ref(stream, self._forget))
+        return stream
+
+    def reopen(self, loop: asyncio.AbstractEventLoop) -> None:
+        """The hand starts in a loop: what it gave up on before does not count any more."""
+        self._failure, self._loop = None, loop
+        for reference in self._streams:
+            stream = reference()
+            if stream is not None:
+                stream.belong_to(loop)
+
+    def push(self, item: T) -> None:
+        """Hand an item to every stream."""
+        for reference in self._streams:
+            stream = reference()
+            if stream is not None:
+                stream.push(item)
+
+    def end(self, failure: Callable[[], RobotiqError] | None = None) -> None:
+        """End every stream, quietly or with a failure."""
+        self._failure, self._loop = failure, None
+        streams, self._streams = self._streams, []
+        for reference in streams:
+            stream = reference()
+            if stream is not None:
+                stream.end(failure)
+
+    def _forget(self, reference: weakref.ref[Stream[T]]) -> None:
+        # A new list: this may happen while somebody goes through the old one.
+        self._streams = [each for each in self._streams if each is not reference]

@@ -1,0 +1,229 @@
+"""One motorised axis: straight lines in time, mechanical stops and obstacles.
+
+An axis never integrates in steps. It keeps where and when its present motion began, how fast it is and where
+it ends; everything else is computed. That makes a result independent of how often somebody looks.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from robotiq_async.calibration.closing_time import STROKE_COUNTS, closing_time
+from robotiq_async.enums import ObjectStatus
+
+from .motor import Motor, peak
+
+if TYPE_CHECKING:
+    from .control_modes import Goal
+    from .spread import Spread
+
+PRESSING: Final = 0.05
+"""Seconds for which an axis presses, still reported as motion, before it reports the contact. No source tells
+how long it is; this is ten polls."""
+
+
+class Obstacle(NamedTuple):
+    """Something in the way of an axis.
+
+    Attributes:
+        position: the count at which the axis touches it.
+        soft: counts by which a force of 255 presses the axis into it; less force, proportionally less.
+    """
+
+    position: int
+    soft: int = 0
+
+
+class _Way(NamedTuple):
+    """A way that is planned: where it ends and why, and where the obstacle that ends it begins."""
+
+    end: float
+    outcome: ObjectStatus
+    surface: float = math.nan
+
+
+class Axis:
+    """A finger or the scissor.
+
+    Times are simulated seconds, positions counts. Methods that take a time must be called with times that do
+    not decrease and never jump over :attr:`ends_at`; the end of a motion is told by :meth:`arrive`.
+
+    Attributes:
+        low: where the opening motion ends, in counts.
+        high: where the closing motion ends, in counts; :meth:`confine` changes it.
+        status: what gDT says about the axis while gGTO = 1.
+        ends_at: when the present motion ends; infinite at rest.
+        in_closing: the obstacle met while closing, if there is one.
+        in_opening: the obstacle met while opening, if there is one.
+    """
+
+    def __init__(self, position: int, low: int, high: int, motor: Motor, spread: Spread) -> None:
+        """An axis at rest between its mechanical stops."""
+        self.low = low
+        self.high = high
+        self.status = ObjectStatus.IN_MOTION
+        self.ends_at = math.inf
+        self.in_closing: Obstacle | None = None
+        self.in_opening: Obstacle | None = None
+        self._motor = motor
+        self._spread = spread
+        self._closed = high
+        self._goal: Goal | None = None
+        self._origin = float(position)
+        self._since = 0.0
+        self._way = _Way(self._origin, ObjectStatus.IN_MOTION)
+        self._rate = self._running = self._peak = 0.0
+        self._travelled = 0.0
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether the axis moves, or presses against something before it reports the contact."""
+        return self.ends_at < math.inf
+
+    @property
+    def target(self) -> int:
+        """Where the axis is driven to, in counts within its stops; at rest without a goal, where it is."""
+        return round(self._origin) if self._goal is None else self._within_stops(self._goal.position)
+
+    def position(self, time: float) -> float:
+        """Where the axis is."""
+        if not self.is_moving:
+            return self._origin
+        way = self._way.end - self._origin
+        return self._origin + math.copysign(min(self._rate * (time - self._since), abs(way)), way)
+
+    def travel(self, time: float) -> float:
+        """The way the axis has gone since it was made, in counts, forth and back added up."""
+        return self._travelled + abs(self.position(time) - self._origin)
+
+    def current(self, time: float) -> int:
+        """Motor current in counts: that of the motion, up to the peak of a contact, and 0 at rest."""
+        if not self.is_moving:
+            return 0
+        return round(self._running + (self._peak - self._running) * self._pressed(time))
+
+    def command(self, time: float, goal: Goal) -> None:
+        """Go to a position; repeating a goal changes nothing.
+
+        A contact latches: a goal beyond it with no more force leaves the axis where it is. With more force it
+        tries again, and presses deeper into something soft.
+        """
+        if goal == self._goal:
+            return
+        is_latched = self._is_latched_against(goal)
+        self._goal = goal
+        if not is_latched:
+            self._plan(time)
+
+    def hold(self, time: float) -> None:
+        """Stop on the count the axis reads now, and forget the goal."""
+        self._rest(time, float(round(self.position(time))))
+        self._goal = None
+
+    def clear(self, time: float) -> None:
+        """Stop like :meth:`hold`, and forget what was touched or reached."""
+        self.hold(time)
+        self.status = ObjectStatus.IN_MOTION
+
+    def arrive(self) -> None:
+        """End the present motion; to be called at :attr:`ends_at`."""
+        self._rest(self.ends_at, self._way.end)
+        self.status = self._way.outcome
+
+    def confine(self, time: float, high: int | None) -> None:
+        """Let the closing motion end at a software limit, or with None at the mechanical stop."""
+        before, self.high = self.high, self._closed if high is None else high
+        if self.high != before and self._goal is not None and not self._is_latched_against(self._goal):
+            self._plan(time)
+
+    def look_again(self, time: float) -> None:
+        """Tell the axis that obstacles have changed. At rest it feels nothing of it: a contact latches."""
+        if self.is_moving:
+            self._plan(time)
+
+    def _plan(self, time: float) -> None:
+        """Begin the motion from here to the goal."""
+        assert self._goal is not None, "only a motion with a goal is planned"
+        here, before, due = self.position(time), self._way, self.ends_at
+        self._way = self._way_to(here, self._goal)
+        reached = self._has_reached(here, self._goal)
+        self._rest(time, here)
+        if reached:
+            self.status = ObjectStatus.AT_POSITION
+            return
+        self.status = ObjectStatus.IN_MOTION
+        self._rate = STROKE_COUNTS / closing_time(self._goal.speed)
+        self._running = self._motor.running(self._rate, closing=self._way.end > here)
+        self._peak = peak(self._goal.force)
+        self.ends_at = time + abs(self._way.end - here) / self._rate
+        if self._way.outcome.is_contact:
+            # A new request while it presses already does not begin the pressing anew.
+            presses = due < math.inf and here == before.end and self._way == before
+            self.ends_at = due if presses else self.ends_at + PRESSING
+
+    def _way_to(self, here: float, goal: Goal) -> _Way:
+        """The way from here to the goal.
+
+        An obstacle that the axis has passed already is behind it and no contact.
+        """
+        target = self._within_stops(goal.position)
+        way = 1 if target > here else -1
+        end = self._within_stops(target + way * self._overshoot(goal))
+        obstacle = self.in_closing if way > 0 else self.in_opening
+        if obstacle is None:
+            return _Way(end, ObjectStatus.AT_POSITION)
+        surface = obstacle.position + self._spread.contact(obstacle.position)
+        far_side = max(way * obstacle.position, way * surface) + obstacle.soft + self._spread.tolerance
+        if way * here > far_side:
+            return _Way(end, ObjectStatus.AT_POSITION)
+        stopped = way * max(way * here, way * surface + _dent(obstacle, goal.force))
+        if way * stopped < way * target:
+            contact = ObjectStatus.CONTACT_CLOSING if way > 0 else ObjectStatus.CONTACT_OPENING
+            return _Way(stopped, contact, surface)
+        return _Way(way * min(way * end, way * stopped), ObjectStatus.AT_POSITION)
+
+    def _overshoot(self, goal: Goal) -> int:
+        """Counts by which the axis will go too far: none at a stop, nor where a reading is what is asked."""
+        if goal.is_reading or not self.low < goal.position < self.high:
+            return 0
+        return self._spread.overshoot(goal.position)
+
+    def _has_reached(self, here: float, goal: Goal) -> bool:
+        """Whether the way that is planned need not be gone: an axis that stands close by is there."""
+        if self._way.outcome is not ObjectStatus.AT_POSITION:
+            return False
+        tolerance = 0 if goal.is_reading or self.is_moving else self._spread.tolerance
+        return self._way.end == here or abs(goal.position - here) <= tolerance
+
+    def _is_latched_against(self, goal: Goal) -> bool:
+        """Whether the contact that the axis stands in holds against a goal beyond it with no more force."""
+        if self._goal is None or self.is_moving or goal.force > self._goal.force:
+            return False
+        beyond = self._within_stops(goal.position) - self._origin
+        return (self.status is ObjectStatus.CONTACT_CLOSING and beyond > 0) or (
+            self.status is ObjectStatus.CONTACT_OPENING and beyond < 0
+        )
+
+    def _pressed(self, time: float) -> float:
+        """How far the axis has been pressed into what stops it, from 0 to 1."""
+        way, position = self._way, self.position(time)
+        if not way.outcome.is_contact:
+            return 0.0
+        if position == way.end:
+            return 1.0
+        return 0.0 if way.end == way.surface else max(0.0, (position - way.surface) / (way.end - way.surface))
+
+    def _within_stops(self, position: int) -> int:
+        return max(self.low, min(self.high, position))
+
+    def _rest(self, time: float, position: float) -> None:
+        """Stand still at a position, with the way up to it accounted for."""
+        self._travelled += abs(position - self._origin)
+        self._origin = position
+        self._since = time
+        self.ends_at = math.inf
+
+
+def _dent(obstacle: Obstacle, force: int) -> int:
+    return round(obstacle.soft * force / 255)

@@ -1,0 +1,102 @@
+"""What a request asks of the four axes, and the fixed sequences: activation, mode change, automatic release.
+
+All of it is data: a :data:`Goals` tuple says where each axis goes, a sequence is a tuple of them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from robotiq_async.calibration.closing_time import OPEN_READING
+from robotiq_async.enums import CLOSED, OPEN, SPEED_MAX, SPEED_MIN, WIDTH_WIDE, Mode
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from robotiq_async.wire.request import AxisRequest, Request
+
+
+class Goal(NamedTuple):
+    """Where an axis goes, how fast and with what force, in counts.
+
+    Attributes:
+        position: where to.
+        speed: 0..255.
+        force: 0..255.
+        is_reading: the axis ends where it reads the position, and not beside it as after a request.
+    """
+
+    position: int
+    speed: int
+    force: int
+    is_reading: bool = False
+
+
+Goals = tuple[Goal | None, ...]
+"""Where A, B, C and the scissor go; None for an axis that stands still."""
+
+SCISSOR_LOW: Final = OPEN_READING
+"""Where the scissor is open: TAMS recorded a pose at 11; as no more is known, it ends where a finger does."""
+SCISSOR_HIGH: Final = 232
+"""Scissor reading when the scissor mode has closed it, its closing stop (manual)."""
+PINCH_CLOSED_READING: Final = 113
+"""Where a finger of the pinch mode is fully closed (manual)."""
+MODE_POSITION: Final = {Mode.BASIC: 137, Mode.PINCH: 219, Mode.WIDE: 24, Mode.SCISSOR: SCISSOR_LOW}
+"""Scissor reading of each mode (manual). The scissor mode begins with the open scissor (TAMS)."""
+
+# No source says how fast or strong the gripper moves on its own; full speed keeps the waits short.
+_SEQUENCE_SPEED: Final = SPEED_MAX
+_SEQUENCE_FORCE: Final = 128
+_RELEASE_SPEED: Final = SPEED_MIN
+
+
+def finger_limit(mode: Mode | None) -> int | None:
+    """Where a mode stops the fingers, None for nowhere; no mode while the scissor has its own registers."""
+    return PINCH_CLOSED_READING if mode is Mode.PINCH else None
+
+
+def requested(request: Request, readings: Sequence[int]) -> Goals:
+    """What a request asks of the axes while rGTO = 1.
+
+    Simple control (rICF = 0, rICS = 0) lets A's registers drive all fingers, or in the scissor mode the
+    scissor alone while the fingers stay at their readings, rICF = 1 or not (manual).
+    """
+    own = tuple(_asked(axis) for axis in request.axes)
+    grip = own[0]
+    scissor_grips = not request.individual_scissor and request.mode is Mode.SCISSOR
+    if scissor_grips:
+        fingers = tuple(Goal(reading, grip.speed, grip.force, is_reading=True) for reading in readings[:3])
+    elif request.individual_fingers:
+        fingers = own[:3]
+    else:
+        fingers = (grip, grip, grip)
+    if request.individual_scissor:
+        return *fingers, own[3]
+    return *fingers, grip if scissor_grips else _on_its_own(MODE_POSITION[request.mode])
+
+
+def activation(mode: Mode | None) -> tuple[Goals, ...]:
+    """Fingers close, then open; the scissor goes to its mode meanwhile (basic without one)."""
+    close, open_ = _on_its_own(CLOSED), _on_its_own(OPEN)
+    scissor = _on_its_own(MODE_POSITION[Mode.BASIC if mode is None else mode])
+    return (close, close, close, scissor), (open_, open_, open_, None)
+
+
+def mode_change(mode: Mode) -> tuple[Goals, ...]:
+    """Fingers open, then the scissor goes to the position of the mode."""
+    open_ = _on_its_own(OPEN)
+    return (open_, open_, open_, None), (None, None, None, _on_its_own(MODE_POSITION[mode]))
+
+
+def release() -> tuple[Goals, ...]:
+    """Every axis opens slowly."""
+    open_ = Goal(OPEN, _RELEASE_SPEED, _SEQUENCE_FORCE)
+    return ((open_, open_, open_, Goal(WIDTH_WIDE, _RELEASE_SPEED, _SEQUENCE_FORCE)),)
+
+
+def _asked(request: AxisRequest) -> Goal:
+    return Goal(request.position, request.speed, request.force)
+
+
+def _on_its_own(position: int) -> Goal:
+    return Goal(position, _SEQUENCE_SPEED, _SEQUENCE_FORCE, is_reading=True)

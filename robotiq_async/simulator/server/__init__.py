@@ -1,0 +1,1 @@
+"""The simulated gripper behind Modbus TCP and Modbus RTU."""

@@ -1,0 +1,119 @@
+"""SerialSimulatorServer: a simulated gripper behind Modbus RTU on a serial line."""
+
+from __future__ import annotations
+
+import asyncio
+import importlib.util
+from typing import TYPE_CHECKING, Final
+
+from pymodbus.server import ModbusSerialServer
+
+from robotiq_async.wire.checks import check_int
+from robotiq_async.wire.registers import RTU_REGISTERS
+
+from .endpoint import SimulatorEndpoint
+from .framing import Frame, take_rtu
+from .register_bank import RTU_FUNCTIONS, RegisterBank
+from .serial_connection import SerialConnection
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from ..physics.gripper import SimulatedGripper
+
+
+_BROADCAST: Final = 0
+
+
+class SerialSimulatorServer(SimulatorEndpoint):
+    """Serves a simulated gripper over Modbus RTU at 115200 baud, 8N1.
+
+    Serves what :class:`~robotiq_async.simulator.SimulatorServer` serves, and FC23, which writes before it
+    reads. The RTU gripper has no exception replies (manual), so a bad request gets no answer. Broadcasts
+    (unit 0) are carried out and not answered, requests to other units are left to them, as Modbus has it;
+    no source says what a real gripper does with a broadcast.
+    """
+
+    link = "rtu"
+    functions = RTU_FUNCTIONS
+
+    def __init__(
+        self,
+        port: str,
+        gripper: SimulatedGripper | None = None,
+        *,
+        device_id: int = RTU_REGISTERS.device_id,
+    ) -> None:
+        """A server that is not started; needs no running loop.
+
+        Args:
+            port: the serial port, such as ``/dev/ttyUSB0``, or one end of a pseudo terminal.
+            gripper: what answers; None for a new one.
+            device_id: the unit id of the gripper.
+
+        Raises:
+            TypeError: device_id is not an int.
+            ValueError: device_id is outside 1..247.
+        """
+        super().__init__(gripper)
+        self._device_id = check_int("device_id", device_id, 1, 247)
+        self._port = port
+
+    @property
+    def port(self) -> str:
+        """The serial port."""
+        return self._port
+
+    @property
+    def address(self) -> str:
+        """The serial port as an address. A client needs the other end of the line, not this one."""
+        return f"rtu://{self._port}"
+
+    async def start(self) -> None:
+        """Begin to answer.
+
+        Raises:
+            ImportError: pyserial is not installed.
+            RuntimeError: it is running already.
+            OSError: the serial port cannot be opened.
+        """
+        if importlib.util.find_spec("serial") is None:
+            raise ImportError("a serial line needs pyserial: pip install 'robotiq-async[serial]'")
+        await super().start()
+
+    def take(self, inbox: bytearray) -> Frame | None:
+        """Cut the next request out of what has arrived."""
+        return take_rtu(inbox)
+
+    def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
+        """What to send for a reply; nothing for an exception, and nothing to a broadcast."""
+        return () if reply[0] == _BROADCAST or reply[1] & 0x80 else super().deliver(reply)
+
+    def _is_meant(self, unit: int) -> bool:
+        return unit in (_BROADCAST, self._device_id)
+
+    async def _open(self) -> ModbusSerialServer:
+        server = _SerialServer(self)
+        # pymodbus's own listen() hides the error.
+        server.transport, _ = await server.call_create()
+        # The transport watches the line from the next turn of the loop on and tells the connection in the
+        # one after that; closing it earlier would fail.
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        return server
+
+
+class _SerialServer(ModbusSerialServer):
+    def __init__(self, endpoint: SerialSimulatorServer) -> None:
+        super().__init__(
+            RegisterBank(endpoint.gripper).device(),
+            port=endpoint.port,
+            baudrate=115200,
+            bytesize=8,
+            parity="N",
+            stopbits=1,
+        )
+        self._endpoint = endpoint
+
+    def callback_new_connection(self) -> SerialConnection:
+        return SerialConnection(self, self._endpoint)

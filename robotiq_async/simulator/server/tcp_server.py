@@ -1,0 +1,163 @@
+"""SimulatorServer: a simulated gripper behind Modbus TCP."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from typing import TYPE_CHECKING, Final
+
+from pymodbus.server import ModbusTcpServer
+
+from robotiq_async.wire.checks import check_int, check_seconds
+
+from .connection import Connection
+from .endpoint import SimulatorEndpoint, hang_up
+from .framing import Frame, take_tcp
+from .register_bank import TCP_FUNCTIONS, RegisterBank
+
+if TYPE_CHECKING:
+    from pymodbus.server.base import ModbusBaseServer
+
+    from ..physics.gripper import SimulatedGripper
+
+_LONGEST_OFF: Final = 3600.0
+
+
+class SimulatorServer(SimulatorEndpoint):
+    """Serves a simulated gripper over Modbus TCP, to any number of clients.
+
+    Answers FC03, FC04, FC06 and FC16 at the addresses of
+    :class:`~robotiq_async.simulator.server.register_bank.RegisterBank`;
+    other functions, addresses and counts get the Modbus exceptions 1, 2 and 3. Bytes that are no Modbus TCP
+    end the connection. Requests of one connection are answered in order; a client that does not take its
+    replies is not read from until it does.
+    """
+
+    link = "tcp"
+    functions = TCP_FUNCTIONS
+
+    def __init__(
+        self,
+        gripper: SimulatedGripper | None = None,
+        *,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        device_id: int | None = None,
+    ) -> None:
+        """A server that is not started; needs no running loop.
+
+        Args:
+            gripper: what answers; None for a new one.
+            host: address to listen on.
+            port: TCP port, 0 for any free one.
+            device_id: the only unit id that is answered; None for all, as units in the field do.
+
+        Raises:
+            TypeError: port or device_id is not an int.
+            ValueError: port is outside 0..65535, or device_id outside 0..255.
+        """
+        super().__init__(gripper)
+        self._device_id = None if device_id is None else check_int("device_id", device_id, 0, 255)
+        self._host = host
+        self._port = check_int("port", port, 0, 65535)
+
+    @property
+    def port(self) -> int:
+        """The TCP port; the one that was found free once the server has been started."""
+        return self._port
+
+    @property
+    def address(self) -> str:
+        """The address for :class:`~robotiq_async.RobotiqHand`."""
+        return f"tcp://{self._host}:{self._port}"
+
+    def cut(self, *, reset: bool = False) -> None:
+        """Drop all connections now; new ones are welcome.
+
+        Args:
+            reset: reset them (RST) in place of closing them in order (FIN).
+
+        Raises:
+            RuntimeError: the server is not running.
+        """
+        hang_up(self._running(), reset=reset)
+
+    def refuse(self) -> None:
+        """Refuse new connections until :meth:`accept`; those that exist go on.
+
+        Raises:
+            RuntimeError: the server is not running.
+        """
+        self._running()
+        self._listener.close()
+
+    async def accept(self) -> None:
+        """Accept connections again, on the same port; without effect when it does.
+
+        Raises:
+            RuntimeError: the server is not running.
+            OSError: somebody else has taken the port.
+        """
+        server = self._running()
+        if not self._listener.is_serving():
+            await self._listen(server)
+
+    async def power_cycle(self, off_time: float = 0.0) -> None:
+        """Cut the gripper's power and come back after it.
+
+        Connections are dropped, new ones refused meanwhile, the gripper comes back reset.
+
+        Args:
+            off_time: simulated seconds without power.
+
+        Raises:
+            RuntimeError: the server is not running.
+            TypeError: off_time is not a number.
+            ValueError: off_time is negative or above an hour.
+        """
+        check_seconds("off_time", off_time, 0, _LONGEST_OFF)
+        self.refuse()
+        self.cut()
+        self.gripper.power_off()
+        await asyncio.sleep(off_time / self.gripper.speedup)
+        self.gripper.power_on()
+        if self.is_running:
+            await self.accept()
+
+    def take(self, inbox: bytearray) -> Frame | None:
+        """Cut the next request out of what has arrived."""
+        return take_tcp(inbox)
+
+    def _is_meant(self, unit: int) -> bool:
+        return self._device_id in (None, unit)
+
+    async def _open(self) -> ModbusTcpServer:
+        server = _TcpServer(self)
+        await self._listen(server)
+        return server
+
+    async def _listen(self, server: ModbusBaseServer) -> None:
+        """Listen. pymodbus's own listen() hides the error and cannot listen again on a port it found."""
+        loop = asyncio.get_running_loop()
+        try:
+            self._listener = await loop.create_server(
+                server.handle_new_connection, self._host, self._port, reuse_address=True
+            )
+        except UnicodeError as error:  # of a name that can be none
+            raise OSError(f"{self._host} cannot be resolved: {error}") from error
+        if not self._listener.sockets:
+            # asyncio takes every socket that cannot be made for one of a family that is not known here.
+            self._listener.close()
+            socket.socket().close()  # raises why
+            raise OSError(f"there is no socket for {self._host}")
+        self._port = self._listener.sockets[0].getsockname()[1]
+        server.transport = self._listener  # type: ignore[assignment]  # as pymodbus does
+
+
+class _TcpServer(ModbusTcpServer):
+    def __init__(self, endpoint: SimulatorServer) -> None:
+        super().__init__(RegisterBank(endpoint.gripper).device())
+        self._endpoint = endpoint
+
+    def callback_new_connection(self) -> Connection:
+        return Connection(self, self._endpoint)

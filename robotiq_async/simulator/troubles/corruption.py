@@ -1,0 +1,146 @@
+"""What can be done to the bytes of one reply, on either kind of link. No I/O: a reply in, bytes out.
+
+Apart from what a function is named after, the frame it makes is in order: length and check sum are made
+anew, so that a client which finds it out has looked at the right thing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from pymodbus.framer import FramerRTU
+
+from ..server.register_bank import READ_HOLDING, READ_INPUT, READ_WRITE, WRITE_MULTIPLE, WRITE_SINGLE
+
+Parts = Sequence[tuple[float, bytes]]
+"""What to send, in order: (delay in seconds, bytes)."""
+
+_ANOTHER = {
+    READ_HOLDING: READ_INPUT,
+    READ_INPUT: READ_HOLDING,
+    READ_WRITE: READ_HOLDING,
+    WRITE_SINGLE: WRITE_MULTIPLE,
+    WRITE_MULTIPLE: WRITE_SINGLE,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """The frame of one reply.
+
+    Attributes:
+        frame: all of it.
+        serial: whether it goes over a serial line.
+    """
+
+    frame: bytes
+    serial: bool
+
+    @property
+    def unit(self) -> int:
+        """The unit it comes from."""
+        return self.frame[0 if self.serial else 6]
+
+    @property
+    def pdu(self) -> bytes:
+        """Function code and data."""
+        return self.frame[1:-2] if self.serial else self.frame[7:]
+
+    @property
+    def is_to_a_write(self) -> bool:
+        """Whether it answers a write; to FC23, which also writes, the answer is what was read."""
+        return self.pdu[0] & 0x7F in (WRITE_SINGLE, WRITE_MULTIPLE)
+
+    @property
+    def is_exception(self) -> bool:
+        """Whether the simulator refuses the request."""
+        return bool(self.pdu[0] & 0x80)
+
+    def changed(self, *, unit: int | None = None, pdu: bytes | None = None) -> Parts:
+        """The reply with another unit or PDU, in an orderly frame."""
+        body = bytes((self.unit if unit is None else unit,)) + (self.pdu if pdu is None else pdu)
+        if self.serial:
+            return ((0.0, body + FramerRTU.compute_CRC(body).to_bytes(2, "big")),)
+        return ((0.0, self.frame[:4] + len(body).to_bytes(2, "big") + body),)
+
+
+Damage = Callable[[Reply, float], Parts]
+"""Takes the reply and the value of the trouble (see trouble.py); says what is sent instead."""
+
+
+def delay(reply: Reply, value: float) -> Parts:
+    """The reply comes later."""
+    return ((value, reply.frame),)
+
+
+def drop(reply: Reply, value: float) -> Parts:
+    """The reply does not come."""
+    return ()
+
+
+def half(reply: Reply, value: float) -> Parts:
+    """The first half of the reply comes, and then nothing."""
+    return ((0.0, reply.frame[: len(reply.frame) // 2]),)
+
+
+def pieces(reply: Reply, value: float) -> Parts:
+    """The reply comes in three pieces, that far apart."""
+    frame, third = reply.frame, len(reply.frame) // 3
+    return ((0.0, frame[:third]), (value, frame[third:-third]), (2 * value, frame[-third:]))
+
+
+def twice(reply: Reply, value: float) -> Parts:
+    """The reply comes twice in one segment."""
+    return ((0.0, 2 * reply.frame),)
+
+
+def wrong_function(reply: Reply, value: float) -> Parts:
+    """The reply is one to another function: 03 and 04, 06 and 16 stand for each other, 03 for 23."""
+    return reply.changed(pdu=bytes((_ANOTHER[reply.pdu[0]],)) + reply.pdu[1:])
+
+
+def wrong_length(reply: Reply, value: float) -> Parts:
+    """The reply has one register less and says so, as if less had been asked; one to a write lacks a byte."""
+    pdu = reply.pdu
+    return reply.changed(pdu=pdu[:-1] if reply.is_to_a_write else bytes((pdu[0], pdu[1] - 2)) + pdu[2:-2])
+
+
+def wrong_count(reply: Reply, value: float) -> Parts:
+    """The reply announces two bytes more than it has; one to a write, another number of registers."""
+    pdu = reply.pdu
+    if reply.is_to_a_write:
+        return reply.changed(pdu=pdu[:-1] + bytes((pdu[-1] ^ 1,)))
+    return reply.changed(pdu=bytes((pdu[0], pdu[1] + 2)) + pdu[2:])
+
+
+def wrong_transaction(reply: Reply, value: float) -> Parts:
+    """The reply carries the number of the transaction before."""
+    number = (int.from_bytes(reply.frame[:2], "big") - 1) & 0xFFFF
+    return ((0.0, number.to_bytes(2, "big") + reply.frame[2:]),)
+
+
+def wrong_unit(reply: Reply, value: float) -> Parts:
+    """The reply comes from the next unit."""
+    return reply.changed(unit=(reply.unit + 1) & 0xFF)
+
+
+def wrong_protocol(reply: Reply, value: float) -> Parts:
+    """The header names another protocol than Modbus."""
+    return ((0.0, reply.frame[:2] + b"\x00\x01" + reply.frame[4:]),)
+
+
+def wrong_echo(reply: Reply, value: float) -> Parts:
+    """The reply to a write names the register next to the one that was written."""
+    pdu = reply.pdu
+    return reply.changed(pdu=pdu[:2] + bytes((pdu[2] ^ 1,)) + pdu[3:])
+
+
+def wrong_checksum(reply: Reply, value: float) -> Parts:
+    """One bit of the check sum is wrong."""
+    return ((0.0, reply.frame[:-1] + bytes((reply.frame[-1] ^ 1,))),)
+
+
+def refusal(reply: Reply, value: float) -> Parts:
+    """An exception reply with this code comes instead."""
+    return reply.changed(pdu=bytes((reply.pdu[0] | 0x80, int(value))))

@@ -1,0 +1,257 @@
+"""What can go wrong, as data: one table of kinds, and troubles written as words or as values.
+
+A trouble is an event (a reply is lost, another client writes) or a condition that lasts (nobody answers,
+the device is slow). In words it is
+``KIND [VALUE] [on read|write] [at S] [for S|for ever|once] [every S]``::
+
+    drop at 5                      one reply is lost, 5 s after the beginning
+    delay 0.05                     every reply comes 50 ms later
+    wrong-unit on write once       the next reply to a write comes from another unit
+    power-cut at 10 for 2 every 60
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, Literal, NamedTuple, get_args
+
+from robotiq_async.wire.checks import check_seconds
+
+from . import corruption as damage
+from .corruption import Damage
+
+LONGEST: Final = 86400.0
+
+On = Literal["read", "write", "any"]
+Link = Literal["tcp", "rtu"]
+
+
+class Kind(NamedTuple):
+    """What is known of one kind of trouble.
+
+    Attributes:
+        meaning: one line about it.
+        lasts: how long it lasts when nothing is said: 0 for an event, infinity for a condition.
+        value: what its value is when nothing is said; None where it has none.
+        low: the least value.
+        high: the greatest value.
+        damage: what it does to a reply, if that is what it does.
+        on: the requests whose replies it can be about.
+        link: the only kind of link it fits, if there is only one.
+    """
+
+    meaning: str
+    lasts: float
+    value: float | None = None
+    low: float = 0.0
+    high: float = 0.0
+    damage: Damage | None = None
+    on: On = "any"
+    link: Link | None = None
+
+    @property
+    def can_hit_once(self) -> bool:
+        """Whether it makes sense to have it for a single reply or a single moment."""
+        return self.lasts == _EVENT or self.damage is not None or self is KINDS["silence"]
+
+
+_EVENT: Final = 0.0
+_CONDITION: Final = math.inf
+
+KINDS: Final[dict[str, Kind]] = {
+    # Replies.
+    "delay": Kind("replies come VALUE seconds later", _CONDITION, 0.05, 0, 10, damage.delay),
+    "late": Kind(
+        "a reply comes VALUE seconds later, after the client has given up", _EVENT, 0.7, 0, 10, damage.delay
+    ),
+    "drop": Kind("a reply is lost; its request was carried out", _EVENT, damage=damage.drop),
+    "half": Kind("only the first half of a reply comes", _EVENT, damage=damage.half),
+    "pieces": Kind(
+        "replies come in three pieces, VALUE seconds apart", _CONDITION, 0.002, 0, 1, damage.pieces
+    ),
+    "twice": Kind("a reply comes twice in one segment", _EVENT, damage=damage.twice),
+    "wrong-function": Kind("a reply is one to another function", _EVENT, damage=damage.wrong_function),
+    "wrong-length": Kind("a reply is one register short", _EVENT, damage=damage.wrong_length),
+    "wrong-count": Kind("a reply lies about how much it holds", _EVENT, damage=damage.wrong_count),
+    "wrong-transaction": Kind(
+        "a reply carries an old transaction number", _EVENT, damage=damage.wrong_transaction, link="tcp"
+    ),
+    "wrong-unit": Kind("a reply comes from another unit", _EVENT, damage=damage.wrong_unit),
+    "wrong-protocol": Kind(
+        "a reply is of another protocol than Modbus", _EVENT, damage=damage.wrong_protocol, link="tcp"
+    ),
+    "wrong-echo": Kind(
+        "a reply to a write names another register", _EVENT, damage=damage.wrong_echo, on="write"
+    ),
+    "wrong-checksum": Kind("a reply has a wrong check sum", _EVENT, damage=damage.wrong_checksum, link="rtu"),
+    "exception": Kind(
+        "a request is answered by exception VALUE", _EVENT, 4, 1, 255, damage.refusal, link="tcp"
+    ),
+    # Requests and connections.
+    "silence": Kind("requests are not heard; connections stay open", _CONDITION),
+    "reset": Kind("all connections are reset", _EVENT, link="tcp"),
+    "close": Kind("all connections are closed in order", _EVENT, link="tcp"),
+    "accept-silence": Kind(
+        "connections are reset; new ones are accepted, not answered", _CONDITION, link="tcp"
+    ),
+    "refuse": Kind("connections are reset; new ones are refused", _CONDITION, link="tcp"),
+    "multiplexer": Kind(
+        "a gateway keeps its own connection: replies come VALUE seconds later, to whoever is connected then",
+        *(_CONDITION, 0.7, 0, 10),
+        link="tcp",
+    ),
+    # The gripper.
+    "power-cut": Kind("the gripper has no power, and comes back reset", _CONDITION),
+    "idle-reset": Kind(
+        "the gripper loses its activation when no request comes for VALUE seconds", _CONDITION, 5.0, 0, 3600
+    ),
+    "foreign": Kind("another client sends all axes to VALUE", _EVENT, 128, 0, 255),
+    "slow-device": Kind("requests take effect VALUE seconds after they came", _CONDITION, 0.2, 0, 10),
+    "interference": Kind("the scissor is blocked: fault 0x0A, after 20 s 0x0E", _CONDITION),
+    "fault": Kind("the gripper reports fault VALUE", _CONDITION, 9, 1, 15),
+    "release": Kind("the gripper releases automatically", _EVENT),
+}
+"""Every kind of trouble, by its name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trouble:
+    """One thing that goes wrong.
+
+    Attributes:
+        kind: one of :data:`KINDS`.
+        value: what the kind says; None for its usual value.
+        on: the requests whose replies it is about.
+        at: seconds after the beginning of the plan.
+        lasts: seconds, infinity for ever, 0 for once (one reply, one request, one cut); None for what is
+            usual for the kind.
+        every: seconds after which it comes again, if it does.
+    """
+
+    kind: str
+    value: float | None = None
+    on: On = "any"
+    at: float = 0.0
+    lasts: float | None = None
+    every: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check that all of it fits together.
+
+        Raises:
+            TypeError: not a number.
+            ValueError: no such kind, or something that does not fit it.
+        """
+        known = KINDS.get(self.kind)
+        if known is None:
+            raise ValueError(f"no trouble is called {self.kind!r}; known are: {', '.join(KINDS)}")
+        if self.value is not None:
+            _check_value(self.kind, known, self.value)
+        if self.on not in get_args(On):
+            raise ValueError(f"on must be read, write or any, got {self.on!r}")
+        if self.on != "any" and (known.damage is None or known.on not in ("any", self.on)):
+            raise ValueError(f"'on {self.on}' means nothing for {self.kind}")
+        check_seconds("at", self.at, 0, LONGEST)
+        if self.duration != math.inf:
+            check_seconds("for", self.duration, 0, LONGEST)
+        if self.duration == 0 and not known.can_hit_once:
+            raise ValueError(f"{self.kind} is a condition: say for how long, or leave that out for ever")
+        if self.every is not None and check_seconds("every", self.every, 0.001, LONGEST) <= self.duration:
+            raise ValueError(f"{self.kind} cannot come again after {self.every:g} s: it lasts as long")
+
+    @property
+    def duration(self) -> float:
+        """How long it lasts, in seconds: 0 for once, infinity for ever."""
+        return KINDS[self.kind].lasts if self.lasts is None else self.lasts
+
+    @property
+    def amount(self) -> float:
+        """Its value, or the usual one; 0 where there is none."""
+        return (KINDS[self.kind].value if self.value is None else self.value) or 0.0
+
+    def is_about(self, *, write: bool) -> bool:
+        """Whether it is about replies to writes, or to reads."""
+        this: On = "write" if write else "read"
+        return self.on in (this, "any") and KINDS[self.kind].on in (this, "any")
+
+    def __str__(self) -> str:
+        """The trouble in words; :func:`parse_troubles` reads them."""
+        words = [self.kind]
+        words += [] if self.value is None else [_digits(self.value)]
+        words += [] if self.on == "any" else [f"on {self.on}"]
+        words += [f"at {_digits(self.at)}"] if self.at else []
+        if self.lasts is not None:
+            words += ["once" if self.lasts == 0 else f"for {_digits(self.lasts)}"]
+        words += [] if self.every is None else [f"every {_digits(self.every)}"]
+        return " ".join(words)
+
+
+def _digits(number: float) -> str:
+    """A number with all its digits, and no more."""
+    if number == math.inf:
+        return "ever"
+    return repr(int(number) if number == int(number) else number)
+
+
+def _check_value(name: str, kind: Kind, value: object) -> None:
+    if kind.value is None:
+        raise ValueError(f"{name} takes no value, got {value!r}")
+    whole = isinstance(kind.value, int)
+    form = "a whole number" if whole else "seconds"
+    what = f"the value of {name} must be {form} in {kind.low:g}..{kind.high:g}"
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        raise TypeError(f"{what}, got {value!r}")
+    if not kind.low <= value <= kind.high or (whole and value != int(value)):
+        raise ValueError(f"{what}, got {value!r}")
+
+
+def parse_troubles(text: str) -> list[Trouble]:
+    """Read troubles: one a line, or several with ``;`` between them. What follows a ``#`` is a remark.
+
+    Raises:
+        ValueError: a line that is none; named with the reason.
+    """
+    lines = (part for line in text.splitlines() for part in line.partition("#")[0].split(";"))
+    return [_parse_one(line) for line in lines if line.strip()]
+
+
+def _parse_one(line: str) -> Trouble:
+    words = line.split()
+    kind = words.pop(0)
+    value = None
+    if kind not in KINDS:
+        Trouble(kind)  # says so
+    if words and words[0] not in _WORDS:
+        value = _number(kind, words.pop(0))
+    options: dict[str, str] = {}
+    while words:
+        word = words.pop(0)
+        if word not in _WORDS or word in options or (word != "once" and not words):
+            raise ValueError(f"cannot read {line.strip()!r} at {word!r}; the form is: {FORM}")
+        options[word] = "" if word == "once" else words.pop(0)
+    if "once" in options and "for" in options:
+        raise ValueError(f"cannot read {line.strip()!r}: 'once' and 'for' contradict each other")
+    lasts: float | None = 0.0 if "once" in options else None
+    if "for" in options:
+        lasts = math.inf if options["for"] == "ever" else _number("for", options["for"])
+    on = options.get("on", "any")
+    return Trouble(
+        kind,
+        value,
+        on=on,  # type: ignore[arg-type]  # checked there
+        at=_number("at", options.get("at", "0")),
+        lasts=lasts,
+        every=_number("every", options["every"]) if "every" in options else None,
+    )
+
+
+FORM: Final = "KIND [VALUE] [on read|write] [at S] [for S|for ever|once] [every S]"
+_WORDS: Final = ("on", "at", "for", "once", "every")
+
+
+def _number(what: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f"{what} must be followed by a number, got {text!r}") from None

@@ -1,0 +1,1 @@
+"""A hand as messages: recordings, viewers, metrics. Each behind its extra."""

@@ -1,0 +1,207 @@
+"""Everything about a hand as messages on four topics, for recordings and for viewers.
+
+``/gripper/status`` (every poll), ``/gripper/command`` (every request that was written) and ``/gripper/event``
+(transitions and faults) are JSON with a JSON Schema; ``/joint_states`` is what ROS 2 encodes.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from ..enums import Fault
+from ..errors import RobotiqConnectionError
+from ..hand import RobotiqHand
+from ..kinematics import joint_angles, joint_velocities
+from ..log import log
+from ..session.clock import now
+from ..session.streams import SentRequest, Stream, Transition
+from ..wire.status import RobotiqStatus
+from .joint_states import SCHEMA, SCHEMA_NAME, JointStateEncoder
+from .payloads import (
+    SCHEMAS,
+    Fields,
+    beginning_fields,
+    command_fields,
+    efforts,
+    fault_fields,
+    status_fields,
+    transition_fields,
+)
+
+BUFFER: Final = 100_000
+"""Statuses that wait to be taken: minutes."""
+GIVEN_UP_S: Final = 0.2
+"""Between two looks at a hand that has given up."""
+VELOCITY_S: Final = 0.05
+"""Joint velocities are taken over this time: a count is half a degree."""
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """What is sent on a topic, in the words of MCAP and Foxglove.
+
+    Attributes:
+        name: the topic.
+        encoding: of its messages.
+        schema_name: the type of its messages.
+        schema_encoding: how the type is described.
+        schema: the description.
+    """
+
+    name: str
+    encoding: str
+    schema_name: str
+    schema_encoding: str
+    schema: bytes
+
+
+def json_topic(name: str, schema: object) -> Topic:
+    """A topic ``/gripper/NAME`` of JSON objects."""
+    return Topic(f"/gripper/{name}", "json", f"gripper.{name}", "jsonschema", json.dumps(schema).encode())
+
+
+def compact(fields: Fields) -> bytes:
+    """An object as one short line of JSON."""
+    return json.dumps(fields, separators=(",", ":")).encode()
+
+
+STATUS: Final = json_topic("status", SCHEMAS["status"])
+COMMAND: Final = json_topic("command", SCHEMAS["command"])
+EVENT: Final = json_topic("event", SCHEMAS["event"])
+JOINTS: Final = Topic("/joint_states", "cdr", SCHEMA_NAME, "ros2msg", SCHEMA.encode())
+TOPICS: Final = (STATUS, COMMAND, EVENT, JOINTS)
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One message.
+
+    Attributes:
+        topic: where it belongs.
+        nanoseconds: since 1970: when it happened.
+        data: encoded as the topic says.
+        sequence: the number of the status it was made from; 0 for commands and events.
+    """
+
+    topic: Topic
+    nanoseconds: int
+    data: bytes
+    sequence: int = 0
+
+
+class _Source:
+    """A stream of a hand that is opened again when it ends."""
+
+    def __init__(self, stream: Callable[[], Stream[Any]], take: Callable[[Any], None]) -> None:
+        self._make = stream
+        self._take = take
+        self._stream: Stream[Any]
+        self._missed_before = 0
+
+    @property
+    def missed(self) -> int:
+        return self._missed_before + self._stream.missed
+
+    def open(self) -> None:
+        self._stream = self._make()
+
+    async def listen(self) -> None:
+        while True:
+            try:
+                async for item in self._stream:
+                    self._take(item)
+            except RobotiqConnectionError:
+                await asyncio.sleep(GIVEN_UP_S)  # until the hand is started again, its streams end at once
+            self._missed_before = self.missed
+            self.open()
+
+    def drain(self) -> None:
+        for item in self._stream.drain():
+            self._take(item)
+
+
+class Feed:
+    """Turns what happens to a hand into messages. It only listens, also over stops and starts of the hand."""
+
+    def __init__(self, hand: RobotiqHand, take: Callable[[Message], None]) -> None:
+        """Prepare.
+
+        Args:
+            hand: started before or while it is listened to.
+            take: is called with every message, in the event loop.
+        """
+        self._hand = hand
+        self._take = take
+        self._encoder = JointStateEncoder()
+        self._before: list[RobotiqStatus] = []
+        self._fault = Fault.NONE
+        self._epoch = 0.0
+        self._sources: tuple[_Source, ...] = (
+            _Source(lambda: hand.statuses(BUFFER), self._take_status),
+            _Source(hand.requests, self._take_request),
+            _Source(hand.transitions, self._take_transition),
+        )
+        self._tasks: list[asyncio.Task[None]] = []
+
+    @property
+    def missed(self) -> int:
+        """Statuses that came and were not taken in time. A loop that is held up polls none: see overruns."""
+        return self._sources[0].missed
+
+    def begin(self) -> None:
+        """Listen from now on; :meth:`end` ends it."""
+        loop = asyncio.get_running_loop()
+        # What happens carries a monotonic clock; messages are stamped with the world's.
+        began = now()
+        self._epoch = time.time() - began
+        self._tell(EVENT, began, beginning_fields(self._hand.state, began))
+        for source in self._sources:
+            source.open()
+        self._tasks = [
+            loop.create_task(source.listen(), name="robotiq_async feed") for source in self._sources
+        ]
+
+    async def end(self) -> None:
+        """Take what was published before now and not seen yet, and listen no longer."""
+        for task in self._tasks:
+            task.cancel()
+        for ended in await asyncio.gather(*self._tasks, return_exceptions=True):
+            if isinstance(ended, Exception):
+                log.critical("what happened to a hand could not be told any more", exc_info=ended)
+        for source in self._sources:
+            source.drain()
+
+    def nanoseconds(self, timestamp: float) -> int:
+        """A timestamp of the hand's, since 1970."""
+        return round((timestamp + self._epoch) * 1e9)
+
+    def _tell(self, topic: Topic, timestamp: float, fields: Fields, sequence: int = 0) -> None:
+        self._take(Message(topic, self.nanoseconds(timestamp), compact(fields), sequence))
+
+    def _take_status(self, status: RobotiqStatus) -> None:
+        self._tell(STATUS, status.timestamp, status_fields(status), status.sequence)
+        self._take_joints(status)
+        if status.fault != self._fault:
+            self._fault = status.fault
+            self._tell(EVENT, status.timestamp, fault_fields(status))
+
+    def _take_joints(self, status: RobotiqStatus) -> None:
+        while len(self._before) > 1 and status.timestamp - self._before[1].timestamp >= VELOCITY_S:
+            del self._before[0]
+        self._before.append(status)
+        angles, seconds = joint_angles(status), status.timestamp - self._before[0].timestamp
+        velocities = joint_velocities(self._before[0], status) if seconds else (0.0,) * len(angles)
+        stamp = self.nanoseconds(status.timestamp)
+        data = self._encoder.encode(stamp, angles, velocities, efforts(status))
+        self._take(Message(JOINTS, stamp, data, status.sequence))
+
+    def _take_request(self, sent: SentRequest) -> None:
+        self._tell(COMMAND, sent.timestamp, command_fields(sent))
+
+    def _take_transition(self, transition: Transition) -> None:
+        self._tell(EVENT, transition.timestamp, transition_fields(transition))

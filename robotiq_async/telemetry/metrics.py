@@ -1,0 +1,123 @@
+"""Figures of long-running hands for Prometheus. Needs the extra ``metrics`` (prometheus-client).
+
+    async with serve_metrics(hand, port=9100):
+        ...
+
+The figures are taken when somebody asks for them and cost nothing in between. They count from the hand's last
+start, as :attr:`RobotiqHand.statistics` does; Prometheus knows such resets.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Iterable, Iterator
+from typing import Final
+
+try:
+    from prometheus_client import CollectorRegistry, start_http_server
+    from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+    from prometheus_client.registry import Collector
+except ModuleNotFoundError as error:
+    raise ImportError("metrics need prometheus-client: pip install 'robotiq-async[metrics]'") from error
+
+from ..enums import State
+from ..hand import RobotiqHand
+from ..session.statistics import Statistics
+from ..wire.checks import check_int
+
+LOOPBACK: Final = "127.0.0.1"
+PATIENCE_S: Final = 5.0
+"""How long whoever asks waits for a loop that is held up."""
+
+_COUNTERS: Final = {
+    "polls": "Statuses read.",
+    "writes": "Requests acknowledged.",
+    "overruns": "Ticks of the polling that were missed and skipped.",
+    "reconnects": "Times the link was opened again.",
+    "foreign_commands": "Times another client was seen to command the gripper.",
+    "faults": "Times the gripper reported a minor or a major fault.",
+}
+_GAUGES: Final = {
+    "period_p50": "Median time between two polls.",
+    "period_p99": "99th percentile of the time between two polls.",
+    "round_trip_p50": "Median time from a read to its reply.",
+    "round_trip_p99": "99th percentile of the time from a read to its reply.",
+    "longest_stall": "Longest time the event loop was held up.",
+}
+
+
+class HandCollector(Collector):
+    """Gives a hand's figures to a registry of yours."""
+
+    def __init__(self, hands: Iterable[RobotiqHand]) -> None:
+        """Must be made in the event loop that the hands run in.
+
+        Args:
+            hands: each is told from the others by its label ``hand``, its address.
+        """
+        self._hands = list(hands)
+        self._loop = asyncio.get_running_loop()
+
+    def describe(self) -> Iterable[Metric]:
+        """Nothing: a registry would ask for figures at once otherwise, and stop the loop it waits for."""
+        return []
+
+    def collect(self) -> Iterator[Metric]:
+        """The figures; called in a thread of the server's, taken in the loop."""
+        asking = asyncio.run_coroutine_threadsafe(self._figures(), self._loop)
+        figures = asking.result(PATIENCE_S)
+        for name, meaning in _COUNTERS.items():
+            counter = CounterMetricFamily(f"robotiq_{name}", meaning, labels=["hand"])
+            for address, (_, statistics) in figures.items():
+                counter.add_metric([address], getattr(statistics, name))
+            yield counter
+        for name, meaning in _GAUGES.items():
+            gauge = GaugeMetricFamily(f"robotiq_{name}_seconds", meaning, labels=["hand"])
+            for address, (_, statistics) in figures.items():
+                gauge.add_metric([address], getattr(statistics, name))
+            yield gauge
+        moves = CounterMetricFamily("robotiq_moves", "Moves by outcome.", labels=["hand", "outcome"])
+        state = GaugeMetricFamily("robotiq_state", "1 for the present state.", labels=["hand", "state"])
+        for address, (present, statistics) in figures.items():
+            for outcome, count in statistics.moves.items():
+                moves.add_metric([address, outcome], count)
+            for each in State:
+                state.add_metric([address, each.name], float(each is present))
+        yield moves
+        yield state
+
+    async def _figures(self) -> dict[str, tuple[State, Statistics]]:
+        return {hand.address: (hand.state, hand.statistics) for hand in self._hands}
+
+
+@contextlib.asynccontextmanager
+async def serve_metrics(
+    *hands: RobotiqHand, port: int = 9100, host: str = LOOPBACK
+) -> AsyncIterator[tuple[str, int]]:
+    """Serve the figures of hands over HTTP while the block runs; gives host and port.
+
+    There is no password: who listens on another interface than loopback shows the figures to everybody there.
+
+    Args:
+        hands: at least one.
+        port: 0 takes a free one.
+        host: the interface to listen on.
+
+    Raises:
+        ValueError: no hand, or a port outside 0..65535.
+        OSError: the port is taken.
+    """
+    if not hands:
+        raise ValueError("hands must name at least one RobotiqHand, got none")
+    check_int("port", port, 0, 65535)
+    registry = CollectorRegistry()
+    registry.register(HandCollector(hands))
+    server, thread = start_http_server(port, addr=host, registry=registry)
+    try:
+        yield host, server.server_port
+    finally:
+        # It may be answering, and wait for this loop: close it in a thread.
+        await asyncio.to_thread(server.shutdown)
+        server.server_close()
+        thread.join()

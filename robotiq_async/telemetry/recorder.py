@@ -1,0 +1,212 @@
+"""Records everything about a hand in an MCAP file. Needs the extra ``record`` (mcap).
+
+    hand = RobotiqHand(address)
+    async with Recorder(hand, "grasp.mcap"), hand:
+        ...
+
+In this order the start and the stop are in it too, and nothing that concerns the file delays the stop.
+
+Four channels: ``/gripper/status`` (every poll), ``/gripper/command`` (every request that was written) and
+``/gripper/event`` (transitions and faults) as JSON with a JSON Schema; ``/joint_states`` as ROS 2 encodes it.
+Tools of ROS 2 refuse a file with channels that are not ROS's: ``ros2=True`` leaves them out.
+What is recorded reaches the disk twice a second, from a thread: a program that is killed loses no more than
+that, and ``robotiq-async recover`` makes its file whole.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import errno
+import os
+from io import FileIO
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Self
+
+try:
+    from mcap.writer import CompressionType, Writer
+except ModuleNotFoundError as error:
+    raise ImportError("recordings need mcap: pip install 'robotiq-async[record]'") from error
+
+from ..concurrency import in_a_thread, to_the_end
+from ..errors import RobotiqError
+from ..hand import RobotiqHand
+from ..version import __version__
+from .feed import JOINTS, TOPICS, Feed, Message, Topic
+
+FLUSH_S: Final = 0.5
+"""Between two writes to the disk."""
+DISK_S: Final = 10.0
+"""What a disk may take for the last of it."""
+
+
+class RecordingError(RobotiqError):
+    """A recording could not be written, or read."""
+
+
+class _Outbox:
+    """What the MCAP writer writes to: keeps the bytes until they are taken to the disk."""
+
+    def __init__(self) -> None:
+        self._waiting: list[bytes] = []
+        self._count = 0
+
+    def write(self, data: bytes) -> int:
+        self._waiting.append(bytes(data))
+        self._count += len(data)
+        return len(data)
+
+    def tell(self) -> int:
+        return self._count
+
+    def flush(self) -> None:
+        """Nothing: the disk is a thread's business."""
+
+    def take(self) -> bytes:
+        data, self._waiting = b"".join(self._waiting), []
+        return data
+
+
+class Recorder:
+    """Records a hand while a block runs. It only listens: the gripper is not touched, whatever fails.
+
+    Attributes:
+        path: the file.
+        recorded: polls in it so far.
+    """
+
+    def __init__(self, hand: RobotiqHand, path: Path | str, *, ros2: bool = False) -> None:
+        """Prepare; opens nothing.
+
+        Args:
+            hand: started before or while it is recorded.
+            path: a file that is not there yet.
+            ros2: write the joint states alone, in the profile ``ros2``: a file that tools of ROS 2 open.
+        """
+        self.path = Path(path)
+        self.recorded = 0
+        self._profile = "ros2" if ros2 else ""
+        self._topics: tuple[Topic, ...] = (JOINTS,) if ros2 else TOPICS
+        self._address = hand.address
+        self._feed = Feed(hand, self._take)
+        self._outbox = _Outbox()
+        self._file: FileIO
+        self._writer: Any
+        self._channels: dict[Topic, int] = {}
+        self._saving: asyncio.Task[None]
+        self._over: asyncio.Event
+        self._failed: asyncio.Future[RecordingError]
+
+    @property
+    def missed(self) -> int:
+        """Statuses that were not taken in time; a loop that is held up polls none: see ``overruns``."""
+        return self._feed.missed
+
+    @property
+    def size(self) -> int:
+        """Bytes of the file, about."""
+        return self._outbox.tell()
+
+    async def __aenter__(self) -> Self:
+        """Open the file and begin.
+
+        Raises:
+            RecordingError: the file is there already, or cannot be made.
+        """
+        loop = asyncio.get_running_loop()
+        self._failed = loop.create_future()
+        self._over = asyncio.Event()
+        opening = in_a_thread(lambda: FileIO(self.path, "x"))
+        try:
+            await to_the_end(opening)
+        except asyncio.CancelledError:
+            if opening.exception() is None:
+                opening.result().close()
+                self.path.unlink(missing_ok=True)
+            raise
+        try:
+            self._file = opening.result()
+        except OSError as error:
+            raise RecordingError(f"{self.path}: {error.strerror}") from error
+        self._begin()
+        self._feed.begin()
+        self._saving = loop.create_task(self._save_again_and_again(), name="robotiq_async recorder")
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Write what is left and close the file, also when cancelled meanwhile.
+
+        Raises:
+            RecordingError: something could not be written; never in place of another exception.
+        """
+        await to_the_end(asyncio.ensure_future(self._end()))
+        if self._failed.done() and error is None:
+            raise self._failed.result()
+
+    async def failure(self) -> RecordingError:
+        """Wait until the recording fails (a full disk, say); what was saved before stays readable."""
+        return await asyncio.shield(self._failed)
+
+    def _begin(self) -> None:
+        self._writer = writer = Writer(self._outbox, compression=CompressionType.ZSTD)  # type: ignore[arg-type]
+        writer.start(profile=self._profile, library=f"robotiq_async {__version__}")
+        metadata = {"version": __version__, "address": self._address, "note": "never run on real hardware"}
+        writer.add_metadata("robotiq_async", metadata)
+        for topic in self._topics:
+            schema = writer.register_schema(topic.schema_name, topic.schema_encoding, topic.schema)
+            self._channels[topic] = writer.register_channel(topic.name, topic.encoding, schema)
+
+    def _take(self, message: Message) -> None:
+        if self._failed.done() or message.topic not in self._channels:
+            return
+        channel, stamp = self._channels[message.topic], message.nanoseconds
+        self._writer.add_message(channel, stamp, message.data, stamp, message.sequence & 0xFFFFFFFF)
+        self.recorded += message.topic is JOINTS  # the last that is told of a poll
+
+    # -- the disk --------------------------------------------------------------------------------------
+
+    async def _save_again_and_again(self) -> None:
+        while not (self._over.is_set() or self._failed.done()):
+            self._writer.flush()
+            await self._save()
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(FLUSH_S):
+                    await self._over.wait()
+
+    async def _end(self) -> None:
+        await self._feed.end()
+        self._over.set()
+        try:
+            async with asyncio.timeout(DISK_S):
+                await self._saving
+                if not self._failed.done():
+                    self._writer.finish()
+                    await self._save()
+                await in_a_thread(self._file.close)
+        except TimeoutError:
+            self._fail(f"the disk does not answer within {DISK_S:g} s")
+        except OSError as error:
+            self._fail(error.strerror)
+
+    async def _save(self) -> None:
+        """Take to the disk what waits; a failure ends the recording."""
+        data = self._outbox.take()
+        try:
+            await in_a_thread(lambda: self._write(data))
+        except OSError as error:
+            self._fail(error.strerror)
+
+    def _fail(self, why: str | None) -> None:
+        if not self._failed.done():
+            self._failed.set_result(RecordingError(f"{self.path}: {why}"))
+
+    def _write(self, data: bytes) -> None:
+        left = memoryview(data)
+        while left:
+            left = left[self._file.write(left) :]
+        os.fsync(self._file.fileno())
+        if os.fstat(self._file.fileno()).st_nlink == 0:
+            raise FileNotFoundError(errno.ENOENT, "the file has been deleted")

@@ -1,0 +1,127 @@
+"""Argument checks: each names the argument, the value and the range, and nothing is clamped."""
+
+from __future__ import annotations
+
+import sys
+from typing import Final
+
+from ..enums import Finger
+
+_BY_VALUE: Final = {int(axis): axis for axis in (Finger.A, Finger.B, Finger.C, Finger.SCISSOR)}
+
+
+def check_byte(name: str, value: object) -> int:
+    """A position, speed or force: an int in 0..255.
+
+    Raises:
+        TypeError: not an int (a bool is not one here).
+        ValueError: outside 0..255.
+    """
+    return check_int(name, value, 0, 255)
+
+
+def check_int(name: str, value: object, low: int, high: int) -> int:
+    """An int in low..high.
+
+    Raises:
+        TypeError: not an int (a bool is not one here).
+        ValueError: outside the range.
+    """
+    if not isinstance(value, int) or isinstance(value, bool):
+        raise TypeError(f"{name} must be an int in {low}..{high}, got {value!r}")
+    if not low <= value <= high:
+        raise ValueError(f"{name} must be in {low}..{high}, got {value!r}")
+    return int(value)
+
+
+def check_mask(fingers: object) -> Finger:
+    """A mask of axes: a Finger, or an int in 1..15.
+
+    Raises:
+        TypeError: not a Finger or an int.
+        ValueError: empty, or bits beyond the four axes.
+    """
+    if not isinstance(fingers, int) or isinstance(fingers, bool):
+        raise TypeError(f"fingers must be a Finger mask or an int in 1..15, got {fingers!r}")
+    if not 1 <= int(fingers) <= 15:
+        raise ValueError(f"fingers must be a mask of Finger members in 1..15, got {int(fingers)!r}")
+    return Finger(int(fingers))
+
+
+def parse_fingers(name: str, text: str) -> Finger:
+    """A mask of axes from words: ``ABC``, ``A,B``, ``scissor``, ``all``.
+
+    Raises:
+        ValueError: it names something else, or nothing.
+    """
+    mask = Finger(0)
+    for word in text.upper().split(","):
+        word = word.strip()
+        if word in Finger.__members__:
+            mask |= Finger[word]
+        elif word and set(word) <= set("ABC"):
+            for letter in word:
+                mask |= Finger[letter]
+        else:
+            raise ValueError(f"{name} must name axes (ABC, or A,B, or scissor, or all), got {word!r}")
+    return mask
+
+
+def check_axis(finger: object) -> Finger:
+    """Exactly one axis.
+
+    Raises:
+        TypeError: not a Finger or an int.
+        ValueError: not one of A, B, C, SCISSOR.
+    """
+    if type(finger) is Finger and finger in _SINGLE:
+        return finger
+    if not isinstance(finger, int) or isinstance(finger, bool):
+        raise TypeError(f"finger must be one Finger (A, B, C or SCISSOR), got {finger!r}")
+    axis = _BY_VALUE.get(int(finger))
+    if axis is None:
+        raise ValueError(f"finger must be one of Finger.A, B, C or SCISSOR (1, 2, 4 or 8), got {finger!r}")
+    return axis
+
+
+def check_seconds(name: str, value: object, low: float, high: float) -> float:
+    """A duration in seconds within low..high.
+
+    Raises:
+        TypeError: not a number.
+        ValueError: not finite, or outside the range.
+    """
+    return check_number(name, value, low, high, "seconds")
+
+
+def check_number(name: str, value: object, low: float, high: float, what: str = "a number") -> float:
+    """A number within low..high; ``what`` is for the message.
+
+    Raises:
+        TypeError: not a number.
+        ValueError: not finite, or outside the range.
+    """
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        raise TypeError(f"{name} must be {what} in {low}..{high}, got {value!r}")
+    if not low <= value <= high:
+        raise ValueError(f"{name} must be {what} in {low}..{high}, got {value!r}")
+    return float(value)
+
+
+def check_timeout(name: str, value: object) -> float | None:
+    """A time-out: None for no limit, or seconds above 0.
+
+    Raises:
+        TypeError: not None and not a number.
+        ValueError: not finite, or not above 0.
+    """
+    if value is None:
+        return None
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        raise TypeError(f"{name} must be None or seconds above 0, got {value!r}")
+    if not 0 < value <= sys.float_info.max:
+        raise ValueError(f"{name} must be None or seconds above 0, got {value!r}")
+    return float(value)
+
+
+_SINGLE: Final = frozenset(_BY_VALUE.values())

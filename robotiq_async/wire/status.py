@@ -1,0 +1,204 @@
+"""RobotiqStatus: one reading of the gripper's eight status registers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from ..enums import AXES, Fault, Finger, Initialization, Mode, ObjectStatus
+from . import registers as reg
+from .checks import check_axis
+
+_set = object.__setattr__
+_INDEX = {axis: index for index, axis in enumerate(AXES)}
+
+
+def _masks(wanted: Callable[[ObjectStatus], bool]) -> tuple[Finger, ...]:
+    """For each value of the byte that holds the four gDT: the axes that read what is wanted."""
+    return tuple(
+        Finger(
+            sum(
+                axis
+                for axis, field in zip(AXES, reg.gDT, strict=True)
+                if wanted(ObjectStatus(field.read([byte])))
+            )
+        )
+        for byte in range(256)
+    )
+
+
+_MOVING = _masks(lambda what: what is ObjectStatus.IN_MOTION)
+_CONTACTS = _masks(lambda what: what.is_contact)
+
+
+class RobotiqStatus:
+    """What the gripper said at one moment. Immutable and hashable; decoded when asked.
+
+    Two statuses are equal when their registers, timestamp and sequence are.
+
+    Attributes:
+        registers: the eight registers as they came.
+        timestamp: monotonic seconds at which the reply arrived.
+        sequence: counts every poll of a hand, from 0.
+    """
+
+    __slots__ = ("_registers", "_sequence", "_timestamp")
+    _registers: reg.Registers
+    _timestamp: float
+    _sequence: int
+
+    # The hand makes one of these 200 times a second: it keeps the registers and nothing else.
+    def __init__(self, registers: reg.Registers, timestamp: float = 0.0, sequence: int = 0) -> None:
+        """Keep eight checked registers; :meth:`from_registers` checks them."""
+        if hasattr(self, "_sequence"):
+            raise AttributeError("RobotiqStatus is immutable: it is made once")
+        _set(self, "_registers", registers)
+        _set(self, "_timestamp", timestamp)
+        _set(self, "_sequence", sequence)
+
+    @classmethod
+    def from_registers(
+        cls, registers: Sequence[int], *, timestamp: float = 0.0, sequence: int = 0
+    ) -> RobotiqStatus:
+        """A status from eight registers.
+
+        Raises:
+            TypeError: a register is not an int.
+            ValueError: not eight registers, or one outside 0..65535.
+        """
+        return cls(reg.check_registers(registers), timestamp, sequence)
+
+    @property
+    def registers(self) -> reg.Registers:
+        """The eight registers as they came."""
+        return self._registers
+
+    @property
+    def timestamp(self) -> float:
+        """Monotonic seconds (``time.monotonic()``) at which the reply arrived."""
+        return self._timestamp
+
+    @property
+    def sequence(self) -> int:
+        """Counts every poll of the hand since its first start."""
+        return self._sequence
+
+    # One axis. Each takes one Finger member; a mask of several is a ValueError.
+
+    def finger_status(self, finger: Finger | int) -> ObjectStatus:
+        """Whether the axis moves, touches something or has arrived (gDT).
+
+        Raises:
+            TypeError: not a Finger or an int.
+            ValueError: not exactly one axis.
+        """
+        return ObjectStatus(reg.gDT[_INDEX[check_axis(finger)]].read(self._registers))
+
+    def position(self, finger: Finger | int) -> int:
+        """Position in counts, 0..255: open reads 6-7, closed 240 or more (gPO)."""
+        return reg.gPO[_INDEX[check_axis(finger)]].read(self._registers)
+
+    def requested_position(self, finger: Finger | int) -> int:
+        """Echo of the position request, 0..255 (gPR)."""
+        return reg.gPR[_INDEX[check_axis(finger)]].read(self._registers)
+
+    def current(self, finger: Finger | int) -> int:
+        """Motor current in counts, 0..255 (gCU)."""
+        return reg.gCU[_INDEX[check_axis(finger)]].read(self._registers)
+
+    def current_ma(self, finger: Finger | int) -> int:
+        """Motor current in milliampere, 10 a count."""
+        return self.current(finger) * reg.MILLIAMPERE_PER_COUNT
+
+    # The whole hand.
+
+    @property
+    def fault(self) -> Fault:
+        """The fault code (gFLT); an unassigned code keeps its number."""
+        return Fault(reg.gFLT.read(self._registers))
+
+    @property
+    def activation_echo(self) -> bool:
+        """Echo of the activation bit (gACT); true while the activation still runs."""
+        return bool(reg.gACT.read(self._registers))
+
+    @property
+    def go_echo(self) -> bool:
+        """Echo of the go bit (gGTO)."""
+        return bool(reg.gGTO.read(self._registers))
+
+    @property
+    def mode(self) -> Mode:
+        """Echo of the mode (gMOD)."""
+        return Mode(reg.gMOD.read(self._registers))
+
+    @property
+    def initialization(self) -> Initialization:
+        """How far activation or mode change is (gIMC)."""
+        return Initialization(reg.gIMC.read(self._registers))
+
+    @property
+    def motion(self) -> int:
+        """The motion summary of the three fingers, 0..3, as the gripper gives it (gSTA)."""
+        return reg.gSTA.read(self._registers)
+
+    @property
+    def is_activated(self) -> bool:
+        """Whether activation and mode change are complete (gIMC = 3)."""
+        return self.initialization is Initialization.COMPLETE
+
+    @property
+    def is_reset(self) -> bool:
+        """Whether gIMC = 0: reset, or in automatic release (the fault tells which)."""
+        return self.initialization is Initialization.RESET
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether an axis moves: gGTO = 1, gIMC = 3 and a gDT of 0.
+
+        gSTA = 0 or gDT = 0 alone do not mean motion: a gripper that is ready and was never told to go
+        reads 0 in both.
+        """
+        return bool(self.moving)
+
+    @property
+    def moving(self) -> Finger:
+        """The axes that move (empty when none does)."""
+        return _MOVING[self._registers[0] & 0xFF] if self.go_echo and self.is_activated else Finger(0)
+
+    @property
+    def contacts(self) -> Finger:
+        """The axes stopped by a contact (empty when none is)."""
+        return _CONTACTS[self._registers[0] & 0xFF]
+
+    def __eq__(self, other: object) -> bool:
+        """Equal registers, timestamp and sequence."""
+        if not isinstance(other, RobotiqStatus):
+            return NotImplemented
+        return self._key() == other._key()
+
+    def __hash__(self) -> int:
+        """Hash of what is compared."""
+        return hash(self._key())
+
+    def __reduce__(self) -> tuple[type[RobotiqStatus], tuple[reg.Registers, float, int]]:
+        """Copy and pickle."""
+        return RobotiqStatus, self._key()
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Refuse changes after construction."""
+        raise AttributeError(f"RobotiqStatus is immutable: cannot set {name!r}")
+
+    def __repr__(self) -> str:
+        """The words a person looks for first."""
+        axes = ", ".join(
+            f"{axis.name}={self.position(axis)}->{self.requested_position(axis)} "
+            f"{self.finger_status(axis).name} {self.current_ma(axis)}mA"
+            for axis in AXES
+        )
+        return (
+            f"<RobotiqStatus #{self._sequence} {self.initialization.name} go={int(self.go_echo)} "
+            f"fault={self.fault.name} {axes}>"
+        )
+
+    def _key(self) -> tuple[reg.Registers, float, int]:
+        return self._registers, self._timestamp, self._sequence
