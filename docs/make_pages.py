@@ -3,9 +3,9 @@
     python docs/make_pages.py
     python docs/make_pages.py --check
 
-The picture comes from make_diagram.py, the layout for viewers from make_layout.py and the tables from
-make_tables.py. With ``--check`` nothing is written: the stale files are named, and the exit code is 1 when
-there are any.
+The pictures come from make_architecture.py and make_diagram.py, the layout for viewers from make_layout.py
+and the tables from make_tables.py. With ``--check`` nothing is written: the stale files are named, and the
+exit code is 1 when there are any.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ ROOT: Final = Path(__file__).parents[1]
 if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
 
-from docs import make_diagram, make_layout, make_tables  # noqa: E402
+from docs import make_architecture, make_diagram, make_layout, make_tables  # noqa: E402
 
 
 def generated() -> dict[Path, str]:
@@ -30,7 +30,8 @@ def generated() -> dict[Path, str]:
         OSError: a page that holds tables is missing.
         ValueError: a page has no place for one of its tables, or picture and table disagree.
     """
-    files = {make_diagram.PICTURE: make_diagram.draw(), make_layout.FILE: make_layout.draw()}
+    files = {each.PICTURE: each.draw() for each in (make_architecture, make_diagram)}
+    files[make_layout.FILE] = make_layout.draw()
     for page in make_tables.PAGES:
         path = make_tables.DOCS / page
         files[path] = make_tables.filled(page, path.read_text(encoding="utf-8"))

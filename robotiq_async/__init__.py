@@ -66,7 +66,7 @@ Nothing of this has run on real hardware yet.
 """
 
 from .control.motion import MoveResult
-from .control.state_machine import Trigger
+from .control.triggers import Trigger
 from .enums import (
     CLOSED,
     FORCE_MAX,
@@ -103,8 +103,8 @@ from .errors import (
     StateTimeoutError,
 )
 from .hand import RobotiqHand
-from .link.modbus import Transport
-from .session.poller import ReconnectPolicy
+from .link.transport import Transport
+from .session.reconnecting import ReconnectPolicy
 from .session.statistics import Statistics
 from .session.streams import SentRequest, Stream, Transition
 from .version import __version__ as __version__

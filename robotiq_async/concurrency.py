@@ -13,7 +13,7 @@ import anyio
 T = TypeVar("T")
 
 
-async def to_the_end(work: asyncio.Future[Any]) -> None:
+async def wait_shielded(work: asyncio.Future[Any]) -> None:
     """Wait until something is done, also when cancelled meanwhile; the cancellation is raised afterwards.
 
     What the work itself raises is not raised here: ask it for its result.

@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
-from .control.sequences import signature_of_status
 from .enums import Severity
 from .errors import ConnectFailedError, ProtocolError, ResponseTimeoutError, RobotiqConnectionError
 from .link.address import Address
 from .link.host_names import addresses_of
-from .link.modbus import ModbusTransport, Transport
+from .link.modbus import ModbusTransport
 from .link.simulated import SimulatedTransport, new_gripper
+from .link.transport import Transport
 from .session.statistics import percentile
 from .wire.registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap
 from .wire.status import RobotiqStatus
@@ -291,7 +291,7 @@ async def _others(link: Transport, report: Report) -> None:
     loop = asyncio.get_running_loop()
     until, seen = loop.time() + WATCH_S, set()
     while loop.time() < until:
-        seen.add(signature_of_status(RobotiqStatus.from_registers(await link.read())))
+        seen.add(RobotiqStatus.from_registers(await link.read()).echo)
         await asyncio.sleep(0.01)
     if len(seen) == 1:
         found = f"no request changed within {WATCH_S:g} s: none seen to write, unless always the same"

@@ -29,6 +29,8 @@ class Finger(IntFlag):
 
 AXES: Final = (Finger.A, Finger.B, Finger.C, Finger.SCISSOR)
 """The four axes in the order of their registers."""
+NO_AXES: Final = Finger(0)
+"""The empty mask."""
 
 OPEN: Final = 0
 """Position request of a fully open finger (it reads 6-7 there)."""

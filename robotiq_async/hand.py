@@ -3,36 +3,27 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Collection, Mapping
 from types import TracebackType
-from typing import Any, ClassVar, Final, Self, TypeVar
+from typing import Final, Self, TypeVar
 
 import anyio
 
-from .calibration.scales import SpeedCalibration
-from .concurrency import to_the_end
-from .control.controller import Core
+from .calibration import SpeedCalibration
 from .control.motion import Move, MoveResult
-from .control.pending import Delivery
-from .control.state_machine import RUNNING, SEQUENCES, Machine, Trigger
+from .control.state_machine import RUNNING, SEQUENCES, StateMachine
+from .control.triggers import Trigger
 from .enums import CLOSED, OPEN, Finger, Severity, State
 from .errors import (
-    ActivationTimeoutError,
     ConnectionLostError,
-    GripperFaultError,
     InvalidStateError,
     MoveTimeoutError,
     NotActivatedError,
     NotStartedError,
-    RobotiqConnectionError,
-    RobotiqError,
     StateTimeoutError,
 )
-from .link.modbus import Transport
-from .log import log
-from .session.claims import Claims
+from .link.transport import Transport
 from .session.clock import now
-from .session.event_loop import check_loop, running_loop
+from .session.event_loop import running_loop
 from .session.options import (
     ACTIVATION_TIMEOUT_S,
     CONNECT_TIMEOUT_S,
@@ -40,11 +31,11 @@ from .session.options import (
     RESPONSE_TIMEOUT_S,
     check_options,
 )
-from .session.poller import Owner, ReconnectPolicy
-from .session.state_waiters import StateWaiters
+from .session.reconnecting import ReconnectPolicy
+from .session.session import Session
 from .session.statistics import Counters, Statistics
-from .session.streams import Channel, SentRequest, Stream, Transition
-from .wire.checks import check_byte, check_int, check_mask, check_timeout
+from .session.streams import Channel, Channels, SentRequest, Stream, Transition
+from .wire.checks import check_byte, check_int, check_mask, check_optional_byte, check_timeout
 from .wire.status import RobotiqStatus
 
 T = TypeVar("T")
@@ -67,9 +58,6 @@ class RobotiqHand:
 
     Nothing of this has run on real hardware yet.
     """
-
-    _running: ClassVar[Claims[RobotiqHand]] = Claims()
-    """Hands that own a gripper in this process."""
 
     def __init__(
         self,
@@ -128,17 +116,10 @@ class RobotiqHand:
             status_address=status_address,
             calibration=calibration,
         )
-        self._machine = Machine(self._on_transition)
-        self._core = self._new_core()
-        self._counters = Counters()
-        self._statuses: Channel[RobotiqStatus] = Channel()
-        self._transitions: Channel[Transition] = Channel()
-        self._requests: Channel[SentRequest] = Channel()
-        self._until_link_lost: set[Stream[RobotiqStatus]] = set()
-        """Streams of those who wait for what the gripper does next: they end when the link goes down."""
-        self._waiters = StateWaiters()
-        self._owner: Owner | None = None
-        self._task: asyncio.Task[None] | None = None
+        self._machine = StateMachine()
+        self._channels = Channels()
+        self._session: Session | None = None
+        """The run under way, or the last one."""
 
     # -- lifetime --------------------------------------------------------------------------------------
 
@@ -177,33 +158,20 @@ class RobotiqHand:
         """
         if not isinstance(activate, bool):
             raise TypeError(f"activate must be True or False, got {activate!r}")
-        loop = running_loop()
+        running_loop()
         self._abandon_if_loop_closed()
-        self._claim()
-        self._core = self._new_core()
-        self._counters = Counters()
-        for channel in self._channels:
-            channel.reopen(loop)
-        sequence = self._owner.sequence if self._owner is not None else 0
-        owner = self._owner = Owner(
-            self._options.make_transport(),
-            self._core,
-            self._counters,
-            address=self._options.address,
+        before = self._session
+        self._session = session = Session(
+            self._options,
+            self._machine,
+            self._channels,
             activate=activate,
-            poll_interval=self._options.poll_interval,
-            policy=self._options.policy,
-            first_sequence=sequence,
-            publish=self._statuses.push,
-            publish_request=self._requests.push,
+            first_sequence=0 if before is None else before.next_sequence,
         )
-        self._machine.happen(Trigger.ASK_START)
-        self._task = loop.create_task(owner.run(), name="robotiq_async owner")
-        self._task.add_done_callback(self._on_owner_done)
         try:
-            await owner.connected
+            await session.connected()
             if activate:
-                await self._wait_until_active()
+                await session.activated()
         except BaseException:
             await self.stop()
             raise
@@ -226,15 +194,8 @@ class RobotiqHand:
         if not isinstance(halt, bool):
             raise TypeError(f"halt must be True or False, got {halt!r}")
         self._abandon_if_loop_closed()
-        task, owner = self._task, self._owner
-        if task is None or owner is None:
-            return
-        check_loop(task.get_loop(), "hand.stop()")
-        owner.request_stop(halt=halt)
-        try:
-            await to_the_end(task)
-        finally:
-            self._on_owner_done(task)
+        if self._session is not None and not self._session.is_over:
+            await self._session.stop(halt=halt)
 
     # -- commands --------------------------------------------------------------------------------------
 
@@ -306,10 +267,9 @@ class RobotiqHand:
         axes = check_mask(fingers)
         if position is None and speed is None and force is None:
             raise ValueError("command() needs at least one of position, speed and force in 0..255, got none")
-        position = None if position is None else check_byte("position", position)
-        speed = None if speed is None else check_byte("speed", speed)
-        force = None if force is None else check_byte("force", force)
-        self._started().command(axes, position, speed, force)
+        position = check_optional_byte("position", position)
+        speed, force = check_optional_byte("speed", speed), check_optional_byte("force", force)
+        self._asked().controller.command(axes, position, speed, force)
 
     async def move(
         self,
@@ -347,39 +307,28 @@ class RobotiqHand:
         """
         axes = check_mask(fingers)
         target = check_byte("position", position)
-        speed = None if speed is None else check_byte("speed", speed)
-        force = None if force is None else check_byte("force", force)
+        speed, force = check_optional_byte("speed", speed), check_optional_byte("force", force)
         limit = check_timeout("timeout", timeout)
-        core = self._started()
-        core.refuse_unless_running(Trigger.ASK_COMMAND)
+        session = self._asked()
+        controller = session.controller
         if limit is None:
-            limit = core.move_timeout(target, axes, speed)
-        loop = asyncio.get_running_loop()
-        ended: asyncio.Future[MoveResult] = loop.create_future()
-
-        def resolve(outcome: MoveResult | RobotiqError) -> None:
-            if ended.done():
-                return
-            if isinstance(outcome, MoveResult):
-                ended.set_result(outcome)
-            else:
-                ended.set_exception(outcome)
-
-        move = Move(target, axes, now(), resolve)
-        core.move(move, speed, force)
-        with self._counters.move() as note:
+            limit = controller.move_timeout(target, axes, speed)
+        ended: asyncio.Future[MoveResult] = session.waiter()
+        move = Move(target, axes, now(), ended)
+        controller.move(move, speed, force)
+        with session.counters.move() as note:
             try:
                 with anyio.move_on_after(limit):
                     result = await ended
                     note(result)
                     return result
             except asyncio.CancelledError:
-                core.abandon(move, unseen=True)
+                controller.abandon(move, unseen=True)
                 if ended.done() and not ended.cancelled():
                     ended.exception()  # nobody else will look at it
                 raise
             finally:
-                core.abandon(move)
+                controller.abandon(move)
             raise MoveTimeoutError(
                 f"{axes} still moved after {limit:.2f} s on the way to {target}", self.status
             )
@@ -421,11 +370,11 @@ class RobotiqHand:
             StateTimeoutError: an activation or a release was not seen to end within 5 s.
             RobotiqError: not connected, or the link went down before the acknowledgement.
         """
-        core = self._connected()
+        session = self._asked()
         if self.state in SEQUENCES:
             await self._reset(Trigger.ASK_HALT)
         else:
-            await self._told(core.halt)
+            await session.answered(session.controller.halt)
 
     # -- activation, faults ----------------------------------------------------------------------------
 
@@ -440,13 +389,11 @@ class RobotiqHand:
             ActivationTimeoutError: not finished within the activation time-out.
             RobotiqError: not possible now, or the link went down.
         """
-        core = self._connected()
+        session = self._asked()
         if self.state in RUNNING:
             return
-        if self.state in (State.FAULT, State.ATR_DONE):
-            raise GripperFaultError(self.status.fault)
-        ask = None if self.state in (State.DO_ACTIVATION, State.WF_ACTIVATION) else core.activate
-        await self._wait_until_active(ask)
+        under_way = self.state in (State.DO_ACTIVATION, State.WF_ACTIVATION)
+        await session.activated(None if under_way else session.controller.activate)
 
     async def reset(self) -> None:
         """Reset the gripper (rACT = 0): clears faults, and lets go of what it holds.
@@ -461,12 +408,12 @@ class RobotiqHand:
         await self._reset(Trigger.ASK_RESET)
 
     async def _reset(self, trigger: Trigger) -> None:
-        core = self._connected()
-        await self._reach(
+        session = self._asked()
+        await session.reach(
             {State.RESET},
             RESET_TIMEOUT_S,
-            ask=lambda: core.reset(trigger),
-            failing={State.DISCONNECTED: self._link_lost},
+            ask=lambda: session.controller.reset(trigger),
+            failing={State.DISCONNECTED: session.link_lost},
             what="the gripper did not report the reset",
         )
 
@@ -482,13 +429,13 @@ class RobotiqHand:
             StateTimeoutError: the release was not finished within 60 s.
             RobotiqError: the link went down.
         """
-        core = self._connected()
-        await self._reach(
+        session = self._asked()
+        await session.reach(
             {State.ATR_DONE},
             RELEASE_TIMEOUT_S,
-            ask=core.release,
+            ask=session.controller.release,
             failing={
-                State.DISCONNECTED: self._link_lost,
+                State.DISCONNECTED: session.link_lost,
                 State.RESET: lambda: NotActivatedError("the gripper was reset during the automatic release"),
                 State.DO_RESET: lambda: InvalidStateError("reset() or halt() took over", State.DO_RESET),
             },
@@ -512,7 +459,7 @@ class RobotiqHand:
             RobotiqError: the link went down, or the hand was stopped.
         """
         limit = check_timeout("timeout", timeout) or RECOVER_TIMEOUT_S
-        self._started()
+        self._asked()
         with anyio.move_on_after(limit):
             while self.state not in RUNNING:
                 await self._recover_step()
@@ -520,7 +467,7 @@ class RobotiqHand:
         raise StateTimeoutError(f"the gripper is not active after {limit:g} s: {self.state.name}")
 
     async def _recover_step(self) -> None:
-        state = self.state
+        session, state = self._asked(), self.state
         if state is State.RESET:
             await self.activate()
         elif state is State.ATR_DONE or (
@@ -528,18 +475,10 @@ class RobotiqHand:
         ):
             await self.reset()
         elif state is State.DISCONNECTED:
-            raise self._link_lost()
+            raise session.link_lost()
         else:
             # A minor fault, or a sequence under way: the next status may tell more.
-            self._started()
-            stream = self.statuses()
-            self._until_link_lost.add(stream)
-            try:
-                await anext(stream)
-            except StopAsyncIteration:
-                raise NotStartedError("the hand was stopped") from None
-            finally:
-                self._until_link_lost.remove(stream)
+            await session.next_status()
 
     # -- what is going on ------------------------------------------------------------------------------
 
@@ -560,9 +499,10 @@ class RobotiqHand:
         Raises:
             NotStartedError: there is none yet.
         """
-        if self._core.status is None:
+        status = None if self._session is None else self._session.controller.status
+        if status is None:
             raise NotStartedError("no status has been read yet: start the hand first")
-        return self._core.status
+        return status
 
     @property
     def is_activated(self) -> bool:
@@ -591,12 +531,14 @@ class RobotiqHand:
             RobotiqError: not known: not started, or the link is down.
         """
         self._current_status()
-        return self._core.is_moving
+        return self._started().controller.is_moving
 
     @property
     def statistics(self) -> Statistics:
         """How the polling went since the last start."""
-        return self._counters.snapshot(self._core.foreign_commands)
+        if self._session is None:
+            return Counters().snapshot(0)
+        return self._session.counters.snapshot(self._session.controller.foreign_commands)
 
     def statuses(self, buffer: int = 1) -> Stream[RobotiqStatus]:
         """Every status from now on, for one reader; newest wins.
@@ -612,11 +554,11 @@ class RobotiqHand:
             TypeError: buffer is not an int.
             ValueError: buffer is outside its range.
         """
-        return self._open(self._statuses, check_int("buffer", buffer, 1, 1_000_000))
+        return self._open(self._channels.statuses, check_int("buffer", buffer, 1, 1_000_000))
 
     def transitions(self) -> Stream[Transition]:
         """Every change of state from now on, for one reader, none lost. Ends after :meth:`stop`."""
-        return self._open(self._transitions, None)
+        return self._open(self._channels.transitions, None)
 
     def requests(self, buffer: int | None = None) -> Stream[SentRequest]:
         """Every request written from now on, for one reader. Ends after :meth:`stop`.
@@ -629,7 +571,7 @@ class RobotiqHand:
             ValueError: buffer is outside its range.
         """
         kept = None if buffer is None else check_int("buffer", buffer, 1, 1_000_000)
-        return self._open(self._requests, kept)
+        return self._open(self._channels.requests, kept)
 
     async def wait_for_state(self, *states: State, timeout: float | None = None) -> State:
         """Wait until the hand is, if only for a moment, in one of these states, and return it.
@@ -653,9 +595,8 @@ class RobotiqHand:
         limit = check_timeout("timeout", timeout)
         if self.state in states:
             return self.state
-        self._started()
         names = " or ".join(state.name for state in states)
-        return await self._reach(set(states), limit, what=f"{names} was not reached")
+        return await self._asked().reach(set(states), limit, what=f"{names} was not reached")
 
     def __repr__(self) -> str:
         """Address and state."""
@@ -663,183 +604,51 @@ class RobotiqHand:
 
     # -- inside ----------------------------------------------------------------------------------------
 
-    def _new_core(self) -> Core:
-        options = self._options
-        return Core(self._machine, options.speed, options.force, options.closing_time)
-
-    def _claim(self) -> None:
-        """Own the gripper in this process.
-
-        Raises:
-            InvalidStateError: it is owned already.
-        """
-        gripper = self._options.gripper
-        owner = self._running.claim(gripper, self, lambda each: each._task is None)  # noqa: SLF001
-        if owner is not None:
-            who, hint = ("this hand", "") if owner is self else ("another hand", gripper().hint)
-            raise InvalidStateError(
-                f"{who} runs on {owner.address} already: stop() it first{hint}",
-                self.state,
-                {State.DISCONNECTED, State.SHUTDOWN},
-            )
-
-    def _on_owner_done(self, task: asyncio.Task[None]) -> None:
-        """The owner task has ended: nobody may wait for it any longer. Called by whoever sees it first."""
-        if self._task is not task:
-            return
-        self._running.release(self)
-        self._task = None
-        failure: Callable[[], RobotiqError] | None = None
-        if not task.cancelled() and (bug := task.exception()) is not None:
-            log.critical("the task that owns the link failed", exc_info=bug)
-            failure = lambda: ConnectionLostError(f"internal error: {bug!r}")  # noqa: E731
-        elif self._owner is not None and self._owner.failure is not None:
-            failure = self._link_lost
-        self._waiters.fail(failure or (lambda: NotStartedError("the hand was stopped")))
-        for channel in self._channels:
-            channel.end(failure)
-
-    @property
-    def _channels(self) -> tuple[Channel[Any], ...]:
-        return self._statuses, self._transitions, self._requests
-
-    def _open(self, channel: Channel[T], buffer: int | None) -> Stream[T]:
-        """A stream; not from another thread while the hand runs, for the streams are not locked."""
-        if self._task is not None and not self._lost_its_loop():
-            check_loop(self._task.get_loop(), "a stream of the hand")
-        return channel.open(buffer)
-
-    def _lost_its_loop(self) -> bool:
-        """Whether the loop that the hand ran in was closed without stopping the hand."""
-        return self._task is None or self._task.get_loop().is_closed()
-
-    def _abandon_if_loop_closed(self) -> None:
-        """Count as stopped when the hand's loop was closed under it: its task can never end any more.
-
-        Nobody in that loop can be told. What they wait with belongs to it and is left to it.
-        """
-        if self._task is None or not self._lost_its_loop():
-            return
-        log.warning("%s: its event loop was closed before stop(); the fingers may still move", self.address)
-        self._running.release(self)
-        if self._owner is not None:
-            self._owner.abandon()
-        self._task = self._owner = None
-        self._waiters = StateWaiters()
-        for channel in self._channels:
-            channel.end()
-        self._machine.happen(Trigger.ASK_STOP)
-        self._machine.happen(Trigger.STOPPED)
-
-    def _on_transition(self, source: State, target: State, trigger: Trigger) -> None:
-        self._transitions.push(Transition(source, target, trigger, now()))
-        self._counters.faults += target is State.FAULT
-        self._waiters.reached(target)
-        if target is State.DISCONNECTED:
-            for stream in self._until_link_lost:
-                stream.end(self._link_lost)
-
-    def _started(self, *, reading: bool = False) -> Core:
-        """The core of a hand that runs; whoever only reads may do so from anywhere.
+    def _started(self) -> Session:
+        """The run under way, for whoever only reads: that may be done from anywhere.
 
         Raises:
             NotStartedError: not started, or stopped.
             ConnectionLostError: the hand gave up on its link.
-            RuntimeError: called from another thread or event loop.
         """
-        if self._task is None:
-            if self._owner is not None and self._owner.failure is not None:
-                raise self._link_lost()
+        if self._session is None:
             raise NotStartedError("the hand is not started: use 'async with' or start()")
-        if self._lost_its_loop():
-            raise NotStartedError("the event loop that the hand ran in was closed: start() it again")
-        if not reading:
-            check_loop(self._task.get_loop(), "the hand")
-        return self._core
+        self._session.check_running()
+        return self._session
 
-    def _connected(self) -> Core:
-        """The core of a hand that has its link.
+    def _asked(self) -> Session:
+        """The run under way, for whoever asks for something.
 
         Raises:
-            NotStartedError: not started, or stopped.
-            ConnectionLostError: the link is down.
+            NotStartedError, ConnectionLostError: as :meth:`_started`.
+            RuntimeError: called from another thread or event loop.
         """
-        core = self._started()
-        if self.state is State.DISCONNECTED:
-            raise self._link_lost()
-        return core
+        session = self._started()
+        session.check_loop("the hand")
+        return session
 
     def _current_status(self) -> RobotiqStatus:
-        self._started(reading=True)
+        self._started()
         status = self.status
         if self.state is State.DISCONNECTED:
             raise ConnectionLostError("the link is down: what the gripper does is not known")
         return status
 
-    def _link_lost(self) -> RobotiqConnectionError:
-        failure = self._owner.failure if self._owner is not None else None
-        error = ConnectionLostError(f"the link is down{'' if failure is None else f': {failure}'}")
-        error.__cause__ = failure
-        return error
+    def _open(self, channel: Channel[T], buffer: int | None) -> Stream[T]:
+        """A stream; not from another thread while the hand runs, for the streams are not locked."""
+        session = self._session
+        if session is not None and not session.is_over and not session.lost_its_loop:
+            session.check_loop("a stream of the hand")
+        return channel.open(buffer)
+
+    def _abandon_if_loop_closed(self) -> None:
+        if self._session is not None and self._session.lost_its_loop:
+            self._session.abandon()
 
     async def _deliver(
         self, axes: Finger, *, position: int | None = None, speed: int | None = None, force: int | None = None
     ) -> None:
-        core = self._started()
-        await self._told(lambda delivery: core.command(axes, position, speed, force, delivery))
-
-    async def _told(self, ask: Callable[[Delivery], None]) -> None:
-        """Ask for something and wait until told that it was acknowledged, or why not."""
-        told: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-
-        def resolve(failure: RobotiqError | None) -> None:
-            if told.done():
-                return
-            if failure is None:
-                told.set_result(None)
-            else:
-                told.set_exception(failure)
-
-        ask(resolve)
-        await told
-
-    async def _wait_until_active(self, ask: Callable[[], None] | None = None) -> None:
-        """Wait for the end of an activation; one that this hand began must not end in a fault."""
-        if ask is None and self.state not in SEQUENCES:
-            return
-        ours = ask is not None or self.state is State.DO_ACTIVATION or self._core.is_busy
-        states = set(RUNNING) if ours else {*RUNNING, State.FAULT, State.ATR_DONE}
-        failing: Mapping[State, Callable[[], RobotiqError]] = {
-            State.DISCONNECTED: self._link_lost,
-            State.RESET: lambda: NotActivatedError("the gripper was reset during the activation"),
-            State.DO_RESET: lambda: NotActivatedError("reset() or halt() took over"),
-            State.FAULT: lambda: GripperFaultError(self.status.fault),
-            State.ATR_DONE: lambda: GripperFaultError(self.status.fault),
-        }
-        try:
-            await self._reach(
-                states,
-                self._options.activation_timeout,
-                ask=ask,
-                failing={state: make for state, make in failing.items() if state not in states},
-                what="the activation was not finished",
-            )
-        except StateTimeoutError as error:
-            raise ActivationTimeoutError(str(error)) from None
-
-    async def _reach(
-        self,
-        states: Collection[State],
-        timeout: float | None,
-        *,
-        what: str,
-        ask: Callable[[], None] | None = None,
-        failing: Mapping[State, Callable[[], RobotiqError]] | None = None,
-    ) -> State:
-        """Ask for something and wait for a state; some states mean that it will not come."""
-        with self._waiters.watching(states, failing or {}) as reached:
-            if ask is not None:
-                ask()
-            with anyio.move_on_after(timeout):
-                return await reached
-        raise StateTimeoutError(f"{what} within {timeout:g} s (now {self.state.name})")
+        session = self._asked()
+        await session.answered(
+            lambda waiter: session.controller.command(axes, position, speed, force, waiter)
+        )

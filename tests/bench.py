@@ -1,13 +1,15 @@
-"""A bench without I/O: the core on one side, an exact simulated gripper on the other, one clock by hand."""
+"""A bench without I/O: the controller on one side, an exact simulated gripper on the other, one clock."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 from robotiq_async import Finger, MoveResult, RobotiqError, RobotiqStatus, State
-from robotiq_async.control.controller import Core
+from robotiq_async.calibration.closing_time import closing_time
+from robotiq_async.control.controller import Controller
 from robotiq_async.control.motion import Move
-from robotiq_async.control.state_machine import Machine, Trigger
+from robotiq_async.control.state_machine import StateMachine
+from robotiq_async.control.triggers import Trigger
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.wire.registers import Registers
 
@@ -15,14 +17,19 @@ POLL_S = 0.005
 
 
 class Outcome:
-    """What a caller was told; told twice is a failure."""
+    """A caller that waits, and what it was told; told twice is a failure."""
 
     def __init__(self) -> None:
         self.told: list[object] = []
 
-    def __call__(self, outcome: object) -> None:
-        self.told.append(outcome)
+    def done(self) -> bool:
+        return bool(self.told)
+
+    def set_result(self, result: object) -> None:
+        self.told.append(result)
         assert len(self.told) == 1, f"told twice: {self.told}"
+
+    set_exception = set_result
 
     @property
     def is_told(self) -> bool:
@@ -40,14 +47,16 @@ class Outcome:
 
 
 class Bench:
-    """Steps the core and the gripper through cycles of write, acknowledgement and read."""
+    """Steps the controller and the gripper through cycles of read, decision and write."""
 
-    def __init__(self, *, device_cycle: float = 0.005, gripper: SimulatedGripper | None = None) -> None:
+    def __init__(
+        self, *, device_cycle: float = 0.005, gripper: SimulatedGripper | None = None, speed: int = 128
+    ) -> None:
         self.now = 100.0
         self.gripper = gripper or SimulatedGripper(lambda: self.now, device_cycle=device_cycle, spread=False)
         self.transitions: list[tuple[State, State, Trigger]] = []
-        self.machine = Machine(lambda *change: self.transitions.append(change))
-        self.core = Core(self.machine, 128, 64)
+        self.machine = StateMachine(lambda *change: self.transitions.append(change))
+        self.controller = Controller(self.machine, speed, 64, closing_time)
         self.written: list[Registers] = []
         self.polls = 0
 
@@ -58,20 +67,22 @@ class Bench:
         return RobotiqStatus(self.gripper.status_registers(), self.now, self.polls)
 
     def connect(self, *, activate: bool = True) -> None:
-        self.core.found(self.status(), activate=activate)
+        self.controller.activates = activate
+        self.controller.see(self.status())
+        self.controller.activates = False
 
     def step(self, *, answer: bool = True) -> None:
         """One cycle; without an answer the write arrives and the link goes down before it is known."""
         self.now += POLL_S
-        request = self.core.take_request(self.now)
+        self.controller.see(self.status())
+        request = self.controller.decide(self.now)
         if request is not None:
             self.written.append(request.registers)
             self.gripper.write(0, request.registers)
-            if not answer:
-                self.core.lost(None)
-                return
-            self.core.acknowledged(self.now)
-        self.core.see(self.status())
+            if answer:
+                self.controller.acknowledged(self.now)
+            else:
+                self.controller.lost(None)
 
     def run(self, seconds: float) -> None:
         for _ in range(round(seconds / POLL_S)):
@@ -81,7 +92,7 @@ class Bench:
         """Step until something is true; returns how long it took."""
         began = self.now
         while not condition():
-            assert self.now - began < seconds, f"not within {seconds} s: {self.core.status!r}"
+            assert self.now - began < seconds, f"not within {seconds} s: {self.controller.status!r}"
             self.step()
         return self.now - began
 
@@ -97,15 +108,15 @@ class Bench:
 
     @property
     def latest(self) -> RobotiqStatus:
-        assert self.core.status is not None
-        return self.core.status
+        assert self.controller.status is not None
+        return self.controller.status
 
     def move(
         self, position: int, axes: Finger = Finger.ABC, speed: int | None = None, force: int | None = None
     ) -> tuple[Move, Outcome]:
         outcome = Outcome()
         move = Move(position, axes, self.now, outcome)
-        self.core.move(move, speed, force)
+        self.controller.move(move, speed, force)
         return move, outcome
 
     def moved(self, position: int, axes: Finger = Finger.ABC, **options: int) -> MoveResult:
@@ -122,12 +133,12 @@ class Bench:
         force: int | None = None,
     ) -> Outcome:
         outcome = Outcome()
-        self.core.command(axes, position, speed, force, outcome)
+        self.controller.command(axes, position, speed, force, outcome)
         return outcome
 
     def halt(self) -> Outcome:
         outcome = Outcome()
-        self.core.halt(outcome)
+        self.controller.halt(outcome)
         return outcome
 
     def positions(self) -> dict[Finger, int]:

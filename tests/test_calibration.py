@@ -108,7 +108,9 @@ async def test_the_default_time_out_of_a_move_comes_from_the_calibration(tmp_pat
     slow = SpeedCalibration.from_csv(tmp_path / "slow.csv")
     for calibration, seconds in ((None, 2.119), (slow, 60)):
         async with RobotiqHand(calibration=calibration) as hand:
-            timeout = hand._core.move_timeout(255, hand.status.moving | 1, 255)
+            session = hand._session
+            assert session is not None
+            timeout = session.controller.move_timeout(255, Finger.A, 255)
             way = 255 - hand.status.position(Finger.A)
         assert timeout == pytest.approx(2 * way / 235 * seconds + 2, rel=0.005)
 

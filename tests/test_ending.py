@@ -8,12 +8,12 @@ import threading
 import anyio
 import pytest
 
-from robotiq_async.concurrency import in_a_thread, to_the_end
+from robotiq_async.concurrency import in_a_thread, wait_shielded
 
 
 async def test_a_cancellation_waits_for_the_end() -> None:
     work: asyncio.Future[int] = asyncio.get_running_loop().create_future()
-    waiting = asyncio.create_task(to_the_end(work))
+    waiting = asyncio.create_task(wait_shielded(work))
     for _ in range(3):
         await asyncio.sleep(0)
         waiting.cancel()
@@ -30,7 +30,7 @@ async def test_a_scope_that_is_cancelled_waits_too() -> None:
     asyncio.get_running_loop().call_later(0.05, work.set_result, 3)
     with anyio.CancelScope() as scope:
         scope.cancel()
-        await to_the_end(work)
+        await wait_shielded(work)
         assert work.done()
         await asyncio.sleep(0)
         raise AssertionError("the scope is cancelled")
@@ -39,7 +39,7 @@ async def test_a_scope_that_is_cancelled_waits_too() -> None:
 async def test_what_the_work_raises_stays_with_it() -> None:
     work: asyncio.Future[int] = asyncio.get_running_loop().create_future()
     work.set_exception(ZeroDivisionError())
-    await to_the_end(work)
+    await wait_shielded(work)
     assert isinstance(work.exception(), ZeroDivisionError)
 
 

@@ -14,13 +14,8 @@ from typing import Final
 from ..enums import AXES, CLOSED, OPEN, Finger, ObjectStatus
 from ..wire.request import AxisRequest, Request
 from ..wire.status import RobotiqStatus
+from .contact import agrees
 
-TOLERANCE: Final = 2
-"""Counts between a request and the position reached (manual: within 1-2)."""
-OPEN_READING_MAX: Final = 7
-"""An open finger reads 6-7 although 0 was asked."""
-CLOSED_READING_MIN: Final = 240
-"""A closed finger reads 240 or more although 255 was asked."""
 DIRECTION_WAIT_S: Final = 0.1
 """How long a moving axis is watched for its direction: at the slowest speed a count takes 43 ms
 (234 counts in 10.0 s; thesis, table A1.1)."""
@@ -43,7 +38,7 @@ class Adoption:
         self._asked = first.timestamp if asked is None else asked
         self.since = self._asked if since is None else since
 
-    def watch(self, status: RobotiqStatus, asked: float | None = None) -> None:
+    def see(self, status: RobotiqStatus, asked: float | None = None) -> None:
         """Take in the next status, and when it was asked for."""
         self._latest = status
         self._asked = status.timestamp if asked is None else asked
@@ -94,26 +89,3 @@ class Adoption:
     def _direction(self, axis: Finger) -> int:
         """Counts the axis has moved since the first status: above 0 closing, below 0 opening, 0 unknown."""
         return self._latest.position(axis) - self._first.position(axis)
-
-
-def agrees(request: int, what: ObjectStatus, position: int, direction: int) -> bool:
-    """Whether an axis could be doing what it does because of this request.
-
-    Args:
-        request: position request in counts.
-        what: what the axis does.
-        position: where it is, in counts.
-        direction: above 0 closing, below 0 opening, 0 unknown; used only while it moves.
-    """
-    match what:
-        case ObjectStatus.CONTACT_CLOSING:
-            return request > position
-        case ObjectStatus.CONTACT_OPENING:
-            return request < position
-        case ObjectStatus.IN_MOTION:
-            return request != position and (direction == 0 or (request > position) == (direction > 0))
-    if request <= OPEN_READING_MAX:
-        return position <= OPEN_READING_MAX + TOLERANCE
-    if request >= CLOSED_READING_MIN:
-        return position >= CLOSED_READING_MIN - TOLERANCE
-    return abs(request - position) <= TOLERANCE

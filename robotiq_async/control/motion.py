@@ -11,6 +11,7 @@ from ..enums import AXES, Finger, ObjectStatus
 from ..errors import ConnectionLostError, RobotiqError
 from ..values import FrozenMapping
 from ..wire.status import RobotiqStatus
+from .waiters import Waiter, fail
 
 MARGIN_S: Final = 2.0
 """Added to twice the expected time for the default time-out of a move."""
@@ -56,44 +57,28 @@ class MoveResult:
 
 
 class Move:
-    """One awaited move. Ends exactly once, with a result or an error."""
+    """One awaited move."""
 
-    def __init__(
-        self,
-        position: int,
-        axes: Finger,
-        now: float,
-        done: Callable[[MoveResult | RobotiqError], None],
-    ) -> None:
+    def __init__(self, position: int, axes: Finger, now: float, waiter: Waiter[MoveResult]) -> None:
         """Address axes.
 
         Args:
             position: target in counts.
             axes: the addressed axes.
             now: monotonic seconds of the call.
-            done: called once, with the result or the error.
+            waiter: gets the result, or the error.
         """
         self.position = position
         self.axes = axes
         self.was_lost = False
         """Whether the link went down under it."""
+        self.write: int | None = None
+        """The number of the write that carried it; None before that."""
         self._started = now
+        self._waiter = waiter
         self._peak = dict.fromkeys((axis for axis in AXES if axis in axes), 0)
-        self._done: Callable[[MoveResult | RobotiqError], None] | None = done
 
-    @property
-    def has_ended(self) -> bool:
-        """Whether result or error have been handed over."""
-        return self._done is None
-
-    def end(self, outcome: MoveResult | RobotiqError) -> None:
-        """Hand over the outcome, the first time."""
-        done, self._done = self._done, None
-        if done is not None:
-            self.was_lost = isinstance(outcome, ConnectionLostError)
-            done(outcome)
-
-    def observe(self, status: RobotiqStatus) -> None:
+    def see(self, status: RobotiqStatus) -> None:
         """Take in the currents of a status read after the command was sent."""
         for axis, peak in self._peak.items():
             self._peak[axis] = max(peak, status.current_ma(axis))
@@ -108,8 +93,17 @@ class Move:
             status.finger_status(axis) is not ObjectStatus.IN_MOTION for axis in self._peak
         )
 
-    def result(self, status: RobotiqStatus) -> MoveResult:
-        """The result, from the status that ended the move."""
+    def end(self, status: RobotiqStatus) -> None:
+        """Hand over the result, from the status that ended the move."""
+        if not self._waiter.done():
+            self._waiter.set_result(self._result(status))
+
+    def fail(self, error: RobotiqError) -> None:
+        """Hand over an error."""
+        self.was_lost = isinstance(error, ConnectionLostError)
+        fail([self._waiter], error)
+
+    def _result(self, status: RobotiqStatus) -> MoveResult:
         return MoveResult(
             outcomes={axis: status.finger_status(axis) for axis in self._peak},
             positions={axis: status.position(axis) for axis in self._peak},
@@ -118,6 +112,52 @@ class Move:
             peak_current_ma=self._peak,
             status=status,
         )
+
+
+class LiveMoves:
+    """The moves under way. Each leaves once: it has arrived, it failed, or nobody waits for it any more."""
+
+    def __init__(self) -> None:
+        """Begin with none."""
+        self._moves: list[Move] = []
+
+    def __bool__(self) -> bool:
+        """Whether there are any."""
+        return bool(self._moves)
+
+    def add(self, move: Move) -> None:
+        """A move was asked for; it goes out with the next write."""
+        self._moves.append(move)
+
+    def remove(self, move: Move) -> bool:
+        """Nobody waits for a move any more; returns whether it was under way."""
+        if move not in self._moves:
+            return False
+        self._moves.remove(move)
+        return True
+
+    def written(self, number: int) -> None:
+        """What was asked for has been written under this number."""
+        for move in self._moves:
+            if move.write is None:
+                move.write = number
+
+    def see(self, status: RobotiqStatus, acts: Callable[[int], bool]) -> None:
+        """End the moves that a status shows to have arrived, as far as their writes act."""
+        for move in self._moves[:]:
+            if move.write is None:
+                continue
+            move.see(status)
+            if acts(move.write) and move.has_arrived(status):
+                self._moves.remove(move)
+                move.end(status)
+
+    def fail(self, error: RobotiqError, which: Callable[[Move], bool] = lambda _: True) -> None:
+        """End those that an error is for."""
+        failing = [move for move in self._moves if which(move)]
+        self._moves = [move for move in self._moves if move not in failing]
+        for move in failing:
+            move.fail(error)
 
 
 def default_timeout(

@@ -7,20 +7,20 @@ written, and an adopted gripper's requests are only known from its status. No I/
 
 from __future__ import annotations
 
-import math
+from dataclasses import replace
 from typing import Final
 
-from ..enums import AXES, Finger, ObjectStatus
+from ..enums import AXES, NO_AXES, Finger, ObjectStatus
 from ..wire.request import AxisRequest, Request
 from ..wire.status import RobotiqStatus
-from .adoption import TOLERANCE, Adoption, agrees
-from .sequences import signature_of, signature_of_status
-from .writes import SILENT_S, WINDOW_S, EchoWatch
+from .adoption import Adoption
+from .contact import TOLERANCE, agrees
+from .writes import SILENT_S, WINDOW_S, WriteHistory
 
-NOBODY: Final = Finger(0)
+NEVER: Final = float("-inf")
 
 
-class Ledger:
+class RequestShadow:
     """The image that is in force, and what is known of it."""
 
     def __init__(self, speed: int, force: int) -> None:
@@ -33,22 +33,23 @@ class Ledger:
         self._image = Request(axes=(AxisRequest(0, speed, force),) * len(AXES))
         """The last image written, or the one the gripper shows after a reconnect."""
         self._adoption: Adoption | None = None
-        """Set from an adoption until the first write: what the base of that write is made from."""
+        """From an adoption until the first write: what the base of that write is made from."""
         self._adopted = self._image
-        self._watch = EchoWatch()
-        self._unsure_until = -math.inf
-        """Until then a write that was not acknowledged before a reconnect may still show."""
-        self._moved = NOBODY
+        """What others had asked at the last adoption."""
+        self._writes = WriteHistory()
+        self._shown: Request | None = None
+        """The image of ours that the newest status shows, if it shows one."""
+        self._moved = NO_AXES
         """Axes that we have given a position since the gripper was found."""
         self._contacts: dict[Finger, tuple[ObjectStatus, int]] = {}
         """The contacts, and where, when the go bit was last seen set: gDT is not worth reading without it."""
-        self._shown: Request | None = None
-        """The image of ours that the newest status shows, if it shows one."""
-        self._sure_at = 0.0
-        """When no write was in doubt, the last time."""
         self._asked = 0.0
         """When the newest status was asked for. What it shows may be as old as that, however late its reply
         was looked at; so this is the time that the age of a write is measured by."""
+        self._sure_at = 0.0
+        """When no write was in doubt, the last time."""
+        self._unsure_until = NEVER
+        """Until then a write that was not acknowledged before a reconnect may still show."""
 
     # -- what is known ---------------------------------------------------------------------------------
 
@@ -56,6 +57,10 @@ class Ledger:
     def base(self) -> Request:
         """The image that the next one is made from."""
         return self._image if self._adoption is None else self._adoption.request(self._image.axes)
+
+    def at_rest(self, status: RobotiqStatus) -> Request:
+        """The base with rGTO clear and every axis asked to be where it is: nothing to wake."""
+        return replace(self.base, go=False).with_positions({axis: status.position(axis) for axis in AXES})
 
     @property
     def settings(self) -> tuple[AxisRequest, ...]:
@@ -70,21 +75,29 @@ class Ledger:
         link went down may have arrived, and shows within a device cycle: what is written before that would
         take the axes back to what they were asked before it.
         """
-        if self._watch.is_in_doubt and self._asked - self._sure_at < SILENT_S:
+        if self._writes.is_in_doubt and self._asked - self._sure_at < SILENT_S:
             return False
         return self._adoption is None or self._adoption.is_certain
 
     @property
     def is_settled(self) -> bool:
         """Whether the last image acts."""
-        return self._watch.is_settled(self._asked)
+        return self.acts(self._writes.last_number)
+
+    @property
+    def may_begin_to_move(self) -> bool:
+        """Whether an image that does not act yet may set something in motion.
+
+        While rGTO is clear a speed or a force does not: they have no echo, so all that waits looks alike.
+        """
+        return not self.is_settled and (self._image.go or not self._writes.all_look_alike)
 
     @property
     def ours(self) -> Finger:
         """The axes that may move because we said so: all, unless somebody else's requests were adopted."""
         if self._adoption is None:
             return Finger.ALL
-        mask = NOBODY
+        mask = NO_AXES
         for axis in AXES:
             if axis in self._moved and self._adopted.position(axis) == self._image.position(axis):
                 mask |= axis
@@ -92,7 +105,7 @@ class Ledger:
 
     def acts(self, number: int) -> bool:
         """Whether the image of this number acts."""
-        return self._watch.acts(number, self._asked)
+        return self._writes.acts(number, self._asked)
 
     # -- what is written -------------------------------------------------------------------------------
 
@@ -100,45 +113,45 @@ class Ledger:
         """An image is about to be sent, with new positions for some axes; returns the number it goes by."""
         self._image = image
         self._adoption = None
-        self._unsure_until = -math.inf
+        self._unsure_until = NEVER
         self._moved |= moved
         for axis in AXES:
             if axis in moved:
                 self._contacts.pop(axis, None)
-        return self._watch.writing(image, now)
+        return self._writes.writing(image, now)
 
     def acknowledged(self, now: float) -> int:
         """The last image was acknowledged; returns its number."""
-        self._watch.acknowledged(now)
-        return self._watch.last_number
+        self._writes.acknowledged(now)
+        return self._writes.last_number
 
     def lost(self) -> None:
         """The link is down: what others do meanwhile is not seen."""
         self._adoption = None
-        self._watch.lost()
+        self._writes.lost()
 
     # -- what is read ----------------------------------------------------------------------------------
 
-    def read(self, status: RobotiqStatus, asked: float) -> None:
-        """Take in a status that was asked for at a time; what follows is about it."""
+    def see(self, status: RobotiqStatus, asked: float) -> None:
+        """Take in a status and when it was asked for; what follows is about it."""
         self._asked = asked
-        if self._watch.last_number:
-            self._shown = self._watch.observe(status, asked)
+        if self._writes.last_number:
+            self._shown = self._writes.see(status, asked)
         else:
             # The very first: not ours, but what any write of ours comes after.
-            self._watch.restart(self._image, signature_of_status(status), asked)
-        if not self._watch.is_in_doubt:
+            self._writes.restart(self._image, status.echo, asked)
+        if not self._writes.is_in_doubt:
             self._sure_at = asked
 
-    def found(self, status: RobotiqStatus) -> None:
+    def returned(self, status: RobotiqStatus) -> None:
         """The link was lost and is back, and the gripper follows requests: ours, or it is adopted."""
         self._unsure_until = self._asked + WINDOW_S
         if self._shown is None or self._shown is self._adopted:
-            self._moved = NOBODY
+            self._moved = NO_AXES
             self.adopt(status)
         else:
-            self._image = self._watch.newest_that_shows_like(self._shown)
-            self._watch.adopt(self._image, signature_of_status(status), self._asked)
+            self._image = self._writes.newest_that_shows_like(self._shown)
+            self._writes.adopt(self._image, status.echo, self._asked)
 
     def adopt(self, status: RobotiqStatus) -> None:
         """Take the gripper as it is, without writing."""
@@ -147,40 +160,45 @@ class Ledger:
         since = self._asked if self._adoption is None else self._adoption.since
         self._adoption = Adoption(status, self._asked, since)
         self._adopted = self.base
-        self._watch.adopt(self._adopted, signature_of_status(status), self._asked)
+        self._writes.adopt(self._adopted, status.echo, self._asked)
 
-    def compare(self, status: RobotiqStatus) -> bool:
-        """Look at a status of a gripper that follows our requests; False if it follows somebody else's."""
+    def is_ours(self, status: RobotiqStatus) -> bool:
+        """Whether a gripper that follows requests follows ours, and not those of somebody else."""
         shown = self._shown
         if shown is None:
             return False
         if self._adoption is not None and shown is self._adopted:
-            self._adoption.watch(status, self._asked)
+            self._adoption.see(status, self._asked)
         elif self._asked < self._unsure_until and shown is self._adopted:
             self.adopt(status)
         elif self._adoption is not None or self._asked < self._unsure_until:
             # Nothing was written since the link came back, or since another client wrote, and now an older
             # write of ours shows: go on from it.
-            self._image, self._adoption = self._watch.newest_that_shows_like(shown), None
+            self._image, self._adoption = self._writes.newest_that_shows_like(shown), None
         return True
 
-    def note_contacts(self, status: RobotiqStatus) -> None:
+    def restart(self, status: RobotiqStatus) -> bool:
+        """A sequence is over: what it wrote last is what the gripper has, and nothing else is on its way.
+
+        Returns:
+            Whether the status shows that. If not, another client has written meanwhile.
+        """
+        self._writes.restart(self._image, status.echo, self._asked)
+        return status.echo == self._image.echo
+
+    # -- grips -----------------------------------------------------------------------------------------
+
+    def see_contacts(self, status: RobotiqStatus) -> None:
         """Remember which axes grip, as long as that can be seen."""
-        if status.go_echo:
+        if status.go_echo and (self._contacts or status.contacts):
             contacts = status.contacts
-            self._contacts = (
-                {
-                    axis: (status.finger_status(axis), status.position(axis))
-                    for axis in AXES
-                    if axis in contacts
-                }
-                if contacts
-                else {}
-            )
+            self._contacts = {
+                axis: (status.finger_status(axis), status.position(axis)) for axis in AXES if axis in contacts
+            }
 
     def gripping(self, status: RobotiqStatus) -> Finger:
         """The axes that gripped when rGTO was last set, are there still, and by the request they have."""
-        mask, base = NOBODY, self.base
+        mask, base = NO_AXES, self.base
         for axis, (what, at) in self._contacts.items():
             is_there = abs(status.position(axis) - at) <= TOLERANCE
             if is_there and agrees(base.position(axis), what, at, direction=0):
@@ -190,14 +208,3 @@ class Ledger:
     def forget_contacts(self) -> None:
         """A sequence begins: it lets go."""
         self._contacts.clear()
-
-    def is_echoed_by(self, status: RobotiqStatus) -> bool:
-        """Whether a status shows the last image."""
-        return signature_of_status(status) == signature_of(self._image)
-
-    def restart(self, status: RobotiqStatus) -> None:
-        """A sequence is over: what it wrote last is what the gripper has, and nothing else is on its way.
-
-        If the status shows something else, another client has written meanwhile.
-        """
-        self._watch.restart(self._image, signature_of_status(status), self._asked)

@@ -1,98 +1,62 @@
-"""The legal life of the hand, as one table, and the one function that changes its state.
+"""The legal life of a hand: one table of state and trigger, and the one object that follows it.
 
 Theory of operation
 -------------------
-Three kinds of events move the hand from state to state:
+Every state has an entry for every trigger: the state that follows, IGNORED where there is nothing to do or
+nothing new, or the error that a caller gets. A refusal changes nothing.
 
-* what its user asks for (``ASK_``): refused, with a list of the states that would do, where the table
-  has no entry. A refusal changes nothing.
-* what a status shows (``SEEN_``): every status is one of five sights, see :func:`look`. The gripper does
-  what it does, so a sight is never refused; where the table has no entry it says nothing new.
-* what became of the link and of a request (``DELIVERED``, ``LINK_LOST``, ``STOPPED``).
-
-A state that is only passed through is still a state: DO_ states and RUNNING_CC last from the decision to
-send until the gripper has acknowledged, so that a lost link finds the hand in the state that tells what
-was under way. How the hand gets from one state to another is in procedures.py; this module does not know
-registers that are sent, clocks or tasks. The diagram in docs/ is drawn from the table below.
+What a status shows is never refused: the gripper does what it does. DO_ states and RUNNING_CC last from the
+decision to send until the gripper has acknowledged, so that a lost link finds the hand in the state that
+tells what was under way. How an activation, a release, a reset or a shutdown goes on is a generator (see
+sequences.py) that :class:`StateMachine` runs; no register, clock or task is known here. The diagram and the
+tables in docs/ are made from the table below.
 """
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from enum import Enum
-from functools import cache
 from typing import Final
 
-from ..enums import Fault, Initialization, State
-from ..errors import InvalidStateError
+from ..enums import Fault, State
+from ..errors import (
+    ConnectionLostError,
+    GripperFaultError,
+    InvalidStateError,
+    NotActivatedError,
+    NotStartedError,
+    RobotiqError,
+)
 from ..log import log
+from ..wire.request import Request
 from ..wire.status import RobotiqStatus
+from .triggers import Trigger, classify
 
 
-class Trigger(Enum):
-    """What can happen to the hand."""
+class Verdict(Enum):
+    """What a trigger comes to where it leads to no state."""
 
-    __hash__ = object.__hash__  # see State
-
-    ASK_START = "start()"
-    ASK_ACTIVATE = "activate()"
-    ASK_COMMAND = "a command"
-    ASK_HALT = "halt()"
-    ASK_RELEASE = "atr()"
-    ASK_RESET = "reset()"
-    ASK_STOP = "stop()"
-    DELIVERED = "request acknowledged"
-    SEEN_READY = "gripper is active"
-    SEEN_BUSY = "gripper is activating"
-    SEEN_RESET = "gripper is reset"
-    SEEN_FAULT = "gripper reports a fault"
-    SEEN_RELEASED = "automatic release completed"
-    LINK_LOST = "link lost"
-    STOPPED = "shutdown finished"
-
-    @property
-    def is_sight(self) -> bool:
-        """Whether this is something a status shows."""
-        return self.name.startswith("SEEN_")
+    IGNORED = "nothing to do"
+    LINK_DOWN = "ConnectionLostError"
+    NOT_STARTED = "NotStartedError"
+    NOT_ACTIVATED = "NotActivatedError"
+    IN_FAULT = "GripperFaultError"
+    NOT_NOW = "InvalidStateError"
 
 
-def look(status: RobotiqStatus) -> Trigger:
-    """What a status shows of the gripper's state.
+_IGNORED, _LINK_DOWN, _NOT_STARTED = Verdict.IGNORED, Verdict.LINK_DOWN, Verdict.NOT_STARTED
+_NOT_ACTIVATED, _IN_FAULT = Verdict.NOT_ACTIVATED, Verdict.IN_FAULT
 
-    A serious fault comes first, because gIMC = 0 with a fault is an automatic release and not a reset.
-    """
-    # gACT, gIMC and gFLT decide; they rarely change, and this runs at every poll.
-    first, second = status.registers[:2]
-    return _look(first >> 8, second >> 8 & 0x0F)
-
-
-@cache
-def _look(activation: int, fault: int) -> Trigger:
-    """The same, from the byte that holds gACT and gIMC, and from gFLT."""
-    status = RobotiqStatus((activation << 8, fault << 8, 0, 0, 0, 0, 0, 0))
-    if status.fault is Fault.AUTOMATIC_RELEASE_DONE:
-        return Trigger.SEEN_RELEASED
-    if status.fault.is_serious:
-        return Trigger.SEEN_FAULT
-    if not status.activation_echo and status.initialization is Initialization.RESET:
-        return Trigger.SEEN_RESET
-    if status.activation_echo and status.is_activated:
-        return Trigger.SEEN_READY
-    return Trigger.SEEN_BUSY
-
-
-# Rows shared by states. A connected hand can always be stopped and can always lose its link.
-_CONNECTED: Final = {
-    Trigger.ASK_STOP: State.DO_SHUTDOWN,
-    Trigger.LINK_LOST: State.DISCONNECTED,
-}
-# An emergency is heard in every sequence; rACT = 0 is the only request that ends one.
-_EMERGENCY: Final = {
-    Trigger.ASK_HALT: State.DO_RESET,
-    Trigger.ASK_RESET: State.DO_RESET,
-}
-_SIGHTS: Final = {
+_USER: Final = (
+    Trigger.ASK_ACTIVATE,
+    Trigger.ASK_COMMAND,
+    Trigger.ASK_HALT,
+    Trigger.ASK_RELEASE,
+    Trigger.ASK_RESET,
+)
+Row = dict[Trigger, State | Verdict]
+_SEEN: Final[Row] = {
     Trigger.SEEN_READY: State.RUNNING_IDLE,
     Trigger.SEEN_BUSY: State.WF_ACTIVATION,
     Trigger.SEEN_RESET: State.RESET,
@@ -100,121 +64,204 @@ _SIGHTS: Final = {
     Trigger.SEEN_RELEASED: State.ATR_DONE,
 }
 
-TRANSITIONS: Final[dict[State, dict[Trigger, State]]] = {
-    State.DISCONNECTED: {
-        **_SIGHTS,
-        Trigger.ASK_START: State.DISCONNECTED,
-        # start() and the reconnect policy activate straight from here: RESET is never shown on the way.
-        Trigger.ASK_ACTIVATE: State.DO_ACTIVATION,
-        Trigger.ASK_STOP: State.DO_SHUTDOWN,
-        Trigger.LINK_LOST: State.DISCONNECTED,
-    },
-    State.DO_ACTIVATION: {**_CONNECTED, **_EMERGENCY, Trigger.DELIVERED: State.WF_ACTIVATION},
-    State.WF_ACTIVATION: {**_CONNECTED, **_EMERGENCY, **_SIGHTS},
-    State.RUNNING_IDLE: {
-        **_CONNECTED,
-        **_SIGHTS,
-        Trigger.ASK_COMMAND: State.RUNNING_CC,
-        Trigger.ASK_HALT: State.RUNNING_CC,
-        Trigger.ASK_RESET: State.DO_RESET,
-    },
-    State.RUNNING_CC: {
-        **_CONNECTED,
-        **_SIGHTS,
-        Trigger.SEEN_READY: State.RUNNING_CC,
-        Trigger.ASK_COMMAND: State.RUNNING_CC,
-        Trigger.ASK_HALT: State.RUNNING_CC,
-        Trigger.DELIVERED: State.RUNNING_IDLE,
-        Trigger.ASK_RESET: State.DO_RESET,
-    },
-    State.FAULT: {
-        **_CONNECTED,
-        **_SIGHTS,
-        Trigger.ASK_HALT: State.FAULT,
-        Trigger.ASK_RELEASE: State.DO_ATR,
-        Trigger.ASK_RESET: State.DO_RESET,
-    },
-    State.DO_ATR: {**_CONNECTED, **_EMERGENCY, Trigger.DELIVERED: State.WF_ATR},
-    State.WF_ATR: {
-        **_CONNECTED,
-        **_EMERGENCY,
-        Trigger.SEEN_RELEASED: State.ATR_DONE,
-        Trigger.SEEN_RESET: State.RESET,
-    },
-    State.ATR_DONE: {
-        **_CONNECTED,
-        **_SIGHTS,
-        Trigger.ASK_HALT: State.ATR_DONE,
-        Trigger.ASK_RESET: State.DO_RESET,
-    },
-    State.DO_RESET: {**_CONNECTED, **_EMERGENCY, Trigger.DELIVERED: State.WF_RESET},
+
+def _connected(entries: Row) -> Row:
+    """A row of a hand that has its link: it can always be stopped, and always lose its link."""
+    usual: Row = {trigger: _IGNORED if trigger.is_seen else Verdict.NOT_NOW for trigger in Trigger}
+    return usual | {Trigger.ASK_STOP: State.DO_SHUTDOWN, Trigger.LINK_LOST: State.DISCONNECTED} | entries
+
+
+def _all(triggers: tuple[Trigger, ...], verdict: State | Verdict) -> Row:
+    return dict.fromkeys(triggers, verdict)
+
+
+# An emergency is heard in every sequence; rACT = 0 is the only request that ends one.
+_EMERGENCY: Final[Row] = _all((Trigger.ASK_HALT, Trigger.ASK_RESET), State.DO_RESET)
+_OFF: Final[Row] = _connected(
+    _all(_USER, _NOT_STARTED) | {Trigger.ASK_STOP: _IGNORED, Trigger.LINK_LOST: _IGNORED}
+)
+
+TABLE: Final[dict[State, Row]] = {
+    State.DISCONNECTED: _connected(
+        _SEEN
+        | _all(_USER, _LINK_DOWN)
+        | {Trigger.ASK_START: State.DISCONNECTED, Trigger.ACTIVATES: State.DO_ACTIVATION}
+    ),
+    State.DO_ACTIVATION: _connected(
+        _EMERGENCY | {Trigger.ASK_ACTIVATE: _IGNORED, Trigger.DELIVERED: State.WF_ACTIVATION}
+    ),
+    State.WF_ACTIVATION: _connected(_EMERGENCY | _SEEN | {Trigger.ASK_ACTIVATE: _IGNORED}),
+    State.RUNNING_IDLE: _connected(
+        _SEEN
+        | {
+            Trigger.ASK_ACTIVATE: _IGNORED,
+            Trigger.ASK_COMMAND: State.RUNNING_CC,
+            Trigger.ASK_HALT: State.RUNNING_CC,
+            Trigger.ASK_RESET: State.DO_RESET,
+        }
+    ),
+    State.RUNNING_CC: _connected(
+        _SEEN
+        | {
+            Trigger.SEEN_READY: State.RUNNING_CC,
+            Trigger.ASK_ACTIVATE: _IGNORED,
+            Trigger.ASK_COMMAND: State.RUNNING_CC,
+            Trigger.ASK_HALT: State.RUNNING_CC,
+            Trigger.ASK_RESET: State.DO_RESET,
+            Trigger.DELIVERED: State.RUNNING_IDLE,
+        }
+    ),
+    State.FAULT: _connected(
+        _SEEN
+        | {
+            Trigger.ASK_ACTIVATE: _IN_FAULT,
+            Trigger.ASK_COMMAND: _IN_FAULT,
+            Trigger.ASK_HALT: State.FAULT,
+            Trigger.ASK_RELEASE: State.DO_ATR,
+            Trigger.ASK_RESET: State.DO_RESET,
+        }
+    ),
+    State.DO_ATR: _connected(_EMERGENCY | {Trigger.DELIVERED: State.WF_ATR}),
+    State.WF_ATR: _connected(
+        _EMERGENCY | {Trigger.SEEN_RELEASED: State.ATR_DONE, Trigger.SEEN_RESET: State.RESET}
+    ),
+    State.ATR_DONE: _connected(
+        _SEEN
+        | {
+            Trigger.ASK_ACTIVATE: _IN_FAULT,
+            Trigger.ASK_COMMAND: _IN_FAULT,
+            Trigger.ASK_HALT: _IGNORED,
+            Trigger.ASK_RESET: State.DO_RESET,
+        }
+    ),
+    State.DO_RESET: _connected(
+        _all((Trigger.ASK_HALT, Trigger.ASK_RESET), _IGNORED) | {Trigger.DELIVERED: State.WF_RESET}
+    ),
     # A fault may outlast the request that clears it by a device cycle: only the reset itself counts.
-    State.WF_RESET: {**_CONNECTED, **_EMERGENCY, Trigger.SEEN_RESET: State.RESET},
-    State.RESET: {
-        **_CONNECTED,
-        **_SIGHTS,
-        Trigger.ASK_ACTIVATE: State.DO_ACTIVATION,
-        Trigger.ASK_HALT: State.RESET,
-        Trigger.ASK_RESET: State.DO_RESET,
-    },
-    State.DO_SHUTDOWN: {Trigger.LINK_LOST: State.DO_SHUTDOWN, Trigger.STOPPED: State.SHUTDOWN},
-    State.SHUTDOWN: {Trigger.ASK_START: State.DISCONNECTED},
+    State.WF_RESET: _connected(_EMERGENCY | {Trigger.SEEN_RESET: State.RESET}),
+    State.RESET: _connected(
+        _SEEN
+        | {
+            Trigger.ASK_ACTIVATE: State.DO_ACTIVATION,
+            Trigger.ASK_COMMAND: _NOT_ACTIVATED,
+            Trigger.ASK_HALT: _IGNORED,
+            Trigger.ASK_RESET: State.DO_RESET,
+        }
+    ),
+    State.DO_SHUTDOWN: _OFF | {Trigger.STOPPED: State.SHUTDOWN},
+    State.SHUTDOWN: _OFF | {Trigger.ASK_START: State.DISCONNECTED},
 }
+"""For every state and trigger the state that follows, IGNORED, or the error."""
 
 RUNNING: Final = frozenset({State.RUNNING_IDLE, State.RUNNING_CC})
 """The states in which the gripper is active and takes commands."""
-
-
 SEQUENCES: Final = frozenset(
     {State.DO_ACTIVATION, State.WF_ACTIVATION, State.DO_ATR, State.WF_ATR, State.DO_RESET, State.WF_RESET}
 )
 """Activation, release and reset: they lead somewhere by themselves, and clearing rGTO ends none of them."""
+_ABOUT_TO_SEND: Final = frozenset({State.DO_ACTIVATION, State.DO_ATR, State.DO_RESET, State.RUNNING_CC})
 
 
 def states_allowing(trigger: Trigger) -> frozenset[State]:
-    """The states in which the table has an entry for a trigger."""
-    return frozenset(state for state, row in TRANSITIONS.items() if trigger in row)
+    """The states in which a trigger is not refused."""
+    return frozenset(
+        state for state, row in TABLE.items() if isinstance(row[trigger], State) or row[trigger] is _IGNORED
+    )
 
 
-class Machine:
-    """The state of one hand. :meth:`happen` is the one place that changes it."""
+class StateMachine:
+    """The state of one hand, and the sequence under way. :meth:`fire` alone changes the state."""
 
     def __init__(self, changed: Callable[[State, State, Trigger], None] = lambda *_: None) -> None:
-        """Start in DISCONNECTED.
-
-        Args:
-            changed: called with source, target and trigger after each change of state.
-        """
+        """Start in DISCONNECTED."""
+        self.changed = changed
+        """Called with source, target and trigger after each change of state."""
         self._state = State.DISCONNECTED
-        self._changed = changed
+        self._sequence: Generator[Request | None, RobotiqStatus, None] | None = None
 
     @property
     def state(self) -> State:
         """The present state."""
         return self._state
 
-    def happen(self, trigger: Trigger) -> State:
-        """Let something happen and return the state that follows.
+    def fire(self, trigger: Trigger, status: RobotiqStatus | None = None) -> bool:
+        """Let something happen.
+
+        Args:
+            trigger: what happens.
+            status: the newest one, for the error of what a fault refuses.
+
+        Returns:
+            Whether there is anything to do: False where the table says IGNORED.
 
         Raises:
-            InvalidStateError: the table has no entry, and the trigger is not a sight; the state stays.
+            RobotiqError: the table refuses it; the state stays.
         """
-        target = TRANSITIONS[self._state].get(trigger)
-        if target is None:
-            if trigger.is_sight:
-                return self._state
-            raise refusal(trigger, self._state)
-        if target is not self._state:
-            source, self._state = self._state, target
-            # A control loop goes to RUNNING_CC and back with every command: that is for the curious.
-            level = logging.DEBUG if {source, target} <= RUNNING else logging.INFO
-            log.log(level, "%s -> %s (%s)", source.name, target.name, trigger.value)
-            self._changed(source, target, trigger)
-        return target
+        source = self._state
+        target = TABLE[source][trigger]
+        if target is source:
+            return True  # quickly: most statuses show nothing new
+        if target is _IGNORED:
+            return False
+        if isinstance(target, Verdict):
+            raise refusal(trigger, source, status)
+        self._state = target
+        # A control loop goes to RUNNING_CC and back with every command: that is for the curious.
+        level = logging.DEBUG if {source, target} <= RUNNING else logging.INFO
+        log.log(level, "%s -> %s (%s)", source.name, target.name, trigger.value)
+        self.changed(source, target, trigger)
+        return True
+
+    def delivered(self) -> None:
+        """What was about to be sent has been acknowledged, or is not sent after all."""
+        if self._state in _ABOUT_TO_SEND:
+            self.fire(Trigger.DELIVERED)
+
+    # -- the sequence under way ------------------------------------------------------------------------
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a sequence is under way."""
+        return self._sequence is not None
+
+    def begin(self, sequence: Generator[Request | None, RobotiqStatus, None]) -> None:
+        """Run a sequence, in place of the one under way."""
+        self._sequence = sequence
+        next(sequence)
+
+    def advance(self, status: RobotiqStatus) -> Request | None:
+        """Hand a status to the sequence under way, and return what it wants written now.
+
+        When that was its end, the state follows what the status shows.
+        """
+        assert self._sequence is not None, "a sequence is under way"
+        try:
+            return self._sequence.send(status)
+        except StopIteration:
+            pass
+        except RobotiqError as error:
+            log.warning("%s", error)
+        self._sequence = None
+        self.delivered()
+        self.fire(classify(status))
+        return None
+
+    def drop_sequence(self) -> None:
+        """Nothing more comes of the sequence under way."""
+        self._sequence = None
 
 
-def refusal(trigger: Trigger, state: State) -> InvalidStateError:
-    """The error for something that the table does not allow."""
+def refusal(trigger: Trigger, state: State, status: RobotiqStatus | None = None) -> RobotiqError:
+    """The error for what the table refuses."""
+    match TABLE[state][trigger]:
+        case Verdict.LINK_DOWN:
+            return ConnectionLostError("the link is down and being opened again")
+        case Verdict.NOT_STARTED:
+            return NotStartedError("the hand is not started")
+        case Verdict.NOT_ACTIVATED:
+            return NotActivatedError("the gripper is not activated: call activate() or recover()")
+        case Verdict.IN_FAULT:
+            return GripperFaultError(Fault.NONE if status is None else status.fault)
     allowed = states_allowing(trigger)
     names = ", ".join(sorted(each.name for each in allowed))
     return InvalidStateError(

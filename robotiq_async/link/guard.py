@@ -17,7 +17,7 @@ from ..errors import (
 )
 from ..log import log
 from ..wire.registers import Registers, check_registers
-from .modbus import Transport
+from .transport import Transport
 from .worker import LateError, Worker
 
 T = TypeVar("T")

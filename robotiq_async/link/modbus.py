@@ -24,7 +24,7 @@ import logging
 import secrets
 import sys
 from collections.abc import Sequence
-from typing import Any, Final, Protocol, runtime_checkable
+from typing import Any, Final
 
 import anyio
 from pymodbus import FramerType
@@ -69,43 +69,6 @@ class _ExchangeEndedError(Exception):
     def __init__(self, reason: RobotiqConnectionError) -> None:
         self.reason = reason
         super().__init__(str(reason))
-
-
-@runtime_checkable
-class Transport(Protocol):
-    """What a hand needs of a link. Pass an object of this shape instead of an address for other buses.
-
-    One task calls it, one call at a time. After any failure the transport is closed, and :meth:`open`
-    begins anew.
-    """
-
-    @property
-    def is_open(self) -> bool:
-        """Whether requests can be sent."""
-
-    async def open(self) -> None:
-        """Connect.
-
-        Raises:
-            RobotiqConnectionError: nobody answers, or not what was expected.
-        """
-
-    async def read(self) -> Registers:
-        """The eight status registers.
-
-        Raises:
-            RobotiqConnectionError: no clean answer in time; the transport is closed.
-        """
-
-    async def write(self, registers: Sequence[int]) -> None:
-        """Write the eight request registers, exactly once.
-
-        Raises:
-            RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
-        """
-
-    async def close(self) -> None:
-        """Disconnect; never fails, and does nothing when closed."""
 
 
 class ModbusTransport:

@@ -11,13 +11,14 @@ from ..calibration.closing_time import closing_time
 from ..calibration.scales import SpeedCalibration
 from ..link.address import parse_address
 from ..link.guard import GuardedTransport
-from ..link.modbus import ModbusTransport, Transport
+from ..link.modbus import ModbusTransport
 from ..link.places import place_of
 from ..link.simulated import SimulatedTransport, new_gripper
+from ..link.transport import Transport
 from ..wire.checks import check_byte, check_int, check_seconds
 from ..wire.registers import REGISTER_COUNT, RTU_REGISTERS, TCP_REGISTERS
 from .claims import Gripper
-from .poller import ReconnectPolicy
+from .reconnecting import ReconnectPolicy
 
 POLL_INTERVAL_S: Final = 0.005
 """200 Hz, as the thesis polled; the manual names 200 Hz for RTU and 100 Hz for TCP."""

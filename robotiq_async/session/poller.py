@@ -1,8 +1,9 @@
 """The one task that owns the link: connects, polls, writes, reconnects and shuts down.
 
-Nobody else touches the transport; callers leave what they want with the core and wait beside it. So no
-request is ever cancelled in flight, the link stays in step, and start() and stop() may be called from
-different tasks.
+Every cycle reads the status, decides, and writes at once, as the scan of a PLC: what is decided is decided
+on what the gripper has just shown. Nobody else touches the transport; callers leave what they want with
+the controller and wait beside it. So no request is ever cancelled in flight, the link stays in step, and
+start() and stop() may be called from different tasks.
 """
 
 from __future__ import annotations
@@ -12,13 +13,11 @@ import contextlib
 import importlib
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
 
 import anyio
 
-from ..control.controller import Core
-from ..control.state_machine import Trigger
+from ..control.controller import Controller
 from ..errors import (
     ConnectFailedError,
     ConnectionLostError,
@@ -27,10 +26,11 @@ from ..errors import (
     RobotiqConnectionError,
     RobotiqError,
 )
-from ..link.modbus import HELD_S, Transport
+from ..link.modbus import HELD_S
+from ..link.transport import Transport
 from ..log import log
-from ..wire.checks import check_seconds
 from ..wire.status import RobotiqStatus
+from .reconnecting import Backoff, ReconnectPolicy
 from .statistics import Counters
 from .streams import SentRequest
 from .tick import Tick
@@ -47,58 +47,24 @@ SHUTDOWN_S: Final = 1.2
 """Of that, time to reach the gripper and to see the fingers stop."""
 SHUTDOWN_PAUSE_S: Final = 0.05
 """Between two attempts at that."""
+READS: Final = 3
+"""At most so often a status that was asked for in a loop that was held up is asked for again."""
 LATE_S: Final = 0.05
 """Later than this a poll is worth a warning; on a busy machine a few milliseconds are usual."""
-LOOKS: Final = 3
-"""At most so often a status that was asked for in a loop that was held up is asked for again."""
 LATE_WARNING_S: Final = 1.0
 """At most one warning about late polls in this time."""
 
 
-@dataclass(frozen=True, slots=True)
-class ReconnectPolicy:
-    """What becomes of a lost link.
-
-    Attributes:
-        first_delay: seconds before the first try, 0..10.
-        max_delay: the delay doubles up to this, in seconds, 0.01..60.
-        give_up_after: seconds after which the hand gives up; None tries for ever.
-        activate: whether a gripper that comes back without its activation is activated. The fingers
-            MOVE then, without anybody having asked at that moment: leave it off unless nothing can be
-            in their way.
-    """
-
-    first_delay: float = 0.05
-    max_delay: float = 2.0
-    give_up_after: float | None = None
-    activate: bool = False
-
-    def __post_init__(self) -> None:
-        """Check the values.
-
-        Raises:
-            TypeError: not a number, or activate is not a bool.
-            ValueError: outside its range.
-        """
-        check_seconds("first_delay", self.first_delay, 0.0, 10.0)
-        check_seconds("max_delay", self.max_delay, 0.01, 60.0)
-        if self.give_up_after is not None:
-            check_seconds("give_up_after", self.give_up_after, 0.0, 86400.0)
-        if not isinstance(self.activate, bool):
-            raise TypeError(f"activate must be True or False, got {self.activate!r}")
-
-
-class Owner:
+class Poller:
     """Runs one hand's link from start to stop. :meth:`run` is the body of its task."""
 
     def __init__(
         self,
         transport: Transport,
-        core: Core,
+        controller: Controller,
         counters: Counters,
         *,
         address: str,
-        activate: bool,
         poll_interval: float,
         policy: ReconnectPolicy | None,
         first_sequence: int,
@@ -109,21 +75,19 @@ class Owner:
 
         Args:
             transport: the link; nobody else may use it.
-            core: what decides.
+            controller: what decides.
             counters: what is counted.
             address: for messages.
-            activate: whether a reset gripper is activated after the first read.
             poll_interval: seconds between polls.
             policy: what becomes of a lost link; None gives up at once.
             first_sequence: number of the first status.
-            publish: called with each status, after the core has seen it.
+            publish: called with each status, after the controller has seen it.
             publish_request: called with each image that was written.
         """
         self._transport = transport
-        self._core = core
+        self._controller = controller
         self._counters = counters
         self._address = address
-        self._activate = activate
         self._interval = poll_interval
         self._policy = policy
         self.sequence = first_sequence
@@ -140,8 +104,6 @@ class Owner:
         self._interruptible: anyio.CancelScope | None = None
         self._tick = Tick(poll_interval)
         self._last_poll = 0.0
-        self._read_at = 0.0
-        """When the newest status came in."""
         self._warned = -math.inf
 
     def request_stop(self, *, halt: bool) -> None:
@@ -171,7 +133,7 @@ class Owner:
 
     async def _first_contact(self) -> bool:
         try:
-            found = await self._contact()
+            connected = await self._contact()
         except (ResponseTimeoutError, ConnectionLostError) as error:
             failed = ConnectFailedError(self._address, f"connected, but nobody answers: {error}")
             failed.__cause__ = error
@@ -180,11 +142,11 @@ class Owner:
         except RobotiqConnectionError as error:
             self._tell_connected(error)
             return False
-        if found is None:
-            return False
-        self._take_in(*found, self._activate)
-        self._tell_connected(None)
-        return True
+        if connected:
+            self._tell_connected(None)
+            # Only the start may activate unasked; from here on the policy says.
+            self._controller.activates = self._policy is not None and self._policy.activate
+        return connected
 
     def _tell_connected(self, failure: RobotiqError | None) -> None:
         """Tell start(), unless it knows already or does not wait any more."""
@@ -195,46 +157,42 @@ class Owner:
         else:
             self.connected.set_exception(failure)
 
-    async def _contact(self) -> tuple[RobotiqStatus, float] | None:
-        """Open the link and read once, see :meth:`_read`; None when asked to stop meanwhile."""
+    async def _contact(self) -> bool:
+        """Open the link and see the first status; False when asked to stop meanwhile."""
         with anyio.CancelScope() as self._interruptible:
             if not self._stopping:
                 await self._transport.open()
-                return await self._read()
-        return None
-
-    def _take_in(self, status: RobotiqStatus, asked: float, activate: bool) -> None:
-        self._core.found(status, activate=activate, asked=asked)
-        self._publish(status)
-        self._last_poll = 0.0
-        self._tick.start()
-        self._counters.tick = self._tick.source
+                status, asked = await self._read()
+                self._controller.see(status, asked)
+                self._publish(status)
+                self._last_poll = 0.0
+                self._tick.start()
+                self._counters.tick = self._tick.source
+                return True
+        return False
 
     async def _reconnect(self, why: RobotiqConnectionError) -> bool:
         """Open the link again; False when that is given up, or when asked to stop."""
         log.warning("link lost: %s", why)
-        self._core.lost(why)
-        policy = self._policy
-        if policy is None:
+        self._controller.lost(why)
+        if self._policy is None:
             self.failure = why
             return False
-        lost_at, delay = self._loop.time(), policy.first_delay
+        backoff = Backoff(self._policy, self._loop.time())
         while not self._stopping:
             with anyio.CancelScope() as self._interruptible:
-                await asyncio.sleep(delay)
+                await asyncio.sleep(backoff.delay)
             try:
-                found = await self._contact()
+                connected = await self._contact()
             except RobotiqConnectionError as error:
                 log.debug("still no link: %s", error)
-                if policy.give_up_after is not None and self._loop.time() - lost_at >= policy.give_up_after:
+                if backoff.gives_up(self._loop.time()):
                     self.failure = error
                     return False
-                delay = min(max(2 * delay, 0.01), policy.max_delay)
                 continue
-            if found is not None:
+            if connected:
                 self._counters.reconnects += 1
-                log.warning("link back after %.2f s", self._loop.time() - lost_at)
-                self._take_in(*found, policy.activate)
+                log.warning("link back after %.2f s", self._loop.time() - backoff.since)
                 return True
         return False
 
@@ -252,20 +210,13 @@ class Owner:
                     return
 
     async def _cycle(self) -> None:
-        """Write what has changed, then read."""
-        if self._core.has_request:
-            await self._write()
-        await self._look()
-
-    async def _write(self) -> None:
-        """Write what has changed; look first if what is known is old by now."""
-        core = self._core
-        for _ in range(LOOKS):
-            if not self._is_stale():
+        """Read, decide, write."""
+        for _ in range(READS):
+            await self._poll_once()
+            if not self._is_held_up():
                 break
-            await self._look()
         now = self._tick.time()
-        request = core.take_request(now)
+        request = self._controller.decide(now)
         if request is None:
             return
         try:
@@ -274,10 +225,10 @@ class Owner:
             self._publish_request(SentRequest(request, now, acknowledged=False))
             raise
         self._counters.writes += 1
-        core.acknowledged(self._tick.time())
+        self._controller.acknowledged(self._tick.time())
         self._publish_request(SentRequest(request, now, acknowledged=True))
 
-    async def _look(self) -> None:
+    async def _poll_once(self) -> None:
         """Read, and tell everybody."""
         counters = self._counters
         status, asked = await self._read()
@@ -285,7 +236,7 @@ class Owner:
         if self._last_poll:
             counters.periods.append(asked - self._last_poll)
         self._last_poll = asked
-        self._core.see(status, asked)
+        self._controller.see(status, asked)
         self._publish(status)
 
     async def _read(self) -> tuple[RobotiqStatus, float]:
@@ -297,17 +248,17 @@ class Owner:
         status = RobotiqStatus(registers, tick.time(), self.sequence)
         self.sequence += 1
         self._counters.polls += 1
-        self._read_at = status.timestamp
         return status, asked
 
-    def _is_stale(self) -> bool:
-        """Whether the loop was held up since the newest status was asked for.
+    def _is_held_up(self) -> bool:
+        """Whether the loop was held up since the newest status was asked for, or is at this moment.
 
         Nothing is decided on it then: what another client has done, or where an axis is by now, must be
         seen before the next write. While a slow gripper is waited for the ticks come in time; when the loop
-        is held up they do not. And the loop may be held up at this moment: no tick tells of that yet.
+        is held up they do not.
         """
-        return self._tick.late > HELD_S or self._tick.time() - self._read_at > self._interval + LATE_S
+        tick = self._tick
+        return tick.late > HELD_S or tick.time() - tick.due > HELD_S
 
     async def _wait_for_tick(self) -> None:
         """Wait for the next tick; one that was missed is counted and skipped."""
@@ -335,16 +286,16 @@ class Owner:
         self._stopping = True
         deadline = min(self._end_by, self._loop.time() + SHUTDOWN_S)
         try:
-            self._core.stop()
+            self._controller.stop()
             with anyio.CancelScope(deadline=deadline, shield=True) as scope:
-                if self._halt_at_stop and self._core.status is not None:
+                if self._halt_at_stop and self._controller.status is not None:
                     await self._stop_fingers()
             if scope.cancelled_caught:
                 log.warning("the gripper did not confirm in time that the fingers were stopped")
         finally:
             self._tick.close()
             await self._transport.close()
-            self._core.machine.happen(Trigger.STOPPED)
+            self._controller.stopped()
 
     async def _stop_fingers(self) -> None:
         """Clear rGTO and see it; until the time is over. Unlike a motion, a stop may be sent again."""
@@ -357,19 +308,16 @@ class Owner:
                 if not failed:
                     log.warning("the fingers could not be told to stop, trying again: %s", error)
                 failed = True
-                self._core.lost(error)
+                self._controller.lost(error)
             await asyncio.sleep(SHUTDOWN_PAUSE_S)
 
     async def _stop_fingers_once(self) -> None:
         if not self._transport.is_open:
             # A gripper that lost its client goes on moving.
             await self._transport.open()
-        # Whether there is anything to stop is decided on what the gripper does now; and whoever asks
-        # afterwards whether the fingers stand still finds a status that is newer than the stop.
-        status, asked = await self._read()
-        self._core.look_again(status, asked)
-        self._publish(status)
-        self._core.shut_down()
-        while self._core.is_busy:
+        self._controller.shut_down()
+        while True:
             await self._cycle()
+            if not self._controller.machine.is_busy:
+                return
             await asyncio.sleep(self._interval)

@@ -12,12 +12,13 @@ import weakref
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Generic, Self, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
-from ..control.state_machine import Trigger
+from ..control.triggers import Trigger
 from ..enums import State
 from ..errors import RobotiqError
 from ..wire.request import Request
+from ..wire.status import RobotiqStatus
 from .event_loop import check_loop
 
 T = TypeVar("T")
@@ -220,3 +221,24 @@ class Channel(Generic[T]):
     def _forget(self, reference: weakref.ref[Stream[T]]) -> None:
         # A new list: this may happen while somebody goes through the old one.
         self._streams = [each for each in self._streams if each is not reference]
+
+
+class Channels:
+    """Everything that a hand tells: its statuses, its changes of state, what is written."""
+
+    def __init__(self) -> None:
+        """Begin without readers."""
+        self.statuses: Channel[RobotiqStatus] = Channel()
+        self.transitions: Channel[Transition] = Channel()
+        self.requests: Channel[SentRequest] = Channel()
+        self._all: tuple[Channel[Any], ...] = (self.statuses, self.transitions, self.requests)
+
+    def reopen(self, loop: asyncio.AbstractEventLoop) -> None:
+        """The hand starts in a loop."""
+        for channel in self._all:
+            channel.reopen(loop)
+
+    def end(self, failure: Callable[[], RobotiqError] | None = None) -> None:
+        """End every stream, quietly or with a failure."""
+        for channel in self._all:
+            channel.end(failure)

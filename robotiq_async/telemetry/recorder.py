@@ -29,7 +29,7 @@ try:
 except ModuleNotFoundError as error:
     raise ImportError("recordings need mcap: pip install 'robotiq-async[record]'") from error
 
-from ..concurrency import in_a_thread, to_the_end
+from ..concurrency import in_a_thread, wait_shielded
 from ..errors import RobotiqError
 from ..hand import RobotiqHand
 from ..version import __version__
@@ -119,7 +119,7 @@ class Recorder:
         self._over = asyncio.Event()
         opening = in_a_thread(lambda: FileIO(self.path, "x"))
         try:
-            await to_the_end(opening)
+            await wait_shielded(opening)
         except asyncio.CancelledError:
             if opening.exception() is None:
                 opening.result().close()
@@ -142,7 +142,7 @@ class Recorder:
         Raises:
             RecordingError: something could not be written; never in place of another exception.
         """
-        await to_the_end(asyncio.ensure_future(self._end()))
+        await wait_shielded(asyncio.ensure_future(self._end()))
         if self._failed.done() and error is None:
             raise self._failed.result()
 

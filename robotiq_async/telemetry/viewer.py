@@ -30,7 +30,7 @@ except ModuleNotFoundError as error:
     raise ImportError("viewers need foxglove-sdk: pip install 'robotiq-async[view]'") from error
 
 from ..actions import Operator
-from ..concurrency import in_a_thread, to_the_end
+from ..concurrency import in_a_thread, wait_shielded
 from ..enums import State
 from ..errors import RobotiqError
 from ..hand import RobotiqHand
@@ -126,11 +126,11 @@ class Viewer:
         self._channels = {topic: _channel(topic, self._context) for topic in (*TOPICS, STATE)}
         listening = in_a_thread(self._listen)
         try:
-            await to_the_end(listening)
+            await wait_shielded(listening)
         except asyncio.CancelledError:
             if listening.exception() is None:
                 self._server = listening.result()
-                await to_the_end(asyncio.ensure_future(self._stop_server()))
+                await wait_shielded(asyncio.ensure_future(self._stop_server()))
             raise
         try:
             self._server = listening.result()
@@ -148,7 +148,7 @@ class Viewer:
 
         Takes a second at most, and is finished also when cancelled meanwhile.
         """
-        await to_the_end(asyncio.ensure_future(self._close()))
+        await wait_shielded(asyncio.ensure_future(self._close()))
 
     async def _close(self) -> None:
         self._closing = True

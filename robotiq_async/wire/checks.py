@@ -20,6 +20,16 @@ def check_byte(name: str, value: object) -> int:
     return check_int(name, value, 0, 255)
 
 
+def check_optional_byte(name: str, value: object) -> int | None:
+    """A value in 0..255, or None for what is left as it is.
+
+    Raises:
+        TypeError: neither None nor an int.
+        ValueError: outside 0..255.
+    """
+    return None if value is None else check_byte(name, value)
+
+
 def check_int(name: str, value: object, low: int, high: int) -> int:
     """An int in low..high.
 

@@ -17,6 +17,8 @@ REGISTER_COUNT: Final = 8
 
 Registers = tuple[int, ...]
 """Eight registers of 16 bits."""
+Echo = tuple[bool, bool, int, int, int, int]
+"""What a status repeats of a request: activation, go, and the positions of A, B, C and the scissor."""
 
 
 @dataclass(frozen=True, slots=True)

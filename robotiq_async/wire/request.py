@@ -94,6 +94,16 @@ class Request:
             ),
         )
 
+    @property
+    def echo(self) -> reg.Echo:
+        """What a status of a gripper that follows this image repeats of it: rACT, rGTO and the positions.
+
+        Speed and force have no echo. rMOD is left out: it means nothing while the scissor has its own
+        registers.
+        """
+        a, b, c, s = (axis.position for axis in self.axes)
+        return self.activate, self.go, a, b, c, s
+
     def position(self, axis: Finger) -> int:
         """The position request of one axis."""
         return self.axes[AXES.index(axis)].position

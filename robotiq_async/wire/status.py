@@ -127,6 +127,20 @@ class RobotiqStatus:
         return bool(reg.gGTO.read(self._registers))
 
     @property
+    def echo(self) -> reg.Echo:
+        """What is repeated of the request in force: gACT, gGTO, the positions of A, B, C and the scissor."""
+        # By hand for speed: this runs at every poll.
+        word = self._registers
+        return (
+            bool(word[0] & 0x0100),
+            bool(word[0] & 0x0800),
+            word[1] & 0xFF,
+            word[3] >> 8,
+            word[4] & 0xFF,
+            word[6] >> 8,
+        )
+
+    @property
     def mode(self) -> Mode:
         """Echo of the mode (gMOD)."""
         return Mode(reg.gMOD.read(self._registers))

@@ -192,17 +192,18 @@ async def rest(world: World) -> None:
 
 def settled(hand: RobotiqHand) -> bool:
     return hand.state in (*RUNNING, State.RESET, State.FAULT, State.ATR_DONE, State.SHUTDOWN) or (
-        hand.state is State.DISCONNECTED and hand._task is None
+        hand.state is State.DISCONNECTED and (hand._session is None or hand._session.is_over)
     )
 
 
 async def check_nothing_is_left(world: World) -> None:
     """Nobody waits, nothing is pending, the link is in step, and the next command moves only its axis."""
     hand = world.hand
-    core = hand._core
-    assert not core._moves
-    assert core._desk.is_empty
-    assert not hand._waiters._waiters
+    session = hand._session
+    assert session is not None
+    assert not session.controller._callers.moves
+    assert session.controller._callers.pending.is_empty
+    assert not session._waiters._waiters
     assert hand.statistics.reconnects == 0
     world.check_no_stale_status()
     if hand.state is State.SHUTDOWN:

@@ -8,7 +8,7 @@ import selectors
 import time
 from collections.abc import Iterator
 
-from robotiq_async.control.adoption import agrees
+from robotiq_async.control.contact import agrees
 from robotiq_async.enums import AXES, ObjectStatus
 from robotiq_async.wire.request import AxisRequest, Request
 from tests.adversity.world import LONGEST_HOLD_S, World

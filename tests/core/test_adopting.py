@@ -27,9 +27,9 @@ def image(
     ).registers
 
 
-def used_by_another(device_cycle: float = 0.005) -> Bench:
+def used_by_another(device_cycle: float = 0.005, speed: int = 128) -> Bench:
     """A gripper that is active when the hand comes."""
-    bench = Bench(device_cycle=device_cycle)
+    bench = Bench(device_cycle=device_cycle, speed=speed)
     bench.gripper.write(0, Request(activate=True).registers)
     bench.now += 10
     return bench
@@ -55,7 +55,8 @@ def test_the_first_command_leaves_the_other_axes_what_they_do(
     individual: bool, into_motion: float, speed: int, objects: Finger
 ) -> None:
     """Whatever the previous client did, only the addressed axis changes its ways."""
-    bench, undisturbed = used_by_another(), used_by_another()
+    # The hand's own speed is that of the client: speeds have no echo.
+    bench, undisturbed = used_by_another(speed=speed), used_by_another()
     for each in (bench, undisturbed):
         if objects:
             each.gripper.place_object(objects, 120)
@@ -63,9 +64,7 @@ def test_the_first_command_leaves_the_other_axes_what_they_do(
         each.gripper.write(0, image(positions, individual=individual, speed=speed))
         each.now += 0.01 + into_motion
     bench.connect()
-    # The scissor, so that A, B and C are all un-addressed. The hand's own speed is that of the client:
-    # speeds have no echo.
-    bench.core._ledger._image = Request(axes=(AxisRequest(0, speed, 100),) * 4)
+    # The scissor, so that A, B and C are all un-addressed.
     bench.command(S, position=180)
     bench.run(20)
     undisturbed.now = bench.now
@@ -126,14 +125,14 @@ def test_our_own_writes_are_never_taken_for_another_client() -> None:
         bench.run(0.02)
         bench.command(A, position=50)
         bench.run(2.0)
-        assert bench.core.foreign_commands == 0, device_cycle
+        assert bench.controller.foreign_commands == 0, device_cycle
 
 
 def test_another_client_is_counted_and_its_requests_are_taken_over(bench: Bench) -> None:
     bench.moved(100)
     bench.gripper.write(0, image({A: 50, B: 200, C: 30, S: 180}))
     bench.run(5.0)
-    assert bench.core.foreign_commands == 1
+    assert bench.controller.foreign_commands == 1
     before = travels(bench)
     bench.moved(80, A)
     assert {axis: bench.gripper.travel(axis) - before[axis] for axis in (B, C, S)} == {
@@ -155,7 +154,7 @@ def test_a_move_that_another_client_leaves_alone_goes_on(bench: Bench) -> None:
     bench.gripper.write(0, image({A: 255, B: 100, S: 137}))
     bench.until(lambda: ours.is_told)
     assert ours.result.positions[A] >= 240
-    assert bench.core.foreign_commands == 1
+    assert bench.controller.foreign_commands == 1
 
 
 def test_our_write_that_shows_after_another_clients_is_what_counts() -> None:
@@ -167,9 +166,9 @@ def test_our_write_that_shows_after_another_clients_is_what_counts() -> None:
     bench.gripper.write(0, image({A: 90, B: 90, C: 90, S: 90}))
     ours = bench.command(A, position=200)
     bench.run(1.0)
-    bench.until(lambda: not bench.core.is_moving)
+    bench.until(lambda: not bench.controller.is_moving)
     assert ours.told == [None]
-    assert bench.core.foreign_commands == 1
+    assert bench.controller.foreign_commands == 1
     before = travels(bench)
     bench.moved(60, B)
     moved = {axis for axis, travel in travels(bench).items() if travel != before[axis]}
@@ -205,7 +204,7 @@ def test_a_power_cycle_leaves_the_hand_in_reset_and_writes_nothing(bench: Bench)
 def test_a_lost_link_drops_what_was_not_acknowledged(bench: Bench) -> None:
     pending = bench.command(A, position=200)
     _, move = bench.move(100, B)
-    bench.core.lost(None)
+    bench.controller.lost(None)
     assert isinstance(pending.error, ConnectionLostError)
     assert isinstance(move.error, ConnectionLostError)
     assert bench.state is State.DISCONNECTED
@@ -225,11 +224,11 @@ def test_a_write_that_arrived_unacknowledged_is_ours_when_it_shows(bench: Bench)
     bench.now += 0.001  # back before the gripper acts on it
     bench.connect(activate=False)
     bench.run(0.1)
-    assert bench.core.foreign_commands == 0
+    assert bench.controller.foreign_commands == 0
     assert bench.latest.requested_position(A) == 200
     writes = len(bench.written)
     bench.moved(50, B)
-    bench.until(lambda: not bench.core.is_moving)
+    bench.until(lambda: not bench.controller.is_moving)
     assert bench.gripper.position(A) == pytest.approx(200, abs=2), "B's command keeps what A was asked"
     assert len(bench.written) == writes + 1
 
@@ -237,20 +236,20 @@ def test_a_write_that_arrived_unacknowledged_is_ours_when_it_shows(bench: Bench)
 def test_a_motion_goes_on_over_a_lost_link_and_is_adopted(bench: Bench) -> None:
     bench.move(255, A)
     bench.run(0.5)
-    bench.core.lost(None)
+    bench.controller.lost(None)
     bench.now += 0.3
     bench.connect(activate=False)
     assert bench.state is State.RUNNING_IDLE
     bench.moved(100, B)
-    bench.until(lambda: not bench.core.is_moving)
+    bench.until(lambda: not bench.controller.is_moving)
     assert bench.gripper.position(A) >= 240
-    assert bench.core.foreign_commands == 0
+    assert bench.controller.foreign_commands == 0
 
 
 def test_a_gripper_that_lost_its_power_is_not_activated_by_a_reconnect(bench: Bench) -> None:
     bench.move(255)
     bench.run(0.5)
-    bench.core.lost(None)
+    bench.controller.lost(None)
     bench.gripper.power_cycle()
     bench.now += 0.1
     bench.connect(activate=False)

@@ -117,7 +117,7 @@ def test_a_grip_is_kept_over_a_minor_fault(bench: Bench) -> None:
 
 def test_the_release_is_for_faults_only(bench: Bench) -> None:
     with pytest.raises(InvalidStateError) as caught:
-        bench.core.release()
+        bench.controller.release()
     assert caught.value.state is State.RUNNING_IDLE
     assert caught.value.allowed == {State.FAULT}
 
@@ -126,14 +126,14 @@ def test_release_reset_and_activation_bring_the_hand_back(bench: Bench) -> None:
     bench.moved(200)
     bench.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
     bench.step()
-    bench.core.release()
+    bench.controller.release()
     bench.step()
     assert bench.state is State.WF_ATR
     bench.until(lambda: bench.state is State.ATR_DONE, 60)
     assert bench.gripper.position(A) <= 7
-    bench.core.reset()
+    bench.controller.reset()
     bench.until(lambda: bench.state is State.RESET)
-    bench.core.activate()
+    bench.controller.activate()
     bench.until(lambda: bench.state is State.RUNNING_IDLE)
     bench.moved(100, A)
 
@@ -144,7 +144,7 @@ def test_a_release_must_not_activate_a_gripper_that_is_reset() -> None:
     bench.connect()
     assert bench.state is State.FAULT
     with pytest.raises(NotActivatedError):
-        bench.core.release()
+        bench.controller.release()
     bench.run(0.1)
     assert not bench.written
 
@@ -152,7 +152,7 @@ def test_a_release_must_not_activate_a_gripper_that_is_reset() -> None:
 def test_a_reset_ends_moves(bench: Bench) -> None:
     _, outcome = bench.move(255)
     bench.run(0.3)
-    bench.core.reset()
+    bench.controller.reset()
     assert isinstance(outcome.error, MoveSupersededError)
     bench.until(lambda: bench.state is State.RESET)
     assert not bench.gripper.is_moving
@@ -175,14 +175,14 @@ def test_a_sequence_begun_while_a_write_is_on_the_line(bench: Bench, what: str) 
     else:
         pending = bench.command(A, position=200)
     bench.now += POLL_S
-    request = bench.core.take_request(bench.now)
+    request = bench.controller.decide(bench.now)
     assert request is not None
-    (bench.core.reset if what == "reset" else bench.core.release)()
+    (bench.controller.reset if what == "reset" else bench.controller.release)()
     assert isinstance(pending.error, MoveSupersededError)
     bench.gripper.write(0, request.registers)
-    bench.core.acknowledged(bench.now)
+    bench.controller.acknowledged(bench.now)
     assert bench.state in (State.DO_RESET, State.DO_ATR), "its own request has not been sent yet"
-    bench.core.see(bench.status())
+    bench.controller.see(bench.status())
     bench.until(lambda: bench.state in (State.RESET, State.ATR_DONE))
 
 
@@ -208,9 +208,9 @@ def test_a_gripper_found_in_fault_is_left_there() -> None:
 
 
 def shut_down(bench: Bench) -> None:
-    bench.core.stop()
-    bench.core.shut_down()
-    bench.until(lambda: not bench.core.is_busy, 1.0)
+    bench.controller.stop()
+    bench.controller.shut_down()
+    bench.until(lambda: not bench.controller.machine.is_busy, 1.0)
 
 
 def test_the_shutdown_stops_the_fingers_and_keeps_the_activation(bench: Bench) -> None:
@@ -253,10 +253,10 @@ def test_the_shutdown_never_activates_a_gripper_that_was_power_cycled_unnoticed(
     bench.step(answer=False)
     bench.gripper.power_cycle()
     bench.now += 0.01
-    bench.core.stop()
-    bench.core.status = bench.status()
-    bench.core.shut_down()
-    assert bench.core.is_busy, "the write that was not acknowledged may still act"
+    bench.controller.stop()
+    bench.controller.status = bench.status()
+    bench.controller.shut_down()
+    assert bench.controller.machine.is_busy, "the write that was not acknowledged may still act"
     bench.run(0.5)
     assert not bench.gripper.is_moving
     assert not bench.latest.activation_echo
@@ -287,7 +287,7 @@ def test_what_waits_in_fault_is_not_written_to_a_gripper_that_lost_its_activatio
     halted = bench.halt()
     writes = len(bench.written)
     bench.gripper.power_cycle()
-    bench.core.see(bench.status())
+    bench.controller.see(bench.status())
     assert isinstance(halted.error, NotActivatedError)
     bench.run(0.5)
     assert bench.state is State.RESET

@@ -28,10 +28,10 @@ def reset_and_activated_by_another(bench: Bench) -> None:
 def test_a_lost_command_does_not_come_back_when_the_gripper_was_busy_at_the_reconnect() -> None:
     bench = started()
     bench.moved(50)
-    bench.core.command(A, 250, None, None)
+    bench.controller.command(A, 250, None, None)
     bench.now += POLL_S
-    assert bench.core.take_request(bench.now) is not None  # it never arrives
-    bench.core.lost(None)
+    assert bench.controller.decide(bench.now) is not None  # it never arrives
+    bench.controller.lost(None)
     image = Request.from_registers(bench.gripper.request_registers)
     bench.gripper.write(0, replace(image, individual_scissor=False).registers)  # a mode change: gIMC = 2
     bench.now += 0.2
@@ -52,7 +52,7 @@ def test_after_another_clients_reset_and_activation_no_old_grip_closes_the_finge
         bench.until(lambda: halted.is_told)  # noqa: B023
         bench.gripper.remove_object(Finger.ABC)
         if link_is_down_meanwhile:
-            bench.core.lost(None)
+            bench.controller.lost(None)
             bench.gripper.write(0, [0x0000])
             bench.now += 0.05
             bench.gripper.write(0, [0x0100])
@@ -70,7 +70,7 @@ def test_after_a_release_and_another_clients_reset_no_command_releases_again() -
     bench.moved(100)
     bench.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
     bench.run(0.05)
-    bench.core.release()
+    bench.controller.release()
     bench.until(lambda: bench.state is State.ATR_DONE, 60)
     reset_and_activated_by_another(bench)
     written = len(bench.written)
@@ -113,12 +113,12 @@ def test_who_waits_for_a_position_is_told_when_a_move_takes_it_over_and_is_given
     bench = started()
     waiting, other = bench.command(A, position=50), bench.command(B, position=70)
     move, _ = bench.move(100, A)
-    bench.core.abandon(move)
+    bench.controller.abandon(move)
     bench.run(1)
     assert isinstance(waiting.error, MoveSupersededError)
     assert other.told == [None]
     assert bench.positions()[A] < 10
-    bench.until(lambda: not bench.core.is_moving)
+    bench.until(lambda: not bench.controller.is_moving)
     assert abs(bench.positions()[B] - 70) <= 2
 
 
@@ -128,15 +128,15 @@ def test_a_hold_survives_a_lost_link() -> None:
         bench = started()
         move, _ = bench.move(200, A, speed=0)
         bench.run(0.5)
-        bench.core.abandon(move)
+        bench.controller.abandon(move)
         if written:
             bench.now += POLL_S
-            assert bench.core.take_request(bench.now) is not None  # and it is lost
-        bench.core.lost(None)
+            assert bench.controller.decide(bench.now) is not None  # and it is lost
+        bench.controller.lost(None)
         at = bench.positions()[A]
         bench.now += 0.05
         bench.connect(activate=False)
-        assert bench.state is State.RUNNING_CC
+        assert bench.state is State.RUNNING_IDLE, "nobody has asked for anything"
         bench.run(5)
         # Whether a lost hold arrived is known after a device cycle: a quarter of a second, six counts.
         assert bench.positions()[A] <= at + (8 if written else 4)
@@ -147,8 +147,8 @@ def test_a_hold_is_dropped_when_somebody_else_commands_after_the_lost_link() -> 
     bench = started()
     move, _ = bench.move(200, A, speed=0)
     bench.run(0.5)
-    bench.core.abandon(move)
-    bench.core.lost(None)
+    bench.controller.abandon(move)
+    bench.controller.lost(None)
     image = Request.from_registers(bench.gripper.request_registers)
     bench.gripper.write(0, image.with_positions({A: 90}).registers)
     bench.now += 0.5
@@ -163,13 +163,13 @@ def test_an_old_reply_that_was_looked_at_late_does_not_make_our_write_anothers()
     bench = started()
     _, told = bench.move(200, A)
     bench.now += POLL_S
-    request = bench.core.take_request(bench.now)
+    request = bench.controller.decide(bench.now)
     assert request is not None
     bench.gripper.write(0, request.registers)
-    bench.core.acknowledged(bench.now)
+    bench.controller.acknowledged(bench.now)
     asked, shown = bench.now, bench.gripper.status_registers()
     bench.now += 0.6
-    bench.core.see(RobotiqStatus(shown, bench.now, 10_000), asked)
+    bench.controller.see(RobotiqStatus(shown, bench.now, 10_000), asked)
     bench.until(lambda: told.is_told)
-    assert bench.core.foreign_commands == 0
+    assert bench.controller.foreign_commands == 0
     assert abs(told.result.positions[A] - 200) <= 2

@@ -46,15 +46,15 @@ def moved_by_another() -> Bench:
 
 def blink(bench: Bench) -> None:
     """The link is lost and comes back."""
-    bench.core.lost(None)
+    bench.controller.lost(None)
     bench.now += 0.05
     bench.connect(activate=False)
 
 
 def stop(bench: Bench) -> None:
-    bench.core.stop()
-    bench.core.shut_down()
-    while bench.core.is_busy:
+    bench.controller.stop()
+    bench.controller.shut_down()
+    while bench.controller.machine.is_busy:
         bench.step()
 
 
@@ -94,7 +94,7 @@ def test_another_client_that_writes_during_our_activation_is_noticed_at_its_end(
     bench.run(1)
     bench.gripper.write(0, going_to(200))
     bench.until(lambda: bench.state is State.RUNNING_IDLE)
-    assert bench.core.foreign_commands == 1
+    assert bench.controller.foreign_commands == 1
     bench.run(5)  # its fingers grip
     if how == "position":
         bench.moved(180, B)
@@ -121,9 +121,9 @@ def test_stop_leaves_the_activation_of_others_alone() -> None:
 def test_stop_does_not_take_back_an_activation_that_never_arrived_and_that_others_have_begun_since() -> None:
     bench = Bench()
     bench.connect(activate=False)
-    bench.core.activate()
+    bench.controller.activate()
     bench.now += POLL_S
-    assert bench.core.take_request(bench.now) is not None  # it never arrives
+    assert bench.controller.decide(bench.now) is not None  # it never arrives
     blink(bench)
     bench.run(60)
     assert bench.state is State.RESET
@@ -141,8 +141,8 @@ def test_an_activation_is_called_off_when_others_have_activated_meanwhile() -> N
     bench.now += 6
     bench.gripper.write(0, going_to(255))
     bench.now += 3
-    bench.core.activate()
-    bench.core.see(bench.status())  # the loop was held up: the owner looks again before it writes
+    bench.controller.activate()
+    bench.step()  # what is begun is decided on what the gripper shows now
     assert bench.state is State.RUNNING_IDLE
     bench.run(1)
     assert not bench.written
@@ -156,9 +156,9 @@ def test_a_pending_hold_does_not_stop_who_has_taken_over() -> None:
     image = Request.from_registers(bench.gripper.request_registers)
     bench.gripper.write(0, image.with_positions({A: 90}).registers)
     bench.now += 0.02
-    bench.core.abandon(move)
-    bench.core.see(bench.status())
-    assert bench.core.foreign_commands == 1
+    bench.controller.abandon(move)
+    bench.controller.see(bench.status())
+    assert bench.controller.foreign_commands == 1
     bench.run(10)
     assert bench.positions()[A] == 90
 
@@ -176,15 +176,15 @@ def test_a_command_after_a_lost_acknowledgement_waits_until_it_is_known_what_act
         bench.step(answer=False)
     else:
         bench.now += POLL_S
-        assert bench.core.take_request(bench.now) is not None
-        bench.core.lost(None)
+        assert bench.controller.decide(bench.now) is not None
+        bench.controller.lost(None)
     bench.now += 0.001
     bench.connect(activate=False)  # before the gripper acts on it, if it got it
     pending = bench.command(A, position=50)
     began = bench.now
     bench.until(lambda: pending.is_told)
     assert bench.now - began < 0.5
-    bench.until(lambda: not bench.core.is_moving)
+    bench.until(lambda: not bench.controller.is_moving)
     assert bench.positions()[S] == pytest.approx(200 if arrived else 32, abs=2)
     assert bench.positions()[A] == pytest.approx(50, abs=2)
     positions = [Request.from_registers(image).position(S) for image in bench.written]
@@ -254,7 +254,7 @@ def test_a_hold_outlives_what_has_replaced_it_and_was_lost(how: str) -> None:
     bench = started()
     move, _ = bench.move(200, A, speed=0)
     bench.run(0.5)
-    bench.core.abandon(move)
+    bench.controller.abandon(move)
     if how == "halt":
         bench.halt()
     else:
@@ -269,7 +269,7 @@ def test_a_halt_outlives_a_fault_in_the_same_poll() -> None:
     bench = moved_by_another()
     halted = bench.halt()
     bench.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.1)
-    bench.core.see(bench.status())
+    bench.controller.see(bench.status())
     assert bench.state is State.FAULT
     at = bench.positions()[A]
     bench.run(10)
@@ -281,7 +281,7 @@ def test_nothing_resumes_when_a_fault_clears_that_began_while_the_link_was_down(
     bench = started()
     bench.move(200, A, speed=0)
     bench.run(0.5)
-    bench.core.lost(None)
+    bench.controller.lost(None)
     bench.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 2)
     bench.now += 0.1
     bench.connect(activate=False)
@@ -297,8 +297,8 @@ def test_a_lost_hold_does_not_outlive_an_activation() -> None:
     bench = started()
     move, _ = bench.move(200, A, speed=0)
     bench.run(0.3)
-    bench.core.abandon(move)
-    bench.core.lost(None)
+    bench.controller.abandon(move)
+    bench.controller.lost(None)
     bench.gripper.power_cycle()
     bench.now += 0.1
     bench.connect(activate=True)  # as a policy may say

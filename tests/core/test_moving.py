@@ -124,7 +124,7 @@ def test_another_command_supersedes_a_move_whose_other_axes_run_on(bench: Bench)
     bench.run(0.5)
     bench.command(A, position=0)
     assert isinstance(outcome.error, MoveSupersededError)
-    bench.until(lambda: not bench.core.is_moving)
+    bench.until(lambda: not bench.controller.is_moving)
     assert bench.gripper.position(B) >= 240
     assert bench.gripper.position(A) <= 7
 
@@ -150,11 +150,11 @@ def test_a_move_ends_although_another_axis_is_commanded_at_every_poll(bench: Ben
 
 def test_is_moving_from_the_command_until_the_end(bench: Bench) -> None:
     outcome = bench.command(A, position=200)
-    assert bench.core.is_moving
+    assert bench.controller.is_moving
     while not outcome.is_told:
         bench.step()
-    assert bench.core.is_moving, "acknowledged, but it does not act yet"
-    bench.until(lambda: not bench.core.is_moving)
+    assert bench.controller.is_moving, "acknowledged, but it does not act yet"
+    bench.until(lambda: not bench.controller.is_moving)
     assert not bench.gripper.is_moving
     assert bench.gripper.position(A) == pytest.approx(200, abs=2)
 
@@ -165,7 +165,7 @@ def test_is_moving_from_the_command_until_the_end(bench: Bench) -> None:
 def test_an_abandoned_move_is_held_where_it_is(bench: Bench) -> None:
     move, _ = bench.move(255, A | B)
     bench.run(1.0)
-    bench.core.abandon(move)
+    bench.controller.abandon(move)
     at = bench.gripper.position(A)
     bench.run(2.0)
     assert not bench.gripper.is_moving
@@ -176,7 +176,7 @@ def test_an_abandoned_move_leaves_the_others_alone(bench: Bench) -> None:
     move, _ = bench.move(255, A)
     _, other = bench.move(255, B)
     bench.run(0.5)
-    bench.core.abandon(move)
+    bench.controller.abandon(move)
     bench.until(lambda: other.is_told)
     assert other.result.positions[B] >= 240
 
@@ -185,7 +185,7 @@ def test_an_axis_in_contact_keeps_its_request_and_its_grip(bench: Bench) -> None
     bench.gripper.place_object(A, 60)
     move, _ = bench.move(255, A | B)
     bench.until(lambda: bench.latest.contacts == A)
-    bench.core.abandon(move)
+    bench.controller.abandon(move)
     bench.run(1.0)
     assert last(bench).position(A) == 255
     assert last(bench).position(B) < 240
@@ -195,7 +195,7 @@ def test_an_axis_in_contact_keeps_its_request_and_its_grip(bench: Bench) -> None
 def test_a_move_abandoned_before_it_was_sent_is_dropped(bench: Bench) -> None:
     writes = len(bench.written)
     move, _ = bench.move(255, A)
-    bench.core.abandon(move)
+    bench.controller.abandon(move)
     bench.run(0.1)
     assert len(bench.written) == writes
     assert bench.state is State.RUNNING_IDLE
@@ -205,7 +205,7 @@ def test_a_move_abandoned_before_it_was_sent_holds_the_motion_it_had_superseded(
     bench.move(255, A)
     bench.run(0.5)
     move, _ = bench.move(100, A)
-    bench.core.abandon(move)
+    bench.controller.abandon(move)
     at = bench.gripper.position(A)
     bench.run(1.0)
     assert not bench.gripper.is_moving
@@ -217,7 +217,7 @@ def test_a_move_abandoned_before_it_was_sent_keeps_a_grip(bench: Bench) -> None:
     bench.moved(255, A)
     writes = len(bench.written)
     move, _ = bench.move(0, A)
-    bench.core.abandon(move)
+    bench.controller.abandon(move)
     bench.run(0.5)
     assert len(bench.written) == writes
     assert bench.latest.contacts == A
@@ -230,7 +230,7 @@ def test_a_move_abandoned_around_the_moment_it_begins_to_act_is_held(steps: int)
     move, _ = bench.move(255, A, speed=255)
     for _ in range(steps):
         bench.step()
-    bench.core.abandon(move)
+    bench.controller.abandon(move)
     bench.run(1.0)
     assert not bench.gripper.is_moving
     assert bench.gripper.position(A) < 15
@@ -241,7 +241,7 @@ def test_a_superseded_move_that_is_abandoned_later_holds_nothing(bench: Bench) -
     bench.run(0.3)
     _, second = bench.move(200, A)
     assert outcome.is_told
-    bench.core.abandon(move)
+    bench.controller.abandon(move)
     bench.until(lambda: second.is_told)
     assert second.result.positions[A] == pytest.approx(200, abs=2)
 
@@ -313,3 +313,10 @@ def test_halt_in_reset_has_nothing_to_do() -> None:
     assert bench.halt().told == [None]
     bench.run(0.05)
     assert not bench.written
+
+
+def test_the_default_timeout_follows_from_distance_and_speed(bench: Bench) -> None:
+    full = bench.controller.move_timeout(241, A, 0)
+    assert full == pytest.approx(2 * 10.021 + 2, abs=0.1)
+    assert bench.controller.move_timeout(241, A, 255) == pytest.approx(2 * 2.12 + 2, abs=0.1)
+    assert bench.controller.move_timeout(6, A, 0) == pytest.approx(2.0, abs=0.1)

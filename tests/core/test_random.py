@@ -52,7 +52,7 @@ class RandomUse(RuleBasedStateMachine):
     def cancel(self, which: int) -> None:
         live = [move for move, told in self.told if move is not None and not told.is_told]
         move = live[which % len(live)]
-        self.bench.core.abandon(move)
+        self.bench.controller.abandon(move)
         self.told = [each for each in self.told if each[0] is not move]
 
     @rule()
@@ -74,7 +74,7 @@ class RandomUse(RuleBasedStateMachine):
         if not answered:
             self.bench.step(answer=False)
         if self.bench.state is not State.DISCONNECTED:
-            self.bench.core.lost(None)
+            self.bench.controller.lost(None)
         assert all(told.is_told for _, told in self.told), "somebody waits for ever"
         writes = len(self.bench.gripper.writes)
         self.bench.now += away
@@ -103,7 +103,7 @@ class RandomUse(RuleBasedStateMachine):
     @precondition(lambda self: self.running)
     def everything_comes_to_rest(self) -> None:
         self.bench.step()  # an object taken away sets axes in motion without anybody's command
-        self.bench.until(lambda: not self.bench.core.is_moving, 60)
+        self.bench.until(lambda: not self.bench.controller.is_moving, 60)
         self.bench.run(0.6)  # what has no echo is given half a second to act
         assert not self.bench.gripper.is_moving
         for move, told in self.told:
@@ -121,7 +121,7 @@ class RandomUse(RuleBasedStateMachine):
 
     @invariant()
     def nobody_else_was_seen(self) -> None:
-        assert not hasattr(self, "bench") or self.bench.core.foreign_commands == 0
+        assert not hasattr(self, "bench") or self.bench.controller.foreign_commands == 0
 
     @invariant()
     def every_write_is_a_full_image_under_individual_control(self) -> None:

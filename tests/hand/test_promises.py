@@ -126,14 +126,6 @@ async def test_stop_ends_within_two_seconds_on_a_dead_link(
     assert hand.state is State.SHUTDOWN
 
 
-async def test_the_default_timeout_follows_from_distance_and_speed(hand: RobotiqHand) -> None:
-    core = hand._core
-    full = core.move_timeout(241, A, 0)
-    assert full == pytest.approx(2 * 10.021 + 2, abs=0.1)
-    assert core.move_timeout(241, A, 255) == pytest.approx(2 * 2.12 + 2, abs=0.1)
-    assert core.move_timeout(6, A, 0) == pytest.approx(2.0, abs=0.1)
-
-
 # -- 2 and 3 are in tests/core; here over the wire ----------------------------------------------------------
 
 
@@ -353,13 +345,13 @@ async def test_a_cancelled_start_leaves_nothing_running(server: SimulatorServer)
     assert hand.state is State.SHUTDOWN
 
 
-async def test_the_owner_stops_the_fingers_when_the_loop_is_torn_down(
+async def test_the_fingers_are_stopped_when_the_loop_is_torn_down(
     hand: RobotiqHand, server: SimulatorServer
 ) -> None:
     await hand.set_position(255)
-    assert hand._task is not None
-    hand._task.cancel()
-    await asyncio.wait({hand._task})
+    (poller,) = [task for task in asyncio.all_tasks() if task.get_name() == "robotiq_async poller"]
+    poller.cancel()
+    await asyncio.wait({poller})
     assert not server.gripper.is_moving
     assert hand.state is State.SHUTDOWN
 

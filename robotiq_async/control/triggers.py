@@ -1,0 +1,66 @@
+"""What can happen to a hand, and what a status shows of the gripper's condition."""
+
+from __future__ import annotations
+
+from enum import Enum
+from functools import cache
+
+from ..enums import Fault, Initialization
+from ..wire.status import RobotiqStatus
+
+
+class Trigger(Enum):
+    """What can happen to the hand.
+
+    ``ASK_`` is what its user asks for, ``SEEN_`` what a status shows; the others are what became of the
+    link and of a request.
+    """
+
+    __hash__ = object.__hash__  # see State
+
+    ASK_START = "start()"
+    ASK_ACTIVATE = "activate()"
+    ASK_COMMAND = "a command"
+    ASK_HALT = "halt()"
+    ASK_RELEASE = "atr()"
+    ASK_RESET = "reset()"
+    ASK_STOP = "stop()"
+    ACTIVATES = "gripper is reset, and is to be activated"
+    DELIVERED = "request acknowledged"
+    SEEN_READY = "gripper is active"
+    SEEN_BUSY = "gripper is activating"
+    SEEN_RESET = "gripper is reset"
+    SEEN_FAULT = "gripper reports a fault"
+    SEEN_RELEASED = "automatic release completed"
+    LINK_LOST = "link lost"
+    STOPPED = "shutdown finished"
+
+    @property
+    def is_seen(self) -> bool:
+        """Whether this is something a status shows."""
+        return self.name.startswith("SEEN_")
+
+
+def classify(status: RobotiqStatus) -> Trigger:
+    """The condition that a status shows, one of five.
+
+    A serious fault comes first, because gIMC = 0 with a fault is an automatic release and not a reset.
+    """
+    # gACT, gIMC and gFLT decide; they rarely change, and this runs at every poll.
+    first, second = status.registers[:2]
+    return _classify(first >> 8, second >> 8 & 0x0F)
+
+
+@cache
+def _classify(activation: int, fault: int) -> Trigger:
+    """The condition, from the byte that holds gACT and gIMC, and from gFLT."""
+    status = RobotiqStatus((activation << 8, fault << 8, 0, 0, 0, 0, 0, 0))
+    if status.fault is Fault.AUTOMATIC_RELEASE_DONE:
+        return Trigger.SEEN_RELEASED
+    if status.fault.is_serious:
+        return Trigger.SEEN_FAULT
+    if not status.activation_echo and status.initialization is Initialization.RESET:
+        return Trigger.SEEN_RESET
+    if status.activation_echo and status.is_activated:
+        return Trigger.SEEN_READY
+    return Trigger.SEEN_BUSY

@@ -1,0 +1,45 @@
+"""Callers that wait for something, in the shape of futures: ``asyncio.Future`` is one."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable
+from typing import Any, Protocol, TypeVar
+
+from ..errors import RobotiqError
+
+T_contra = TypeVar("T_contra", contravariant=True)
+
+
+class Waiter(Protocol[T_contra]):
+    """Where a result or an error is left for one caller. Done also when the caller has given up."""
+
+    def done(self) -> bool:
+        """Whether nothing can be left any more."""
+
+    def set_result(self, result: T_contra, /) -> None:
+        """Leave the result."""
+
+    def set_exception(self, exception: RobotiqError, /) -> None:
+        """Leave the error."""
+
+
+def resolve(waiters: Iterable[Waiter[None]]) -> None:
+    """Tell callers that it is done."""
+    for waiter in waiters:
+        if not waiter.done():
+            waiter.set_result(None)
+
+
+def fail(waiters: Iterable[Waiter[Any]], error: RobotiqError) -> None:
+    """Tell callers why it never will be; each raises an error of its own, with a traceback of its own."""
+    for waiter in waiters:
+        if not waiter.done():
+            waiter.set_exception(another(error))
+
+
+def another(error: RobotiqError) -> RobotiqError:
+    """A copy of an error, with its cause."""
+    again = copy.copy(error)
+    again.__cause__ = error.__cause__
+    return again

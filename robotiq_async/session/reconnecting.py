@@ -1,0 +1,65 @@
+"""What becomes of a lost link."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from ..wire.checks import check_seconds
+
+SHORTEST_S: Final = 0.01
+"""Between two tries, at least."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReconnectPolicy:
+    """What becomes of a lost link.
+
+    Attributes:
+        first_delay: seconds before the first try, 0..10.
+        max_delay: the delay doubles up to this, in seconds, 0.01..60.
+        give_up_after: seconds after which the hand gives up; None tries for ever.
+        activate: whether a gripper that comes back without its activation is activated. The fingers
+            MOVE then, without anybody having asked at that moment: leave it off unless nothing can be
+            in their way.
+    """
+
+    first_delay: float = 0.05
+    max_delay: float = 2.0
+    give_up_after: float | None = None
+    activate: bool = False
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            TypeError: not a number, or activate is not a bool.
+            ValueError: outside its range.
+        """
+        check_seconds("first_delay", self.first_delay, 0.0, 10.0)
+        check_seconds("max_delay", self.max_delay, 0.01, 60.0)
+        if self.give_up_after is not None:
+            check_seconds("give_up_after", self.give_up_after, 0.0, 86400.0)
+        if not isinstance(self.activate, bool):
+            raise TypeError(f"activate must be True or False, got {self.activate!r}")
+
+
+class Backoff:
+    """The delays of one attempt to get a link back.
+
+    Attributes:
+        since: when the link was lost, in seconds of the caller's clock.
+        delay: seconds until the next try.
+    """
+
+    def __init__(self, policy: ReconnectPolicy, since: float) -> None:
+        """Begin with the first delay."""
+        self._policy = policy
+        self.since = since
+        self.delay = policy.first_delay
+
+    def gives_up(self, now: float) -> bool:
+        """A try has failed: whether that was the last one. If not, the next delay is longer."""
+        limit = self._policy.give_up_after
+        self.delay = min(max(2 * self.delay, SHORTEST_S), self._policy.max_delay)
+        return limit is not None and now - self.since >= limit

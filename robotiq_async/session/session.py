@@ -1,0 +1,328 @@
+"""One run of a hand, from start() to stop(): its controller, its task, and those who wait beside it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Collection, Mapping
+from typing import Any, ClassVar, TypeVar
+
+import anyio
+
+from ..concurrency import wait_shielded
+from ..control.controller import Controller
+from ..control.state_machine import SEQUENCES, StateMachine
+from ..control.triggers import Trigger
+from ..control.waiters import Waiter
+from ..enums import State
+from ..errors import (
+    ActivationTimeoutError,
+    ConnectionLostError,
+    GripperFaultError,
+    InvalidStateError,
+    NotActivatedError,
+    NotStartedError,
+    RobotiqConnectionError,
+    RobotiqError,
+    StateTimeoutError,
+)
+from ..log import log
+from ..wire.status import RobotiqStatus
+from .claims import Claims
+from .clock import now
+from .event_loop import check_loop
+from .options import Options
+from .poller import Poller
+from .state_waiters import StateWaiters
+from .statistics import Counters
+from .streams import Channels, Stream, Transition
+
+T = TypeVar("T")
+Failing = Mapping[State, Callable[[], RobotiqError]]
+"""States that mean that what is waited for will not come, each with the error that says so."""
+
+
+class Session:
+    """Runs a hand once: from start() to stop(), or until its link or its loop is gone for good."""
+
+    _claims: ClassVar[Claims[Session]] = Claims()
+    """Who owns which gripper in this process."""
+
+    def __init__(
+        self,
+        options: Options,
+        machine: StateMachine,
+        channels: Channels,
+        *,
+        activate: bool,
+        first_sequence: int,
+    ) -> None:
+        """Claim the address and begin to connect; must be made in a running event loop.
+
+        Args:
+            options: of the hand.
+            machine: of the hand: its state outlives the session.
+            channels: of the hand: they were opened before, perhaps, and are read afterwards.
+            activate: whether a gripper that is found reset is activated.
+            first_sequence: number of the first status.
+
+        Raises:
+            InvalidStateError: the address is owned already.
+        """
+        self._options = options
+        self._is_over = False
+        self._loop = asyncio.get_running_loop()
+        self.machine = machine
+        self._claim()
+        self.controller = Controller(machine, options.speed, options.force, options.closing_time)
+        self.controller.activates = activate
+        self.counters = Counters()
+        self._channels = channels
+        self._waiters = StateWaiters()
+        self._until_link_lost: set[Stream[RobotiqStatus]] = set()
+        """Streams of those who wait for what the gripper does next: they end when the link goes down."""
+        channels.reopen(self._loop)
+        machine.changed = self._on_transition
+        self._poller = Poller(
+            options.make_transport(),
+            self.controller,
+            self.counters,
+            address=options.address,
+            poll_interval=options.poll_interval,
+            policy=options.policy,
+            first_sequence=first_sequence,
+            publish=channels.statuses.push,
+            publish_request=channels.requests.push,
+        )
+        machine.fire(Trigger.ASK_START)
+        self._task = self._loop.create_task(self._poller.run(), name="robotiq_async poller")
+        self._task.add_done_callback(self._end)
+
+    # -- its end ---------------------------------------------------------------------------------------
+
+    @property
+    def address(self) -> str:
+        """The gripper's, in its full form."""
+        return self._options.address
+
+    @property
+    def is_over(self) -> bool:
+        """Whether nothing runs any more."""
+        return self._is_over
+
+    @property
+    def lost_its_loop(self) -> bool:
+        """Whether the loop was closed under it: its task can never end then."""
+        return not self._is_over and self._loop.is_closed()
+
+    @property
+    def next_sequence(self) -> int:
+        """Number of the next status."""
+        return self._poller.sequence
+
+    async def stop(self, *, halt: bool) -> None:
+        """Stop the fingers (with ``halt``) and disconnect; also when cancelled meanwhile.
+
+        Raises:
+            RuntimeError: called in another event loop.
+        """
+        self.check_loop("hand.stop()")
+        self._poller.request_stop(halt=halt)
+        try:
+            await wait_shielded(self._task)
+        finally:
+            self._end(self._task)
+
+    def abandon(self) -> None:
+        """Count as over when the loop was closed under it.
+
+        Nobody in that loop can be told. What they wait with belongs to it and is left to it.
+        """
+        log.warning(
+            "%s: the event loop was closed before stop(); the fingers may still move", self._options.address
+        )
+        self._release()
+        self._poller.abandon()
+        self._waiters = StateWaiters()
+        self._channels.end()
+        self.machine.fire(Trigger.ASK_STOP)
+        self.machine.fire(Trigger.STOPPED)
+
+    def _claim(self) -> None:
+        gripper = self._options.gripper
+        owner = self._claims.claim(gripper, self, lambda each: each.is_over)
+        if owner is not None:
+            is_this = owner.machine is self.machine
+            who, hint = ("this hand", "") if is_this else ("another hand", gripper().hint)
+            raise InvalidStateError(
+                f"{who} runs on {owner.address} already: stop() it first{hint}",
+                self.machine.state,
+                {State.DISCONNECTED, State.SHUTDOWN},
+            )
+
+    def _release(self) -> None:
+        self._is_over = True
+        self._claims.release(self)
+
+    def _end(self, task: asyncio.Task[None]) -> None:
+        """The task has ended: nobody may wait for it any longer. Called by whoever sees it first."""
+        if self._is_over:
+            return
+        self._release()
+        failure: Callable[[], RobotiqError] | None = None
+        if not task.cancelled() and (bug := task.exception()) is not None:
+            log.critical("the task that owns the link failed", exc_info=bug)
+            failure = lambda: ConnectionLostError(f"internal error: {bug!r}")  # noqa: E731
+        elif self._poller.failure is not None:
+            failure = self.link_lost
+        self._waiters.fail(failure or (lambda: NotStartedError("the hand was stopped")))
+        self._channels.end(failure)
+
+    # -- whether it can be asked -----------------------------------------------------------------------
+
+    def check_loop(self, what: str) -> None:
+        """Refuse a call from another thread or event loop.
+
+        Raises:
+            RuntimeError: it is one.
+        """
+        check_loop(self._loop, what)
+
+    def check_running(self) -> None:
+        """Refuse what needs a running hand.
+
+        Raises:
+            NotStartedError: it is over.
+            ConnectionLostError: the hand gave up on its link.
+        """
+        if self._is_over:
+            if self._poller.failure is not None:
+                raise self.link_lost()
+            raise NotStartedError("the hand is not started: use 'async with' or start()")
+        if self._loop.is_closed():
+            raise NotStartedError("the event loop that the hand ran in was closed: start() it again")
+
+    def check_connected(self) -> None:
+        """Refuse what needs the link.
+
+        Raises:
+            ConnectionLostError: the link is down.
+        """
+        if self.machine.state is State.DISCONNECTED:
+            raise self.link_lost()
+
+    def link_lost(self) -> RobotiqConnectionError:
+        """The error that tells that the link is down, and why if that is known."""
+        failure = self._poller.failure
+        error = ConnectionLostError(f"the link is down{'' if failure is None else f': {failure}'}")
+        error.__cause__ = failure
+        return error
+
+    # -- waiting ---------------------------------------------------------------------------------------
+
+    async def connected(self) -> None:
+        """Wait for the first status.
+
+        Raises:
+            RobotiqError: there was none.
+        """
+        await self._poller.connected
+
+    def waiter(self) -> asyncio.Future[Any]:
+        """What a caller waits with."""
+        return self._loop.create_future()
+
+    async def answered(self, ask: Callable[[Waiter[None]], None]) -> None:
+        """Ask for something and wait until it was acknowledged.
+
+        Raises:
+            RobotiqError: why it was not.
+        """
+        waiter = self.waiter()
+        ask(waiter)
+        await waiter
+
+    async def reach(
+        self,
+        states: Collection[State],
+        timeout: float | None,
+        *,
+        what: str,
+        ask: Callable[[], None] | None = None,
+        failing: Failing | None = None,
+    ) -> State:
+        """Ask for something and wait for a state.
+
+        Args:
+            states: what is waited for.
+            timeout: seconds; None for as long as it takes.
+            what: the sentence for a time-out.
+            ask: asks for it.
+            failing: states that mean it will not come.
+
+        Raises:
+            StateTimeoutError: not in time.
+            RobotiqError: refused, or it will not come.
+        """
+        with self._waiters.watching(states, failing or {}) as reached:
+            if ask is not None:
+                ask()
+            with anyio.move_on_after(timeout):
+                return await reached
+        raise StateTimeoutError(f"{what} within {timeout:g} s (now {self.machine.state.name})")
+
+    async def activated(self, ask: Callable[[], None] | None = None) -> None:
+        """Wait for the end of an activation; one that this hand began must not end in a fault.
+
+        Args:
+            ask: asks for it; None for what the start has begun.
+        """
+        if ask is None and self.machine.state not in SEQUENCES:
+            return
+        ours = ask is not None or self.controller.machine.is_busy
+        wanted = {State.RUNNING_IDLE, State.RUNNING_CC}
+        faulty = {State.FAULT, State.ATR_DONE}
+        failing: dict[State, Callable[[], RobotiqError]] = {
+            State.DISCONNECTED: self.link_lost,
+            State.RESET: lambda: NotActivatedError("the gripper was reset during the activation"),
+            State.DO_RESET: lambda: NotActivatedError("reset() or halt() took over"),
+        }
+        if ours:
+            failing |= dict.fromkeys(faulty, self._fault)
+        try:
+            await self.reach(
+                wanted if ours else wanted | faulty,
+                self._options.activation_timeout,
+                ask=ask,
+                failing=failing,
+                what="the activation was not finished",
+            )
+        except StateTimeoutError as error:
+            raise ActivationTimeoutError(str(error)) from None
+
+    async def next_status(self) -> None:
+        """Wait for the next status, which may tell more.
+
+        Raises:
+            RobotiqConnectionError: the link went down meanwhile.
+            NotStartedError: the hand was stopped.
+        """
+        stream = self._channels.statuses.open(1)
+        self._until_link_lost.add(stream)
+        try:
+            await anext(stream)
+        except StopAsyncIteration:
+            raise NotStartedError("the hand was stopped") from None
+        finally:
+            self._until_link_lost.remove(stream)
+
+    def _fault(self) -> GripperFaultError:
+        assert self.controller.status is not None, "a fault was read from a status"
+        return GripperFaultError(self.controller.status.fault)
+
+    def _on_transition(self, source: State, target: State, trigger: Trigger) -> None:
+        self._channels.transitions.push(Transition(source, target, trigger, now()))
+        self.counters.faults += target is State.FAULT
+        self._waiters.reached(target)
+        if target is State.DISCONNECTED:
+            for stream in self._until_link_lost:
+                stream.end(self.link_lost)
