@@ -12,6 +12,8 @@ from typing import Final
 from .control.motion import MoveResult
 from .enums import (
     AXES,
+    DEFAULT_FORCE,
+    DEFAULT_SPEED,
     FORCE_MAX,
     SPEED_MAX,
     WIDTH_NORMAL,
@@ -23,12 +25,9 @@ from .enums import (
     State,
 )
 from .errors import MoveSupersededError, NotStartedError
-from .hand import RobotiqHand
+from .protocol import Hand
 from .session.clock import now
 
-SPEED: Final = 128
-FORCE: Final = 64
-"""What the axes get until a person asks otherwise: those of :class:`RobotiqHand`."""
 ENDING: Final = frozenset({"halt", "reset", "release"})
 """Whoever asks for one of these wants no recovery to go on by itself."""
 
@@ -47,7 +46,7 @@ class Action:
 
     name: str
     what: str
-    run: Callable[[RobotiqHand], Awaitable[str]]
+    run: Callable[[Hand], Awaitable[str]]
     moves: bool = True
     warning: str = ""
 
@@ -61,7 +60,7 @@ class Operator:
         force: what the axes get, 0..255.
     """
 
-    def __init__(self, hand: RobotiqHand, *, speed: int = SPEED, force: int = FORCE) -> None:
+    def __init__(self, hand: Hand, *, speed: int = DEFAULT_SPEED, force: int = DEFAULT_FORCE) -> None:
         """Listen to what is written; asks for nothing.
 
         Args:
@@ -121,7 +120,7 @@ class Operator:
         """Move axes; gives how it ended, in words.
 
         Raises:
-            TypeError, ValueError, RobotiqError: as :meth:`RobotiqHand.move`.
+            TypeError, ValueError, RobotiqError: as :meth:`Hand.move`.
         """
         with self._counted():
             return in_words(await self.hand.move(position, fingers, speed=speed, force=force))
@@ -129,7 +128,7 @@ class Operator:
     async def leave(self) -> str:
         """Stop the hand, and the fingers only if this person has moved them; tells what became of them.
 
-        Ends as :meth:`RobotiqHand.stop` does.
+        Ends as :meth:`Hand.stop` does.
         """
         has_moved, rests = self.has_moved, self.hand.state in (State.RESET, State.ATR_DONE)
         began = now()
@@ -144,7 +143,7 @@ class Operator:
         """Set the speed of all axes, also of a motion under way; gives it in words.
 
         Raises:
-            TypeError, ValueError, RobotiqError: as :meth:`RobotiqHand.set_speed`.
+            TypeError, ValueError, RobotiqError: as :meth:`Hand.set_speed`.
         """
         await self.hand.set_speed(value)
         self.speed = value
@@ -154,7 +153,7 @@ class Operator:
         """Set the force of all axes; more tightens a grip. Gives it in words.
 
         Raises:
-            TypeError, ValueError, RobotiqError: as :meth:`RobotiqHand.set_force`.
+            TypeError, ValueError, RobotiqError: as :meth:`Hand.set_force`.
         """
         await self.hand.set_force(value)
         self.force = value
@@ -217,42 +216,42 @@ def in_words(result: MoveResult) -> str:
     return f"{', '.join(ends)}; {result.duration:.2f} s"
 
 
-async def _open(hand: RobotiqHand) -> str:
+async def _open(hand: Hand) -> str:
     return in_words(await hand.open())
 
 
-async def _close(hand: RobotiqHand) -> str:
+async def _close(hand: Hand) -> str:
     return in_words(await hand.close())
 
 
-def _width(position: int) -> Callable[[RobotiqHand], Awaitable[str]]:
-    async def run(hand: RobotiqHand) -> str:
+def _width(position: int) -> Callable[[Hand], Awaitable[str]]:
+    async def run(hand: Hand) -> str:
         return in_words(await hand.move(position, Finger.SCISSOR))
 
     return run
 
 
-async def _halt(hand: RobotiqHand) -> str:
+async def _halt(hand: Hand) -> str:
     await hand.halt()
     return "every axis stands still" + (": the gripper is reset" if hand.state is State.RESET else "")
 
 
-async def _activate(hand: RobotiqHand) -> str:
+async def _activate(hand: Hand) -> str:
     await hand.activate()
     return "the gripper is active"
 
 
-async def _reset(hand: RobotiqHand) -> str:
+async def _reset(hand: Hand) -> str:
     await hand.reset()
     return "the gripper is reset"
 
 
-async def _release(hand: RobotiqHand) -> str:
+async def _release(hand: Hand) -> str:
     await hand.atr()
     return "released; only a reset helps now"
 
 
-async def _recover(hand: RobotiqHand) -> str:
+async def _recover(hand: Hand) -> str:
     await hand.recover()
     return "the gripper is active"
 

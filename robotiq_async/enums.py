@@ -51,6 +51,18 @@ FORCE_MIN: Final = 0
 FORCE_MAX: Final = 255
 """Strongest: 60 N nominal (manual)."""
 
+DEFAULT_SPEED: Final = 128
+"""What the axes get until somebody asks otherwise."""
+DEFAULT_FORCE: Final = 64
+"""What the axes get until somebody asks otherwise."""
+
+OPEN_READING: Final = 6
+"""Position, in counts, that a fully open finger reads."""
+CLOSED_READING: Final = 241
+"""Position, in counts, that a fully closed finger reads (real ones read 240 or more)."""
+STROKE_COUNTS: Final = CLOSED_READING - OPEN_READING
+"""Counts between the two: a full closing."""
+
 
 class Mode(IntEnum):
     """rMOD / gMOD: the grasping mode of simple control; ignored while the scissor has its own registers."""

@@ -1,4 +1,4 @@
-"""Everything the library raises about a gripper or its link.
+"""Everything the library raises, bad arguments aside.
 
 ::
 
@@ -13,10 +13,16 @@
     |   +-- MoveTimeoutError (TimeoutError)     .status
     |   +-- MoveSupersededError                 another command took over an axis of this move
     +-- RobotiqConnectionError (ConnectionError)
-        +-- ConnectFailedError                  refused, unreachable, no such port; .address
-        +-- ConnectionLostError
-        +-- ResponseTimeoutError (TimeoutError)
-        +-- ProtocolError                       exception reply, wrong function, length or echo
+    |   +-- ConnectFailedError                  refused, unreachable, no such port; .address
+    |   +-- ConnectionLostError
+    |   +-- ResponseTimeoutError (TimeoutError)
+    |   +-- ProtocolError                       exception reply, wrong function, length or echo
+    +-- RecordingError                          a recording that cannot be written, or read
+    +-- ViewerError                             a viewer that cannot be served
+    +-- MeasuringError                          a measurement that went wrong
+
+The last three concern neither gripper nor link: the hand goes on. They stand here alone, and not among the
+names of the package.
 
 Bad arguments are plain ValueError and TypeError: they are the program's mistake, not the gripper's.
 """
@@ -33,7 +39,7 @@ if TYPE_CHECKING:
 
 
 class RobotiqError(Exception):
-    """Base of everything the library raises about a gripper or its link. Can be pickled and copied."""
+    """Base of everything the library raises, bad arguments aside. Can be pickled and copied."""
 
     def __reduce__(self) -> tuple[Callable[..., RobotiqError], tuple[object, ...], dict[str, object]]:
         """Restore message and attributes without the constructor, which asks for other arguments."""
@@ -138,3 +144,15 @@ class ResponseTimeoutError(RobotiqConnectionError, TimeoutError):
 
 class ProtocolError(RobotiqConnectionError):
     """A reply that is not the answer: an exception, a wrong function, length, echo or transaction."""
+
+
+class RecordingError(RobotiqError):
+    """A recording could not be written, or read."""
+
+
+class ViewerError(RobotiqError):
+    """A viewer could not be served."""
+
+
+class MeasuringError(RobotiqError):
+    """What was measured is not what was to be measured."""

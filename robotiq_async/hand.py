@@ -12,7 +12,7 @@ from .calibration import SpeedCalibration
 from .control.motion import Move, MoveResult
 from .control.state_machine import RUNNING, SEQUENCES, StateMachine
 from .control.triggers import Trigger
-from .enums import CLOSED, OPEN, Finger, Severity, State
+from .enums import CLOSED, DEFAULT_FORCE, DEFAULT_SPEED, OPEN, Finger, Severity, State
 from .errors import (
     ConnectionLostError,
     InvalidStateError,
@@ -69,8 +69,8 @@ class RobotiqHand:
         response_timeout: float = RESPONSE_TIMEOUT_S,
         activation_timeout: float = ACTIVATION_TIMEOUT_S,
         reconnect: bool | ReconnectPolicy = True,
-        speed: int = 128,
-        force: int = 64,
+        speed: int = DEFAULT_SPEED,
+        force: int = DEFAULT_FORCE,
         request_address: int | None = None,
         status_address: int | None = None,
         calibration: SpeedCalibration | None = None,

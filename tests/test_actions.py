@@ -21,7 +21,8 @@ from robotiq_async import (
     RobotiqHand,
     State,
 )
-from robotiq_async.actions import ACTIONS, FORCE, SPEED, Operator
+from robotiq_async.actions import ACTIONS, Operator
+from robotiq_async.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
 
@@ -74,12 +75,13 @@ async def test_speed_and_force_stay_in_range(operator: Operator) -> None:
 async def test_what_is_refused_changes_nothing(operator: Operator) -> None:
     with pytest.raises(NotActivatedError):
         await operator.change_speed(16)
-    assert operator.speed == SPEED
+    assert operator.speed == DEFAULT_SPEED
 
 
 def test_they_begin_where_the_hand_begins() -> None:
-    defaults = inspect.signature(RobotiqHand).parameters
-    assert (defaults["speed"].default, defaults["force"].default) == (SPEED, FORCE)
+    for either in (RobotiqHand, Operator):
+        defaults = inspect.signature(either).parameters
+        assert (defaults["speed"].default, defaults["force"].default) == (DEFAULT_SPEED, DEFAULT_FORCE)
 
 
 def test_what_is_dangerous_is_warned_about() -> None:
@@ -220,13 +222,13 @@ async def test_it_keeps_nothing_of_what_others_write(new: Someone) -> None:
     operator, _ = new
     for position in (10, 20, 30):
         await operator.hand.set_position(position)
-    assert len(operator._requests._items) == 1
+    assert len(list(operator._requests.drain())) == 1
 
 
 async def test_steps_of_the_speed_add_up(new: Someone) -> None:
     operator, _ = new
     await asyncio.gather(*(operator.change_speed(16) for _ in range(3)))
-    assert operator.speed == SPEED + 48
+    assert operator.speed == DEFAULT_SPEED + 48
 
 
 async def test_a_recovery_does_not_go_on_after_a_halt_or_a_reset(

@@ -26,8 +26,12 @@ TREE: dict[str, tuple[str, ...]] = {
     "ConnectionLostError": ("RobotiqConnectionError",),
     "ResponseTimeoutError": ("RobotiqConnectionError", "TimeoutError"),
     "ProtocolError": ("RobotiqConnectionError",),
+    # Around a hand; not among the names of the package.
+    "RecordingError": ("RobotiqError",),
+    "ViewerError": ("RobotiqError",),
+    "MeasuringError": ("RobotiqError",),
 }
-"""The contract's tree: each error with its bases."""
+"""The contract's tree, and what has been added: each error with its bases."""
 
 
 def classes() -> dict[str, type[BaseException]]:

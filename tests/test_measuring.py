@@ -12,10 +12,10 @@ import pytest
 from robotiq_async import Finger, RobotiqHand
 from robotiq_async.calibration.closing_time import closing_time
 from robotiq_async.calibration.csv_tables import FORCE, SPEED, TableError, read_table, thesis_table
+from robotiq_async.errors import MeasuringError
 from robotiq_async.measure.campaigns import (
     GRASP_S,
     Campaign,
-    MeasuringError,
     force_campaign,
     force_values,
     grasp,

@@ -89,7 +89,7 @@ async def test_several_hands_are_told_apart(hand: RobotiqHand) -> None:
 
 
 async def test_wrong_arguments(hand: RobotiqHand) -> None:
-    with pytest.raises(ValueError, match="at least one RobotiqHand"):
+    with pytest.raises(ValueError, match="at least one hand"):
         async with serve_metrics():
             pass
     with pytest.raises(ValueError, match=r"port must be in 0\.\.65535"):

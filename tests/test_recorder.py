@@ -20,10 +20,11 @@ from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from robotiq_async import ConnectionLostError, Finger, RobotiqHand, RobotiqStatus, State
+from robotiq_async.errors import RecordingError
 from robotiq_async.kinematics import JOINTS, joint_angles
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.telemetry.joint_states import SCHEMA, SCHEMA_NAME, JointStateEncoder
-from robotiq_async.telemetry.recorder import Recorder, RecordingError
+from robotiq_async.telemetry.recorder import Recorder
 from robotiq_async.telemetry.recordings import read_recording, recover
 
 ROOT = Path(__file__).parents[1]

@@ -14,11 +14,12 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Final
 
+from ..enums import CLOSED_READING, OPEN_READING, STROKE_COUNTS
 from ..wire.checks import check_byte, check_number
-from .closing_time import CLOSED_READING, OPEN_READING, STROKE_COUNTS
 from .csv_tables import FORCE, SPEED, Layout, Table, TableError, read_table, thesis_table
 
 STROKE_MM: Final = 155.0
@@ -101,8 +102,9 @@ class SpeedCalibration:
         return cls("nominal (manual)", tuple(points))
 
     @classmethod
+    @cache
     def thesis(cls) -> SpeedCalibration:
-        """The thesis's table A1.1: the mean of three runs for every fourth value."""
+        """The thesis's table A1.1: the mean of three runs for every fourth value. Read from its file once."""
         return cls.from_table("thesis, table A1.1", thesis_table("closing_time_ms", SPEED))
 
     @classmethod

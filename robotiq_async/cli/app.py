@@ -9,7 +9,8 @@ from cyclopts import App
 from .. import __version__
 from .commands.demo import demo
 from .commands.doctor import doctor
-from .commands.measure import measure_app
+from .commands.measure_force import force as measure_force
+from .commands.measure_speed import speed as measure_speed
 from .commands.monitor import monitor
 from .commands.move import move
 from .commands.record import plot, record, recover, replay
@@ -37,5 +38,17 @@ def build() -> App:
     app = App(name="robotiq-async", help=_HELP, help_format="plaintext", version=__version__)
     for command in COMMANDS:
         app.command(command)
-    app.command(measure_app())
+    app.command(_measure())
+    return app
+
+
+def _measure() -> App:
+    """The sub-command that has sub-commands of its own."""
+    app = App(
+        name="measure",
+        help="Measure what the values 0..255 mean on your own gripper. THE FINGERS MOVE.",
+        help_format="plaintext",
+    )
+    app.command(measure_speed)
+    app.command(measure_force)
     return app

@@ -4,30 +4,36 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from typing import TYPE_CHECKING
 
+from ..actions import Operator
+from ..enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ..hand import RobotiqHand
+from ..protocol import Hand
+from ..session.options import POLL_INTERVAL_S
 from .arguments import USUAL, Link
 from .failures import usage
 
-if TYPE_CHECKING:
-    from .. import RobotiqHand
-    from ..actions import Operator
 
-
-def make_hand(address: str, link: Link = USUAL, *, speed: int = 128, force: int = 64) -> RobotiqHand:
-    """A hand that is not started.
+def make_hand(
+    address: str,
+    link: Link = USUAL,
+    *,
+    poll_interval: float = POLL_INTERVAL_S,
+    speed: int = DEFAULT_SPEED,
+    force: int = DEFAULT_FORCE,
+) -> Hand:
+    """A hand that is not started. No other place in the command line knows what kind of hand it is.
 
     Raises:
         UsageError: a malformed address.
     """
-    from .. import RobotiqHand
-
     with usage():
         return RobotiqHand(
             address,
             device_id=link.device_id,
             request_address=link.request_address,
             status_address=link.status_address,
+            poll_interval=poll_interval,
             speed=speed,
             force=force,
         )
@@ -39,14 +45,12 @@ def make_operator(address: str, link: Link, *, speed: int, force: int) -> Operat
     Raises:
         UsageError: a malformed address.
     """
-    from ..actions import Operator
-
     hand = make_hand(address, link, speed=speed, force=force)
     return Operator(hand, speed=speed, force=force)
 
 
 @asynccontextmanager
-async def connected(address: str, link: Link = USUAL, *, halt: bool) -> AsyncIterator[RobotiqHand]:
+async def connected(address: str, link: Link = USUAL, *, halt: bool) -> AsyncIterator[Hand]:
     """A hand that has been read and not yet written to.
 
     Args:

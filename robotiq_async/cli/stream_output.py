@@ -21,7 +21,7 @@ from .log_capture import told
 from .text import clock, event_line, status_line
 
 if TYPE_CHECKING:
-    from .. import RobotiqHand
+    from ..protocol import Hand
 
 BUFFER: Final = 4000
 """Statuses kept for a reader that is slow: twenty seconds."""
@@ -32,7 +32,7 @@ EVENTS: Final = ("transition", "fault", "remark")
 Form = Callable[[list[Fields]], list[str]]
 
 
-async def print_objects(hand: RobotiqHand, buffer: int = BUFFER) -> None:
+async def print_objects(hand: Hand, buffer: int = BUFFER) -> None:
     """Every status, transition and fault as a JSON object a line, until the hand ends; ``kind`` tells which.
 
     ``time`` is in seconds since 1970. A reader that is slow loses the oldest statuses; an object of the kind
@@ -41,7 +41,7 @@ async def print_objects(hand: RobotiqHand, buffer: int = BUFFER) -> None:
     await _print(_Story(hand, buffer), lambda told: [compact(each).decode() for each in told], JSON_BEAT_S)
 
 
-async def watch(hand: RobotiqHand) -> None:
+async def watch(hand: Hand) -> None:
     """The state now; then every transition and fault, and the newest status if it shows something new."""
     await in_a_thread(lambda: _write(f"{clock(time.time())} state    {hand.state.name}\n".encode()))
     await _print(_Story(hand, BUFFER), _Words(), WATCH_BEAT_S)
@@ -69,7 +69,7 @@ def _write(data: bytes) -> None:
 class _Story:
     """What happens to a hand, in the order in which it happened."""
 
-    def __init__(self, hand: RobotiqHand, buffer: int) -> None:
+    def __init__(self, hand: Hand, buffer: int) -> None:
         self._hand = hand
         self._remarks: deque[tuple[float, str]] = deque(maxlen=BUFFER)
         self._statuses = hand.statuses(buffer)

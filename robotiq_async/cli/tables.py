@@ -12,10 +12,11 @@ from rich.table import Table
 from ..enums import AXES, Fault, Finger, ObjectStatus
 
 if TYPE_CHECKING:
-    from .. import MoveResult, RobotiqHand, RobotiqStatus
+    from .. import MoveResult, RobotiqStatus
+    from ..protocol import Hand
 
 
-def print_status(hand: RobotiqHand) -> None:
+def print_status(hand: Hand) -> None:
     """State and fault in a line each, then a row for every axis."""
     last = hand.status
     print(f"{hand.state.name}: {_activation(last)}, {'moving' if last.is_moving else 'not moving'}")

@@ -6,8 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from ..calibration.closing_time import STROKE_COUNTS, closing_time
-from ..enums import AXES, Finger, ObjectStatus
+from ..enums import AXES, STROKE_COUNTS, Finger, ObjectStatus
 from ..errors import ConnectionLostError, RobotiqError
 from ..values import FrozenMapping
 from ..wire.status import RobotiqStatus
@@ -165,12 +164,19 @@ def default_timeout(
     axes: Finger,
     status: RobotiqStatus,
     speeds: Mapping[Finger, int],
-    closing_time: Callable[[int], float] = closing_time,
+    closing_time: Callable[[int], float],
 ) -> float:
     """Seconds a move may take: twice the expected time plus 2 s.
 
-    The expected time is that of the slowest addressed axis, from the distance in counts and the closing
-    times of the thesis (table A1.1). The scissor has no published figure and is taken for a finger.
+    The expected time is that of the slowest addressed axis. The scissor has no published figure and is
+    taken for a finger.
+
+    Args:
+        position: target in counts.
+        axes: the addressed axes.
+        status: where they are.
+        speeds: of every axis.
+        closing_time: seconds of a full closing at a speed.
     """
     expected = max(
         abs(position - status.position(axis)) / STROKE_COUNTS * closing_time(speeds[axis])

@@ -28,7 +28,8 @@ from ..calibration.csv_tables import (
     write_table,
 )
 from ..enums import Finger
-from ..hand import RobotiqHand
+from ..errors import MeasuringError
+from ..protocol import Hand
 from ..session.clock import now
 
 REST_S: Final = 0.3
@@ -53,10 +54,6 @@ Currents = dict[int, list[list[Sample]]]
 """For each force value the samples of each run."""
 
 
-class MeasuringError(RuntimeError):
-    """What was measured is not what was to be measured."""
-
-
 # -- what is measured, in which order ----------------------------------------------------------------------
 
 
@@ -74,7 +71,7 @@ def force_values(step: int = 25) -> list[int]:
 # -- speed -------------------------------------------------------------------------------------------------
 
 
-async def time_closing(hand: RobotiqHand, speed: int, fingers: Finger, speedup: float = 1.0) -> float:
+async def time_closing(hand: Hand, speed: int, fingers: Finger, speedup: float = 1.0) -> float:
     """Open fully and at full speed, then close at a speed: seconds from the command until nothing moves.
 
     A run in which the event loop was held up is measured again. When cancelled, the fingers stop.
@@ -88,7 +85,7 @@ async def time_closing(hand: RobotiqHand, speed: int, fingers: Finger, speedup: 
     Raises:
         ValueError: the scissor is among the fingers.
         MeasuringError: the fingers met something, did not go the whole way, or the loop is too busy.
-        RobotiqError: as :meth:`RobotiqHand.move`.
+        RobotiqError: as :meth:`Hand.move`.
     """
     if Finger.SCISSOR in fingers:
         raise ValueError("fingers must be of A, B and C, got the scissor: its stroke is another")
@@ -120,7 +117,7 @@ def expected_seconds(speed: int) -> float:
 # -- force -------------------------------------------------------------------------------------------------
 
 
-async def grasp(hand: RobotiqHand, force: int, speed: int, speedup: float = 1.0) -> list[Sample]:
+async def grasp(hand: Hand, force: int, speed: int, speedup: float = 1.0) -> list[Sample]:
     """Open, then close on what lies between the fingers: the currents from the command on.
 
     The fingers stay closed, for the scale to be read. When cancelled, they stop.
@@ -133,7 +130,7 @@ async def grasp(hand: RobotiqHand, force: int, speed: int, speedup: float = 1.0)
 
     Raises:
         MeasuringError: the fingers met nothing.
-        RobotiqError: as :meth:`RobotiqHand.move`.
+        RobotiqError: as :meth:`Hand.move`.
     """
     opened = await hand.open(speed=255)
     if opened.object_detected:
@@ -151,12 +148,13 @@ async def grasp(hand: RobotiqHand, force: int, speed: int, speedup: float = 1.0)
 
 @contextlib.contextmanager
 def _watching(
-    hand: RobotiqHand, take: Callable[[int, int, int, int], None], began: float, speedup: float
+    hand: Hand, take: Callable[[int, int, int, int], None], began: float, speedup: float
 ) -> Iterator[None]:
     """Hand on every poll of a block."""
+    statuses = hand.statuses(buffer=10_000)
 
     async def watch() -> None:
-        async for status in hand.statuses(buffer=10_000):
+        async for status in statuses:
             time = max(0, round(1000 * (status.timestamp - began) * speedup))
             a, b, c = (status.current_ma(finger) for finger in FINGERS)
             take(time, a, b, c)

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
-from ..calibration.closing_time import closing_time
 from ..calibration.scales import SpeedCalibration
 from ..link.address import parse_address
 from ..link.guard import GuardedTransport
@@ -119,7 +118,7 @@ def check_options(
 
 def _check_calibration(calibration: object) -> Callable[[int], float]:
     if calibration is None:
-        return closing_time
+        return SpeedCalibration.thesis().closing_time
     if not isinstance(calibration, SpeedCalibration):
         raise TypeError(f"calibration must be None or a SpeedCalibration, got {calibration!r}")
     first, last = calibration.points[0][0], calibration.points[-1][0]

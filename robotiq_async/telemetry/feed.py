@@ -15,11 +15,11 @@ from typing import Any, Final
 
 from ..enums import Fault
 from ..errors import RobotiqConnectionError
-from ..hand import RobotiqHand
 from ..kinematics import joint_angles, joint_velocities
 from ..log import log
+from ..protocol import Hand, HandStream
 from ..session.clock import now
-from ..session.streams import SentRequest, Stream, Transition
+from ..session.streams import SentRequest, Transition
 from ..wire.status import RobotiqStatus
 from .joint_states import SCHEMA, SCHEMA_NAME, JointStateEncoder
 from .payloads import (
@@ -97,10 +97,10 @@ class Message:
 class _Source:
     """A stream of a hand that is opened again when it ends."""
 
-    def __init__(self, stream: Callable[[], Stream[Any]], take: Callable[[Any], None]) -> None:
+    def __init__(self, stream: Callable[[], HandStream[Any]], take: Callable[[Any], None]) -> None:
         self._make = stream
         self._take = take
-        self._stream: Stream[Any]
+        self._stream: HandStream[Any]
         self._missed_before = 0
 
     @property
@@ -128,7 +128,7 @@ class _Source:
 class Feed:
     """Turns what happens to a hand into messages. It only listens, also over stops and starts of the hand."""
 
-    def __init__(self, hand: RobotiqHand, take: Callable[[Message], None]) -> None:
+    def __init__(self, hand: Hand, take: Callable[[Message], None]) -> None:
         """Prepare.
 
         Args:

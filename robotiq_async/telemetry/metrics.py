@@ -4,7 +4,7 @@
         ...
 
 The figures are taken when somebody asks for them and cost nothing in between. They count from the hand's last
-start, as :attr:`RobotiqHand.statistics` does; Prometheus knows such resets.
+start, as :attr:`Hand.statistics` does; Prometheus knows such resets.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ except ModuleNotFoundError as error:
     raise ImportError("metrics need prometheus-client: pip install 'robotiq-async[metrics]'") from error
 
 from ..enums import State
-from ..hand import RobotiqHand
+from ..protocol import Hand
 from ..session.statistics import Statistics
 from ..wire.checks import check_int
 
@@ -50,7 +50,7 @@ _GAUGES: Final = {
 class HandCollector(Collector):
     """Gives a hand's figures to a registry of yours."""
 
-    def __init__(self, hands: Iterable[RobotiqHand]) -> None:
+    def __init__(self, hands: Iterable[Hand]) -> None:
         """Must be made in the event loop that the hands run in.
 
         Args:
@@ -93,7 +93,7 @@ class HandCollector(Collector):
 
 @contextlib.asynccontextmanager
 async def serve_metrics(
-    *hands: RobotiqHand, port: int = 9100, host: str = LOOPBACK
+    *hands: Hand, port: int = 9100, host: str = LOOPBACK
 ) -> AsyncIterator[tuple[str, int]]:
     """Serve the figures of hands over HTTP while the block runs; gives host and port.
 
@@ -109,7 +109,7 @@ async def serve_metrics(
         OSError: the port is taken.
     """
     if not hands:
-        raise ValueError("hands must name at least one RobotiqHand, got none")
+        raise ValueError("hands must name at least one hand, got none")
     check_int("port", port, 0, 65535)
     registry = CollectorRegistry()
     registry.register(HandCollector(hands))

@@ -7,8 +7,8 @@ from typing import Any, Final
 
 from ..enums import AXES, Finger, State
 from ..errors import NotStartedError
-from ..hand import RobotiqHand
 from ..kinematics import PREFIX
+from ..protocol import Hand
 from ..session.streams import SentRequest, Transition
 from ..wire.status import RobotiqStatus
 
@@ -157,7 +157,7 @@ def fault_fields(status: RobotiqStatus) -> Fields:
     }
 
 
-def state_fields(hand: RobotiqHand, now: float) -> Fields:
+def state_fields(hand: Hand, now: float) -> Fields:
     """State and figures of a hand; fault and age of the last status only while these are known.
 
     Args:

@@ -30,8 +30,8 @@ except ModuleNotFoundError as error:
     raise ImportError("recordings need mcap: pip install 'robotiq-async[record]'") from error
 
 from ..concurrency import in_a_thread, wait_shielded
-from ..errors import RobotiqError
-from ..hand import RobotiqHand
+from ..errors import RecordingError
+from ..protocol import Hand
 from ..version import __version__
 from .feed import JOINTS, TOPICS, Feed, Message, Topic
 
@@ -39,10 +39,6 @@ FLUSH_S: Final = 0.5
 """Between two writes to the disk."""
 DISK_S: Final = 10.0
 """What a disk may take for the last of it."""
-
-
-class RecordingError(RobotiqError):
-    """A recording could not be written, or read."""
 
 
 class _Outbox:
@@ -76,7 +72,7 @@ class Recorder:
         recorded: polls in it so far.
     """
 
-    def __init__(self, hand: RobotiqHand, path: Path | str, *, ros2: bool = False) -> None:
+    def __init__(self, hand: Hand, path: Path | str, *, ros2: bool = False) -> None:
         """Prepare; opens nothing.
 
         Args:

@@ -23,7 +23,7 @@ try:
 except ModuleNotFoundError as error:
     raise ImportError("recordings need mcap: pip install 'robotiq-async[record]'") from error
 
-from .recorder import RecordingError
+from ..errors import RecordingError
 
 LARGEST: Final = 16 * 2**20
 """Bytes of a record, and of an unpacked chunk; the writers of MCAP make chunks of a sixteenth of it."""

@@ -32,8 +32,8 @@ except ModuleNotFoundError as error:
 from ..actions import Operator
 from ..concurrency import in_a_thread, wait_shielded
 from ..enums import State
-from ..errors import RobotiqError
-from ..hand import RobotiqHand
+from ..errors import ViewerError
+from ..protocol import Hand
 from ..session.clock import now
 from ..wire.checks import check_int
 from .feed import EVENT, TOPICS, Feed, Message, Topic, compact, json_topic
@@ -58,10 +58,6 @@ HALT: Final = "/gripper/halt"
 """The call that always finds a place."""
 
 
-class ViewerError(RobotiqError):
-    """A viewer could not be served."""
-
-
 class Viewer:
     """Serves a hand to viewers while a block runs.
 
@@ -72,7 +68,7 @@ class Viewer:
 
     def __init__(
         self,
-        hand: RobotiqHand,
+        hand: Hand,
         *,
         host: str = LOOPBACK,
         port: int = PORT,

@@ -19,7 +19,7 @@ from robotiq_async.cli.arguments import is_loopback
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.telemetry.services import SERVICES
 from tests.cli.conftest import WITHOUT
-from tests.test_viewer import Client
+from tests.foxglove_client import Client
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Shell

@@ -1,4 +1,4 @@
-"""``robotiq-async measure``: what two kinds of measurements have in common."""
+"""What ``robotiq-async measure speed`` and ``measure force`` have in common."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ from contextlib import asynccontextmanager, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import App, Parameter
+from cyclopts import Parameter
 
+from ...errors import MeasuringError
 from ...link.address import parse_address
 from ..arguments import need
 from ..consent import read_line
 from ..failures import CommandError, UsageError, usage
 
 if TYPE_CHECKING:
-    from ... import RobotiqHand
     from ...measure.campaigns import Campaign
+    from ...protocol import Hand
     from ...simulator import SimulatedGripper
 
 SPEEDUP = 15.0
@@ -30,21 +31,6 @@ POLL_S = 0.001
 Runs = Annotated[int, Parameter(metavar="N")]
 Speedup = Annotated[float | None, Parameter(metavar="FACTOR")]
 NoPlot = Annotated[bool, Parameter(name="--no-plot", negative=())]
-
-
-def measure_app() -> App:
-    """The sub-command and its two."""
-    from .measure_force import force
-    from .measure_speed import speed
-
-    app = App(
-        name="measure",
-        help="Measure what the values 0..255 mean on your own gripper. THE FINGERS MOVE.",
-        help_format="plaintext",
-    )
-    app.command(speed)
-    app.command(force)
-    return app
 
 
 def check(address: str, output: Path, speedup: float | None, runs: int, step: int, plot: bool) -> float:
@@ -76,16 +62,16 @@ def check(address: str, output: Path, speedup: float | None, runs: int, step: in
 @asynccontextmanager
 async def gripper(
     address: str, speedup: float, prepare: Callable[[SimulatedGripper], None] = lambda _: None
-) -> AsyncIterator[RobotiqHand]:
+) -> AsyncIterator[Hand]:
     """An active hand; that of sim:// in a simulated gripper's own, faster time.
 
     Raises:
         RobotiqError: no gripper there, or it cannot be activated.
     """
-    from ... import RobotiqHand
+    from ..connect import make_hand
 
     if not address.startswith("sim:"):
-        async with RobotiqHand(address) as hand:
+        async with make_hand(address) as hand:
             yield hand
         return
     from ...simulator import SimulatedGripper, SimulatorServer
@@ -94,7 +80,7 @@ async def gripper(
     interval = POLL_S if speedup > 1 else 5 * POLL_S
     async with (
         SimulatorServer(simulated) as server,
-        RobotiqHand(server.address, poll_interval=interval) as hand,
+        make_hand(server.address, poll_interval=interval) as hand,
     ):
         prepare(simulated)
         yield hand
@@ -124,7 +110,6 @@ async def carry_out(
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     from ...calibration.csv_tables import TableError
-    from ...measure.campaigns import MeasuringError
 
     done, left = len(campaign.table), campaign.left
     if done and left:

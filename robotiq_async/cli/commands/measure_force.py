@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
+from ...enums import DEFAULT_SPEED
 from ...link.address import parse_address
 from ..arguments import Address, Byte, Yes
 from ..consent import consent
@@ -35,7 +36,7 @@ def force(
     scale: Annotated[Path | None, Parameter(metavar="FILE.csv")] = None,
     step: Annotated[int, Parameter(metavar="N")] = 25,
     runs: Runs = 3,
-    speed: Byte = 128,
+    speed: Byte = DEFAULT_SPEED,
     speedup: Speedup = None,
     no_plot: NoPlot = False,
     yes: Yes = False,

@@ -9,6 +9,7 @@ from typing import Annotated, Final
 
 from cyclopts import Parameter
 
+from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..arguments import USUAL, Address, Byte, Link, need
 from ..consent import forget_keys
 from ..failures import CommandError, UsageError
@@ -24,8 +25,8 @@ async def monitor(
     *,
     watch: Annotated[bool, Parameter(negative=())] = False,
     as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
-    speed: Byte = 128,
-    force: Byte = 64,
+    speed: Byte = DEFAULT_SPEED,
+    force: Byte = DEFAULT_FORCE,
     link: Link = USUAL,
 ) -> None:
     """Show a gripper while it works, and move it by keys. Nothing moves until a key is pressed.

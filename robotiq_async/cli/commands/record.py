@@ -18,7 +18,7 @@ from ..failures import CommandError, UsageError
 from ..text import IN_WORDS, clock
 
 if TYPE_CHECKING:
-    from ...hand import RobotiqHand
+    from ...protocol import Hand
     from ...telemetry.recorder import Recorder
     from ...telemetry.recordings import Entry
 
@@ -77,7 +77,7 @@ async def record(
         pass  # Being told to stop is how this command ends well.
 
 
-def _tell_figures(recorder: Recorder, hand: RobotiqHand) -> None:
+def _tell_figures(recorder: Recorder, hand: Hand) -> None:
     # What was not polled is not in the file and not missed either: the polling tells of it.
     figures = f"{recorder.missed} lost, {hand.statistics.overruns} not polled in time, {recorder.size} bytes"
     print(f"\n{recorder.recorded} polls, {figures}", flush=True)

@@ -11,7 +11,7 @@ from ...enums import AXES
 from ..arguments import USUAL, Address, Link
 
 if TYPE_CHECKING:
-    from ... import RobotiqHand
+    from ...protocol import Hand
 
 
 async def status(
@@ -41,7 +41,7 @@ async def status(
             print_status(hand)
 
 
-def as_dict(hand: RobotiqHand) -> dict[str, object]:
+def as_dict(hand: Hand) -> dict[str, object]:
     """The hand's state and its last status, in types that JSON knows."""
     last = hand.status
     return {

@@ -10,6 +10,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...telemetry.payloads import printable
 from ..arguments import USUAL, Address, Byte, Link, Port, is_loopback, need
 from ..failures import CommandError
@@ -23,8 +24,8 @@ async def view(
     host: str = "127.0.0.1",
     read_only: Annotated[bool, Parameter(negative=())] = False,
     layout: Annotated[Path | None, Parameter(metavar="FILE")] = None,
-    speed: Byte = 128,
-    force: Byte = 64,
+    speed: Byte = DEFAULT_SPEED,
+    force: Byte = DEFAULT_FORCE,
     link: Link = USUAL,
 ) -> None:
     """Show a gripper in Foxglove or Lichtblick, and let buttons there move it, until Ctrl-C.

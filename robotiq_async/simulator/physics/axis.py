@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from robotiq_async.calibration.closing_time import STROKE_COUNTS, closing_time
-from robotiq_async.enums import ObjectStatus
+from robotiq_async.calibration.closing_time import closing_time
+from robotiq_async.enums import STROKE_COUNTS, ObjectStatus
 
 from .motor import Motor, peak
 

@@ -7,8 +7,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from robotiq_async.calibration.closing_time import OPEN_READING
-from robotiq_async.enums import CLOSED, OPEN, SPEED_MAX, SPEED_MIN, WIDTH_WIDE, Mode
+from robotiq_async.enums import (
+    CLOSED,
+    OPEN,
+    OPEN_READING,
+    SPEED_MAX,
+    SPEED_MIN,
+    WIDTH_WIDE,
+    Mode,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

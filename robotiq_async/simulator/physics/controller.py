@@ -9,8 +9,16 @@ from __future__ import annotations
 from collections import deque
 from typing import Final
 
-from robotiq_async.calibration.closing_time import CLOSED_READING, OPEN_READING
-from robotiq_async.enums import AXES, Fault, Finger, Initialization, Mode, ObjectStatus
+from robotiq_async.enums import (
+    AXES,
+    CLOSED_READING,
+    OPEN_READING,
+    Fault,
+    Finger,
+    Initialization,
+    Mode,
+    ObjectStatus,
+)
 from robotiq_async.wire import registers as reg
 from robotiq_async.wire.request import Request
 

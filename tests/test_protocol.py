@@ -1,0 +1,204 @@
+"""Hand: who satisfies it, and that what stands around a hand needs nothing else."""
+
+from __future__ import annotations
+
+import ast
+import asyncio
+import inspect
+import json
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+from textual.widgets import RichLog, Static
+
+import robotiq_async
+from robotiq_async import Fault, Finger, InvalidStateError, RobotiqHand, RobotiqStatus, State, Stream
+from robotiq_async.actions import ACTIONS, Operator
+from robotiq_async.cli.commands.status import as_dict
+from robotiq_async.cli.stream_output import print_objects
+from robotiq_async.cli.tables import print_outcomes, print_status
+from robotiq_async.cli.tui.screen import Monitor
+from robotiq_async.errors import MeasuringError
+from robotiq_async.measure.campaigns import grasp, time_closing
+from robotiq_async.protocol import Hand, HandStream
+from robotiq_async.telemetry.metrics import serve_metrics
+from robotiq_async.telemetry.recorder import Recorder
+from robotiq_async.telemetry.recordings import read_recording
+from tests.fake_hand import FakeHand, FakeStream
+
+ROOT = Path(robotiq_async.__file__).parent
+AROUND = [
+    path
+    for room in ("actions.py", "telemetry", "measure", "cli")
+    for path in sorted((ROOT / room).rglob("*.py") if (ROOT / room).is_dir() else [ROOT / room])
+]
+"""What stands around a hand."""
+
+
+# -- who satisfies it --------------------------------------------------------------------------------------
+
+
+async def test_both_are_hands() -> None:
+    """The assignments are what mypy checks."""
+    real: Hand = RobotiqHand()
+    fake: Hand = FakeHand()
+    streams: list[HandStream[RobotiqStatus]] = [real.statuses(), fake.statuses()]
+    assert [type(stream) for stream in streams] == [Stream, FakeStream]
+
+
+def members(kind: type) -> dict[str, object]:
+    names = {"__aenter__", "__aexit__"}
+    return {name: each for name, each in vars(kind).items() if name in names or not name.startswith("_")}
+
+
+def test_what_is_public_at_a_hand_is_in_the_protocol() -> None:
+    assert members(RobotiqHand).keys() == members(Hand).keys()
+
+
+@pytest.mark.parametrize("name", sorted(name for name, each in members(Hand).items() if callable(each)))
+def test_parameters_and_defaults_are_those_of_the_protocol(name: str) -> None:
+    """Of defaults mypy compares only whether there is one."""
+    promised, given = (inspect.signature(getattr(kind, name)) for kind in (Hand, RobotiqHand))
+    assert [(each.name, each.kind, each.default) for each in promised.parameters.values()] == [
+        (each.name, each.kind, each.default) for each in given.parameters.values()
+    ]
+
+
+@pytest.mark.parametrize("kind", [Hand, HandStream], ids=lambda kind: kind.__name__)
+def test_every_promise_is_described(kind: type) -> None:
+    for name, each in members(kind).items():
+        assert inspect.getdoc(each), name
+
+
+# -- nothing looks further ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", AROUND, ids=lambda path: str(path.relative_to(ROOT)))
+def test_what_stands_around_a_hand_does_not_know_which_one(path: Path) -> None:
+    """But for the one function that makes a hand from an address."""
+    names = {
+        name
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for name in (
+            [node.id]
+            if isinstance(node, ast.Name)
+            else [alias.name for alias in node.names]
+            if isinstance(node, ast.Import | ast.ImportFrom)
+            else []
+        )
+    }
+    assert ("RobotiqHand" in names) == (path == ROOT / "cli" / "connect.py")
+
+
+# -- and needs nothing else --------------------------------------------------------------------------------
+
+
+@pytest.fixture
+async def hand() -> AsyncIterator[FakeHand]:
+    async with FakeHand() as hand:
+        yield hand
+
+
+async def test_actions(hand: FakeHand) -> None:
+    operator = Operator(hand)
+    hand.obstacle = 150
+    assert await operator.act(ACTIONS["wide"]) == "SCISSOR at 6; 0.00 s"
+    assert (await operator.act(ACTIONS["close"])).startswith("A CONTACT_CLOSING at 150, B ")
+    assert await operator.change_speed(16) == "144"
+    assert await operator.act(ACTIONS["halt"]) == "every axis stands still"
+    with pytest.raises(InvalidStateError):
+        await operator.act(ACTIONS["release"])
+    hand.fail(Fault.SCISSOR_BLOCKED)
+    assert await operator.act(ACTIONS["release"]) == "released; only a reset helps now"
+    assert await operator.act(ACTIONS["recover"]) == "the gripper is active"
+    assert await operator.act(ACTIONS["reset"]) == "the gripper is reset"
+    assert await operator.act(ACTIONS["activate"]) == "the gripper is active"
+    assert operator.has_moved
+    assert "were stopped" in await operator.leave()
+
+
+async def test_whoever_has_only_looked_leaves_the_fingers_alone(hand: FakeHand) -> None:
+    assert "left as they are" in await Operator(hand).leave()
+    assert hand.status.go_echo
+
+
+async def test_a_recording(tmp_path: Path) -> None:
+    hand = FakeHand()
+    async with Recorder(hand, tmp_path / "it.mcap") as recorder, hand:
+        await hand.set_force(200, Finger.B)
+        hand.fail(Fault.SCISSOR_BLOCKED)
+    entries = list(read_recording(tmp_path / "it.mcap"))
+    polls = [entry.sequence for entry in entries if entry.topic == "/gripper/status"]
+    assert polls == list(range(hand.statistics.polls))
+    assert (recorder.recorded, recorder.missed) == (len(polls), 0)
+    commands = [entry.fields for entry in entries if entry.topic == "/gripper/command"]
+    assert commands[0]["B"]["force"] == 200
+    events = [entry.fields for entry in entries if entry.topic == "/gripper/event"]
+    assert events[0] | {"monotonic": 0} == {"kind": "state", "target": "DISCONNECTED", "monotonic": 0}
+    assert [event["code"] for event in events if event["kind"] == "fault"] == [14]
+    assert events[-1]["target"] == "SHUTDOWN"
+
+
+async def test_a_viewer(hand: FakeHand) -> None:
+    pytest.importorskip("foxglove")
+    from robotiq_async.telemetry.viewer import Viewer  # noqa: PLC0415
+    from tests.foxglove_client import client  # noqa: PLC0415
+
+    async with Viewer(hand, port=0, operator=Operator(hand)) as viewer, client(viewer) as one:
+        await one.subscribe("/gripper/status", "/gripper/state")
+        assert (await one.call("move", position=77, fingers="B")) == "B at 77; 0.00 s"
+        while not any(status["B"]["position"] == 77 for status in one.objects("/gripper/status")):
+            await one.read()
+        while not one.objects("/gripper/state"):
+            await one.read()
+        assert one.objects("/gripper/state")[0]["address"] == hand.address
+
+
+async def test_metrics(hand: FakeHand) -> None:
+    async with serve_metrics(hand, port=0) as (host, port):
+        reader, writer = await asyncio.open_connection(host, port)
+        writer.write(b"GET /metrics HTTP/1.0\r\n\r\n")
+        page = (await reader.read()).decode()
+        writer.close()
+        await writer.wait_closed()
+    assert f'robotiq_polls_total{{hand="{hand.address}"}} 1.0' in page
+    assert f'robotiq_state{{hand="{hand.address}",state="RUNNING_IDLE"}} 1.0' in page
+
+
+async def test_the_monitor(hand: FakeHand) -> None:
+    hand.obstacle = 150
+    async with Monitor(Operator(hand)).run_test(size=(100, 30)) as pilot:
+        await pilot.press("c")
+        log = pilot.app.query_one("#log", RichLog)
+        async with asyncio.timeout(20):
+            while not any("close: A CONTACT_CLOSING at 150" in line.text for line in log.lines):
+                await pilot.pause(0.02)
+        assert f"  {hand.address}" in str(pilot.app.query_one("#state", Static).render())
+
+
+async def test_what_is_printed(hand: FakeHand, capfd: pytest.CaptureFixture[str]) -> None:
+    print_outcomes(await hand.move(90, Finger.C))
+    print_status(hand)
+    assert as_dict(hand)["state"] == "RUNNING_IDLE"
+    printing = asyncio.create_task(print_objects(hand))
+    await asyncio.sleep(0)  # begun
+    await hand.move(100, Finger.A)
+    await hand.stop()
+    async with asyncio.timeout(5):
+        await printing
+    lines = capfd.readouterr().out.splitlines()
+    told = [json.loads(line) for line in lines if line.startswith("{")]
+    assert any(each["kind"] == "status" and each["A"]["position"] == 100 for each in told)
+    assert told[-1]["state"] == "SHUTDOWN"
+    assert "RUNNING_IDLE: active, not moving" in lines
+
+
+async def test_measurements(hand: FakeHand) -> None:
+    assert await time_closing(hand, 255, Finger.ABC, speedup=1000.0) == 0.0
+    hand.obstacle = 150
+    with pytest.raises(MeasuringError, match="met something"):
+        await time_closing(hand, 255, Finger.ABC, speedup=1000.0)
+    samples = await grasp(hand, 64, 255, speedup=1000.0)
+    assert {sample[1:] for sample in samples} == {(0, 0, 0)}
+    assert hand.state is State.RUNNING_IDLE
