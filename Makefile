@@ -43,10 +43,11 @@ explore: $(STAMP)  ## Try random examples that the tests do not, for some minute
 bench: $(STAMP)  ## Measure steadiness and cost beside bare pymodbus and a C thread (12 minutes; needs gcc)
 	@$(BIN)/python -m tests.benchmarks --json benchmarks.json
 
-lint: $(STAMP)  ## Check style and types
+lint: $(STAMP)  ## Check style, types and the directions of the imports
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
+	$(BIN)/lint-imports --no-logo --no-cache
 
 check: lint test pages  ## Everything CI runs
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from pymodbus.constants import ExcCodes
 from pymodbus.framer import FramerRTU
 
-from .register_bank import READ_WRITE, RTU_FUNCTIONS, WRITE_MULTIPLE, WRITE_SINGLE, is_served
+from ..functions import READ_WRITE, RTU_FUNCTIONS, WRITE_MULTIPLE, WRITE_SINGLE
+from .register_bank import is_served
 
 if TYPE_CHECKING:
     from collections.abc import Collection

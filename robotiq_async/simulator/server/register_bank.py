@@ -8,20 +8,17 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 
 from robotiq_async.wire.registers import REGISTER_COUNT, RTU_REGISTERS
 
+from ..functions import (
+    READ_HOLDING,
+    READ_INPUT,
+    READ_WRITE,
+)
+
 if TYPE_CHECKING:
     from pymodbus.constants import ExcCodes
 
     from ..physics.gripper import SimulatedGripper
 
-READ_HOLDING: Final = 3
-READ_INPUT: Final = 4
-WRITE_SINGLE: Final = 6
-WRITE_MULTIPLE: Final = 16
-READ_WRITE: Final = 23
-TCP_FUNCTIONS: Final = frozenset({READ_HOLDING, READ_INPUT, WRITE_SINGLE, WRITE_MULTIPLE})
-"""The Modbus functions that are served over TCP."""
-RTU_FUNCTIONS: Final = TCP_FUNCTIONS | {READ_WRITE}
-"""Those on a serial line. The manual describes function 23 there, with an example, and nowhere else."""
 _STARTS: Final = (0, RTU_REGISTERS.request, RTU_REGISTERS.status)
 
 

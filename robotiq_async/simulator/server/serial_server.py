@@ -11,9 +11,10 @@ from pymodbus.server import ModbusSerialServer
 from robotiq_async.wire.checks import check_int
 from robotiq_async.wire.registers import RTU_REGISTERS
 
+from ..functions import RTU_FUNCTIONS
 from .endpoint import SimulatorEndpoint
 from .framing import Frame, take_rtu
-from .register_bank import RTU_FUNCTIONS, RegisterBank
+from .register_bank import RegisterBank
 from .serial_connection import SerialConnection
 
 if TYPE_CHECKING:

@@ -10,10 +10,11 @@ from pymodbus.server import ModbusTcpServer
 
 from robotiq_async.wire.checks import check_int, check_seconds
 
+from ..functions import TCP_FUNCTIONS
 from .connection import Connection
 from .endpoint import SimulatorEndpoint, hang_up
 from .framing import Frame, take_tcp
-from .register_bank import TCP_FUNCTIONS, RegisterBank
+from .register_bank import RegisterBank
 
 if TYPE_CHECKING:
     from pymodbus.server.base import ModbusBaseServer

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from pymodbus.framer import FramerRTU
 
-from ..server.register_bank import READ_HOLDING, READ_INPUT, READ_WRITE, WRITE_MULTIPLE, WRITE_SINGLE
+from ..functions import READ_HOLDING, READ_INPUT, READ_WRITE, WRITE_MULTIPLE, WRITE_SINGLE
 
 Parts = Sequence[tuple[float, bytes]]
 """What to send, in order: (delay in seconds, bytes)."""

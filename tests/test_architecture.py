@@ -1,0 +1,50 @@
+"""The rooms of the package. Who may import whom is import-linter's business: `make lint`."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import robotiq_async
+from docs import make_architecture
+
+PACKAGE = Path(robotiq_async.__file__).parent
+OUTSIDE = {"__init__", "__main__", "__pycache__", "_demo", "data", "py", "version"}
+"""What no contract needs to speak of."""
+
+
+def test_every_room_has_its_layer() -> None:
+    """A module that no contract names may import anything, and be imported by anybody."""
+    rooms = {path.name.partition(".")[0] for path in PACKAGE.iterdir()} - OUTSIDE
+    assert rooms == {room for layer in make_architecture.layers() for room in layer}
+
+
+def test_every_room_says_what_it_is_for() -> None:
+    for layer in make_architecture.layers():
+        for room in layer:
+            assert len(make_architecture.purpose(room)) > 20
+
+
+def test_no_module_is_longer_than_four_hundred_lines() -> None:
+    long = {
+        str(path.relative_to(PACKAGE)): lines
+        for path in PACKAGE.rglob("*.py")
+        if (lines := len(path.read_text(encoding="utf-8").splitlines())) >= 400
+    }
+    assert not long
+
+
+def test_importing_the_library_imports_neither_simulator_nor_extras() -> None:
+    """They take tens of milliseconds, and the extras may be missing."""
+    script = "import sys, robotiq_async; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    modules = done.stdout.split()
+    for name in (
+        "robotiq_async.simulator",
+        "robotiq_async.cli",
+        "robotiq_async.telemetry",
+        "matplotlib",
+        "mcap",
+    ):
+        assert name not in modules
