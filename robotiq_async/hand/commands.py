@@ -1,0 +1,207 @@
+"""Motions, speeds, forces, and the halt."""
+
+from __future__ import annotations
+
+import asyncio
+
+import anyio
+
+from ..control.motion import Move, MoveResult
+from ..control.state_machine import SEQUENCES
+from ..control.triggers import Trigger
+from ..enums import CLOSED, OPEN, Finger
+from ..errors import (
+    MoveTimeoutError,
+)
+from ..session.clock import now
+from ..wire.checks import check_byte, check_mask, check_optional_byte, check_timeout
+from .recovery import Recovery
+
+
+class Commands(Recovery):
+    """A hand that is told to move."""
+
+    async def set_position(self, value: int, fingers: Finger | int = Finger.ABC) -> None:
+        """Ask axes to go somewhere; returns when the gripper has acknowledged it, not when they are there.
+
+        When cancelled, the request may still be sent: :meth:`halt` stops it.
+
+        Args:
+            value: target in counts, 0 (open) .. 255 (closed).
+            fingers: mask of the axes.
+
+        Raises:
+            TypeError: value or mask of the wrong type; nothing is sent.
+            ValueError: value or mask outside their range; nothing is sent.
+            RobotiqError: the hand takes no commands now, or the link went down before the
+                acknowledgement (the request is not sent again).
+        """
+        await self._deliver(check_mask(fingers), position=check_byte("value", value))
+
+    async def set_speed(self, value: int, fingers: Finger | int = Finger.ALL) -> None:
+        """Set the speed of axes, also of a motion under way; never starts one.
+
+        Args:
+            value: 0 (22 mm/s nominal) .. 255 (110 mm/s nominal).
+            fingers: mask of the axes.
+
+        Raises:
+            TypeError, ValueError, RobotiqError: as :meth:`set_position`.
+        """
+        await self._deliver(check_mask(fingers), speed=check_byte("value", value))
+
+    async def set_force(self, value: int, fingers: Finger | int = Finger.ALL) -> None:
+        """Set the force of axes; never starts a motion. More force tightens a grip.
+
+        Args:
+            value: 0 (15 N nominal) .. 255 (60 N nominal); not linear.
+            fingers: mask of the axes.
+
+        Raises:
+            TypeError, ValueError, RobotiqError: as :meth:`set_position`.
+        """
+        await self._deliver(check_mask(fingers), force=check_byte("value", value))
+
+    def command(
+        self,
+        fingers: Finger | int = Finger.ABC,
+        *,
+        position: int | None = None,
+        speed: int | None = None,
+        force: int | None = None,
+    ) -> None:
+        """Ask axes for something, for control loops: never blocks and never queues.
+
+        What is set between two polls goes out as one write; the last value wins. What cannot be
+        delivered because the link goes down is dropped, which the state and the log tell.
+
+        Args:
+            fingers: mask of the axes.
+            position: target in counts, 0..255.
+            speed: 0..255.
+            force: 0..255.
+
+        Raises:
+            TypeError: an argument of the wrong type; nothing is sent.
+            ValueError: an argument outside its range, or none of position, speed and force.
+            RobotiqError: the hand takes no commands now.
+        """
+        axes = check_mask(fingers)
+        if position is None and speed is None and force is None:
+            raise ValueError("command() needs at least one of position, speed and force in 0..255, got none")
+        position = check_optional_byte("position", position)
+        speed, force = check_optional_byte("speed", speed), check_optional_byte("force", force)
+        self._asked().controller.command(axes, position, speed, force)
+
+    async def move(
+        self,
+        position: int,
+        fingers: Finger | int = Finger.ABC,
+        *,
+        speed: int | None = None,
+        force: int | None = None,
+        timeout: float | None = None,
+    ) -> MoveResult:
+        """Move axes and return when every one of them has stopped: there, or against something.
+
+        Cancelled (by a task, ``asyncio.timeout`` or an anyio scope) or timed out, those of its axes that
+        still move are held where they are; an axis in contact keeps its request and its grip.
+
+        Args:
+            position: target in counts, 0 (open) .. 255 (closed).
+            fingers: mask of the axes; the others stay as they are.
+            speed: new speed of these axes, 0..255; None leaves it.
+            force: new force of these axes, 0..255; None leaves it.
+            timeout: seconds; None for twice the expected time plus 2 s.
+
+        Returns:
+            How each axis ended. A contact is a result, not an error.
+
+        Raises:
+            TypeError: an argument of the wrong type; nothing is sent.
+            ValueError: an argument outside its range; nothing is sent.
+            MoveTimeoutError: an axis still moved when the time was over.
+            MoveSupersededError: another command, halt(), reset() or another client took over an axis.
+            GripperFaultError: the gripper reports a minor or a major fault.
+            NotActivatedError: the gripper is not activated, or lost its activation.
+            ConnectionLostError: the link went down; the gripper may still be moving.
+            RobotiqStateError: the hand takes no commands now, or was stopped.
+        """
+        axes = check_mask(fingers)
+        target = check_byte("position", position)
+        speed, force = check_optional_byte("speed", speed), check_optional_byte("force", force)
+        limit = check_timeout("timeout", timeout)
+        session = self._asked()
+        controller = session.controller
+        if limit is None:
+            limit = controller.move_timeout(target, axes, speed)
+        ended: asyncio.Future[MoveResult] = session.waiter()
+        move = Move(target, axes, now(), ended)
+        controller.move(move, speed, force)
+        with session.counters.move() as note:
+            try:
+                with anyio.move_on_after(limit):
+                    result = await ended
+                    note(result)
+                    return result
+            except asyncio.CancelledError:
+                controller.abandon(move, unseen=True)
+                if ended.done() and not ended.cancelled():
+                    ended.exception()  # nobody else will look at it
+                raise
+            finally:
+                controller.abandon(move)
+            raise MoveTimeoutError(
+                f"{axes} still moved after {limit:.2f} s on the way to {target}", self.status
+            )
+
+    async def open(
+        self,
+        fingers: Finger | int = Finger.ABC,
+        *,
+        speed: int | None = None,
+        force: int | None = None,
+        timeout: float | None = None,
+    ) -> MoveResult:
+        """Open fingers: :meth:`move` to 0. Returns and raises what it does."""
+        return await self.move(OPEN, fingers, speed=speed, force=force, timeout=timeout)
+
+    async def close(
+        self,
+        fingers: Finger | int = Finger.ABC,
+        *,
+        speed: int | None = None,
+        force: int | None = None,
+        timeout: float | None = None,
+    ) -> MoveResult:
+        """Close the fingers, not the connection (that is :meth:`stop`): :meth:`move` to 255."""
+        return await self.move(CLOSED, fingers, speed=speed, force=force, timeout=timeout)
+
+    async def halt(self) -> None:
+        """Stop every axis now (rGTO = 0); the next command goes again, and moves only what it addresses.
+
+        Returns when the gripper shows that it has stopped, at most half a second after its
+        acknowledgement. Awaited moves end with MoveSupersededError. When cancelled, the halt is sent all
+        the same. In RESET and ATR_DONE nothing moves and nothing is sent.
+
+        rGTO does not stop an activation or an automatic release. During these, halt() takes rACT back, as
+        :meth:`reset` does, and returns in RESET.
+
+        Raises:
+            MoveSupersededError: reset() took over before it was sent.
+            StateTimeoutError: an activation or a release was not seen to end within 5 s.
+            RobotiqError: not connected, or the link went down before the acknowledgement.
+        """
+        session = self._asked()
+        if self.state in SEQUENCES:
+            await self._reset(Trigger.ASK_HALT)
+        else:
+            await session.answered(session.controller.halt)
+
+    async def _deliver(
+        self, axes: Finger, *, position: int | None = None, speed: int | None = None, force: int | None = None
+    ) -> None:
+        session = self._asked()
+        await session.answered(
+            lambda waiter: session.controller.command(axes, position, speed, force, waiter)
+        )

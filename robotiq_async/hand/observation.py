@@ -1,0 +1,187 @@
+"""What a hand shows: its state, its statuses, its statistics, and streams of all of it."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from ..control.state_machine import StateMachine
+from ..enums import State
+from ..errors import (
+    ConnectionLostError,
+    NotStartedError,
+)
+from ..session.options import (
+    Options,
+)
+from ..session.session import Session
+from ..session.statistics import Counters, Statistics
+from ..session.streams import Channel, Channels, SentRequest, Stream, Transition
+from ..wire.checks import check_int, check_timeout
+from ..wire.status import RobotiqStatus
+
+T = TypeVar("T")
+
+
+class Observation:
+    """A hand that is looked at: from any thread, but for its streams, which belong to its event loop."""
+
+    _options: Options
+    _machine: StateMachine
+    _channels: Channels
+    _session: Session | None
+    """The run under way, or the last one."""
+
+    @property
+    def address(self) -> str:
+        """The gripper's address in its full form; for a transport object, what messages call it."""
+        return self._options.address
+
+    @property
+    def state(self) -> State:
+        """Where the hand is."""
+        return self._machine.state
+
+    @property
+    def status(self) -> RobotiqStatus:
+        """The most recent status; its timestamp tells how old it is.
+
+        Raises:
+            NotStartedError: there is none yet.
+        """
+        status = None if self._session is None else self._session.controller.status
+        if status is None:
+            raise NotStartedError("no status has been read yet: start the hand first")
+        return status
+
+    @property
+    def is_activated(self) -> bool:
+        """Whether the gripper is active (gIMC = 3).
+
+        Raises:
+            RobotiqError: not known: not started, or the link is down.
+        """
+        return self._current_status().is_activated
+
+    @property
+    def is_reset(self) -> bool:
+        """Whether the gripper is reset (gACT = 0 and gIMC = 0).
+
+        Raises:
+            RobotiqError: not known: not started, or the link is down.
+        """
+        status = self._current_status()
+        return status.is_reset and not status.activation_echo
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether an axis moves, or will because of a command that does not act yet.
+
+        Raises:
+            RobotiqError: not known: not started, or the link is down.
+        """
+        self._current_status()
+        return self._started().controller.is_moving
+
+    @property
+    def statistics(self) -> Statistics:
+        """How the polling went since the last start."""
+        if self._session is None:
+            return Counters().snapshot(0)
+        return self._session.counters.snapshot(self._session.controller.foreign_commands)
+
+    def statuses(self, buffer: int = 1) -> Stream[RobotiqStatus]:
+        """Every status from now on, for one reader; newest wins.
+
+        A slow reader costs only itself: it keeps the newest ``buffer`` statuses and ``.missed`` counts
+        the others. Opened before the start it waits, and it waits out a lost link. Ends after
+        :meth:`stop`; raises RobotiqConnectionError when the hand gives up.
+
+        Args:
+            buffer: statuses kept for the reader, 1..1000000.
+
+        Raises:
+            TypeError: buffer is not an int.
+            ValueError: buffer is outside its range.
+        """
+        return self._open(self._channels.statuses, check_int("buffer", buffer, 1, 1_000_000))
+
+    def transitions(self) -> Stream[Transition]:
+        """Every change of state from now on, for one reader, none lost. Ends after :meth:`stop`."""
+        return self._open(self._channels.transitions, None)
+
+    def requests(self, buffer: int | None = None) -> Stream[SentRequest]:
+        """Every request written from now on, for one reader. Ends after :meth:`stop`.
+
+        Args:
+            buffer: requests kept for the reader, the newest ones, 1..1000000; None loses none.
+
+        Raises:
+            TypeError: buffer is not an int.
+            ValueError: buffer is outside its range.
+        """
+        kept = None if buffer is None else check_int("buffer", buffer, 1, 1_000_000)
+        return self._open(self._channels.requests, kept)
+
+    async def wait_for_state(self, *states: State, timeout: float | None = None) -> State:
+        """Wait until the hand is, if only for a moment, in one of these states, and return it.
+
+        Args:
+            states: at least one.
+            timeout: seconds; None waits for as long as the hand runs.
+
+        Raises:
+            TypeError: not a State.
+            ValueError: no state, or a malformed time-out.
+            StateTimeoutError: not reached in time.
+            NotStartedError: the hand is not started, or was stopped meanwhile.
+            RobotiqConnectionError: the hand gave up on its link.
+        """
+        if not states:
+            raise ValueError("states must name at least one State, got none")
+        for state in states:
+            if not isinstance(state, State):
+                raise TypeError(f"states must be State members, got {state!r}")
+        limit = check_timeout("timeout", timeout)
+        if self.state in states:
+            return self.state
+        names = " or ".join(state.name for state in states)
+        return await self._asked().reach(set(states), limit, what=f"{names} was not reached")
+
+    # -- inside ----------------------------------------------------------------------------------------
+
+    def _started(self) -> Session:
+        """The run under way, for whoever only reads: that may be done from anywhere.
+
+        Raises:
+            NotStartedError: not started, or stopped.
+            ConnectionLostError: the hand gave up on its link.
+        """
+        if self._session is None:
+            raise NotStartedError("the hand is not started: use 'async with' or start()")
+        self._session.check_running()
+        return self._session
+
+    def _asked(self) -> Session:
+        """The run under way, for whoever asks for something.
+
+        Raises:
+            NotStartedError, ConnectionLostError: as :meth:`_started`.
+            RuntimeError: called from another thread or event loop.
+        """
+        session = self._started()
+        session.check_loop("the hand")
+        return session
+
+    def _current_status(self) -> RobotiqStatus:
+        self._started()
+        status = self.status
+        if self.state is State.DISCONNECTED:
+            raise ConnectionLostError("the link is down: what the gripper does is not known")
+        return status
+
+    def _open(self, channel: Channel[T], buffer: int | None) -> Stream[T]:
+        """A stream; not from another thread while the hand runs, for the streams are not locked."""
+        session = self._session
+        if session is not None and not session.is_over and not session.lost_its_loop:
+            session.check_loop("a stream of the hand")
+        return channel.open(buffer)

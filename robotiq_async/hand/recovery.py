@@ -1,0 +1,131 @@
+"""Activation, reset, automatic release, and the way out of a fault."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import anyio
+
+from ..control.state_machine import RUNNING
+from ..control.triggers import Trigger
+from ..enums import Severity, State
+from ..errors import (
+    InvalidStateError,
+    NotActivatedError,
+    StateTimeoutError,
+)
+from ..wire.checks import check_timeout
+from .observation import Observation
+
+RESET_TIMEOUT_S: Final = 5.0
+"""A reset takes a device cycle or two; this leaves room for a slow one."""
+RELEASE_TIMEOUT_S: Final = 60.0
+"""A release opens slowly; no figure is published. A full stroke at the slowest speed takes 10 s."""
+RECOVER_TIMEOUT_S: Final = 90.0
+"""Interference counts as minor for 20 s, a release may take a minute, a reset and an activation follow."""
+
+
+class Recovery(Observation):
+    """A hand whose gripper is activated, reset and released."""
+
+    async def activate(self) -> None:
+        """Activate the gripper, if it is not active yet. The fingers MOVE to their stops.
+
+        When cancelled, the activation goes on; :meth:`reset` ends it.
+
+        Raises:
+            GripperFaultError: a fault is latched (see :meth:`recover`), or the activation ended in one.
+            NotActivatedError: the gripper was reset meanwhile.
+            ActivationTimeoutError: not finished within the activation time-out.
+            RobotiqError: not possible now, or the link went down.
+        """
+        session = self._asked()
+        if self.state in RUNNING:
+            return
+        under_way = self.state in (State.DO_ACTIVATION, State.WF_ACTIVATION)
+        await session.activated(None if under_way else session.controller.activate)
+
+    async def reset(self) -> None:
+        """Reset the gripper (rACT = 0): clears faults, and lets go of what it holds.
+
+        Returns in RESET. Ends an activation or a release under way, too. Awaited moves end with
+        MoveSupersededError. When cancelled, the reset goes on.
+
+        Raises:
+            StateTimeoutError: the gripper did not report the reset within 5 s.
+            RobotiqError: not possible now, or the link went down.
+        """
+        await self._reset(Trigger.ASK_RESET)
+
+    async def _reset(self, trigger: Trigger) -> None:
+        session = self._asked()
+        await session.reach(
+            {State.RESET},
+            RESET_TIMEOUT_S,
+            ask=lambda: session.controller.reset(trigger),
+            failing={State.DISCONNECTED: session.link_lost},
+            what="the gripper did not report the reset",
+        )
+
+    async def atr(self) -> None:
+        """Release automatically: all axes open slowly, whatever the fault. Only in FAULT.
+
+        Returns in ATR_DONE; then only :meth:`reset` and :meth:`activate`, or :meth:`recover`, help. When
+        cancelled, the release goes on.
+
+        Raises:
+            InvalidStateError: not in FAULT.
+            NotActivatedError: the gripper is or was reset.
+            StateTimeoutError: the release was not finished within 60 s.
+            RobotiqError: the link went down.
+        """
+        session = self._asked()
+        await session.reach(
+            {State.ATR_DONE},
+            RELEASE_TIMEOUT_S,
+            ask=session.controller.release,
+            failing={
+                State.DISCONNECTED: session.link_lost,
+                State.RESET: lambda: NotActivatedError("the gripper was reset during the automatic release"),
+                State.DO_RESET: lambda: InvalidStateError("reset() or halt() took over", State.DO_RESET),
+            },
+            what="the automatic release was not finished",
+        )
+
+    async def recover(self, timeout: float | None = None) -> None:
+        """Do whatever the present fault needs, until the gripper is active again.
+
+        Waits for a minor fault to clear, and for an activation, reset or release under way; resets and
+        activates after a major one. A reset DROPS the part, and an activation MOVES the fingers.
+
+        Args:
+            timeout: seconds for all of it; None for 90 s.
+
+        Raises:
+            StateTimeoutError: not active in time.
+            ActivationTimeoutError: the new activation took longer than the activation time-out.
+            GripperFaultError: the new activation ended in a fault.
+            NotActivatedError: the gripper was reset during the new activation.
+            RobotiqError: the link went down, or the hand was stopped.
+        """
+        limit = check_timeout("timeout", timeout) or RECOVER_TIMEOUT_S
+        self._asked()
+        with anyio.move_on_after(limit):
+            while self.state not in RUNNING:
+                await self._recover_step()
+            return
+        raise StateTimeoutError(f"the gripper is not active after {limit:g} s: {self.state.name}")
+
+    async def _recover_step(self) -> None:
+        session, state = self._asked(), self.state
+        if state is State.RESET:
+            await self.activate()
+        elif state is State.ATR_DONE or (
+            state is State.FAULT and self.status.fault.severity is Severity.MAJOR
+        ):
+            await self.reset()
+        elif state is State.DISCONNECTED:
+            raise session.link_lost()
+        else:
+            # A minor fault, or a sequence under way: the next status may tell more.
+            await session.next_status()

@@ -1,0 +1,179 @@
+"""RobotiqHand: its options, its start and its end."""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import Self
+
+from ..calibration import SpeedCalibration
+from ..control.state_machine import StateMachine
+from ..enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ..link.transport import Transport
+from ..session.event_loop import running_loop
+from ..session.options import (
+    ACTIVATION_TIMEOUT_S,
+    CONNECT_TIMEOUT_S,
+    POLL_INTERVAL_S,
+    RESPONSE_TIMEOUT_S,
+    check_options,
+)
+from ..session.reconnecting import ReconnectPolicy
+from ..session.session import Session
+from ..session.streams import Channels
+from .commands import Commands
+
+
+class RobotiqHand(Commands):
+    """A Robotiq 3-Finger gripper behind Modbus TCP, a serial line, or simulated.
+
+    Use it as ``async with RobotiqHand(address) as hand:``, or call :meth:`start` and :meth:`stop`. One
+    task polls the gripper; every call here leaves its wish with that task and never blocks the loop.
+    Calls may come from any task of the loop the hand was started in. From another thread, or another
+    loop, every call is a RuntimeError that says what to do, and nothing has been asked then.
+
+    Nothing of this has run on real hardware yet.
+    """
+
+    def __init__(
+        self,
+        address: str | Transport = "sim://",
+        *,
+        device_id: int | None = None,
+        poll_interval: float = POLL_INTERVAL_S,
+        connect_timeout: float = CONNECT_TIMEOUT_S,
+        response_timeout: float = RESPONSE_TIMEOUT_S,
+        activation_timeout: float = ACTIVATION_TIMEOUT_S,
+        reconnect: bool | ReconnectPolicy = True,
+        speed: int = DEFAULT_SPEED,
+        force: int = DEFAULT_FORCE,
+        request_address: int | None = None,
+        status_address: int | None = None,
+        calibration: SpeedCalibration | None = None,
+    ) -> None:
+        """Check every option. Opens nothing and needs no running loop.
+
+        Speed and force have no echo. So after adopting an active gripper, ``speed`` and ``force`` are also
+        what the axes get that a first command does not address: pass what the gripper was used with if
+        that matters to what it holds.
+
+        Args:
+            address: ``tcp://HOST[:502]`` (or HOST, HOST:PORT), ``rtu:///dev/ttyUSB0``, ``sim://``, or a
+                transport object.
+            device_id: Modbus unit id, 1..247; by default 2 over TCP and 9 over RTU. Two hands on one TCP
+                address need one each: that of their gripper behind the gateway.
+            poll_interval: seconds between polls, 0.001..0.1.
+            connect_timeout: seconds for opening the link, 0.01..5.
+            response_timeout: seconds for one answer, 0.005..0.5.
+            activation_timeout: seconds for an activation, 0.01..120.
+            reconnect: whether a lost link is opened again, or a :class:`ReconnectPolicy`.
+            speed: what the axes get until set otherwise, 0..255.
+            force: what the axes get until set otherwise, 0..255.
+            request_address: first request register; by default 0 over TCP and 0x03E8 over RTU.
+            status_address: first status register; by default 0 over TCP and 0x07D0 over RTU.
+            calibration: how fast this gripper is: default time-outs of moves come from it. None for the
+                thesis's gripper.
+
+        Raises:
+            TypeError: an option of the wrong type.
+            ValueError: an option outside its range, or a malformed address.
+        """
+        self._options = check_options(
+            address,
+            device_id=device_id,
+            poll_interval=poll_interval,
+            connect_timeout=connect_timeout,
+            response_timeout=response_timeout,
+            activation_timeout=activation_timeout,
+            reconnect=reconnect,
+            speed=speed,
+            force=force,
+            request_address=request_address,
+            status_address=status_address,
+            calibration=calibration,
+        )
+        self._machine = StateMachine()
+        self._channels = Channels()
+        self._session: Session | None = None
+        """The run under way, or the last one."""
+
+    async def __aenter__(self) -> Self:
+        """Start, with activation. See :meth:`start` for what it raises."""
+        await self.start()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop, also when the block failed or was cancelled."""
+        await self.stop()
+
+    async def start(self, activate: bool = True) -> None:
+        """Connect, read the status, activate if the gripper is reset, and poll from then on.
+
+        An activation MOVES the fingers: they open and close to their stops. A gripper that is active
+        already is adopted: nothing is written. One that is in fault already is left there, so that
+        :meth:`atr` and :meth:`recover` can run.
+
+        A failed or cancelled start leaves nothing running; an activation that it began is taken back.
+
+        Args:
+            activate: False leaves a reset gripper in RESET.
+
+        Raises:
+            RuntimeError: not in a running asyncio event loop.
+            InvalidStateError: this hand is started already, or another one runs on the same gripper.
+            NotStartedError: stop() was called meanwhile.
+            ConnectFailedError: nobody answers within the connect time-out.
+            RobotiqConnectionError: somebody answers, but not a gripper; or the link went down again.
+            GripperFaultError: the activation that was begun ended in a fault.
+            NotActivatedError: the gripper was reset during the activation that was begun.
+            ActivationTimeoutError: the activation was not finished in time.
+        """
+        if not isinstance(activate, bool):
+            raise TypeError(f"activate must be True or False, got {activate!r}")
+        running_loop()
+        self._abandon_if_loop_closed()
+        before = self._session
+        self._session = session = Session(
+            self._options,
+            self._machine,
+            self._channels,
+            activate=activate,
+            first_sequence=0 if before is None else before.next_sequence,
+        )
+        try:
+            await session.connected()
+            if activate:
+                await session.activated()
+        except BaseException:
+            await self.stop()
+            raise
+
+    async def stop(self, *, halt: bool = True) -> None:
+        """Stop the fingers (rGTO = 0), keep the activation, disconnect. Idempotent.
+
+        Ends within 2 s even on a dead link, and also when cancelled meanwhile: the cancellation is
+        raised once the hand has stopped. If the link is down, it is tried once more. What other tasks
+        wait for ends with NotStartedError.
+
+        Args:
+            halt: False disconnects and leaves the fingers to what they do; for programs that only look.
+
+        Raises:
+            RuntimeError: called in another event loop than the hand runs in; it goes on. (When that loop
+                has been closed, nothing can reach the gripper any more: the hand counts as stopped, and
+                the fingers go on with what they do.)
+        """
+        if not isinstance(halt, bool):
+            raise TypeError(f"halt must be True or False, got {halt!r}")
+        self._abandon_if_loop_closed()
+        if self._session is not None and not self._session.is_over:
+            await self._session.stop(halt=halt)
+
+    def __repr__(self) -> str:
+        """Address and state."""
+        return f"<RobotiqHand {self._options.address} {self.state.name}>"
+
+    def _abandon_if_loop_closed(self) -> None:
+        if self._session is not None and self._session.lost_its_loop:
+            self._session.abandon()
