@@ -75,7 +75,11 @@ def exported() -> dict[str, object]:
 
 def public_members(owner: type) -> Iterator[tuple[str, object]]:
     """The methods and properties a class defines itself, made ones (of dataclasses and enums) aside."""
-    for name, member in vars(owner).items():
+    members: dict[str, object] = {}
+    for base in reversed(owner.__mro__):
+        if base.__module__.startswith("robotiq_async"):
+            members |= vars(base)
+    for name, member in members.items():
         if name.startswith("_"):
             continue
         inner = member.fget if isinstance(member, property) else getattr(member, "__func__", member)
@@ -190,8 +194,8 @@ def test_the_hand_has_the_calls_of_the_contract() -> None:
     )
     hand = robotiq_async.RobotiqHand
     for name in [*names.split(" "), "__aenter__", "__aexit__"]:
-        assert name in vars(hand), name
-    calls = {name for name in names.split(" ") if inspect.iscoroutinefunction(vars(hand)[name])}
+        assert hasattr(hand, name), name
+    calls = {name for name in names.split(" ") if inspect.iscoroutinefunction(getattr(hand, name))}
     assert calls == {
         "start",
         "stop",

@@ -49,7 +49,10 @@ async def test_both_are_hands() -> None:
 
 def members(kind: type) -> dict[str, object]:
     names = {"__aenter__", "__aexit__"}
-    return {name: each for name, each in vars(kind).items() if name in names or not name.startswith("_")}
+    own = {
+        name for base in kind.__mro__ if base.__module__.startswith("robotiq_async") for name in vars(base)
+    }
+    return {name: getattr(kind, name) for name in own if name in names or not name.startswith("_")}
 
 
 def test_what_is_public_at_a_hand_is_in_the_protocol() -> None:

@@ -33,6 +33,9 @@ HINTS: Final = {
 """For people who meant two grippers. A gateway takes several connections; on a serial line replies carry no
 number, and whoever has it open gets part of what arrives."""
 
+# Read when this is imported: a hand may be made in a running loop, and that waits for no disk.
+_THESIS: Final = SpeedCalibration.thesis()
+
 
 @dataclass(frozen=True, slots=True)
 class Options:
@@ -118,7 +121,7 @@ def check_options(
 
 def _check_calibration(calibration: object) -> Callable[[int], float]:
     if calibration is None:
-        return SpeedCalibration.thesis().closing_time
+        return _THESIS.closing_time
     if not isinstance(calibration, SpeedCalibration):
         raise TypeError(f"calibration must be None or a SpeedCalibration, got {calibration!r}")
     first, last = calibration.points[0][0], calibration.points[-1][0]

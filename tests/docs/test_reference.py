@@ -34,7 +34,8 @@ WORDS = set(re.findall(r"\w+", REFERENCE))
 
 
 def public(kind: type) -> Iterator[str]:
-    yield from (name for name in vars(kind) if not name.startswith("_"))
+    bases = [base for base in kind.__mro__ if base.__module__.startswith("robotiq_async")]
+    yield from sorted({name for base in bases for name in vars(base) if not name.startswith("_")})
     if dataclasses.is_dataclass(kind):
         yield from (field.name for field in dataclasses.fields(kind))
 
