@@ -65,6 +65,8 @@ class Client:
             self._topics[number] = topic
             subscriptions.append({"id": number, "channelId": self.channels[topic]["id"]})
         await self.socket.send(json.dumps({"op": "subscribe", "subscriptions": subscriptions}))
+        # A subscription is not acknowledged. What is read after it is: what comes from here on is not missed.
+        await (await self.socket.ping())
 
     async def ask(self, number: int, name: str, arguments: object) -> None:
         service, payload = self.services[f"/gripper/{name}"]["id"], json.dumps(arguments).encode()

@@ -16,7 +16,7 @@ import zstandard
 from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, Chunk, Header, McapRecord, Message, Schema
 
-from robotiq_async.telemetry.recorder import RecordingError
+from robotiq_async.errors import RecordingError
 from robotiq_async.telemetry.recordings import LARGEST, Entry, read_recording, recover
 
 MAGIC = b"\x89MCAP0\r\n"

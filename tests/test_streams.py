@@ -10,7 +10,7 @@ from collections.abc import Awaitable, Callable, Iterator
 import anyio
 import pytest
 
-from robotiq_async.control.state_machine import Trigger
+from robotiq_async.control.triggers import Trigger
 from robotiq_async.enums import State
 from robotiq_async.errors import ConnectionLostError, RobotiqError
 from robotiq_async.session.streams import Channel, Stream, Transition

@@ -10,6 +10,7 @@ import json
 import pickle
 import pkgutil
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future
 from typing import Any
 
 import pytest
@@ -67,9 +68,11 @@ def statistics() -> Statistics:
 
 
 def real_result() -> MoveResult:
-    move = Move(255, A | B, 10.0, lambda _: None)
-    move.observe(status_of(0x39, 0xC0, current=15))
-    return move.result(status_of(0xB9, 0xEA, at=12.5))
+    waiter: Future[MoveResult] = Future()
+    move = Move(255, A | B, 10.0, waiter)
+    move.see(status_of(0x39, 0xC0, current=15))
+    move.end(status_of(0xB9, 0xEA, at=12.5))
+    return waiter.result(timeout=0)
 
 
 VALUES: list[object] = [
@@ -162,7 +165,7 @@ def test_a_value_can_be_taken_apart_and_is_not_changed_by_that(value: Any) -> No
 NO_VALUES = {
     "Action": "what a person may ask, with the function that does it",
     "Campaign": "work in progress",
-    "Desk": "work in progress",
+    "PendingCommand": "work in progress",
     "Gripper": "internal",
     "Link": "arguments of a command",
     "Message": "bytes on their way",

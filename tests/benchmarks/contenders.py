@@ -94,7 +94,8 @@ async def hand_with_readers(seconds: float, ports: list[int], count: int) -> Fig
     async with RobotiqHand(f"127.0.0.1:{ports[0]}") as it:
         readers = [asyncio.create_task(read(it)) for _ in range(count)]
         await asyncio.sleep(SETTLE_S)
-        counters = it._counters
+        assert it._session is not None
+        counters = it._session.counters
         counters.periods.clear()
         before = it.statistics
         used, began = cpu_and_wall()

@@ -391,10 +391,10 @@ async def test_no_address_of_a_name_can_be_reached(resolved: Callable[..., None]
             await to_the_host(transport).open()
 
 
-@pytest.mark.parametrize("name", ["nowhere.invalid", "a" * 64])
-async def test_a_name_that_nobody_knows_is_told(name: str) -> None:
-    transport = ModbusTransport(parse_address(name), TCP_REGISTERS, connect_timeout=5.0, response_timeout=0.1)
-    with pytest.raises(ConnectFailedError, match=f"{name}:502: the name cannot be resolved: "):
+async def test_a_name_that_nobody_knows_is_told() -> None:
+    address = parse_address("nowhere.invalid")
+    transport = ModbusTransport(address, TCP_REGISTERS, connect_timeout=5.0, response_timeout=0.1)
+    with pytest.raises(ConnectFailedError, match=r"nowhere\.invalid:502: the name cannot be resolved: "):
         await transport.open()
 
 
