@@ -38,7 +38,7 @@ fuzz: $(STAMP)  ## A million mutated replies through the decoder, 100,000 throug
 
 explore: $(STAMP)  ## Try random examples that the tests do not, for some minutes
 	@HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest -o faulthandler_timeout=1800 \
-		tests/adversity/test_model.py tests/core/test_random.py
+		tests/adversity/test_model.py tests/control/test_random.py
 
 bench: $(STAMP)  ## Measure steadiness and cost beside bare pymodbus and a C thread (12 minutes; needs gcc)
 	@$(BIN)/python -m tests.benchmarks --json benchmarks.json

@@ -22,7 +22,8 @@ ROOT: Final = Path(__file__).parents[1]
 if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
 
-from robotiq_async.control.state_machine import SEQUENCES, TRANSITIONS, Trigger, states_allowing  # noqa: E402
+from robotiq_async.control.state_machine import SEQUENCES, TABLE, Verdict, states_allowing  # noqa: E402
+from robotiq_async.control.triggers import Trigger  # noqa: E402
 from robotiq_async.enums import State  # noqa: E402
 
 PICTURE: Final = ROOT / "docs" / "state-machine.svg"
@@ -53,7 +54,7 @@ PLACES: Final[dict[State, tuple[int, int]]] = {
 }
 """Column and row of each box."""
 
-SIGHTS: Final = tuple(trigger for trigger in Trigger if trigger.is_sight)
+SEEN: Final = tuple(trigger for trigger in Trigger if trigger.is_seen)
 
 FILLS: Final = {
     "DO": "#fff3cd",  # a request is being sent
@@ -62,8 +63,8 @@ FILLS: Final = {
     "FAULT": "#f9dcdc",
     "ATR": "#f9dcdc",
 }
-STROKES: Final = {"ask": "#1d4f91", "sight": "#2c7a3f", "other": "#555555"}
-DASHES: Final = {"ask": "", "sight": "7 4", "other": "2 3"}
+STROKES: Final = {"ask": "#1d4f91", "seen": "#2c7a3f", "other": "#555555"}
+DASHES: Final = {"ask": "", "seen": "7 4", "other": "2 3"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +152,8 @@ def lines() -> list[Line]:
             (from_disconnected[1][0], low),
             (to_activation[0], low),
             to_activation,
-            label=(to_activation[0] + 10, low - 6),
+            label=(from_disconnected[1][0] - 10, low - 6),
+            anchor="end",
         ),
         upright(s.DISCONNECTED, s.WF_ACTIVATION, shift=10, words=10),
         bent(
@@ -229,18 +231,23 @@ def stubs() -> list[tuple[Line, Trigger, str]]:
 def triggers(source: State, target: State) -> list[Trigger]:
     """What leads from one state straight to another, stop and lost link aside."""
     families = {Trigger.ASK_STOP, Trigger.LINK_LOST}
-    row = TRANSITIONS[source]
-    return [trigger for trigger in Trigger if row.get(trigger) is target and trigger not in families]
+    row = TABLE[source]
+    return [trigger for trigger in Trigger if row[trigger] is target and trigger not in families]
+
+
+def leading(trigger: Trigger, target: State) -> set[State]:
+    """The states from which a trigger leads to another one, or leaves it."""
+    return {state for state, row in TABLE.items() if row[trigger] is target}
 
 
 def following() -> list[State]:
     """The states that go wherever a status shows the gripper to be."""
-    return [state for state, row in TRANSITIONS.items() if all(sight in row for sight in SIGHTS)]
+    return [state for state, row in TABLE.items() if all(isinstance(row[each], State) for each in SEEN)]
 
 
-def usual_target(sight: Trigger) -> State:
-    """Where a sight leads from most of the states that follow what is seen."""
-    targets = [TRANSITIONS[state][sight] for state in following()]
+def usual_target(condition: Trigger) -> State:
+    """Where a condition leads from most of the states that follow what is seen."""
+    targets = [TABLE[state][condition] for state in following()]
     return max(State, key=targets.count)
 
 
@@ -252,7 +259,7 @@ def in_words(source: State, trigger: Trigger, target: State) -> bool:
         return True
     if trigger is Trigger.ASK_HALT and target is State.DO_RESET:
         return True  # the third family has it too
-    return trigger in SIGHTS and source in following() and target is usual_target(trigger)
+    return trigger in SEEN and source in following() and target is usual_target(trigger)
 
 
 def check() -> None:
@@ -266,30 +273,33 @@ def check() -> None:
         assert line.source is not None
         if not triggers(line.source, line.target):
             raise ValueError(f"the table has no entry for the line {line.source.name} -> {line.target.name}")
-    for source, row in TRANSITIONS.items():
+    for source, row in TABLE.items():
         for trigger, target in row.items():
-            if (source, target) not in drawn and not in_words(source, trigger, target):
+            if not isinstance(target, State) or (source, target) in drawn:
+                continue
+            if not in_words(source, trigger, target):
                 raise ValueError(f"not drawn: {source.name} -> {target.name} ({trigger.value})")
 
 
 def kind(trigger: Trigger) -> str:
     """Which of the three kinds of events a trigger is."""
-    if trigger in SIGHTS:
-        return "sight"
+    if trigger in SEEN or trigger is Trigger.ACTIVATES:
+        return "seen"
     return "ask" if trigger.name.startswith("ASK_") else "other"
 
 
 def notes() -> list[str]:
     """The families in words."""
-    stoppable = states_allowing(Trigger.ASK_STOP)
-    assert states_allowing(Trigger.LINK_LOST) - stoppable == {State.DO_SHUTDOWN}, "the second note is wrong"
+    stoppable = leading(Trigger.ASK_STOP, State.DO_SHUTDOWN)
+    assert leading(Trigger.LINK_LOST, State.DISCONNECTED) == stoppable, "the second note is wrong"
+    assert TABLE[State.DO_SHUTDOWN][Trigger.LINK_LOST] is Verdict.IGNORED, "the second note is wrong"
     resettable = states_allowing(Trigger.ASK_RESET)
     assert stoppable - resettable == {State.DISCONNECTED}, "the third note is wrong"
-    halting = {state for state in TRANSITIONS if TRANSITIONS[state].get(Trigger.ASK_HALT) is State.DO_RESET}
-    assert halting == SEQUENCES, "the third note is wrong"
+    assert resettable - leading(Trigger.ASK_RESET, State.DO_RESET) == {State.DO_RESET}, "it stays"
+    assert leading(Trigger.ASK_HALT, State.DO_RESET) == SEQUENCES - {State.DO_RESET}, "it stays, too"
     halt = f"{Trigger.ASK_HALT.value}: from those in which a sequence runs (DO_, WF_)"
-    ends = names(frozenset(TRANSITIONS) - stoppable)
-    leads = [f"{usual_target(sight).name} ({sight.value.removeprefix('gripper ')})" for sight in SIGHTS]
+    ends = names(set(TABLE) - stoppable)
+    leads = [f"{usual_target(each).name} ({each.value.removeprefix('gripper ')})" for each in SEEN]
     return [
         f"¹ {Trigger.ASK_STOP.value}: from the {len(stoppable)} states other than {' and '.join(ends)}.",
         f"² {Trigger.LINK_LOST.value}: from the same states; DO_SHUTDOWN stays what it is.",
@@ -300,9 +310,9 @@ def notes() -> list[str]:
     ]
 
 
-def names(states: frozenset[State]) -> list[str]:
+def names(states: set[State]) -> list[str]:
     """Names in the order of the table."""
-    return [state.name for state in TRANSITIONS if state in states]
+    return [state.name for state in TABLE if state in states]
 
 
 # -- drawing -------------------------------------------------------------------------------------------
@@ -330,7 +340,7 @@ def draw() -> str:
         parts += _arrow(line, kind(found[0]), [each.value for each in found])
     for stub, trigger, mark in stubs():
         parts += _arrow(stub, kind(trigger), [f"{trigger.value} {mark}"])
-    for state in TRANSITIONS:
+    for state in TABLE:
         parts += _box(state)
     parts += _legend()
     return "\n".join([*parts, "</svg>", ""])
@@ -397,7 +407,7 @@ def _legend() -> Iterator[str]:
     x, y = 40, ROWS[3] + 92
     for name, text in (
         ("ask", "what the program asks"),
-        ("sight", "what a status shows"),
+        ("seen", "what a status shows"),
         ("other", "what became of a request or of the link"),
     ):
         yield from _arrow(

@@ -11,7 +11,7 @@ from __future__ import annotations
 import inspect
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -19,11 +19,13 @@ ROOT: Final = Path(__file__).parents[1]
 if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
 
-from robotiq_async import ReconnectPolicy, RobotiqHand, registers  # noqa: E402
+from robotiq_async import ReconnectPolicy, RobotiqHand  # noqa: E402
 from robotiq_async.calibration.csv_tables import SPEED, read_table, thesis_table  # noqa: E402
-from robotiq_async.control.state_machine import TRANSITIONS, Trigger  # noqa: E402
-from robotiq_async.enums import Fault, Initialization, Mode, ObjectStatus, Severity  # noqa: E402
+from robotiq_async.control.state_machine import TABLE, Verdict  # noqa: E402
+from robotiq_async.control.triggers import Trigger  # noqa: E402
+from robotiq_async.enums import Fault, Initialization, Mode, ObjectStatus, Severity, State  # noqa: E402
 from robotiq_async.simulator.troubles.trouble import KINDS  # noqa: E402
+from robotiq_async.wire import registers  # noqa: E402
 from robotiq_async.wire.registers import RTU_REGISTERS, TCP_REGISTERS, Field  # noqa: E402
 
 DOCS: Final = ROOT / "docs"
@@ -40,26 +42,30 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def asked() -> str:
     """What each state answers to each call."""
-    return _entries([trigger for trigger in Trigger if trigger.name.startswith("ASK_")], "refused")
+    return _entries([trigger for trigger in Trigger if trigger.name.startswith("ASK_")])
 
 
 def seen() -> str:
-    """Where each state goes with each sight, and with what becomes of a request or the link."""
-    return _entries([trigger for trigger in Trigger if not trigger.name.startswith("ASK_")], "")
+    """Where each state goes with what a status shows, and with what becomes of a request or the link."""
+    return _entries(
+        [trigger for trigger in Trigger if not trigger.name.startswith("ASK_")],
+        dict.fromkeys(Verdict, ""),
+    )
 
 
-def _entries(triggers: Sequence[Trigger], otherwise: str) -> str:
-    def cell(source: str, target: str) -> str:
-        return "stays" if source == target else target
+def _entries(triggers: Sequence[Trigger], words: Mapping[Verdict, str] | None = None) -> str:
+    """The table's columns for some triggers; what leads to no state is said in these words, or in its own."""
+
+    def cell(source: State, to: State | Verdict) -> str:
+        if isinstance(to, Verdict):
+            return to.value if words is None else words[to]
+        return "stays" if source is to else to.name
 
     return table(
         ["state", *(trigger.value for trigger in triggers)],
         (
-            [
-                f"**{state.name}**",
-                *(cell(state.name, row[each].name) if each in row else otherwise for each in triggers),
-            ]
-            for state, row in TRANSITIONS.items()
+            [f"**{state.name}**", *(cell(state, row[trigger]) for trigger in triggers)]
+            for state, row in TABLE.items()
         ),
     )
 

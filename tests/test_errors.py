@@ -8,7 +8,7 @@ import pytest
 
 from robotiq_async import errors
 from robotiq_async.enums import Fault, State
-from tests.words import status_of
+from tests.register_words import status_of
 
 TREE: dict[str, tuple[str, ...]] = {
     "RobotiqError": ("Exception",),

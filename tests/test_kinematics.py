@@ -16,7 +16,7 @@ from robotiq_async.kinematics import (
     joint_velocities,
     palm_angle,
 )
-from tests.words import status_of
+from tests.register_words import status_of
 
 HALF_TURN = 3.2
 

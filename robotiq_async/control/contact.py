@@ -39,13 +39,22 @@ def agrees(request: int, what: ObjectStatus, position: int, direction: int) -> b
     return abs(request - position) <= TOLERANCE
 
 
-def drifts(axis: Finger, base: Request, status: RobotiqStatus) -> bool:
+def drifts(axis: Finger, base: Request, status: RobotiqStatus, arrived: Finger) -> bool:
     """Whether an axis moves or is about to: then holding it means asking for where it is.
 
     An axis in contact keeps its request, and with it its grip; so does one that stands where it was asked
     to. What an axis does may still come from the request before this one: then the two disagree.
+
+    Args:
+        axis: the axis.
+        base: the image that acts, or will in a moment.
+        status: the newest status.
+        arrived: the axes that have come to rest under their requests. Another one that is at rest close by
+            may not have begun yet.
     """
-    what, position = status.finger_status(axis), status.position(axis)
-    return base.go and (
-        what is ObjectStatus.IN_MOTION or not agrees(base.position(axis), what, position, direction=0)
-    )
+    if not base.go:
+        return False
+    what, position, request = status.finger_status(axis), status.position(axis), base.position(axis)
+    if what is ObjectStatus.AT_POSITION and axis not in arrived:
+        return request != position
+    return what is ObjectStatus.IN_MOTION or not agrees(request, what, position, direction=0)

@@ -241,6 +241,7 @@ class Controller:
             self._callers.see_halt(status, self._shadow.acts)
         if after in RUNNING:
             self._shadow.see_contacts(status)
+            self._shadow.see_arrivals(status)
             if self._callers.moves:
                 self._callers.moves.see(status, self._shadow.acts)
 
@@ -254,15 +255,16 @@ class Controller:
         # Most cycles end here.
         if pending.is_empty or self.machine.state not in _COMMANDED or self._is_too_early(status):
             return None
-        image = merged(self._shadow.base, pending, status, self._shadow.gripping(status))
-        if pending.holds_at_most and image == self._shadow.base:
+        shadow = self._shadow
+        image = merged(shadow.base, pending, status, gripping=shadow.gripping(status), arrived=shadow.arrived)
+        if pending.holds_at_most and image == shadow.base:
             # Nothing drifts; but what was written before may not act yet, and then something might.
-            if self._shadow.is_settled:
+            if shadow.is_settled:
                 self._callers.pending = PendingCommand()
                 self.machine.delivered()
             return None
         sent = self._callers.take()
-        number = self._shadow.writing(image, sent.moved, now)
+        number = shadow.writing(image, sent.moved, now)
         if sent.positions:
             self._callers.moves.written(number)
         return image

@@ -11,7 +11,9 @@ from .contact import drifts
 from .pending import PendingCommand
 
 
-def merged(base: Request, pending: PendingCommand, status: RobotiqStatus, gripping: Finger) -> Request:
+def merged(
+    base: Request, pending: PendingCommand, status: RobotiqStatus, *, gripping: Finger, arrived: Finger
+) -> Request:
     """The image with everything that callers ask for; axes that nobody addresses stay as they are.
 
     Args:
@@ -19,6 +21,7 @@ def merged(base: Request, pending: PendingCommand, status: RobotiqStatus, grippi
         pending: what is asked for. A halt goes alone: the rest follows once the gripper has stopped.
         status: the newest status.
         gripping: the axes that were in contact when rGTO was last set.
+        arrived: the axes that have come to rest under their requests.
     """
     # rACT is for the sequences: raised here it would activate a gripper that has lost its activation. And
     # rATR would let go.
@@ -29,7 +32,9 @@ def merged(base: Request, pending: PendingCommand, status: RobotiqStatus, grippi
         # Raising rGTO wakes every axis. One that gripped keeps its request, or the grip would be gone.
         base = base.with_positions({axis: status.position(axis) for axis in AXES if axis not in gripping})
     held = {
-        axis: status.position(axis) for axis in AXES if axis in pending.hold and drifts(axis, base, status)
+        axis: status.position(axis)
+        for axis in AXES
+        if axis in pending.hold and drifts(axis, base, status, arrived)
     }
     positions = held | pending.positions
     return replace(

@@ -43,6 +43,8 @@ class RequestShadow:
         """Axes that we have given a position since the gripper was found."""
         self._contacts: dict[Finger, tuple[ObjectStatus, int]] = {}
         """The contacts, and where, when the go bit was last seen set: gDT is not worth reading without it."""
+        self._arrived = Finger.ALL
+        """Axes that have been seen at rest under the position that they were asked last."""
         self._asked = 0.0
         """When the newest status was asked for. What it shows may be as old as that, however late its reply
         was looked at; so this is the time that the age of a write is measured by."""
@@ -103,6 +105,11 @@ class RequestShadow:
                 mask |= axis
         return mask
 
+    @property
+    def arrived(self) -> Finger:
+        """The axes that have come to rest under their requests; the others move, or are about to."""
+        return self._arrived
+
     def acts(self, number: int) -> bool:
         """Whether the image of this number acts."""
         return self._writes.acts(number, self._asked)
@@ -115,6 +122,7 @@ class RequestShadow:
         self._adoption = None
         self._unsure_until = NEVER
         self._moved |= moved
+        self._arrived &= ~moved
         for axis in AXES:
             if axis in moved:
                 self._contacts.pop(axis, None)
@@ -185,6 +193,17 @@ class RequestShadow:
         """
         self._writes.restart(self._image, status.echo, self._asked)
         return status.echo == self._image.echo
+
+    def see_arrivals(self, status: RobotiqStatus) -> None:
+        """Remember which axes have come to rest, from a status of a gripper that has no fault.
+
+        In a fault an axis that has not begun yet is at rest, too.
+        """
+        if self._arrived is Finger.ALL or not (status.go_echo and self.is_settled):
+            return
+        for axis in AXES:
+            if status.finger_status(axis) is not ObjectStatus.IN_MOTION:
+                self._arrived |= axis
 
     # -- grips -----------------------------------------------------------------------------------------
 

@@ -48,6 +48,9 @@ class Verdict(Enum):
 _IGNORED, _LINK_DOWN, _NOT_STARTED = Verdict.IGNORED, Verdict.LINK_DOWN, Verdict.NOT_STARTED
 _NOT_ACTIVATED, _IN_FAULT = Verdict.NOT_ACTIVATED, Verdict.IN_FAULT
 
+Row = dict[Trigger, State | Verdict]
+"""The entries of one state."""
+
 _USER: Final = (
     Trigger.ASK_ACTIVATE,
     Trigger.ASK_COMMAND,
@@ -55,7 +58,6 @@ _USER: Final = (
     Trigger.ASK_RELEASE,
     Trigger.ASK_RESET,
 )
-Row = dict[Trigger, State | Verdict]
 _SEEN: Final[Row] = {
     Trigger.SEEN_READY: State.RUNNING_IDLE,
     Trigger.SEEN_BUSY: State.WF_ACTIVATION,

@@ -1,7 +1,7 @@
 """Random use over a live link that fails at random: what was written, what moved and what was reported.
 
-What an example has found becomes a test of its own, beside the code that was wrong (tests/core, tests/hand)
-or below. More of them: ``HYPOTHESIS_PROFILE=explore``.
+What an example has found becomes a test of its own, beside the code that was wrong (tests/control,
+tests/hand) or below. More of them: ``HYPOTHESIS_PROFILE=explore``.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from robotiq_async.enums import AXES
 from robotiq_async.simulator import Trouble
 from robotiq_async.wire.request import Request
 from tests.adversity.world import World, world
+from tests.register_words import only_holds
 from tests.virtual import VirtualLoop
-from tests.words import only_holds
 
 ALL, NOBODY = Finger.ALL, Finger(0)
 masks = st.integers(1, 15).map(Finger)

@@ -94,8 +94,9 @@ async def hand_with_readers(seconds: float, ports: list[int], count: int) -> Fig
     async with RobotiqHand(f"127.0.0.1:{ports[0]}") as it:
         readers = [asyncio.create_task(read(it)) for _ in range(count)]
         await asyncio.sleep(SETTLE_S)
-        assert it._session is not None
-        counters = it._session.counters
+        session = it._session
+        assert session is not None
+        counters = session.counters  # every single period: the public figures are of the last few seconds
         counters.periods.clear()
         before = it.statistics
         used, began = cpu_and_wall()

@@ -9,7 +9,8 @@ import pytest
 
 from docs import make_diagram, make_tables
 from robotiq_async import State
-from robotiq_async.control.state_machine import TRANSITIONS, Trigger
+from robotiq_async.control.state_machine import TABLE, Verdict
+from robotiq_async.control.triggers import Trigger
 from tests.docs.pages import DOCS
 
 Box = tuple[float, float, float, float]
@@ -32,13 +33,13 @@ def test_a_page_without_a_place_for_its_table_is_an_error() -> None:
 
 
 def test_an_entry_that_nobody_drew_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(TRANSITIONS[State.WF_RESET], Trigger.SEEN_FAULT, State.ATR_DONE)
+    monkeypatch.setitem(TABLE[State.WF_RESET], Trigger.SEEN_FAULT, State.ATR_DONE)
     with pytest.raises(ValueError, match="not drawn: WF_RESET -> ATR_DONE"):
         make_diagram.draw()
 
 
 def test_a_line_without_an_entry_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delitem(TRANSITIONS[State.FAULT], Trigger.ASK_RELEASE)
+    monkeypatch.setitem(TABLE[State.FAULT], Trigger.ASK_RELEASE, Verdict.NOT_NOW)
     with pytest.raises(ValueError, match="no entry for the line FAULT -> DO_ATR"):
         make_diagram.draw()
 

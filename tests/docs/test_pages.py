@@ -12,7 +12,8 @@ from typing import Any
 import pytest
 
 from docs import make_diagram, make_pages
-from robotiq_async.control.state_machine import TRANSITIONS, Trigger
+from robotiq_async.control.state_machine import TABLE, Verdict
+from robotiq_async.control.triggers import Trigger
 from robotiq_async.enums import State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.docs.pages import DOCS, PAGES, ROOT, Block, blocks, prose, requirements
@@ -90,14 +91,10 @@ def test_a_stale_page_is_named_and_made_again(
 
 def test_what_the_notes_of_the_picture_say_of_stop_and_a_lost_link_is_so() -> None:
     """They stand for these entries, whatever else is drawn between the same two boxes."""
-    for state, row in TRANSITIONS.items():
-        assert row.get(Trigger.ASK_STOP) is (
-            None if state in (State.DO_SHUTDOWN, State.SHUTDOWN) else State.DO_SHUTDOWN
-        )
-        assert row.get(Trigger.LINK_LOST) is {
-            State.DO_SHUTDOWN: State.DO_SHUTDOWN,
-            State.SHUTDOWN: None,
-        }.get(state, State.DISCONNECTED)
+    for state, row in TABLE.items():
+        is_off = state in (State.DO_SHUTDOWN, State.SHUTDOWN)
+        assert row[Trigger.ASK_STOP] is (Verdict.IGNORED if is_off else State.DO_SHUTDOWN)
+        assert row[Trigger.LINK_LOST] is (Verdict.IGNORED if is_off else State.DISCONNECTED)
 
 
 # -- code ----------------------------------------------------------------------------------------------
@@ -178,5 +175,5 @@ def test_quoted_messages_are_the_librarys() -> None:
 
 
 def test_a_message_that_the_library_does_not_have_is_told_apart() -> None:
-    assert is_from("another hand runs on", source())
+    assert is_from("a hand runs on", source())
     assert not is_from("your gripper is on fire", source())

@@ -126,7 +126,7 @@ async def test_stop_ends_within_two_seconds_on_a_dead_link(
     assert hand.state is State.SHUTDOWN
 
 
-# -- 2 and 3 are in tests/core; here over the wire ----------------------------------------------------------
+# -- 2 and 3 are in tests/control; here over the wire -------------------------------------------------------
 
 
 async def test_the_first_exchange_is_a_read_and_adopting_writes_nothing(

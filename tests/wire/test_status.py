@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from robotiq_async import Fault, Finger, Initialization, Mode, ObjectStatus, RobotiqStatus
 from robotiq_async.enums import AXES
-from tests.words import bytes_of, registers_of, status_of
+from tests.register_words import bytes_of, registers_of, status_of
 
 A, B, C, S = AXES
 BLOCKS = st.tuples(*[st.integers(0, 0xFFFF)] * 8)

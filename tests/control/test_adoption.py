@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.control.adoption import DIRECTION_WAIT_S, Adoption, agrees
+from robotiq_async.control.adoption import DIRECTION_WAIT_S, Adoption
 from robotiq_async.enums import AXES, Finger, Mode, ObjectStatus
 from robotiq_async.wire.request import AxisRequest, Request
 from robotiq_async.wire.status import RobotiqStatus
-from tests.words import status_of
+from tests.register_words import status_of
 
 A, B, C, S = AXES
 MOVING, OPENING, CLOSING, THERE = ObjectStatus
@@ -34,7 +34,7 @@ def adopted(*statuses: RobotiqStatus) -> Request:
     """The request that statuses tell, the first one first."""
     adoption = Adoption(statuses[0])
     for status in statuses[1:]:
-        adoption.watch(status)
+        adoption.see(status)
     return adoption.request(SETTINGS)
 
 
@@ -116,50 +116,6 @@ def test_a_halted_gripper_has_its_own_positions_as_requests(what: ObjectStatus) 
     assert not request.go
 
 
-# -- what an axis does and what it may have been asked -----------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("request_", "what", "position", "direction", "expected"),
-    [
-        # At the requested position, within one or two counts.
-        (100, THERE, 100, 0, True),
-        (100, THERE, 98, 0, True),
-        (100, THERE, 102, 0, True),
-        (100, THERE, 97, 0, False),
-        (100, THERE, 103, 0, False),
-        # Fully open reads 6-7 although 0 was asked, fully closed 240 or more although 255 was asked.
-        (0, THERE, 6, 0, True),
-        (0, THERE, 7, 0, True),
-        (0, THERE, 20, 0, False),
-        (255, THERE, 240, 0, True),
-        (255, THERE, 241, 0, True),
-        (255, THERE, 255, 0, True),
-        (255, THERE, 230, 0, False),
-        (0, THERE, 137, 0, False),
-        # A contact while closing needs a request further closed, one while opening further open.
-        (151, CLOSING, 150, 0, True),
-        (150, CLOSING, 150, 0, False),
-        (0, CLOSING, 150, 0, False),
-        (149, OPENING, 150, 0, True),
-        (150, OPENING, 150, 0, False),
-        (255, OPENING, 150, 0, False),
-        # A moving axis goes towards its request.
-        (200, MOVING, 100, 0, True),
-        (200, MOVING, 100, 5, True),
-        (200, MOVING, 100, -5, False),
-        (0, MOVING, 100, 5, False),
-        (0, MOVING, 100, -5, True),
-        (100, MOVING, 100, 0, False),
-        (100, MOVING, 100, 5, False),
-    ],
-)
-def test_a_request_agrees_with_what_an_axis_does(
-    request_: int, what: ObjectStatus, position: int, direction: int, expected: bool
-) -> None:
-    assert agrees(request_, what, position, direction) is expected
-
-
 # -- directions --------------------------------------------------------------------------------------------
 
 
@@ -177,19 +133,17 @@ def test_the_direction_of_b_tells_its_own_echo_from_that_of_a(moved: int, expect
 def test_nothing_is_certain_before_every_moving_axis_has_shown_its_direction() -> None:
     adoption = Adoption(gripper(MOVING, MOVING, THERE, THERE, position=(100, 100, 6, 6)))
     assert not adoption.is_certain
-    adoption.watch(gripper(MOVING, MOVING, THERE, THERE, position=(101, 100, 6, 6), at=0.01))
+    adoption.see(gripper(MOVING, MOVING, THERE, THERE, position=(101, 100, 6, 6), at=0.01))
     assert not adoption.is_certain
-    adoption.watch(gripper(MOVING, MOVING, THERE, THERE, position=(101, 99, 6, 6), at=0.02))
+    adoption.see(gripper(MOVING, MOVING, THERE, THERE, position=(101, 99, 6, 6), at=0.02))
     assert adoption.is_certain
 
 
 def test_an_axis_that_stays_where_it_is_is_not_waited_for_any_longer_than_a_count_takes() -> None:
     adoption = Adoption(gripper(MOVING, THERE, THERE, THERE, position=(100, 0, 0, 0), at=5.0))
-    adoption.watch(
-        gripper(MOVING, THERE, THERE, THERE, position=(100, 0, 0, 0), at=5.0 + DIRECTION_WAIT_S / 2)
-    )
+    adoption.see(gripper(MOVING, THERE, THERE, THERE, position=(100, 0, 0, 0), at=5.0 + DIRECTION_WAIT_S / 2))
     assert not adoption.is_certain
-    adoption.watch(gripper(MOVING, THERE, THERE, THERE, position=(100, 0, 0, 0), at=5.001 + DIRECTION_WAIT_S))
+    adoption.see(gripper(MOVING, THERE, THERE, THERE, position=(100, 0, 0, 0), at=5.001 + DIRECTION_WAIT_S))
     assert adoption.is_certain
 
 

@@ -11,8 +11,9 @@ from robotiq_async.control.motion import Move
 from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.enums import AXES
 from robotiq_async.wire.request import Request
-from tests.bench import Bench, Outcome
-from tests.words import only_holds
+from tests.control.outcome import Outcome
+from tests.control.scan import Scan
+from tests.register_words import only_holds
 
 masks = st.integers(1, 15).map(Finger)
 values = st.integers(0, 255)
@@ -23,89 +24,89 @@ class RandomUse(RuleBasedStateMachine):
 
     @initialize(device_cycle=st.sampled_from([0.0, 0.005, 0.03, 0.2]))
     def begin(self, device_cycle: float) -> None:
-        self.bench = Bench(device_cycle=device_cycle)
-        self.bench.start()
+        self.scan = Scan(device_cycle=device_cycle)
+        self.scan.start()
         self.asked: set[Finger] = set()
         """Axes that were ever addressed by a position since the last activation."""
-        self.travel = {axis: self.bench.gripper.travel(axis) for axis in AXES}
+        self.travel = {axis: self.scan.gripper.travel(axis) for axis in AXES}
         self.told: list[tuple[Move | None, Outcome]] = []
 
     @property
     def running(self) -> bool:
-        return self.bench.state in RUNNING
+        return self.scan.state in RUNNING
 
     @rule(axes=masks, position=values, speed=st.none() | values)
     @precondition(lambda self: self.running)
     def move(self, axes: Finger, position: int, speed: int | None) -> None:
         self.asked |= {axis for axis in AXES if axis in axes}
-        self.told.append(self.bench.move(position, axes, speed=speed))
+        self.told.append(self.scan.move(position, axes, speed=speed))
 
     @rule(axes=masks, position=st.none() | values, force=values)
     @precondition(lambda self: self.running)
     def command(self, axes: Finger, position: int | None, force: int) -> None:
         if position is not None:
             self.asked |= {axis for axis in AXES if axis in axes}
-        self.told.append((None, self.bench.command(axes, position=position, force=force)))
+        self.told.append((None, self.scan.command(axes, position=position, force=force)))
 
     @rule(which=st.integers(0, 1000))
     @precondition(lambda self: any(move is not None and not told.is_told for move, told in self.told))
     def cancel(self, which: int) -> None:
         live = [move for move, told in self.told if move is not None and not told.is_told]
         move = live[which % len(live)]
-        self.bench.controller.abandon(move)
+        self.scan.controller.abandon(move)
         self.told = [each for each in self.told if each[0] is not move]
 
     @rule()
     @precondition(lambda self: self.running)
     def halt(self) -> None:
-        self.told.append((None, self.bench.halt()))
+        self.told.append((None, self.scan.halt()))
 
     @rule(seconds=st.sampled_from([0.005, 0.01, 0.05, 0.3, 3.0]))
     def wait(self, seconds: float) -> None:
-        self.bench.run(seconds)
+        self.scan.run(seconds)
 
     @rule(axes=masks, position=st.integers(20, 230))
     def place(self, axes: Finger, position: int) -> None:
-        self.bench.gripper.place_object(axes, position)
+        self.scan.gripper.place_object(axes, position)
 
     @rule(answered=st.booleans(), away=st.sampled_from([0.0, 0.01, 1.0]))
     @precondition(lambda self: self.running)
     def lose_the_link(self, answered: bool, away: float) -> None:
         if not answered:
-            self.bench.step(answer=False)
-        if self.bench.state is not State.DISCONNECTED:
-            self.bench.controller.lost(None)
+            self.scan.step(answer=False)
+        if self.scan.state is not State.DISCONNECTED:
+            self.scan.controller.lost(None)
         assert all(told.is_told for _, told in self.told), "somebody waits for ever"
-        writes = len(self.bench.gripper.writes)
-        self.bench.now += away
-        self.bench.connect(activate=False)
-        self.bench.run(1.5)  # a hold may have to bring an axis back that had begun to move
-        assert only_holds(self.bench.gripper, writes), "something was replayed"
+        writes = len(self.scan.gripper.writes)
+        self.scan.now += away
+        self.scan.connect(activate=False)
+        self.scan.run(1.5)  # a hold may have to bring an axis back that had begun to move
+        assert only_holds(self.scan.gripper, writes), "something was replayed"
 
     @rule(fault=st.sampled_from([0x09, 0x0C, 0x0E]))
     @precondition(lambda self: self.running)
     def fault(self, fault: int) -> None:
-        self.bench.gripper.inject_fault(fault)
-        self.bench.step()
-        assert self.bench.state is State.FAULT
-        self.bench.run(1.0)
+        self.scan.gripper.inject_fault(fault)
+        self.scan.step()
+        assert self.scan.state is State.FAULT
+        self.scan.run(1.0)
         assert all(told.is_told for _, told in self.told), "somebody waits for ever"
-        at = {axis: self.bench.gripper.position(axis) for axis in AXES}
-        contacts = self.bench.latest.contacts
-        self.bench.gripper.clear_faults()
-        self.bench.run(1.0)
-        assert self.bench.state is State.RUNNING_IDLE
+        at = {axis: self.scan.gripper.position(axis) for axis in AXES}
+        contacts = self.scan.latest.contacts
+        self.scan.gripper.clear_faults()
+        self.scan.run(1.0)
+        assert self.scan.state is State.RUNNING_IDLE
         for axis in AXES:
             if axis not in contacts:
-                assert abs(self.bench.gripper.position(axis) - at[axis]) <= 1, f"{axis!r} resumed"
+                assert abs(self.scan.gripper.position(axis) - at[axis]) <= 1, f"{axis!r} resumed"
 
     @rule()
     @precondition(lambda self: self.running)
     def everything_comes_to_rest(self) -> None:
-        self.bench.step()  # an object taken away sets axes in motion without anybody's command
-        self.bench.until(lambda: not self.bench.controller.is_moving, 60)
-        self.bench.run(0.6)  # what has no echo is given half a second to act
-        assert not self.bench.gripper.is_moving
+        self.scan.step()  # an object taken away sets axes in motion without anybody's command
+        self.scan.until(lambda: not self.scan.controller.is_moving, 60)
+        self.scan.run(0.6)  # what has no echo is given half a second to act
+        assert not self.scan.gripper.is_moving
         for move, told in self.told:
             assert told.is_told
             if move is not None and isinstance(told.told[0], MoveResult):
@@ -117,19 +118,19 @@ class RandomUse(RuleBasedStateMachine):
             return
         for axis in AXES:
             if axis not in self.asked:
-                assert self.bench.gripper.travel(axis) == self.travel[axis], f"{axis!r} moved"
+                assert self.scan.gripper.travel(axis) == self.travel[axis], f"{axis!r} moved"
 
     @invariant()
     def nobody_else_was_seen(self) -> None:
-        assert not hasattr(self, "bench") or self.bench.controller.foreign_commands == 0
+        assert not hasattr(self, "scan") or self.scan.controller.foreign_commands == 0
 
     @invariant()
     def every_write_is_a_full_image_under_individual_control(self) -> None:
-        if hasattr(self, "bench") and self.bench.written:
-            image = Request.from_registers(self.bench.written[-1])
+        if hasattr(self, "scan") and self.scan.written:
+            image = Request.from_registers(self.scan.written[-1])
             assert image.individual_fingers
             assert image.individual_scissor
-            assert image.registers == self.bench.written[-1]
+            assert image.registers == self.scan.written[-1]
 
 
 TestRandomUse = RandomUse.TestCase

@@ -11,18 +11,25 @@ from hypothesis import strategies as st
 from robotiq_async.calibration.closing_time import closing_time
 from robotiq_async.control.motion import MARGIN_S, Move, MoveResult, default_timeout
 from robotiq_async.enums import AXES, Finger, ObjectStatus
-from robotiq_async.errors import MoveSupersededError, RobotiqError
-from tests.words import status_of
+from robotiq_async.errors import ConnectionLostError, MoveSupersededError, RobotiqError
+from robotiq_async.wire.status import RobotiqStatus
+from tests.control.outcome import Outcome
+from tests.register_words import status_of
 
 A, B, C, S = AXES
 ABC = Finger.ABC
 
 
-def move(
-    position: int = 255, axes: Finger = ABC, now: float = 10.0
-) -> tuple[Move, list[MoveResult | RobotiqError]]:
-    told: list[MoveResult | RobotiqError] = []
-    return Move(position, axes, now, told.append), told
+def move(position: int = 255, axes: Finger = ABC, now: float = 10.0) -> tuple[Move, Outcome]:
+    outcome = Outcome()
+    return Move(position, axes, now, outcome), outcome
+
+
+def ended(each: tuple[Move, Outcome], status: RobotiqStatus) -> MoveResult:
+    """The result of a move that a status has ended."""
+    move, outcome = each
+    move.end(status)
+    return outcome.result
 
 
 # -- when it has ended -------------------------------------------------------------------------------------
@@ -74,21 +81,33 @@ def test_arriving_does_not_depend_on_the_position_reached() -> None:
 
 
 def test_a_move_ends_once_with_the_first_outcome() -> None:
-    each, told = move()
-    assert not each.has_ended
-    first, second = MoveSupersededError("first"), MoveSupersededError("second")
-    each.end(first)
-    each.end(second)
-    each.end(each.result(status_of(0xF9, 0xFF)))
-    assert told == [first]
-    assert each.has_ended
+    each, outcome = move()
+    each.fail(MoveSupersededError("first"))
+    each.fail(MoveSupersededError("second"))
+    each.end(status_of(0xF9, 0xFF))
+    assert [str(error) for error in outcome.told] == ["first"]
 
 
-def test_a_move_counts_as_ended_while_its_outcome_is_handed_over() -> None:
-    seen: list[bool] = []
-    each = Move(255, ABC, 0.0, lambda _: seen.append(each.has_ended))
-    each.end(MoveSupersededError("now"))
-    assert seen == [True]
+def test_a_move_that_ended_well_does_not_fail_afterwards() -> None:
+    each, outcome = move()
+    each.end(status_of(0xF9, 0xFF))
+    each.fail(MoveSupersededError("late"))
+    assert outcome.result.status == status_of(0xF9, 0xFF)
+
+
+def test_every_caller_has_an_error_of_its_own() -> None:
+    (one, first), (other, second), error = move(), move(), MoveSupersededError("both")
+    one.fail(error)
+    other.fail(error)
+    assert first.error is not second.error
+
+
+@pytest.mark.parametrize("error", [MoveSupersededError("no"), ConnectionLostError("yes")])
+def test_a_move_knows_whether_the_link_went_down_under_it(error: RobotiqError) -> None:
+    each, _ = move()
+    assert not each.was_lost
+    each.fail(error)
+    assert each.was_lost == (str(error) == "yes")
 
 
 # -- the result --------------------------------------------------------------------------------------------
@@ -96,14 +115,14 @@ def test_a_move_counts_as_ended_while_its_outcome_is_handed_over() -> None:
 
 def held() -> MoveResult:
     """A and B hold something, C is closed, the scissor touches something too."""
-    each, _ = move(255, ABC, now=10.0)
-    each.observe(status_of(0x39, 0xC0, echo=255, current=(15, 5, 0, 200)))
-    each.observe(status_of(0x39, 0xC0, echo=255, current=(3, 40, 1, 0)))
+    each, outcome = move(255, ABC, now=10.0)
+    each.see(status_of(0x39, 0xC0, echo=255, current=(15, 5, 0, 200)))
+    each.see(status_of(0x39, 0xC0, echo=255, current=(3, 40, 1, 0)))
     last = status_of(
         0x79, 0b10_11_10_10, echo=255, position=(150, 151, 241, 99), current=(9, 9, 9, 9), at=12.5
     )
-    each.observe(last)
-    return each.result(last)
+    each.see(last)
+    return ended((each, outcome), last)
 
 
 def test_a_result_tells_outcome_and_position_of_each_addressed_axis() -> None:
@@ -123,16 +142,14 @@ def test_a_result_tells_contacts_of_addressed_axes_only() -> None:
 
 
 def test_a_contact_while_opening_is_an_object_too() -> None:
-    each, _ = move(0, A)
-    result = each.result(status_of(0x79, 0b11_11_11_01, echo=0))
+    result = ended(move(0, A), status_of(0x79, 0b11_11_11_01, echo=0))
     assert dict(result.outcomes) == {A: ObjectStatus.CONTACT_OPENING}
     assert result.contacts == A
     assert result.object_detected
 
 
 def test_without_a_contact_nothing_was_detected() -> None:
-    each, _ = move(255, A)
-    result = each.result(status_of(0x79, 0b10_10_10_11, echo=255))
+    result = ended(move(255, A), status_of(0x79, 0b10_10_10_11, echo=255))
     assert result.contacts == Finger(0)
     assert not result.object_detected
 
@@ -157,9 +174,9 @@ def test_a_result_cannot_be_changed() -> None:
 
 
 def test_a_result_does_not_change_with_what_is_seen_later() -> None:
-    each, _ = move(255, A)
-    result = each.result(status_of(0xF9, 0xFF))
-    each.observe(status_of(0xF9, 0xFF, current=255))
+    each, outcome = move(255, A)
+    result = ended((each, outcome), status_of(0xF9, 0xFF))
+    each.see(status_of(0xF9, 0xFF, current=255))
     assert dict(result.peak_current_ma) == {A: 0}
 
 

@@ -27,7 +27,7 @@ from robotiq_async.telemetry.joint_states import SCHEMA, SCHEMA_NAME, JointState
 from robotiq_async.telemetry.recorder import Recorder
 from robotiq_async.telemetry.recordings import read_recording, recover
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture

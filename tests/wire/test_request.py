@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from robotiq_async.enums import AXES, Finger, Mode
 from robotiq_async.wire.request import AxisRequest, Request
-from tests.words import REQUEST_RESERVED, bytes_of, registers_of
+from tests.register_words import REQUEST_RESERVED, bytes_of, registers_of
 
 BYTES = st.integers(0, 255)
 AXIS_REQUESTS = st.builds(AxisRequest, BYTES, BYTES, BYTES)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async.wire import registers as reg
-from tests.words import REQUEST_RESERVED, bytes_of, registers_of
+from tests.register_words import REQUEST_RESERVED, bytes_of, registers_of
 
 BLOCKS = st.tuples(*[st.integers(0, 0xFFFF)] * 8)
 

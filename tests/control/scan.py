@@ -1,53 +1,26 @@
-"""A bench without I/O: the controller on one side, an exact simulated gripper on the other, one clock."""
+"""Cycles of read, decide and write without I/O: the controller, an exact simulated gripper, one clock."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from robotiq_async import Finger, MoveResult, RobotiqError, RobotiqStatus, State
+from robotiq_async import Finger, MoveResult, RobotiqStatus, State
 from robotiq_async.calibration.closing_time import closing_time
 from robotiq_async.control.controller import Controller
 from robotiq_async.control.motion import Move
 from robotiq_async.control.state_machine import StateMachine
 from robotiq_async.control.triggers import Trigger
+from robotiq_async.enums import AXES
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.wire.registers import Registers
+from robotiq_async.wire.request import Request
+from tests.control.outcome import Outcome
 
 POLL_S = 0.005
 
 
-class Outcome:
-    """A caller that waits, and what it was told; told twice is a failure."""
-
-    def __init__(self) -> None:
-        self.told: list[object] = []
-
-    def done(self) -> bool:
-        return bool(self.told)
-
-    def set_result(self, result: object) -> None:
-        self.told.append(result)
-        assert len(self.told) == 1, f"told twice: {self.told}"
-
-    set_exception = set_result
-
-    @property
-    def is_told(self) -> bool:
-        return bool(self.told)
-
-    @property
-    def result(self) -> MoveResult:
-        assert isinstance(self.told[0], MoveResult), self.told
-        return self.told[0]
-
-    @property
-    def error(self) -> RobotiqError:
-        assert isinstance(self.told[0], RobotiqError), self.told
-        return self.told[0]
-
-
-class Bench:
-    """Steps the controller and the gripper through cycles of read, decision and write."""
+class Scan:
+    """Steps the controller and the gripper through them."""
 
     def __init__(
         self, *, device_cycle: float = 0.005, gripper: SimulatedGripper | None = None, speed: int = 128
@@ -96,6 +69,12 @@ class Bench:
             self.step()
         return self.now - began
 
+    def blink(self, away: float = 0.05) -> None:
+        """The link is lost and comes back."""
+        self.controller.lost(None)
+        self.now += away
+        self.connect(activate=False)
+
     # -- a caller --------------------------------------------------------------------------------------
 
     def start(self) -> None:
@@ -141,6 +120,27 @@ class Bench:
         self.controller.halt(outcome)
         return outcome
 
+    def stop(self) -> None:
+        self.controller.stop()
+        self.controller.shut_down()
+        self.until(lambda: not self.controller.machine.is_busy, 1.0)
+
+    # -- what has happened -----------------------------------------------------------------------------
+
+    @property
+    def last_image(self) -> Request:
+        return Request.from_registers(self.written[-1])
+
+    def travels(self) -> dict[Finger, float]:
+        return {axis: self.gripper.travel(axis) for axis in AXES}
+
     def positions(self) -> dict[Finger, int]:
         status = self.status()
-        return {axis: status.position(axis) for axis in (Finger.A, Finger.B, Finger.C, Finger.SCISSOR)}
+        return {axis: status.position(axis) for axis in AXES}
+
+
+def started(device_cycle: float = 0.005) -> Scan:
+    """A hand that has activated its gripper."""
+    scan = Scan(device_cycle=device_cycle)
+    scan.start()
+    return scan

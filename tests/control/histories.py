@@ -1,0 +1,39 @@
+"""A history of writes, the images written and the statuses that show them, in few words."""
+
+from __future__ import annotations
+
+from robotiq_async.control.writes import WriteHistory
+from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.wire.status import RobotiqStatus
+from tests.register_words import status_of
+
+EPSILON = 0.001
+
+
+def image(position: int, *, speed: int = 100, force: int = 50, go: bool = True) -> Request:
+    return Request(activate=True, go=go, axes=(AxisRequest(position, speed, force),) * 4)
+
+
+def shows(position: int, at: float, *, go: bool = True) -> RobotiqStatus:
+    return status_of(0x31 | go << 3, 0xFF, echo=position, position=position, at=at)
+
+
+class History(WriteHistory):
+    """Of a gripper that shows position 0, and writes that are acknowledged at once."""
+
+    def __init__(self, position: int = 0) -> None:
+        super().__init__()
+        self.restart(image(position), image(position).echo, 0.0)
+
+    def see_at_once(self, status: RobotiqStatus) -> Request | None:
+        """See a status that was answered at once."""
+        return self.see(status, status.timestamp)
+
+    def is_settled(self, now: float) -> bool:
+        """Whether the last image acts."""
+        return self.acts(self.last_number, now)
+
+    def write(self, request: Request, at: float) -> int:
+        number = self.writing(request, at)
+        self.acknowledged(at)
+        return number

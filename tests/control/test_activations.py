@@ -1,0 +1,152 @@
+"""Activations, resets and releases: how they go, and what they must not begin from."""
+
+from __future__ import annotations
+
+import pytest
+
+from robotiq_async import Fault, Finger, InvalidStateError, MoveSupersededError, NotActivatedError, State
+from robotiq_async.wire.request import Request
+from tests.control.other_client import going_to, reset_and_activated_by_another
+from tests.control.scan import POLL_S, Scan
+
+A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
+
+
+def test_activation_from_reset_goes_through_its_states_and_never_shows_reset(scan: Scan) -> None:
+    assert [target for _, target, _ in scan.transitions] == [
+        State.DO_ACTIVATION,
+        State.WF_ACTIVATION,
+        State.RUNNING_IDLE,
+    ]
+    assert scan.last_image.go is False
+
+
+def test_an_activation_that_fails_ends_in_fault() -> None:
+    scan = Scan()
+    scan.gripper.fail_activation = True
+    scan.connect()
+    scan.until(lambda: scan.state is State.FAULT)
+    assert scan.latest.fault is Fault.ACTIVATION_FAULT
+
+
+def test_a_power_cycle_in_mid_activation_ends_in_reset() -> None:
+    scan = Scan()
+    scan.connect()
+    scan.run(1.0)
+    scan.gripper.power_cycle()
+    scan.run(0.1)
+    assert scan.state is State.RESET
+
+
+def test_an_activation_is_called_off_when_others_have_activated_meanwhile() -> None:
+    scan = Scan()
+    scan.connect(activate=False)
+    scan.gripper.place_object(Finger.ABC, 150)
+    scan.gripper.write(0, [0x0100])
+    scan.now += 6
+    scan.gripper.write(0, going_to(255))
+    scan.now += 3
+    scan.controller.activate()
+    scan.step()  # what is begun is decided on what the gripper shows now
+    assert scan.state is State.RUNNING_IDLE
+    scan.run(1)
+    assert not scan.written
+    assert scan.latest.contacts == Finger.ABC
+
+
+@pytest.mark.parametrize("how", ["position", "speed"])
+def test_another_client_that_writes_during_our_activation_is_noticed_at_its_end(how: str) -> None:
+    scan = Scan()
+    scan.gripper.place_object(Finger.ABC, 150)
+    scan.connect()
+    scan.run(1)
+    scan.gripper.write(0, going_to(200))
+    scan.until(lambda: scan.state is State.RUNNING_IDLE)
+    assert scan.controller.foreign_commands == 1
+    scan.run(5)  # its fingers grip
+    if how == "position":
+        scan.moved(180, B)
+        scan.run(3)
+        assert scan.positions()[A] == 150
+    else:
+        scan.command(B, speed=10)
+        scan.run(1)
+        assert scan.latest.go_echo
+
+
+# -- resets and releases ---------------------------------------------------------------------------------
+
+
+def test_a_reset_ends_moves(scan: Scan) -> None:
+    _, outcome = scan.move(255)
+    scan.run(0.3)
+    scan.controller.reset()
+    assert isinstance(outcome.error, MoveSupersededError)
+    scan.until(lambda: scan.state is State.RESET)
+    assert not scan.gripper.is_moving
+
+
+@pytest.mark.parametrize("what", ["reset", "release"])
+def test_a_sequence_begun_while_a_write_is_on_the_line(scan: Scan, what: str) -> None:
+    if what == "release":
+        scan.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+        scan.run(0.1)
+        pending = scan.halt()
+    else:
+        pending = scan.command(A, position=200)
+    scan.now += POLL_S
+    request = scan.controller.decide(scan.now)
+    assert request is not None
+    (scan.controller.reset if what == "reset" else scan.controller.release)()
+    assert isinstance(pending.error, MoveSupersededError)
+    scan.gripper.write(0, request.registers)
+    scan.controller.acknowledged(scan.now)
+    assert scan.state in (State.DO_RESET, State.DO_ATR), "its own request has not been sent yet"
+    scan.controller.see(scan.status())
+    scan.until(lambda: scan.state in (State.RESET, State.ATR_DONE))
+
+
+def test_release_reset_and_activation_bring_the_hand_back(scan: Scan) -> None:
+    scan.moved(200)
+    scan.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    scan.step()
+    scan.controller.release()
+    scan.step()
+    assert scan.state is State.WF_ATR
+    scan.until(lambda: scan.state is State.ATR_DONE, 60)
+    assert scan.gripper.position(A) <= 7
+    scan.controller.reset()
+    scan.until(lambda: scan.state is State.RESET)
+    scan.controller.activate()
+    scan.until(lambda: scan.state is State.RUNNING_IDLE)
+    scan.moved(100, A)
+
+
+def test_the_release_is_for_faults_only(scan: Scan) -> None:
+    with pytest.raises(InvalidStateError) as caught:
+        scan.controller.release()
+    assert caught.value.state is State.RUNNING_IDLE
+    assert caught.value.allowed == {State.FAULT}
+
+
+def test_a_release_must_not_activate_a_gripper_that_is_reset() -> None:
+    scan = Scan()
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
+    scan.connect()
+    assert scan.state is State.FAULT
+    with pytest.raises(NotActivatedError):
+        scan.controller.release()
+    scan.run(0.1)
+    assert not scan.written
+
+
+def test_after_a_release_and_another_clients_reset_no_command_releases_again(scan: Scan) -> None:
+    scan.moved(100)
+    scan.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    scan.run(0.05)
+    scan.controller.release()
+    scan.until(lambda: scan.state is State.ATR_DONE, 60)
+    reset_and_activated_by_another(scan)
+    written = len(scan.written)
+    scan.moved(60, B)
+    assert not any(Request.from_registers(image).release for image in scan.written[written:])

@@ -1,0 +1,53 @@
+"""Commands: what is written, what moves, and for how long it counts as moving."""
+
+from __future__ import annotations
+
+import pytest
+
+from robotiq_async import Finger
+from tests.control.scan import Scan
+
+A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
+
+
+def test_the_first_command_after_an_activation_moves_only_what_it_addresses(scan: Scan) -> None:
+    before = {axis: scan.gripper.travel(axis) for axis in (B, C, S)}
+    scan.moved(200, A)
+    assert {axis: scan.gripper.travel(axis) for axis in (B, C, S)} == before
+
+
+def test_what_is_set_between_two_polls_is_one_write_and_the_last_value_wins(scan: Scan) -> None:
+    writes = len(scan.written)
+    told = [scan.command(A, position=value) for value in (10, 20, 30)]
+    told.append(scan.command(B, speed=7))
+    told.append(scan.command(C, force=9))
+    scan.step()
+    assert len(scan.written) == writes + 1
+    image = scan.last_image
+    assert (image.position(A), image.axes[1].speed, image.axes[2].force) == (30, 7, 9)
+    assert [outcome.told for outcome in told] == [[None]] * 5
+
+
+def test_speed_and_force_never_start_a_motion(scan: Scan) -> None:
+    travel = {axis: scan.gripper.travel(axis) for axis in (A, B, C, S)}
+    scan.command(Finger.ALL, speed=255, force=255)
+    scan.run(1.0)
+    assert {axis: scan.gripper.travel(axis) for axis in (A, B, C, S)} == travel
+
+
+def test_is_moving_from_the_command_until_the_end(scan: Scan) -> None:
+    outcome = scan.command(A, position=200)
+    assert scan.controller.is_moving
+    while not outcome.is_told:
+        scan.step()
+    assert scan.controller.is_moving, "acknowledged, but it does not act yet"
+    scan.until(lambda: not scan.controller.is_moving)
+    assert not scan.gripper.is_moving
+    assert scan.gripper.position(A) == pytest.approx(200, abs=2)
+
+
+def test_the_default_timeout_follows_from_distance_and_speed(scan: Scan) -> None:
+    full = scan.controller.move_timeout(241, A, 0)
+    assert full == pytest.approx(2 * 10.021 + 2, abs=0.1)
+    assert scan.controller.move_timeout(241, A, 255) == pytest.approx(2 * 2.12 + 2, abs=0.1)
+    assert scan.controller.move_timeout(6, A, 0) == pytest.approx(2.0, abs=0.1)

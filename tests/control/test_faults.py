@@ -1,0 +1,192 @@
+"""Faults: what they end, and that nothing resumes when they clear."""
+
+from __future__ import annotations
+
+import pytest
+
+from robotiq_async import Fault, Finger, GripperFaultError, NotActivatedError, State
+from robotiq_async.wire.request import Request
+from tests.control.other_client import moved_by_another
+from tests.control.scan import Scan
+
+A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
+
+
+@pytest.mark.parametrize("code", [0x09, 0x0A, 0x0C, 0x0D, 0x0E, 0x01])
+def test_a_serious_or_unknown_fault_ends_a_move_at_once(scan: Scan, code: int) -> None:
+    _, outcome = scan.move(255)
+    scan.run(0.3)
+    scan.gripper.inject_fault(code)
+    scan.step()
+    assert scan.state is State.FAULT
+    assert isinstance(outcome.error, GripperFaultError)
+    assert outcome.error.fault == code
+    with pytest.raises(GripperFaultError):
+        scan.command(A, position=0)
+
+
+@pytest.mark.parametrize("code", [0x05, 0x06, 0x07])
+def test_priority_codes_neither_raise_nor_lead_to_fault(scan: Scan, code: int) -> None:
+    _, outcome = scan.move(255)
+    scan.run(0.3)
+    scan.gripper.inject_fault(code)
+    scan.until(lambda: outcome.is_told)
+    assert scan.state is State.RUNNING_IDLE
+    assert outcome.result.positions[A] >= 240
+
+
+def test_a_gripper_found_in_fault_is_left_there() -> None:
+    scan = Scan()
+    scan.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    scan.connect()
+    scan.run(0.5)
+    assert scan.state is State.FAULT
+    assert not scan.written
+
+
+def test_nothing_resumes_when_a_minor_fault_clears(scan: Scan) -> None:
+    scan.move(255)
+    scan.run(0.5)
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 1.0)
+    scan.run(0.5)
+    at = scan.gripper.position(A)
+    scan.until(lambda: scan.state is State.RUNNING_IDLE)
+    scan.run(2.0)
+    assert not scan.gripper.is_moving
+    assert scan.gripper.position(A) == pytest.approx(at, abs=2)
+
+
+def test_a_motion_nobody_awaits_does_not_resume_either(scan: Scan) -> None:
+    scan.command(A, position=255)
+    scan.run(0.5)
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.5)
+    scan.run(3.0)
+    assert scan.state is State.RUNNING_IDLE
+    assert scan.gripper.position(A) < 200
+
+
+def test_a_command_sent_just_before_the_fault_does_not_begin_to_act_when_it_clears() -> None:
+    scan = Scan(device_cycle=0.2)
+    scan.start()
+    scan.command(A, position=149)
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 1.0)
+    scan.run(3.0)
+    assert scan.state is State.RUNNING_IDLE
+    assert scan.gripper.position(A) <= 7
+
+
+def test_a_write_lost_before_the_fault_does_not_begin_to_act_when_it_clears() -> None:
+    scan = Scan(device_cycle=0.2)
+    scan.start()
+    scan.command(A, position=149)
+    scan.step(answer=False)
+    scan.connect(activate=False)
+    scan.step()
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 1.0)
+    scan.run(3.0)
+    assert scan.state is State.RUNNING_IDLE
+    assert scan.gripper.position(A) <= 7
+
+
+def test_nothing_resumes_when_a_fault_clears_that_began_while_the_link_was_down(scan: Scan) -> None:
+    scan.move(200, A, speed=0)
+    scan.run(0.5)
+    scan.controller.lost(None)
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 2)
+    scan.now += 0.1
+    scan.connect(activate=False)
+    assert scan.state is State.FAULT
+    with pytest.raises(GripperFaultError):
+        scan.command(B, position=3)
+    at = scan.positions()[A]
+    scan.run(10)
+    assert scan.positions()[A] <= at + 4
+
+
+def test_an_axis_that_the_fault_keeps_from_starting_is_held() -> None:
+    scan = Scan(device_cycle=0.0)
+    scan.start()
+    scan.moved(6)
+    scan.command(A, position=107)
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 1.0)
+    scan.run(3.0)
+    assert scan.gripper.position(A) <= 7
+
+
+@pytest.mark.parametrize("device_cycle", [0.0, 0.005, 0.03, 0.2])
+@pytest.mark.parametrize("by", [-2, -1, 1, 2])
+def test_an_axis_that_the_fault_keeps_from_its_last_two_counts_is_held(device_cycle: float, by: int) -> None:
+    """So close to its request an axis counts as there; one that had not begun yet went on afterwards."""
+    for steps in range(8):
+        scan = Scan(device_cycle=device_cycle)
+        scan.start()
+        scan.moved(112, A)
+        scan.move(112 + by, A)
+        for _ in range(steps):
+            scan.step()
+        scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 1.0)
+        scan.run(0.5)
+        assert scan.state is State.FAULT
+        at = scan.gripper.travel(A)
+        scan.run(2.0)
+        assert scan.state is State.RUNNING_IDLE
+        assert scan.gripper.travel(A) == at, f"it went on, {steps} steps after the command"
+
+
+def test_a_motion_of_ours_does_not_resume_after_a_fault_because_another_client_moved_another_axis(
+    scan: Scan,
+) -> None:
+    _, told = scan.move(200, A)
+    scan.run(0.3)
+    image = Request.from_registers(scan.gripper.request_registers)
+    scan.gripper.write(0, image.with_positions({B: 60}).registers)
+    scan.run(0.5)
+    assert not told.is_told, "A is still ours"
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.5)
+    scan.run(0.1)
+    assert isinstance(told.error, GripperFaultError)
+    at = scan.positions()[A]
+    scan.run(5)
+    assert scan.positions()[A] <= at + 2
+    assert scan.positions()[B] == 60, "what the other client asked goes on"
+
+
+def test_a_fault_does_not_stop_the_motion_of_another_client_after_a_blink_of_the_link() -> None:
+    scan = moved_by_another()
+    scan.blink()
+    scan.run(0.3)
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.1)
+    scan.run(15)
+    assert not scan.written
+    assert scan.positions()[A] == 200
+
+
+def test_a_fault_at_the_loss_of_the_activation_does_not_activate(scan: Scan) -> None:
+    scan.move(200, A)
+    scan.run(0.3)
+    written = len(scan.written)
+    scan.gripper.power_cycle()
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.5)
+    at = scan.positions()
+    scan.run(3)
+    assert scan.positions() == at
+    assert scan.state is State.RESET
+    assert len(scan.written) == written
+
+
+def test_what_waits_in_fault_is_not_written_to_a_gripper_that_lost_its_activation(scan: Scan) -> None:
+    """A hold or a halt carries rACT = 1: written after a power cycle it would activate."""
+    scan.move(255)
+    scan.run(0.5)
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
+    scan.step()
+    assert scan.state is State.FAULT
+    halted = scan.halt()
+    writes = len(scan.written)
+    scan.gripper.power_cycle()
+    scan.controller.see(scan.status())
+    assert isinstance(halted.error, NotActivatedError)
+    scan.run(0.5)
+    assert scan.state is State.RESET
+    assert len(scan.written) == writes
+    assert not scan.gripper.is_moving

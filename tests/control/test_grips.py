@@ -1,0 +1,93 @@
+"""Grips: what they survive, and when there is none any more."""
+
+from __future__ import annotations
+
+from robotiq_async import Fault, Finger, ObjectStatus, State
+from tests.control.other_client import reset_and_activated_by_another
+from tests.control.scan import Scan, started
+
+A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
+
+
+def test_a_grip_survives_a_halt_and_a_command_to_another_axis(scan: Scan) -> None:
+    scan.gripper.place_object(B, 60)
+    scan.moved(255, B)
+    scan.halt()
+    scan.run(0.1)
+    scan.moved(100, A)
+    assert scan.last_image.position(B) == 255
+    assert scan.latest.finger_status(B) is ObjectStatus.CONTACT_CLOSING
+
+
+def test_a_grip_is_kept_over_a_minor_fault(scan: Scan) -> None:
+    scan.gripper.place_object(A, 60)
+    scan.moved(255, A)
+    writes = len(scan.written)
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.5)
+    scan.run(1.0)
+    assert scan.state is State.RUNNING_IDLE
+    assert scan.latest.requested_position(A) == 255
+    assert len(scan.written) == writes
+
+
+def test_a_halted_grip_survives_a_blink_of_the_link(scan: Scan) -> None:
+    scan.gripper.place_object(B, 150)
+    scan.moved(255, B)
+    halted = scan.halt()
+    scan.until(lambda: halted.is_told)
+    scan.blink()
+    scan.run(0.1)
+    scan.moved(60, A)
+    assert scan.latest.requested_position(B) == 255
+
+
+def test_a_grip_that_is_somewhere_else_by_now_is_none(scan: Scan) -> None:
+    scan.gripper.place_object(Finger.ABC, 150)
+    scan.moved(255)
+    halted = scan.halt()
+    scan.until(lambda: halted.is_told)
+    scan.gripper.remove_object(Finger.ABC)
+    scan.gripper.write(0, [0x0000])  # all of this while the loop is held up
+    scan.now += 0.05
+    scan.gripper.write(0, [0x0100])
+    scan.now += 6
+    scan.step()
+    scan.moved(100, S)
+    scan.run(3)
+    assert scan.positions()[A] < 20
+
+
+def test_a_motion_that_was_halted_does_not_come_back_because_the_axis_had_gripped() -> None:
+    scan = started(device_cycle=0.02)
+    scan.gripper.place_object(A, 150)
+    scan.moved(255, A)
+    scan.command(A, position=20)
+    scan.step()
+    scan.gripper.device_cycle = 0  # both writes fall into one tick of the device
+    halted = scan.halt()
+    scan.until(lambda: halted.is_told)
+    scan.moved(60, B)
+    scan.run(3)
+    assert scan.positions()[A] == 150
+
+
+def test_after_another_clients_reset_and_activation_no_old_grip_closes_the_fingers() -> None:
+    for link_is_down_meanwhile in (False, True):
+        scan = started()
+        scan.gripper.place_object(Finger.ABC, 150)
+        scan.moved(255)
+        halted = scan.halt()
+        scan.until(lambda: halted.is_told)  # noqa: B023
+        scan.gripper.remove_object(Finger.ABC)
+        if link_is_down_meanwhile:
+            scan.controller.lost(None)
+            scan.gripper.write(0, [0x0000])
+            scan.now += 0.05
+            scan.gripper.write(0, [0x0100])
+            scan.now += 10
+            scan.connect(activate=False)
+        else:
+            reset_and_activated_by_another(scan)
+        scan.moved(100, S)
+        scan.run(3)
+        assert scan.positions()[A] < 20

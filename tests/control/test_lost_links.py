@@ -1,0 +1,231 @@
+"""A link that goes down and comes back: nothing is replayed, nothing is undone, and a stop is not lost."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from robotiq_async import ConnectionLostError, Finger, State
+from robotiq_async.wire.request import AxisRequest, Request
+from tests.control.other_client import activated_by_another
+from tests.control.scan import POLL_S, Scan, started
+
+A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
+
+
+def test_a_lost_link_drops_what_was_not_acknowledged(scan: Scan) -> None:
+    pending = scan.command(A, position=200)
+    _, move = scan.move(100, B)
+    scan.controller.lost(None)
+    assert isinstance(pending.error, ConnectionLostError)
+    assert isinstance(move.error, ConnectionLostError)
+    assert scan.state is State.DISCONNECTED
+    with pytest.raises(ConnectionLostError):
+        scan.command(A, position=1)
+    writes = len(scan.written)
+    scan.connect(activate=False)
+    scan.run(2.0)
+    assert len(scan.written) == writes
+    assert scan.state is State.RUNNING_IDLE
+
+
+def test_a_write_that_arrived_unacknowledged_is_ours_when_it_shows(scan: Scan) -> None:
+    lost = scan.command(A, position=200)
+    scan.step(answer=False)
+    assert isinstance(lost.error, ConnectionLostError)
+    scan.now += 0.001  # back before the gripper acts on it
+    scan.connect(activate=False)
+    scan.run(0.1)
+    assert scan.controller.foreign_commands == 0
+    assert scan.latest.requested_position(A) == 200
+    writes = len(scan.written)
+    scan.moved(50, B)
+    scan.until(lambda: not scan.controller.is_moving)
+    assert scan.gripper.position(A) == pytest.approx(200, abs=2), "B's command keeps what A was asked"
+    assert len(scan.written) == writes + 1
+
+
+def test_a_motion_goes_on_over_a_lost_link_and_is_adopted(scan: Scan) -> None:
+    scan.move(255, A)
+    scan.run(0.5)
+    scan.controller.lost(None)
+    scan.now += 0.3
+    scan.connect(activate=False)
+    assert scan.state is State.RUNNING_IDLE
+    scan.moved(100, B)
+    scan.until(lambda: not scan.controller.is_moving)
+    assert scan.gripper.position(A) >= 240
+    assert scan.controller.foreign_commands == 0
+
+
+def test_a_gripper_that_lost_its_power_is_not_activated_by_a_reconnect(scan: Scan) -> None:
+    scan.move(255)
+    scan.run(0.5)
+    scan.controller.lost(None)
+    scan.gripper.power_cycle()
+    scan.now += 0.1
+    scan.connect(activate=False)
+    scan.run(1.0)
+    assert scan.state is State.RESET
+    assert not scan.gripper.is_moving
+
+
+@pytest.mark.parametrize("device_cycle", [0.005, 0.03, 0.1, 0.2])
+@pytest.mark.parametrize("arrived", [True, False])
+def test_a_command_after_a_lost_acknowledgement_waits_until_it_is_known_what_acts(
+    device_cycle: float, arrived: bool
+) -> None:
+    scan = started(device_cycle)
+    scan.command(S, position=32)
+    scan.run(0.6)
+    scan.command(S, position=200)
+    if arrived:
+        scan.step(answer=False)
+    else:
+        scan.now += POLL_S
+        assert scan.controller.decide(scan.now) is not None
+        scan.controller.lost(None)
+    scan.now += 0.001
+    scan.connect(activate=False)  # before the gripper acts on it, if it got it
+    pending = scan.command(A, position=50)
+    began = scan.now
+    scan.until(lambda: pending.is_told)
+    assert scan.now - began < 0.5
+    scan.until(lambda: not scan.controller.is_moving)
+    assert scan.positions()[S] == pytest.approx(200 if arrived else 32, abs=2)
+    assert scan.positions()[A] == pytest.approx(50, abs=2)
+    positions = [Request.from_registers(image).position(S) for image in scan.written]
+    assert positions[-1] == (200 if arrived else 32)
+
+
+def test_a_lost_command_does_not_come_back_when_the_gripper_was_busy_at_the_reconnect(scan: Scan) -> None:
+    scan.moved(50)
+    scan.controller.command(A, 250, None, None)
+    scan.now += POLL_S
+    assert scan.controller.decide(scan.now) is not None  # it never arrives
+    scan.controller.lost(None)
+    image = Request.from_registers(scan.gripper.request_registers)
+    scan.gripper.write(0, replace(image, individual_scissor=False).registers)  # a mode change: gIMC = 2
+    scan.now += 0.2
+    scan.connect(activate=False)
+    scan.until(lambda: scan.state is State.RUNNING_IDLE)
+    scan.run(1)
+    scan.moved(60, B)
+    scan.run(2)
+    assert scan.positions()[A] <= 52
+
+
+def test_what_was_adopted_is_not_ours_after_a_blink_of_the_link() -> None:
+    scan = activated_by_another()
+    scan.gripper.place_object(Finger.ABC, 150)
+    simple = (AxisRequest(200, 128, 64), AxisRequest(), AxisRequest(), AxisRequest(137))
+    scan.gripper.write(0, Request(activate=True, go=True, individual_fingers=False, axes=simple).registers)
+    scan.now += 0.5
+    scan.connect(activate=False)  # while the fingers close, all of them by A's registers
+    scan.run(8)
+    scan.blink()
+    scan.run(1)
+    scan.moved(100, S)
+    scan.run(3)
+    assert scan.positions()[B] == 150, "B still holds"
+
+
+# -- holds: unlike motions they are not dropped ----------------------------------------------------------
+
+
+def test_a_hold_survives_a_lost_link() -> None:
+    # A hold is a stop: unlike a motion it is not dropped.
+    for written in (False, True):
+        scan = started()
+        move, _ = scan.move(200, A, speed=0)
+        scan.run(0.5)
+        scan.controller.abandon(move)
+        if written:
+            scan.now += POLL_S
+            assert scan.controller.decide(scan.now) is not None  # and it is lost
+        scan.controller.lost(None)
+        at = scan.positions()[A]
+        scan.now += 0.05
+        scan.connect(activate=False)
+        assert scan.state is State.RUNNING_IDLE, "nobody has asked for anything"
+        scan.run(5)
+        # Whether a lost hold arrived is known after a device cycle: a quarter of a second, six counts.
+        assert scan.positions()[A] <= at + (8 if written else 4)
+        assert scan.state is State.RUNNING_IDLE
+
+
+@pytest.mark.parametrize("how", ["halt", "command"])
+def test_a_hold_outlives_what_has_replaced_it_and_was_lost(scan: Scan, how: str) -> None:
+    move, _ = scan.move(200, A, speed=0)
+    scan.run(0.5)
+    scan.controller.abandon(move)
+    if how == "halt":
+        scan.halt()
+    else:
+        scan.command(A, position=10)
+    at = scan.positions()[A]
+    scan.blink()
+    scan.run(10)
+    assert abs(scan.positions()[A] - at) <= 4
+
+
+def test_a_hold_is_dropped_when_somebody_else_commands_after_the_lost_link(scan: Scan) -> None:
+    move, _ = scan.move(200, A, speed=0)
+    scan.run(0.5)
+    scan.controller.abandon(move)
+    scan.controller.lost(None)
+    image = Request.from_registers(scan.gripper.request_registers)
+    scan.gripper.write(0, image.with_positions({A: 90}).registers)
+    scan.now += 0.5
+    written = len(scan.written)
+    scan.connect(activate=False)
+    scan.run(5)
+    assert len(scan.written) == written
+
+
+def test_a_lost_hold_does_not_outlive_an_activation(scan: Scan) -> None:
+    move, _ = scan.move(200, A, speed=0)
+    scan.run(0.3)
+    scan.controller.abandon(move)
+    scan.controller.lost(None)
+    scan.gripper.power_cycle()
+    scan.now += 0.1
+    scan.connect(activate=True)  # as a policy may say
+    scan.until(lambda: scan.state is State.RUNNING_IDLE)
+    scan.command(A, position=200)
+    scan.run(0.5)
+    scan.blink()
+    scan.run(10)
+    assert scan.positions()[A] >= 198
+
+
+# -- what has no echo ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("moved_before", [False, True])
+def test_an_acknowledged_speed_survives_a_blink_of_the_link(moved_before: bool) -> None:
+    scan = started(device_cycle=0.1)
+    if moved_before:
+        scan.command(B, position=120)
+        scan.step()
+    scan.command(B, speed=77, force=33)
+    scan.step()
+    scan.blink()
+    scan.run(0.3)
+    scan.command(A, position=60)
+    scan.run(0.6)
+    image = Request.from_registers(scan.written[-1])
+    assert (image.axes[1].speed, image.axes[1].force) == (77, 33)
+
+
+def test_a_speed_that_was_not_acknowledged_is_not_taken_for_the_axis_s_own(scan: Scan) -> None:
+    scan.command(B, speed=77, force=33)
+    scan.step(answer=False)
+    scan.now += 0.05
+    scan.connect(activate=False)
+    scan.run(0.3)
+    scan.command(A, position=60)
+    scan.run(0.6)
+    image = Request.from_registers(scan.written[-1])
+    assert (image.axes[1].speed, image.axes[1].force) == (128, 64)

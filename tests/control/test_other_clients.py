@@ -1,0 +1,181 @@
+"""Other clients: what they had asked before the hand came, and what they ask beside it."""
+
+from __future__ import annotations
+
+import pytest
+
+from robotiq_async import Finger, MoveSupersededError, NotActivatedError, RobotiqStatus, State
+from robotiq_async.enums import AXES
+from robotiq_async.wire.request import Request
+from tests.control.other_client import image, used_by_another
+from tests.control.scan import POLL_S, Scan
+
+A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
+
+
+def test_adopting_writes_nothing() -> None:
+    scan = used_by_another()
+    scan.connect()
+    assert scan.state is State.RUNNING_IDLE
+    scan.run(1.0)
+    assert not scan.written
+
+
+@pytest.mark.parametrize("individual", [True, False])
+@pytest.mark.parametrize("into_motion", [0.0, 0.3, 5.0])
+@pytest.mark.parametrize("speed", [0, 255])
+@pytest.mark.parametrize("objects", [Finger(0), B, A | B | C])
+def test_the_first_command_leaves_the_other_axes_what_they_do(
+    individual: bool, into_motion: float, speed: int, objects: Finger
+) -> None:
+    """Whatever the previous client did, only the addressed axis changes its ways."""
+    # The hand's own speed is that of the client: speeds have no echo.
+    scan, undisturbed = used_by_another(speed=speed), used_by_another()
+    for each in (scan, undisturbed):
+        if objects:
+            each.gripper.place_object(objects, 120)
+        positions = dict.fromkeys(AXES, 220) if individual else {A: 220}
+        each.gripper.write(0, image(positions, individual=individual, speed=speed))
+        each.now += 0.01 + into_motion
+    scan.connect()
+    # The scissor, so that A, B and C are all un-addressed.
+    scan.command(S, position=180)
+    scan.run(20)
+    undisturbed.now = scan.now
+    for axis in (A, B, C):
+        assert scan.gripper.position(axis) == pytest.approx(undisturbed.gripper.position(axis), abs=2), axis
+        assert scan.gripper.travel(axis) == pytest.approx(undisturbed.gripper.travel(axis), abs=3), axis
+    assert scan.latest.contacts & (A | B | C) == objects
+
+
+def test_a_halted_gripper_is_adopted_where_it_stands() -> None:
+    scan = used_by_another()
+    scan.gripper.write(0, image(dict.fromkeys(AXES, 255)))
+    scan.now += 0.5
+    scan.gripper.write(0, image(dict.fromkeys(AXES, 255), go=False))
+    scan.now += 0.1
+    before = scan.travels()
+    scan.connect()
+    scan.command(A, position=0)
+    scan.run(5)
+    after = scan.travels()
+    assert {axis: after[axis] - before[axis] for axis in (B, C, S)} == {
+        axis: pytest.approx(0, abs=1) for axis in (B, C, S)
+    }
+    assert scan.gripper.position(A) <= 7
+
+
+# -- beside the hand -------------------------------------------------------------------------------------
+
+
+def test_our_own_writes_are_never_taken_for_another_client() -> None:
+    for device_cycle in (0.0, 0.005, 0.05, 0.2):
+        scan = Scan(device_cycle=device_cycle)
+        scan.start()
+        for value in (100, 200, 100, 0, 100, 200, 255, 0):
+            scan.command(A, position=value)
+            scan.run(0.02)
+        scan.halt()
+        scan.run(0.02)
+        scan.command(A, position=50)
+        scan.run(2.0)
+        assert scan.controller.foreign_commands == 0, device_cycle
+
+
+def test_an_old_reply_that_was_looked_at_late_does_not_make_our_write_anothers(scan: Scan) -> None:
+    # The loop was held up between the request of a status and its reply: what it shows is as old as that.
+    _, told = scan.move(200, A)
+    scan.now += POLL_S
+    request = scan.controller.decide(scan.now)
+    assert request is not None
+    scan.gripper.write(0, request.registers)
+    scan.controller.acknowledged(scan.now)
+    asked, shown = scan.now, scan.gripper.status_registers()
+    scan.now += 0.6
+    scan.controller.see(RobotiqStatus(shown, scan.now, 10_000), asked)
+    scan.until(lambda: told.is_told)
+    assert scan.controller.foreign_commands == 0
+    assert abs(told.result.positions[A] - 200) <= 2
+
+
+def test_another_client_is_counted_and_its_requests_are_taken_over(scan: Scan) -> None:
+    scan.moved(100)
+    scan.gripper.write(0, image({A: 50, B: 200, C: 30, S: 180}))
+    scan.run(5.0)
+    assert scan.controller.foreign_commands == 1
+    before = scan.travels()
+    scan.moved(80, A)
+    assert {axis: scan.gripper.travel(axis) - before[axis] for axis in (B, C, S)} == {
+        axis: pytest.approx(0, abs=1) for axis in (B, C, S)
+    }
+
+
+def test_a_move_that_another_client_takes_over_is_superseded(scan: Scan) -> None:
+    _, taken = scan.move(255, A)
+    scan.run(0.3)
+    scan.gripper.write(0, image({A: 10}))
+    scan.run(0.1)
+    assert isinstance(taken.error, MoveSupersededError)
+
+
+def test_a_move_that_another_client_leaves_alone_goes_on(scan: Scan) -> None:
+    _, ours = scan.move(255, A)
+    scan.run(0.3)
+    scan.gripper.write(0, image({A: 255, B: 100, S: 137}))
+    scan.until(lambda: ours.is_told)
+    assert ours.result.positions[A] >= 240
+    assert scan.controller.foreign_commands == 1
+
+
+def test_our_write_that_shows_after_another_clients_is_what_counts() -> None:
+    # Another client's write and ours are on their way together; ours acts last and sends B and C back.
+    scan = used_by_another(device_cycle=0.03)
+    scan.connect()
+    scan.moved(20, S)
+    scan.run(1.0)
+    scan.gripper.write(0, image({A: 90, B: 90, C: 90, S: 90}))
+    ours = scan.command(A, position=200)
+    scan.run(1.0)
+    scan.until(lambda: not scan.controller.is_moving)
+    assert ours.told == [None]
+    assert scan.controller.foreign_commands == 1
+    before = scan.travels()
+    scan.moved(60, B)
+    moved = {axis for axis, travel in scan.travels().items() if travel != before[axis]}
+    assert moved == {B}
+
+
+def test_a_pending_hold_does_not_stop_who_has_taken_over(scan: Scan) -> None:
+    move, _ = scan.move(200, A, speed=0)
+    scan.run(0.5)
+    image = Request.from_registers(scan.gripper.request_registers)
+    scan.gripper.write(0, image.with_positions({A: 90}).registers)
+    scan.now += 0.02
+    scan.controller.abandon(move)
+    scan.controller.see(scan.status())
+    assert scan.controller.foreign_commands == 1
+    scan.run(10)
+    assert scan.positions()[A] == 90
+
+
+def test_a_reset_by_another_client_is_a_lost_activation(scan: Scan) -> None:
+    _, outcome = scan.move(255)
+    scan.run(0.3)
+    scan.gripper.write(0, Request().registers)
+    scan.run(0.1)
+    assert scan.state is State.RESET
+    assert isinstance(outcome.error, NotActivatedError)
+    with pytest.raises(NotActivatedError):
+        scan.command(A, position=0)
+
+
+def test_a_power_cycle_leaves_the_hand_in_reset_and_writes_nothing(scan: Scan) -> None:
+    _, outcome = scan.move(255)
+    scan.run(0.3)
+    writes = len(scan.written)
+    scan.gripper.power_cycle()
+    scan.run(1.0)
+    assert scan.state is State.RESET
+    assert isinstance(outcome.error, NotActivatedError)
+    assert len(scan.written) == writes
+    assert not scan.gripper.is_moving
