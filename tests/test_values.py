@@ -14,7 +14,6 @@ from concurrent.futures import Future
 from typing import Any
 
 import pytest
-from tests.register_words import status_of
 
 import robotiq_async
 from robotiq_async import (
@@ -45,6 +44,7 @@ from robotiq_async.simulator import Trouble
 from robotiq_async.values import FrozenMapping
 from robotiq_async.wire.registers import TCP_REGISTERS, gDT
 from robotiq_async.wire.request import AxisRequest, Request
+from tests.register_words import status_of
 
 A, B = Finger.A, Finger.B
 

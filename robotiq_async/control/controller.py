@@ -9,7 +9,6 @@ No I/O, no clock and no event loop. Whoever owns the link calls, once per cycle 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
@@ -23,10 +22,10 @@ from ..errors import (
     NotStartedError,
     RobotiqError,
 )
-from ..log import log
 from ..wire.request import Request
 from ..wire.status import RobotiqStatus
 from .callers import Callers
+from .foreign_commands import ForeignCommands
 from .merging import merged
 from .motion import Move, default_timeout
 from .pending import PendingCommand
@@ -36,8 +35,6 @@ from .state_machine import RUNNING, StateMachine
 from .triggers import Trigger, classify
 from .waiters import Waiter
 
-FOREIGN_WARNING_S: Final = 1.0
-"""At most one warning about another client in this time."""
 _COMMANDED: Final = RUNNING | {State.FAULT}
 """The states in which the gripper follows requests, ours or another client's."""
 
@@ -54,13 +51,13 @@ class Controller:
             machine: the state of the hand, in DISCONNECTED.
             speed: what every axis gets until set otherwise, 0..255.
             force: what every axis gets until set otherwise, 0..255.
-            closing_time: seconds of a full closing at a speed; default time-outs of moves come from it.
+            closing_time: seconds of a full closing at a speed; default timeouts of moves come from it.
         """
         self.machine = machine
         self.status: RobotiqStatus | None = None
         self.activates = False
         """Whether a gripper that is found reset is activated."""
-        self.foreign_commands = 0
+        self._foreign = ForeignCommands()
         self._closing_time = closing_time
         self._shadow = RequestShadow(speed, force)
         self._callers = Callers()
@@ -68,11 +65,12 @@ class Controller:
         """Whether what is on the line is a step of the sequence under way."""
         self._step = 0
         """The write that carried the last step of a sequence: it sees only what came of it."""
+        self._is_stop = False
+        """Whether the sequence under way begins with a stop."""
         self._activating = False
         """Whether an activation of ours may still be under way: to be taken back if the hand is stopped."""
         self._hold_on_return = NO_AXES
         """Axes whose hold was not delivered before the link went down."""
-        self._warned = -math.inf
 
     # -- what is asked ---------------------------------------------------------------------------------
 
@@ -104,9 +102,7 @@ class Controller:
     def abandon(self, move: Move, *, unseen: bool = False) -> None:
         """Nobody waits for this move any more: hold those of its axes that still move.
 
-        Args:
-            move: the move.
-            unseen: it was cancelled: if it has ended meanwhile, nobody knows of that.
+        ``unseen``: it was cancelled, and if it has ended meanwhile, nobody knows of that.
         """
         if self._callers.moves.remove(move):
             self._callers.hold(move.axes, "a move took over and was given up")
@@ -145,7 +141,7 @@ class Controller:
         """
         if self.machine.fire(trigger, self.status):
             self._callers.fail(MoveSupersededError(f"{trigger.value} took over"))
-            self._begin(reset(self._shadow.at_rest))
+            self._begin(reset(self._shadow.at_rest), is_stop=True)
 
     def release(self) -> None:
         """Begin an automatic release.
@@ -176,9 +172,16 @@ class Controller:
 
         An activation that this hand began is taken back (rACT = 0): clearing rGTO would not stop it.
         """
-        self._begin(reset(self._shadow.at_rest) if self._activating else shutdown(self._last_image))
+        sequence = reset(self._shadow.at_rest) if self._activating else shutdown(self._last_image)
+        moves = self.status is not None and self._last_image(self.status) is not None
+        self._begin(sequence, is_stop=self._activating or moves)
 
     # -- what is known ---------------------------------------------------------------------------------
+
+    @property
+    def foreign_commands(self) -> int:
+        """How often another client was seen to command the gripper."""
+        return self._foreign.count
 
     @property
     def is_moving(self) -> bool:
@@ -188,15 +191,8 @@ class Controller:
             return status is not None and status.is_moving
         return status.is_moving or bool(self._callers.pending.positions) or self._shadow.may_begin_to_move
 
-    def speeds(self) -> dict[Finger, int]:
-        """The speed each axis has or is about to get."""
-        return {
-            axis: self._callers.pending.speeds.get(axis, request.speed)
-            for axis, request in zip(AXES, self._shadow.settings, strict=True)
-        }
-
     def move_timeout(self, position: int, axes: Finger, speed: int | None) -> float:
-        """The default time-out of a move from where the axes are, in seconds.
+        """The default timeout of a move from where the axes are, in seconds.
 
         Raises:
             RobotiqError: the hand takes no command now.
@@ -204,7 +200,8 @@ class Controller:
         if self.status is None or self.machine.state not in RUNNING:
             self.machine.fire(Trigger.ASK_COMMAND, self.status)
         assert self.status is not None, "the hand is running, so a status has been read"
-        speeds = self.speeds() if speed is None else dict.fromkeys(AXES, speed)
+        has = {axis: request.speed for axis, request in zip(AXES, self._shadow.settings, strict=True)}
+        speeds = has | self._callers.pending.speeds if speed is None else dict.fromkeys(AXES, speed)
         return default_timeout(position, axes, self.status, speeds, self._closing_time)
 
     # -- the cycle -------------------------------------------------------------------------------------
@@ -245,6 +242,13 @@ class Controller:
             if self._callers.moves:
                 self._callers.moves.see(status, self._shadow.acts)
 
+    @property
+    def is_urgent(self) -> bool:
+        """Whether a stop is to be written. It does not wait for a status that may never come."""
+        if self.machine.is_busy:
+            return self._is_stop and not self._step
+        return self._callers.pending.halting is not None
+
     def decide(self, now: float) -> Request | None:
         """The image to write now, after the status just seen, or None. It counts as sent from here on."""
         status, pending = self.status, self._callers.pending
@@ -253,9 +257,11 @@ class Controller:
         if self.machine.is_busy:
             return self._next_step(status, now)
         # Most cycles end here.
-        if pending.is_empty or self.machine.state not in _COMMANDED or self._is_too_early(status):
+        if pending.is_empty or self.machine.state not in _COMMANDED:
             return None
         shadow = self._shadow
+        if pending.halting is None and not shadow.is_ready(status, moves=bool(pending.positions)):
+            return None  # for a halt it is never too early
         image = merged(shadow.base, pending, status, gripping=shadow.gripping(status), arrived=shadow.arrived)
         if pending.holds_at_most and image == shadow.base:
             # Nothing drifts; but what was written before may not act yet, and then something might.
@@ -268,16 +274,6 @@ class Controller:
         if sent.positions:
             self._callers.moves.written(number)
         return image
-
-    def _is_too_early(self, status: RobotiqStatus) -> bool:
-        """Whether it is too early to tell what to write. For a halt it never is."""
-        if self._callers.pending.halting is not None:
-            return False
-        if not self._shadow.is_certain:
-            return True
-        # Where the fingers stop is known once a halt has acted.
-        stopping = not self._shadow.base.go and status.go_echo and not self._shadow.is_settled
-        return bool(self._callers.pending.positions) and stopping
 
     def acknowledged(self, now: float) -> None:
         """The image was acknowledged."""
@@ -302,9 +298,9 @@ class Controller:
         self._activating = True
         self._begin(activation(self._shadow.at_rest))
 
-    def _begin(self, sequence: Sequence) -> None:
+    def _begin(self, sequence: Sequence, *, is_stop: bool = False) -> None:
         self.machine.begin(sequence)
-        self._step = 0
+        self._step, self._is_stop = 0, is_stop
         self._step_is_sent = False  # what is on the line now was a step of another one
         self._hold_on_return = NO_AXES
         self._shadow.forget_contacts()
@@ -322,8 +318,8 @@ class Controller:
         return image
 
     def _after_sequence(self, status: RobotiqStatus) -> None:
-        if not self._step:  # what it was to begin from was gone: nothing was sent
-            self._activating = False
+        if not self._step:
+            self._activating = False  # what it was to begin from was gone: nothing was sent
             return
         is_ours = self._shadow.restart(status)
         if self.machine.state in _COMMANDED and not is_ours:
@@ -382,10 +378,7 @@ class Controller:
 
     def _take_over(self, status: RobotiqStatus) -> None:
         """Another client commands the gripper: take over its requests, or our next write undoes them."""
-        self.foreign_commands += 1
-        if status.timestamp - self._warned >= FOREIGN_WARNING_S:
-            self._warned = status.timestamp
-            log.warning("another client commands the gripper: %r", status)
+        self._foreign.see(status)
         self._shadow.adopt(status)
         self._callers.pending.hold &= self._shadow.ours
         self._callers.moves.fail(

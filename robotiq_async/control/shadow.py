@@ -81,6 +81,17 @@ class RequestShadow:
             return False
         return self._adoption is None or self._adoption.is_certain
 
+    def is_ready(self, status: RobotiqStatus, *, moves: bool) -> bool:
+        """Whether the next image can be made from the base now.
+
+        Args:
+            status: the newest status.
+            moves: whether it is to set an axis going: after a halt that waits until it has acted, for only
+                then it is known where the fingers stopped.
+        """
+        stopping = not self.base.go and status.go_echo and not self.is_settled
+        return self.is_certain and not (moves and stopping)
+
     @property
     def is_settled(self) -> bool:
         """Whether the last image acts."""

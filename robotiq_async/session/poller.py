@@ -210,11 +210,17 @@ class Poller:
                     return
 
     async def _cycle(self) -> None:
-        """Read, decide, write."""
+        """Read, decide, write. A stop is written before that, too: the gripper may hear without answering."""
+        if self._controller.is_urgent and not self._is_held_up():
+            await self._write()
         for _ in range(READS):
             await self._poll_once()
             if not self._is_held_up():
                 break
+        await self._write()
+
+    async def _write(self) -> None:
+        """Write what the controller decides on, if anything."""
         now = self._tick.time()
         request = self._controller.decide(now)
         if request is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from robotiq_async import Finger
+from robotiq_async import Finger, NotActivatedError
 from tests.control.scan import Scan
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
@@ -51,3 +51,15 @@ def test_the_default_timeout_follows_from_distance_and_speed(scan: Scan) -> None
     assert full == pytest.approx(2 * 10.021 + 2, abs=0.1)
     assert scan.controller.move_timeout(241, A, 255) == pytest.approx(2 * 2.12 + 2, abs=0.1)
     assert scan.controller.move_timeout(6, A, 0) == pytest.approx(2.0, abs=0.1)
+
+
+def test_a_command_does_not_activate_a_gripper_that_was_reset_since_the_last_poll(scan: Scan) -> None:
+    """Every image repeats rACT = 1. Written on what the poll before had shown, it activated the gripper."""
+    scan.run(0.1)
+    writes = len(scan.written)
+    scan.gripper.power_cycle()
+    asked = scan.command(A, position=200)
+    scan.run(1.0)
+    assert isinstance(asked.error, NotActivatedError)
+    assert len(scan.written) == writes
+    assert not scan.latest.activation_echo

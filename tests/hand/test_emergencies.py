@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 
 import pytest
 
@@ -16,6 +17,7 @@ from robotiq_async import (
 )
 from robotiq_async.control.state_machine import SEQUENCES
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.wire.registers import Registers
 from robotiq_async.wire.request import Request
 
 
@@ -155,3 +157,52 @@ async def test_a_recovery_goes_on_when_the_minor_fault_clears(
     gripper.clear_faults()
     await recovering
     assert hand.state is State.RUNNING_IDLE
+
+
+# -- a stop goes out before the next read -------------------------------------------------------------------
+
+
+class Wire:
+    """A gripper without a network, that notes what it is asked."""
+
+    def __init__(self) -> None:
+        self.gripper = SimulatedGripper(speedup=20)
+        self.is_open = False
+        self.asked: list[str] = []
+
+    async def open(self) -> None:
+        self.is_open = True
+
+    async def close(self) -> None:
+        self.is_open = False
+
+    async def read(self) -> Registers:
+        self.asked.append("read")
+        return self.gripper.status_registers()
+
+    async def write(self, registers: Sequence[int]) -> None:
+        request = Request.from_registers(registers)
+        self.asked.append("go" if request.go else "halt" if request.activate else "reset")
+        self.gripper.write(0, registers)
+
+
+@pytest.mark.parametrize("stop", ["halt", "reset", "stop"])
+async def test_a_stop_is_written_before_the_next_read(stop: str) -> None:
+    """The gripper may hear without being heard: a read that fails first would keep the stop from it."""
+    wire = Wire()
+    async with RobotiqHand(wire) as hand:
+        await hand.set_position(255)
+        await anext(hand.statuses())
+        wire.asked.clear()
+        await getattr(hand, stop)()
+        assert wire.asked[0] == ("reset" if stop == "reset" else "halt")
+        assert not wire.gripper.is_moving
+
+
+async def test_a_command_is_written_after_a_read() -> None:
+    wire = Wire()
+    async with RobotiqHand(wire) as hand:
+        await anext(hand.statuses())
+        wire.asked.clear()
+        await hand.set_position(200)
+        assert wire.asked[:2] == ["read", "go"]
