@@ -7,11 +7,13 @@ from itertools import pairwise
 
 import pytest
 
-from robotiq_async import Finger, State
+from robotiq_async import Fault, Finger, NotActivatedError, State
 from robotiq_async.simulator import Trouble
+from robotiq_async.wire.request import Request
 from tests.adversity.world import world
 from tests.virtual import run
 
+A = Finger.A
 POLL_S = 0.01
 
 
@@ -112,5 +114,101 @@ def test_a_silent_gripper_is_given_up_on_also_in_a_loop_that_is_held_up_again_an
                     here.loop.hold_up(0.05)
                     await asyncio.sleep(0)
                     assert here.loop.time() - began < 1.0
+
+    run(main)
+
+
+# -- what happened meanwhile is seen before anything is written --------------------------------------------
+
+
+@pytest.mark.parametrize("how", ["command", "stop"])
+def test_what_happened_while_the_loop_was_held_up_is_seen_before_the_next_write(how: str) -> None:
+    async def main() -> None:
+        async with world() as here:
+            await here.activate_beforehand()
+            await here.hand.start()
+            await here.hand.move(50, A)
+            here.gripper.write(0, [0x0000])  # somebody resets the gripper ...
+            here.loop.hold_up(1.0)  # ... while other code holds the loop
+            if how == "command":
+                here.hand.command(A, position=100)
+            else:
+                await here.hand.stop()
+            await here.nothing_moves_for(6)
+
+    run(main)
+
+
+@pytest.mark.parametrize("turns", range(1, 31))
+def test_wherever_in_a_poll_the_loop_is_held_up_what_happened_meanwhile_is_seen_first(turns: int) -> None:
+    async def main() -> None:
+        async with world() as here:
+            await here.activate_beforehand()
+            await here.hand.start()
+            await here.hand.move(50, A)
+
+            def hold_up() -> None:
+                here.gripper.write(0, [0x0000])
+                here.loop.hold_up(1.0)
+                here.hand.command(A, position=100)
+
+            here.loop.after_turns(turns, hold_up)
+            await asyncio.sleep(2.0)
+            await here.nothing_moves_for(6)
+            assert not Request.from_registers(here.gripper.request_registers).activate
+
+    run(main)
+
+
+def test_a_gripper_is_polled_once_more_when_the_loop_is_held_up_again_during_the_second_poll() -> None:
+    async def main() -> None:
+        async with world() as here:
+            await here.activate_beforehand()
+            await here.hand.start()
+            await here.hand.move(50, A)
+            await anext(here.hand.statuses())
+            here.loop.hold_up(0.3)
+            here.hand.command(A, position=100)
+            heard = len(here.server.heard)
+            await here.until(lambda: len(here.server.heard) > heard)
+            await asyncio.sleep(0.0001)
+            here.loop.hold_up(0.1)
+            here.gripper.write(0, [0x0000])
+            here.loop.hold_up(0.2)
+            await here.nothing_moves_for(6)
+
+    run(main)
+
+
+def test_a_release_is_called_off_when_the_gripper_was_reset_while_the_loop_was_held_up() -> None:
+    async def main() -> None:
+        async with world() as here:
+            await here.activate_beforehand()
+            await here.hand.start()
+            await here.hand.move(100)
+            here.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+            await here.until_state(State.FAULT)
+            await asyncio.sleep(0.3)
+            here.gripper.write(0, [0x0000])
+            here.loop.hold_up(1.0)
+            with pytest.raises(NotActivatedError):
+                await here.hand.atr()
+            await here.nothing_moves_for(6)
+
+    run(main)
+
+
+def test_a_move_cancelled_while_the_loop_was_held_up_stops_where_it_is_by_then() -> None:
+    async def main() -> None:
+        async with world() as here:
+            await here.activate_beforehand()
+            await here.hand.start()
+            moving = asyncio.create_task(here.hand.move(255, A, speed=0))
+            await asyncio.sleep(0.3)
+            moving.cancel()
+            here.loop.hold_up(0.5)
+            at = here.gripper.position(A)
+            await asyncio.sleep(2)
+            assert abs(here.gripper.position(A) - at) < 10
 
     run(main)

@@ -1,7 +1,7 @@
 """Random use over a live link that fails at random: what was written, what moved and what was reported.
 
-What an example has found becomes a test of its own, beside the code that was wrong (tests/control,
-tests/hand) or below. More of them: ``HYPOTHESIS_PROFILE=explore``.
+What an example has found becomes a test of its own, among those of its subject (tests/control, tests/hand,
+tests/adversity). More examples: ``HYPOTHESIS_PROFILE=explore``.
 """
 
 from __future__ import annotations
@@ -46,10 +46,7 @@ LASTING_TROUBLES = [
     Trouble("slow-device", 0.2),
     Trouble("silence"),
     Trouble("refuse"),
-    Trouble("multiplexer", 0.05),
-    Trouble("multiplexer"),
     Trouble("power-cut"),
-    Trouble("idle-reset", 0.5),
     Trouble("interference"),
     Trouble("fault", 9),
     Trouble("fault", 12),

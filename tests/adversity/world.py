@@ -115,6 +115,12 @@ class World:
     def travels(self) -> dict[Finger, float]:
         return {axis: self.gripper.travel(axis) for axis in AXES}
 
+    async def nothing_moves_for(self, seconds: float, tolerance: float = 0.0) -> None:
+        before = self.travels()
+        await asyncio.sleep(seconds)
+        after = self.travels()
+        assert all(after[axis] - before[axis] <= tolerance for axis in after), (before, after)
+
     def motions(self, since: int = 0) -> list[tuple[int, ...]]:
         """The positions asked by each write that set the axes going, from a number of writes on."""
         images = [Request.from_registers(write.registers) for write in self.gripper.writes[since:]]

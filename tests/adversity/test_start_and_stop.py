@@ -1,0 +1,119 @@
+"""The start, an activation and the end, cut short or in bad company: nothing moves afterwards."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+
+import pytest
+
+from robotiq_async import Finger, NotStartedError, RobotiqError, State
+from robotiq_async.simulator import Trouble
+from robotiq_async.wire.request import Request
+from tests.adversity.world import world
+from tests.virtual import run
+
+A = Finger.A
+
+
+@pytest.mark.parametrize("device_cycle", [0.005, 0.05, 0.1, 0.2])
+@pytest.mark.parametrize("after", [0.001, 0.02, 0.15])
+def test_a_start_that_was_cancelled_does_not_disturb_the_next(device_cycle: float, after: float) -> None:
+    async def main() -> None:
+        async with world() as here:
+            here.gripper.device_cycle = device_cycle * here.gripper.speedup
+            with pytest.raises(TimeoutError):
+                async with asyncio.timeout(after):
+                    await here.hand.start()
+            await here.hand.start()
+            assert here.hand.state is State.RUNNING_IDLE
+            await here.nothing_moves_for(6)
+
+    run(main)
+
+
+@pytest.mark.parametrize("device_cycle", [0.01, 0.1])
+def test_an_activation_that_was_cancelled_and_reset_can_be_asked_for_again(device_cycle: float) -> None:
+    async def main() -> None:
+        async with world() as here:
+            here.gripper.device_cycle = device_cycle * here.gripper.speedup
+            await here.hand.start(activate=False)
+            with pytest.raises(TimeoutError):
+                async with asyncio.timeout(0.02):
+                    await here.hand.activate()
+            await here.hand.reset()
+            assert here.hand.state is State.RESET
+            await here.nothing_moves_for(1)
+            await here.hand.activate()
+
+    run(main)
+
+
+@pytest.mark.parametrize("how", ["start", "stop"])
+def test_an_activation_of_ours_is_taken_back_also_after_the_link_blinked(how: str) -> None:
+    async def main() -> None:
+        async with world(speedup=1.0) as here:
+            if how == "stop":
+                await here.hand.start(activate=False)
+            activating = asyncio.create_task(here.hand.start() if how == "start" else here.hand.activate())
+            await here.until_moving()
+            await here.server.adversary.begin(Trouble("close"))
+            with pytest.raises(RobotiqError):
+                await activating
+            if how == "stop":
+                await asyncio.sleep(0.5)
+                await here.hand.stop()
+            await here.nothing_moves_for(6, tolerance=2)
+
+    run(main)
+
+
+@pytest.mark.parametrize("device_cycle", [0.005, 0.05, 0.2])
+def test_stop_during_a_reset_does_not_activate_again(device_cycle: float) -> None:
+    async def main() -> None:
+        async with world() as here:
+            here.gripper.device_cycle = device_cycle * here.gripper.speedup
+            await here.activate_beforehand()
+            await here.hand.start()
+            resetting = asyncio.create_task(here.hand.reset())
+            await here.until_state(State.WF_RESET)
+            await here.hand.stop()
+            with pytest.raises(NotStartedError):
+                await resetting
+            await here.nothing_moves_for(6)
+            assert not Request.from_registers(here.gripper.request_registers).activate
+
+    run(main)
+
+
+class FullDisk(logging.Handler):
+    def emit(self, record: logging.LogRecord) -> None:  # noqa: ARG002
+        raise OSError(28, "no space left on device")
+
+
+def test_a_log_handler_that_fails_does_not_keep_the_fingers_from_stopping(
+    capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO, logger="robotiq_async")
+    logger, handler = logging.getLogger("robotiq_async"), FullDisk()
+
+    async def main() -> None:
+        async with world() as here:
+            await here.activate_beforehand()
+            await here.hand.start()
+            moving = asyncio.create_task(here.hand.move(255, A, speed=0))
+            waiting = asyncio.create_task(here.hand.wait_for_state(State.FAULT))
+            await asyncio.sleep(0.3)
+            logger.addHandler(handler)
+            await here.hand.stop()
+            assert not here.gripper.is_moving
+            for task in (moving, waiting):
+                with pytest.raises(NotStartedError):
+                    await task
+            await here.hand.start()
+
+    try:
+        run(main)
+    finally:
+        logger.removeHandler(handler)
+    assert "no space left" in capsys.readouterr().err
