@@ -1,0 +1,211 @@
+"""The next image: what the gripper has, with the pending command put in, and nothing else changed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robotiq_async.control.merging import merged
+from robotiq_async.control.pending import PendingCommand
+from robotiq_async.enums import AXES, NO_AXES, Finger, Mode
+from robotiq_async.errors import MoveSupersededError
+from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.wire.status import RobotiqStatus
+from tests.control.outcome import Outcome
+from tests.register_words import status_of
+
+A, B, C, S = AXES
+AT = (101, 102, 103, 104)
+GOING = Request(
+    activate=True,
+    go=True,
+    mode=Mode.WIDE,
+    axes=(AxisRequest(10, 1, 5), AxisRequest(20, 2, 6), AxisRequest(30, 3, 7), AxisRequest(40, 4, 8)),
+)
+HALTED = replace(GOING, go=False)
+MOVING = status_of(0x39, 0x00, position=AT)
+RESTING = status_of(0x31, 0xFF, position=AT)
+SUPERSEDED = MoveSupersededError("held")
+
+
+def after(
+    base: Request,
+    pending: PendingCommand,
+    status: RobotiqStatus = MOVING,
+    *,
+    gripping: Finger = NO_AXES,
+    arrived: Finger = Finger.ALL,
+) -> Request:
+    return merged(base, pending, status, gripping=gripping, arrived=arrived)
+
+
+def command(
+    axes: Finger, position: int | None = None, speed: int | None = None, force: int | None = None
+) -> PendingCommand:
+    pending = PendingCommand()
+    pending.merge(axes, position, speed, force)
+    return pending
+
+
+def hold(axes: Finger) -> PendingCommand:
+    pending = PendingCommand()
+    pending.merge_hold(axes, SUPERSEDED)
+    return pending
+
+
+def positions(image: Request) -> tuple[int, ...]:
+    return tuple(axis.position for axis in image.axes)
+
+
+# -- what is asked -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("base", [GOING, HALTED])
+def test_nothing_pending_changes_nothing(base: Request) -> None:
+    assert after(base, PendingCommand()) == base
+
+
+def test_a_position_changes_its_axes_and_no_other() -> None:
+    assert after(GOING, command(A | S, 200)) == GOING.with_positions({A: 200, S: 200})
+
+
+def test_a_speed_and_a_force_change_their_axes_and_start_nothing() -> None:
+    image = after(HALTED, command(B, speed=200, force=100))
+    assert image == replace(HALTED, axes=(*HALTED.axes[:1], AxisRequest(20, 200, 100), *HALTED.axes[2:]))
+
+
+def test_a_position_sets_rgto() -> None:
+    assert after(HALTED, command(A, 200), RESTING).go
+
+
+# -- waking ------------------------------------------------------------------------------------------------
+
+
+def test_raising_rgto_asks_every_other_axis_to_stay_where_it_is() -> None:
+    """It wakes them all: each would go where it was asked to before the halt."""
+    assert positions(after(HALTED, command(A, 200), RESTING)) == (200, 102, 103, 104)
+
+
+def test_an_axis_that_gripped_keeps_its_request_when_rgto_is_raised() -> None:
+    """Asked to be where it is it would touch the object and not hold it."""
+    assert positions(after(HALTED, command(A, 200), RESTING, gripping=B)) == (200, 20, 103, 104)
+
+
+def test_an_axis_that_gripped_goes_where_it_is_asked() -> None:
+    assert positions(after(HALTED, command(A, 200), RESTING, gripping=A | B)) == (200, 20, 103, 104)
+
+
+# -- rACT and rATR are for the sequences -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("had", [True, False])
+@pytest.mark.parametrize("shows", [True, False])
+def test_ract_is_never_raised(had: bool, shows: bool) -> None:
+    """It would activate a gripper that has lost its activation, or that was reset on purpose."""
+    status = status_of(0x30 | shows, 0xFF)
+    assert after(replace(HALTED, activate=had), command(A, 200), status).activate == (had and shows)
+
+
+def test_ratr_is_never_repeated() -> None:
+    """The base may be the image of a release: written again, it would let go."""
+    released = replace(HALTED, release=True)
+    assert not after(released, command(A, 200), RESTING).release
+
+
+# -- halting -----------------------------------------------------------------------------------------------
+
+
+def test_a_halt_goes_alone() -> None:
+    """What was asked after it follows once the gripper has stopped."""
+    pending = command(B, 200, speed=9, force=9)
+    pending.merge_halt(Outcome(), SUPERSEDED)
+    pending.merge(C, 200, None, None)
+    assert after(GOING, pending) == HALTED
+
+
+# -- holding -----------------------------------------------------------------------------------------------
+
+
+def test_an_axis_that_drifts_is_asked_to_stay_where_it_is() -> None:
+    assert positions(after(GOING, hold(A | B))) == (101, 102, 30, 40)
+
+
+def test_an_axis_that_stands_where_it_was_asked_to_keeps_its_request() -> None:
+    at_rest = status_of(0x39, 0xFF, position=(9, 22, 103, 40))
+    assert positions(after(GOING, hold(Finger.ALL), at_rest)) == (10, 20, 103, 40)
+
+
+def test_an_axis_that_has_not_arrived_is_held_however_close_it_stands() -> None:
+    at_rest = status_of(0x39, 0xFF, position=(9, 22, 30, 40))
+    assert positions(after(GOING, hold(Finger.ALL), at_rest, arrived=B)) == (9, 20, 30, 40)
+
+
+def test_an_axis_in_contact_keeps_its_grip_while_another_is_held() -> None:
+    gripping = status_of(0x39, 0b00_00_00_10, position=(5, 102, 103, 104))
+    assert positions(after(GOING, hold(A | B), gripping)) == (10, 102, 30, 40)
+
+
+def test_a_hold_never_sets_rgto() -> None:
+    assert after(HALTED, hold(Finger.ALL), RESTING) == HALTED
+
+
+def test_an_axis_may_be_held_while_another_is_sent_somewhere() -> None:
+    pending = hold(A | B)
+    pending.merge(B, 200, None, None)
+    assert positions(after(GOING, pending)) == (101, 200, 30, 40)
+
+
+# -- anything ----------------------------------------------------------------------------------------------
+
+BYTES = st.integers(0, 255)
+IMAGES = st.builds(
+    Request,
+    activate=st.booleans(),
+    go=st.booleans(),
+    release=st.booleans(),
+    mode=st.sampled_from(Mode),
+    axes=st.tuples(*[st.builds(AxisRequest, BYTES, BYTES, BYTES)] * 4),
+)
+STATUSES = st.builds(
+    status_of,
+    st.sampled_from([0x31, 0x39, 0x30, 0x00, 0x11]),
+    BYTES,
+    position=st.tuples(*[BYTES] * 4),
+)
+MASKS = st.integers(0, 15).map(Finger)
+COMMANDS = st.lists(
+    st.tuples(st.integers(1, 15).map(Finger), st.none() | BYTES, st.none() | BYTES, st.none() | BYTES),
+    max_size=4,
+)
+
+
+@given(IMAGES, COMMANDS, MASKS, STATUSES, MASKS, MASKS)
+def test_whatever_is_asked_an_axis_that_nobody_addresses_is_asked_nothing_new_or_to_stay(
+    base: Request,
+    commands: list[tuple[Finger, int | None, int | None, int | None]],
+    held: Finger,
+    status: RobotiqStatus,
+    gripping: Finger,
+    arrived: Finger,
+) -> None:
+    pending = PendingCommand()
+    pending.merge_hold(held, SUPERSEDED)
+    for each in commands:
+        pending.merge(*each)
+    image = merged(base, pending, status, gripping=gripping, arrived=arrived)
+    assert (image.mode, image.individual_fingers, image.individual_scissor) == (base.mode, True, True)
+    assert not image.release
+    assert not (image.activate and not (base.activate and status.activation_echo))
+    assert image.go == (base.go or bool(pending.positions))
+    for axis, before, now in zip(AXES, base.axes, image.axes, strict=True):
+        assert now.speed == pending.speeds.get(axis, before.speed)
+        assert now.force == pending.forces.get(axis, before.force)
+        if axis in pending.positions:
+            assert now.position == pending.positions[axis]
+        else:
+            assert now.position in (before.position, status.position(axis))
+        if base.go and axis not in pending.hold and axis not in pending.positions:
+            assert now.position == before.position
