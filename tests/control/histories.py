@@ -1,8 +1,10 @@
-"""A history of writes, the images written and the statuses that show them, in few words."""
+"""A history of writes and a shadow of requests, with images and the statuses that show them, in few words."""
 
 from __future__ import annotations
 
+from robotiq_async.control.shadow import RequestShadow
 from robotiq_async.control.writes import WriteHistory
+from robotiq_async.enums import Finger
 from robotiq_async.wire.request import AxisRequest, Request
 from robotiq_async.wire.status import RobotiqStatus
 from tests.register_words import status_of
@@ -36,4 +38,25 @@ class History(WriteHistory):
     def write(self, request: Request, at: float) -> int:
         number = self.writing(request, at)
         self.acknowledged(at)
+        return number
+
+
+class Shadow(RequestShadow):
+    """One that sees statuses as they are answered, and writes that are acknowledged at once."""
+
+    def __init__(self) -> None:
+        super().__init__(128, 64)
+        self.now = 0.0
+
+    def shown(self, status: RobotiqStatus, at: float) -> RobotiqStatus:
+        self.now = at
+        self.see(status, at)
+        return status
+
+    def write(self, request: Request, moved: Finger = Finger.ALL, *, answered: bool = True) -> int:
+        number = self.writing(request, moved, self.now)
+        if answered:
+            self.acknowledged(self.now)
+        else:
+            self.lost()
         return number

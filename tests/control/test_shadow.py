@@ -1,0 +1,211 @@
+"""The shadow of the requests: what the next image is made from, and whose it is."""
+
+from __future__ import annotations
+
+from robotiq_async.control.adoption import DIRECTION_WAIT_S
+from robotiq_async.control.shadow import RequestShadow
+from robotiq_async.control.writes import SILENT_S, WINDOW_S
+from robotiq_async.enums import AXES, NO_AXES, Finger
+from robotiq_async.wire.request import AxisRequest, Request
+from tests.control.histories import EPSILON, Shadow, image, shows
+from tests.register_words import status_of
+
+A, B, C, S = AXES
+
+
+def positions(request: Request) -> list[int]:
+    return [request.position(axis) for axis in AXES]
+
+
+# -- before anything was written ---------------------------------------------------------------------------
+
+
+def test_before_anything_is_known_every_axis_has_the_settings_of_the_hand() -> None:
+    shadow = RequestShadow(128, 64)
+    assert shadow.settings == (AxisRequest(0, 128, 64),) * 4
+    assert shadow.base == Request(axes=shadow.settings)
+
+
+def test_what_a_gripper_shows_when_it_is_found_is_not_ours_but_settled(shadow: Shadow) -> None:
+    assert shadow.base == image(100, speed=128, force=64)
+    assert shadow.ours == NO_AXES
+    assert shadow.is_certain
+    assert shadow.is_settled
+    assert not shadow.may_begin_to_move
+
+
+def test_a_gripper_that_was_found_reset_is_settled_too() -> None:
+    shadow = Shadow()
+    shadow.shown(status_of(0x00), 1.0)
+    assert shadow.is_settled
+    assert shadow.is_certain
+
+
+def test_a_moving_gripper_that_is_found_is_not_certain_before_it_has_shown_its_direction() -> None:
+    shadow, moving = Shadow(), status_of(0x39, 0x00, echo=100, position=50)
+    shadow.returned(shadow.shown(moving, 1.0))
+    assert not shadow.is_certain
+    assert shadow.is_ours(shadow.shown(moving, 1.0 + DIRECTION_WAIT_S))
+    assert shadow.is_certain
+
+
+def test_at_rest_nothing_could_be_woken(ours: Shadow) -> None:
+    """With rGTO clear, every axis is asked to be where it is."""
+    at_rest = ours.at_rest(status_of(0x39, 0x00, echo=200, position=(1, 2, 3, 4)))
+    assert not at_rest.go
+    assert positions(at_rest) == [1, 2, 3, 4]
+    assert [(axis.speed, axis.force) for axis in at_rest.axes] == [(100, 50)] * 4
+
+
+# -- what we write -----------------------------------------------------------------------------------------
+
+
+def test_the_last_image_written_is_what_the_next_is_made_from(shadow: Shadow) -> None:
+    shadow.write(image(200))
+    assert shadow.base == image(200)
+    assert shadow.settings == image(200).axes
+    assert shadow.ours == Finger.ALL
+
+
+def test_a_write_acts_once_it_shows(shadow: Shadow) -> None:
+    number = shadow.write(image(200))
+    assert shadow.is_ours(shadow.shown(shows(100, 1.01), 1.01))
+    assert not shadow.acts(number)
+    assert not shadow.is_settled
+    assert shadow.may_begin_to_move
+    assert shadow.is_ours(shadow.shown(shows(200, 1.02), 1.02))
+    assert shadow.acts(number)
+    assert shadow.is_settled
+    assert not shadow.may_begin_to_move
+
+
+def test_the_age_of_a_write_counts_until_the_status_was_asked_for(shadow: Shadow) -> None:
+    """The reply may have been looked at long after."""
+    number = shadow.write(image(100, speed=7))
+    shadow.see(shows(100, 9.0), 1.0 + SILENT_S - EPSILON)
+    assert not shadow.acts(number)
+    shadow.see(shows(100, 9.1), 1.0 + SILENT_S)
+    assert shadow.acts(number)
+
+
+def test_a_speed_that_does_not_act_yet_sets_nothing_in_motion_while_rgto_is_clear(ours: Shadow) -> None:
+    ours.write(image(200, go=False))
+    ours.shown(shows(200, 1.2 + WINDOW_S, go=False), 1.2 + WINDOW_S)
+    ours.shown(shows(200, 1.3 + 2 * WINDOW_S, go=False), 1.3 + 2 * WINDOW_S)
+    ours.write(image(200, go=False, speed=7))
+    assert not ours.is_settled
+    assert not ours.may_begin_to_move
+    ours.write(image(200, speed=7))
+    assert ours.may_begin_to_move
+
+
+# -- another client beside us ------------------------------------------------------------------------------
+
+
+def test_what_we_never_wrote_is_anothers(ours: Shadow) -> None:
+    assert not ours.is_ours(ours.shown(shows(77, 1.2), 1.2))
+
+
+def test_the_requests_of_another_client_are_what_the_next_image_is_made_from(ours: Shadow) -> None:
+    status = ours.shown(shows(77, 1.2), 1.2)
+    ours.adopt(status)
+    assert ours.base == image(77), "speed and force stay as we last wrote them: they have no echo"
+    assert ours.is_ours(ours.shown(shows(77, 1.3), 1.3))
+
+
+def test_an_axis_that_another_client_leaves_alone_stays_ours(shadow: Shadow) -> None:
+    shadow.write(image(200), moved=A | B)
+    shadow.shown(shows(200, 1.1), 1.1)
+    shadow.adopt(
+        shadow.shown(status_of(0x39, 0xFF, echo=(200, 77, 200, 200), position=(200, 77, 200, 200)), 1.2)
+    )
+    assert shadow.ours == A, "B is asked for something else, and C was never moved by us"
+
+
+def test_our_write_that_shows_after_another_clients_is_gone_on_from(ours: Shadow) -> None:
+    ours.write(image(30))
+    ours.adopt(ours.shown(shows(77, 1.2), 1.2))
+    assert not ours.is_certain, "our write may still act"
+    assert ours.is_ours(ours.shown(shows(30, 1.3), 1.3))
+    assert ours.base == image(30)
+    assert ours.ours == Finger.ALL
+    assert ours.is_certain
+
+
+def test_who_writes_again_and_again_does_not_make_us_wait_again_and_again(shadow: Shadow) -> None:
+    """A moving axis is given its time once, or nothing of ours would ever be written."""
+    for n in range(10):
+        at = 2.0 + n * DIRECTION_WAIT_S / 5
+        moving = status_of(0x39, 0x00, echo=150 + n, position=50)
+        assert not shadow.is_ours(shadow.shown(moving, at))
+        shadow.adopt(moving)
+    assert shadow.is_certain
+
+
+# -- a link that comes back --------------------------------------------------------------------------------
+
+
+def test_our_image_that_shows_when_the_link_is_back_is_still_ours(ours: Shadow) -> None:
+    ours.lost()
+    ours.returned(ours.shown(shows(200, 9.0), 9.0))
+    assert ours.base == image(200)
+    assert ours.ours == Finger.ALL
+    assert ours.is_certain
+
+
+def test_what_somebody_asked_while_the_link_was_down_is_theirs(ours: Shadow) -> None:
+    ours.lost()
+    ours.returned(ours.shown(shows(77, 9.0), 9.0))
+    assert ours.base == image(77)
+    assert ours.ours == NO_AXES
+
+
+def test_what_was_adopted_is_not_ours_after_the_link_was_lost(shadow: Shadow) -> None:
+    """Under simple control B and C echo 0: taken for our own image, it would have let go."""
+    shadow.lost()
+    shadow.returned(shadow.shown(shows(100, 2.0), 2.0))
+    assert shadow.ours == NO_AXES
+
+
+def test_a_write_that_may_have_arrived_is_waited_for(ours: Shadow) -> None:
+    ours.write(image(30), answered=False)
+    ours.returned(ours.shown(shows(200, 1.2), 1.2))
+    assert ours.base == image(200)
+    assert not ours.is_certain
+    assert ours.is_ours(ours.shown(shows(200, 1.15 + SILENT_S), 1.15 + SILENT_S))
+    assert ours.is_certain, "what has not shown by now has not arrived"
+
+
+def test_a_write_that_has_arrived_all_the_same_is_gone_on_from(ours: Shadow) -> None:
+    ours.write(image(30), answered=False)
+    ours.returned(ours.shown(shows(200, 1.2), 1.2))
+    assert ours.is_ours(ours.shown(shows(30, 1.3), 1.3))
+    assert ours.base == image(30)
+    assert ours.is_certain
+
+
+def test_an_acknowledged_speed_is_kept_over_a_lost_link(ours: Shadow) -> None:
+    ours.write(image(200, speed=7))
+    ours.lost()
+    ours.returned(ours.shown(shows(200, 1.2), 1.2))
+    assert ours.base == image(200, speed=7)
+
+
+def test_a_speed_that_may_not_have_arrived_is_not_taken_for_the_axis_s_own(ours: Shadow) -> None:
+    ours.write(image(200, speed=7), answered=False)
+    ours.returned(ours.shown(shows(200, 1.2), 1.2))
+    assert ours.base == image(200)
+
+
+# -- the end of a sequence ---------------------------------------------------------------------------------
+
+
+def test_after_a_sequence_the_gripper_has_what_was_written_last(ours: Shadow) -> None:
+    ours.write(image(30))
+    assert ours.restart(ours.shown(shows(30, 1.2), 1.2))
+    assert ours.is_settled
+
+
+def test_another_client_that_has_written_during_a_sequence_is_noticed(ours: Shadow) -> None:
+    ours.write(image(30))
+    assert not ours.restart(ours.shown(shows(77, 1.2), 1.2))
