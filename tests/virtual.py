@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 import os
 import selectors
 import threading
@@ -248,3 +249,13 @@ def run(main: Callable[[], Coroutine[Any, Any, T]]) -> T:
         assert not left, f"tasks left running: {left}"
         assert not loop.complaints, f"the event loop complained: {loop.complaints}"
         return result
+
+
+def virtual(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., None]:
+    """Let a coroutine function be a test that runs in a virtual loop."""
+
+    @functools.wraps(test)
+    def in_virtual_time(**arguments: Any) -> None:
+        run(lambda: test(**arguments))
+
+    return in_virtual_time

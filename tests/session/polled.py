@@ -1,0 +1,100 @@
+"""A poller with what it owns, on a wire without a network, in virtual time."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+
+from robotiq_async.calibration.closing_time import closing_time
+from robotiq_async.control.controller import Controller
+from robotiq_async.control.state_machine import StateMachine
+from robotiq_async.control.triggers import Trigger
+from robotiq_async.enums import State
+from robotiq_async.errors import ConnectionLostError
+from robotiq_async.session.poller import STOP_S, Poller
+from robotiq_async.session.reconnecting import ReconnectPolicy
+from robotiq_async.session.statistics import Counters
+from robotiq_async.session.streams import SentRequest
+from robotiq_async.wire.status import RobotiqStatus
+from tests.session.wire import Wire
+from tests.virtual import VirtualLoop
+
+POLL_S = 0.01
+LOST = ConnectionLostError("unplugged")
+
+
+class Polled:
+    """A poller with what it owns, and what it has told."""
+
+    def __init__(self, policy: ReconnectPolicy | None, *, activate: bool = False) -> None:
+        self.wire = Wire()
+        self.changes: list[tuple[State, State, Trigger]] = []
+        self.machine = StateMachine(lambda *change: self.changes.append(change))
+        self.controller = Controller(self.machine, 128, 64, closing_time)
+        self.controller.activates = activate
+        self.counters = Counters()
+        self.statuses: list[RobotiqStatus] = []
+        self.requests: list[SentRequest] = []
+        self.poller = Poller(
+            self.wire,
+            self.controller,
+            self.counters,
+            address="wire",
+            poll_interval=POLL_S,
+            policy=policy,
+            first_sequence=7,
+            publish=self.publish,
+            publish_request=self.requests.append,
+        )
+        self.at_next_status: Callable[[], None] | None = None
+        self.task: asyncio.Task[None]
+
+    def publish(self, status: RobotiqStatus) -> None:
+        assert self.controller.status is status, "the controller is told first"
+        self.statuses.append(status)
+        call, self.at_next_status = self.at_next_status, None
+        if call is not None:
+            call()
+
+    def start(self) -> None:
+        self.task = asyncio.create_task(self.poller.run())
+
+    async def polls(self, count: int = 1) -> None:
+        """Wait until so many more statuses have come."""
+        until = len(self.statuses) + count
+        async with asyncio.timeout(30):
+            while len(self.statuses) < until:  # noqa: ASYNC110  # the poller tells nobody
+                await asyncio.sleep(0.0001)
+
+    async def end(self, within: float = STOP_S + 0.1) -> None:
+        """Wait for the end; it comes in time whatever happens."""
+        async with asyncio.timeout(within):
+            await asyncio.wait({self.task})
+        assert self.machine.state is State.SHUTDOWN
+        assert self.wire.calls[-1] == "close"
+        self.task.result()
+
+    @property
+    def loop(self) -> VirtualLoop:
+        loop = asyncio.get_running_loop()
+        assert isinstance(loop, VirtualLoop)
+        return loop
+
+
+@asynccontextmanager
+async def polled(
+    policy: ReconnectPolicy | None = ReconnectPolicy(),  # noqa: B008  # it is frozen
+    *,
+    activate: bool = False,
+    active: bool = True,
+) -> AsyncIterator[Polled]:
+    """A poller that has had its first contact with a gripper, active or just switched on."""
+    here = Polled(policy, activate=activate)
+    if active:
+        await here.wire.activate()
+    here.start()
+    await here.poller.connected
+    yield here
+    here.poller.request_stop(halt=True)
+    await here.end()

@@ -1,0 +1,233 @@
+"""The task that owns the link: what it asks of it, in which order, and how it begins and ends."""
+
+from __future__ import annotations
+
+import asyncio
+from itertools import pairwise
+
+import pytest
+
+from robotiq_async.control.triggers import Trigger
+from robotiq_async.enums import Finger, State
+from robotiq_async.errors import (
+    ConnectFailedError,
+    ConnectionLostError,
+    ProtocolError,
+    ResponseTimeoutError,
+    RobotiqConnectionError,
+)
+from robotiq_async.session.poller import READS, STOP_S
+from robotiq_async.session.reconnecting import ReconnectPolicy
+from robotiq_async.wire.request import Request
+from tests.session.polled import LOST, POLL_S, Polled, polled
+from tests.virtual import virtual
+
+# -- read, decide, write -----------------------------------------------------------------------------------
+
+
+@virtual
+async def test_while_nothing_is_asked_it_reads_at_its_interval_and_writes_nothing() -> None:
+    async with polled() as here:
+        await here.polls(50)
+        assert here.wire.calls == ["open", *["read"] * 51]
+        asked = [status.timestamp for status in here.statuses[1:]]
+        assert all(later - earlier == pytest.approx(POLL_S) for earlier, later in pairwise(asked))
+        assert [status.sequence for status in here.statuses] == list(range(7, 58))
+        assert here.counters.polls == here.poller.sequence - 7 == 51
+        assert not here.requests
+
+
+@virtual
+async def test_a_status_is_read_before_anything_is_written_and_the_write_follows_at_once() -> None:
+    async with polled() as here:
+        await here.polls(3)
+        here.controller.command(Finger.A, 100, None, None)
+        del here.wire.calls[:]
+        await here.polls(2)
+        assert here.wire.calls[:3] == ["read", "write", "read"]
+        (sent,) = here.requests
+        assert sent.acknowledged
+        assert sent.request.position(Finger.A) == 100
+        assert sent.timestamp == here.statuses[-2].timestamp, "decided on what was read just now"
+        assert here.counters.writes == 1
+
+
+@virtual
+async def test_what_is_decided_is_decided_on_what_the_gripper_has_just_shown() -> None:
+    """Another client resets it between two polls: a command that was waiting would activate it again."""
+    async with polled() as here:
+        await here.polls(3)
+        here.controller.command(Finger.A, 100, None, None)
+        here.wire.gripper.write(0, Request().registers)
+        await here.polls(3)
+        assert here.machine.state is State.RESET
+        assert not here.requests
+
+
+@virtual
+async def test_a_write_that_was_not_acknowledged_is_published_as_such_and_never_repeated() -> None:
+    async with polled() as here:
+        await here.polls(3)
+        here.wire.failing["write"] = LOST
+        here.controller.command(Finger.A, 100, None, None)
+        await here.polls(1)
+        await asyncio.sleep(0.005)
+        assert here.machine.state is State.DISCONNECTED
+        here.wire.failing.clear()
+        await here.polls(20)
+        assert here.machine.state is State.RUNNING_IDLE
+        assert [sent.acknowledged for sent in here.requests] == [False]
+        assert here.counters.writes == 0
+        assert here.counters.reconnects == 1
+
+
+@virtual
+async def test_when_the_loop_was_held_up_the_gripper_is_read_again_before_anything_is_written() -> None:
+    """What another client has done, or where an axis is by now, must be seen before the next write."""
+    async with polled() as here:
+        await here.polls(3)
+        here.controller.command(Finger.A, 100, None, None)
+
+        def hold_up() -> None:
+            here.wire.gripper.write(0, Request().registers)
+            here.loop.hold_up(0.5)
+
+        del here.wire.calls[:]
+        here.at_next_status = hold_up
+        await here.polls(3)
+        assert here.wire.calls[:3] == ["read", "read", "read"]
+        assert here.machine.state is State.RESET
+        assert not here.requests
+
+
+@virtual
+async def test_in_a_loop_that_is_always_held_up_something_is_written_in_the_end() -> None:
+    async with polled() as here:
+        await here.polls(3)
+        here.controller.command(Finger.A, 100, None, None)
+
+        def hold_up() -> None:
+            here.loop.hold_up(0.1)
+            here.at_next_status = hold_up
+
+        del here.wire.calls[:]
+        here.at_next_status = hold_up
+        await here.polls(READS + 1)
+        assert here.wire.calls[: READS + 1] == [*["read"] * READS, "write"]
+        here.at_next_status = None
+
+
+# -- the first contact -------------------------------------------------------------------------------------
+
+
+@virtual
+@pytest.mark.parametrize(
+    ("failing", "error", "told"),
+    [
+        ("open", ConnectFailedError("wire", "refused"), ConnectFailedError),
+        ("open", ProtocolError("no gripper"), ProtocolError),
+        ("read", ResponseTimeoutError("silence"), ConnectFailedError),
+        ("read", ConnectionLostError("gone"), ConnectFailedError),
+        ("read", ProtocolError("no gripper"), ProtocolError),
+    ],
+)
+async def test_a_first_contact_that_fails_is_told_and_ends_the_task(
+    failing: str, error: RobotiqConnectionError, told: type[RobotiqConnectionError]
+) -> None:
+    here = Polled(ReconnectPolicy())
+    here.wire.failing[failing] = error
+    here.start()
+    with pytest.raises(told) as caught:
+        await here.poller.connected
+    assert caught.value is error or caught.value.__cause__ is error
+    await here.end()
+    assert "write" not in here.wire.calls
+    assert here.poller.failure is None, "the hand has not given up: it has never begun"
+
+
+@virtual
+async def test_the_start_may_activate_and_nothing_else_does_unasked() -> None:
+    async with polled(activate=True, active=False) as here:
+        assert here.changes[0] == (State.DISCONNECTED, State.DO_ACTIVATION, Trigger.ACTIVATES)
+        await asyncio.sleep(10)
+        assert here.machine.state is State.RUNNING_IDLE
+        here.wire.failing["read"] = LOST
+        here.wire.gripper.power_cycle()
+        await asyncio.sleep(0.1)
+        here.wire.failing.clear()
+        written = len(here.requests)
+        await asyncio.sleep(10)
+        assert here.machine.state is State.RESET
+        assert len(here.requests) == written
+
+
+@virtual
+async def test_a_gripper_that_was_adopted_is_not_activated_when_it_comes_back_reset() -> None:
+    """The start might have activated it, had it been reset then."""
+    async with polled(activate=True) as here:
+        here.wire.failing["read"] = LOST
+        here.wire.gripper.power_cycle()
+        await asyncio.sleep(0.1)
+        here.wire.failing.clear()
+        await asyncio.sleep(10)
+        assert here.machine.state is State.RESET
+        assert not here.requests
+
+
+@virtual
+async def test_the_policy_may_activate_a_gripper_that_comes_back_without_its_activation() -> None:
+    async with polled(ReconnectPolicy(activate=True)) as here:
+        here.wire.failing["read"] = LOST
+        here.wire.gripper.power_cycle()
+        await asyncio.sleep(0.1)
+        here.wire.failing.clear()
+        await asyncio.sleep(10)
+        assert here.machine.state is State.RUNNING_IDLE
+
+
+@virtual
+async def test_a_policy_that_may_activate_leaves_the_first_start_alone() -> None:
+    async with polled(ReconnectPolicy(activate=True), active=False) as here:
+        await asyncio.sleep(10)
+        assert here.machine.state is State.RESET
+        assert not here.requests
+
+
+# -- a link that is lost -----------------------------------------------------------------------------------
+
+
+@virtual
+async def test_without_a_policy_a_lost_link_is_the_end() -> None:
+    async with polled(None) as here:
+        await here.polls(3)
+        here.wire.failing["read"] = here.wire.failing["open"] = LOST
+        await here.end()
+        assert here.poller.failure is LOST
+
+
+@virtual
+async def test_the_delays_between_tries_double_up_to_their_limit() -> None:
+    async with polled(ReconnectPolicy(first_delay=0.1, max_delay=0.5)) as here:
+        await here.polls(3)
+        opened: list[float] = []
+        here.wire.failing["read"] = here.wire.failing["open"] = LOST
+        del here.wire.calls[:]
+        while len(opened) < 6:
+            await asyncio.sleep(0.0005)
+            if here.wire.calls.count("open") > len(opened):
+                opened.append(here.loop.time())
+        gaps = [later - earlier for earlier, later in pairwise(opened)]
+        assert gaps == [pytest.approx(gap, abs=0.003) for gap in (0.2, 0.4, 0.5, 0.5, 0.5)]
+        here.wire.failing.clear()
+        await here.polls(3)
+        assert here.counters.reconnects == 1
+
+
+@virtual
+async def test_the_policy_may_give_up_and_says_why() -> None:
+    async with polled(ReconnectPolicy(give_up_after=0.3)) as here:
+        await here.polls(3)
+        here.wire.failing["read"] = LOST
+        here.wire.failing["open"] = why = ConnectFailedError("wire", "no route")
+        await here.end(within=0.6 + STOP_S)
+        assert here.poller.failure is why

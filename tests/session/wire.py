@@ -1,0 +1,60 @@
+"""A transport without a network: a simulated gripper in the time of the loop, that fails when told to."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+
+from robotiq_async.errors import RobotiqConnectionError
+from robotiq_async.simulator import SimulatedGripper
+from robotiq_async.wire.registers import Registers
+from robotiq_async.wire.request import Request
+
+EXCHANGE_S = 0.001
+
+
+class Wire:
+    """The transport.
+
+    Attributes:
+        calls: what was asked of it, in order.
+        failing: the calls that fail, and with what; until taken out.
+        silent: the calls that never end.
+    """
+
+    def __init__(self) -> None:
+        self.gripper = SimulatedGripper(asyncio.get_running_loop().time)
+        self.is_open = False
+        self.calls: list[str] = []
+        self.failing: dict[str, RobotiqConnectionError] = {}
+        self.silent: set[str] = set()
+
+    async def open(self) -> None:
+        await self._carry("open")
+        self.is_open = True
+
+    async def read(self) -> Registers:
+        await self._carry("read")
+        return self.gripper.status_registers()
+
+    async def write(self, registers: Sequence[int]) -> None:
+        await self._carry("write")
+        self.gripper.write(0, registers)
+
+    async def close(self) -> None:
+        self.calls.append("close")
+        self.is_open = False
+
+    async def _carry(self, what: str) -> None:
+        self.calls.append(what)
+        if what in self.silent:
+            await asyncio.Event().wait()
+        await asyncio.sleep(EXCHANGE_S)
+        if what in self.failing:
+            self.is_open = False
+            raise self.failing[what]
+
+    async def activate(self) -> None:
+        """Leave the gripper active, as another client would."""
+        self.gripper.write(0, Request(activate=True).registers)
+        await asyncio.sleep(10)
