@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import os
 import sys
 import time
 from collections import deque
@@ -16,6 +15,7 @@ from ..session.clock import now
 from ..session.streams import Transition
 from ..telemetry.feed import compact
 from ..telemetry.payloads import Fields, fault_fields, status_fields, transition_fields
+from ..telemetry.raw_output import write_all
 from ..wire.status import RobotiqStatus
 from .log_capture import told
 from .text import clock, event_line, status_line
@@ -60,10 +60,7 @@ async def _print(story: _Story, form: Form, beat: float) -> None:
 
 
 def _write(data: bytes) -> None:
-    # Below Python's buffers: at its end the interpreter would wait for whoever writes to one of those.
-    left = memoryview(data)
-    while left:
-        left = left[os.write(sys.stdout.fileno(), left) :]
+    write_all(sys.stdout.fileno(), data)
 
 
 class _Story:

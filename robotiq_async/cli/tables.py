@@ -9,7 +9,8 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from ..enums import AXES, Fault, Finger, ObjectStatus
+from ..enums import AXES, Fault, Finger
+from .text import object_status
 
 if TYPE_CHECKING:
     from .. import MoveResult, RobotiqStatus
@@ -26,18 +27,12 @@ def print_status(hand: Hand) -> None:
         (
             last.position(axis),
             last.requested_position(axis),
-            _object(last, axis),
+            object_status(last.finger_status(axis).name, is_moving=axis in last.moving),
             last.current_ma(axis),
         )
         for axis in AXES
     ]
     _print_table(("position", "requested", "object", "mA"), AXES, rows)
-
-
-def _object(status: RobotiqStatus, axis: Finger) -> str:
-    # The gripper also says "in motion" of an axis that was never told to go.
-    seen = status.finger_status(axis)
-    return "-" if seen is ObjectStatus.IN_MOTION and not axis & status.moving else seen.name
 
 
 def _activation(status: RobotiqStatus) -> str:

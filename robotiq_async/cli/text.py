@@ -6,9 +6,11 @@ from collections.abc import Callable
 from datetime import datetime
 from typing import Final
 
-from ..enums import AXES
+from ..enums import AXES, ObjectStatus
 from ..telemetry.payloads import Fields
 
+NOTHING: Final = "-"
+"""What stands for an object status that tells nothing."""
 _NAMES: Final = [str(axis.name) for axis in AXES]
 
 
@@ -19,14 +21,24 @@ def clock(seconds: float) -> str:
 
 def status_line(fields: Fields) -> str:
     """A status: every axis."""
-    axes = (f"{name}={fields[name]['position']} {_does(fields, name)}" for name in _NAMES)
+    axes = (f"{name}={fields[name]['position']} {_object_status(fields, name)}" for name in _NAMES)
     return f"status   {' '.join(axes)}"
 
 
-def _does(fields: Fields, name: str) -> str:
-    # The gripper also says "in motion" of an axis that was never told to go.
-    seen = str(fields[name]["status"])
-    return "-" if seen == "IN_MOTION" and not fields["moving"] else seen
+def _object_status(fields: Fields, name: str) -> str:
+    return object_status(str(fields[name]["status"]), is_moving=fields["moving"])
+
+
+def object_status(reported: str, *, is_moving: bool) -> str:
+    """What an axis does, or ``-`` where what it reports tells nothing.
+
+    The gripper reports IN_MOTION also of an axis that was never told to go.
+
+    Args:
+        reported: its object status, by name.
+        is_moving: whether it moves, as the whole status shows.
+    """
+    return NOTHING if reported == ObjectStatus.IN_MOTION.name and not is_moving else reported
 
 
 def command_line(fields: Fields) -> str:

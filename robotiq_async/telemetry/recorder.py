@@ -34,6 +34,7 @@ from ..errors import RecordingError
 from ..protocol import Hand
 from ..version import __version__
 from .feed import JOINTS, TOPICS, Feed, Message, Topic
+from .raw_output import write_all
 
 FLUSH_S: Final = 0.5
 """Between two writes to the disk."""
@@ -200,9 +201,7 @@ class Recorder:
             self._failed.set_result(RecordingError(f"{self.path}: {why}"))
 
     def _write(self, data: bytes) -> None:
-        left = memoryview(data)
-        while left:
-            left = left[self._file.write(left) :]
+        write_all(self._file.fileno(), data)
         os.fsync(self._file.fileno())
         if os.fstat(self._file.fileno()).st_nlink == 0:
             raise FileNotFoundError(errno.ENOENT, "the file has been deleted")

@@ -7,13 +7,14 @@ more (a stalled ssh, a window that is gone) would hold up the loop that polls th
 from __future__ import annotations
 
 import contextlib
-import os
 import queue
 import threading
 from typing import Any, Final
 
 from textual.app import App
 from textual.drivers.linux_driver import LinuxDriver
+
+from ...telemetry.raw_output import write_all
 
 BACKLOG: Final = 30
 """Writes that may wait for the terminal; what comes then is dropped."""
@@ -64,11 +65,8 @@ class UnhurriedDriver(LinuxDriver):
             self._thread.join(CLOSING_S)
 
     def _run(self) -> None:
-        # Below Python's buffers: at its end the interpreter would wait for whoever writes to one of those.
         assert self._file is not None
         terminal = self._file.fileno()
         with contextlib.suppress(OSError):  # it is gone
             while (data := self._waiting.get()) is not None:
-                left = memoryview(data)
-                while left:
-                    left = left[os.write(terminal, left) :]
+                write_all(terminal, data)

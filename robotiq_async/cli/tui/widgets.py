@@ -16,6 +16,7 @@ from textual.widgets import Static
 from ...enums import AXES, Fault, Finger, ObjectStatus, Severity, State
 from ...session.statistics import Statistics
 from ...wire.status import RobotiqStatus
+from ..text import NOTHING, object_status
 
 HISTORY: Final = 60
 """Currents kept: five seconds."""
@@ -105,12 +106,12 @@ class Axes(Widget):
         return line
 
     def _does(self, axis: Finger) -> Text:
-        seen = self._status.finger_status(axis)
-        # The gripper says "in motion" also of an axis that was never told to go, and moves axes in an
-        # activation and in a release without saying so.
-        if seen is ObjectStatus.IN_MOTION and not axis & self._status.moving and self._still[axis] >= STILL:
-            return Text(f"{'-':15}", "dim")
-        words, style = _OBJECT[seen]
+        reported = self._status.finger_status(axis)
+        told = object_status(reported.name, is_moving=axis in self._status.moving)
+        # In an activation and in a release axes move of which the status as a whole says that they do not.
+        if told == NOTHING and self._still[axis] >= STILL:
+            return Text(f"{NOTHING:15}", "dim")
+        words, style = _OBJECT[reported]
         return Text(f"{words:15}", style)
 
 
