@@ -25,25 +25,25 @@ from .joint_states import SCHEMA, SCHEMA_NAME, JointStateEncoder
 from .payloads import (
     SCHEMAS,
     Fields,
-    beginning_fields,
     command_fields,
     efforts,
     fault_fields,
+    initial_state_fields,
     status_fields,
     transition_fields,
 )
 
 BUFFER: Final = 100_000
-"""Statuses that wait to be taken: minutes."""
-GIVEN_UP_S: Final = 0.2
-"""Between two looks at a hand that has given up."""
+"""Statuses kept while the event loop is busy with something else: minutes."""
+REOPEN_S: Final = 0.2
+"""Between two attempts to open the streams of a hand that has given up on its link."""
 VELOCITY_S: Final = 0.05
 """Joint velocities are taken over this time: a count is half a degree."""
 
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """What is sent on a topic, in the words of MCAP and Foxglove.
+    """A topic and the type of its messages, as MCAP and Foxglove describe them.
 
     Attributes:
         name: the topic.
@@ -66,7 +66,7 @@ def json_topic(name: str, schema: object) -> Topic:
 
 
 def compact(fields: Fields) -> bytes:
-    """An object as one short line of JSON."""
+    """An object as JSON, in one line without spaces."""
     return json.dumps(fields, separators=(",", ":")).encode()
 
 
@@ -97,9 +97,9 @@ class Message:
 class _Source:
     """A stream of a hand that is opened again when it ends."""
 
-    def __init__(self, stream: Callable[[], HandStream[Any]], take: Callable[[Any], None]) -> None:
-        self._make = stream
-        self._take = take
+    def __init__(self, open_stream: Callable[[], HandStream[Any]], publish: Callable[[Any], None]) -> None:
+        self._open_stream = open_stream
+        self._publish = publish
         self._stream: HandStream[Any]
         self._missed_before = 0
 
@@ -108,89 +108,89 @@ class _Source:
         return self._missed_before + self._stream.missed
 
     def open(self) -> None:
-        self._stream = self._make()
+        self._stream = self._open_stream()
 
     async def listen(self) -> None:
         while True:
             try:
                 async for item in self._stream:
-                    self._take(item)
+                    self._publish(item)
             except RobotiqConnectionError:
-                await asyncio.sleep(GIVEN_UP_S)  # until the hand is started again, its streams end at once
+                await asyncio.sleep(REOPEN_S)  # until the hand is started again, its streams end at once
             self._missed_before = self.missed
             self.open()
 
     def drain(self) -> None:
         for item in self._stream.drain():
-            self._take(item)
+            self._publish(item)
 
 
 class Feed:
-    """Turns what happens to a hand into messages. It only listens, also over stops and starts of the hand."""
+    """Publishes what happens to a hand as messages. It only listens, across stops and starts of the hand."""
 
-    def __init__(self, hand: Hand, take: Callable[[Message], None]) -> None:
-        """Prepare.
+    def __init__(self, hand: Hand, publish: Callable[[Message], None]) -> None:
+        """Prepare; subscribes to nothing.
 
         Args:
-            hand: started before or while it is listened to.
-            take: is called with every message, in the event loop.
+            hand: started before or while the feed runs.
+            publish: is called with every message, in the event loop.
         """
         self._hand = hand
-        self._take = take
+        self._publish = publish
         self._encoder = JointStateEncoder()
         self._before: list[RobotiqStatus] = []
         self._fault = Fault.NONE
         self._epoch = 0.0
         self._sources: tuple[_Source, ...] = (
-            _Source(lambda: hand.statuses(BUFFER), self._take_status),
-            _Source(hand.requests, self._take_request),
-            _Source(hand.transitions, self._take_transition),
+            _Source(lambda: hand.statuses(BUFFER), self._publish_status),
+            _Source(hand.requests, self._publish_request),
+            _Source(hand.transitions, self._publish_transition),
         )
         self._tasks: list[asyncio.Task[None]] = []
 
     @property
     def missed(self) -> int:
-        """Statuses that came and were not taken in time. A loop that is held up polls none: see overruns."""
+        """Statuses that were dropped unpublished. A blocked event loop polls none: see ``overruns``."""
         return self._sources[0].missed
 
-    def begin(self) -> None:
-        """Listen from now on; :meth:`end` ends it."""
+    def start(self) -> None:
+        """Listen from now on."""
         loop = asyncio.get_running_loop()
-        # What happens carries a monotonic clock; messages are stamped with the world's.
+        # Statuses carry monotonic time; messages are stamped with wall-clock time.
         began = now()
         self._epoch = time.time() - began
-        self._tell(EVENT, began, beginning_fields(self._hand.state, began))
+        self._publish_json(EVENT, began, initial_state_fields(self._hand.state, began))
         for source in self._sources:
             source.open()
         self._tasks = [
             loop.create_task(source.listen(), name="robotiq_async feed") for source in self._sources
         ]
 
-    async def end(self) -> None:
-        """Take what was published before now and not seen yet, and listen no longer."""
+    async def stop(self) -> None:
+        """Publish what has happened up to now, and stop listening."""
         for task in self._tasks:
             task.cancel()
         for ended in await asyncio.gather(*self._tasks, return_exceptions=True):
             if isinstance(ended, Exception):
-                log.critical("what happened to a hand could not be told any more", exc_info=ended)
+                log.critical("a feed failed: what happens to the hand is no longer published", exc_info=ended)
         for source in self._sources:
             source.drain()
 
     def nanoseconds(self, timestamp: float) -> int:
-        """A timestamp of the hand's, since 1970."""
+        """Nanoseconds since 1970, of a timestamp in monotonic seconds."""
         return round((timestamp + self._epoch) * 1e9)
 
-    def _tell(self, topic: Topic, timestamp: float, fields: Fields, sequence: int = 0) -> None:
-        self._take(Message(topic, self.nanoseconds(timestamp), compact(fields), sequence))
+    def _publish_json(self, topic: Topic, timestamp: float, fields: Fields, sequence: int = 0) -> None:
+        self._publish(Message(topic, self.nanoseconds(timestamp), compact(fields), sequence))
 
-    def _take_status(self, status: RobotiqStatus) -> None:
-        self._tell(STATUS, status.timestamp, status_fields(status), status.sequence)
-        self._take_joints(status)
+    def _publish_status(self, status: RobotiqStatus) -> None:
+        self._publish_json(STATUS, status.timestamp, status_fields(status), status.sequence)
+        self._publish_joints(status)
         if status.fault != self._fault:
             self._fault = status.fault
-            self._tell(EVENT, status.timestamp, fault_fields(status))
+            self._publish_json(EVENT, status.timestamp, fault_fields(status))
 
-    def _take_joints(self, status: RobotiqStatus) -> None:
+    def _publish_joints(self, status: RobotiqStatus) -> None:
         while len(self._before) > 1 and status.timestamp - self._before[1].timestamp >= VELOCITY_S:
             del self._before[0]
         self._before.append(status)
@@ -198,10 +198,10 @@ class Feed:
         velocities = joint_velocities(self._before[0], status) if seconds else (0.0,) * len(angles)
         stamp = self.nanoseconds(status.timestamp)
         data = self._encoder.encode(stamp, angles, velocities, efforts(status))
-        self._take(Message(JOINTS, stamp, data, status.sequence))
+        self._publish(Message(JOINTS, stamp, data, status.sequence))
 
-    def _take_request(self, sent: SentRequest) -> None:
-        self._tell(COMMAND, sent.timestamp, command_fields(sent))
+    def _publish_request(self, sent: SentRequest) -> None:
+        self._publish_json(COMMAND, sent.timestamp, command_fields(sent))
 
-    def _take_transition(self, transition: Transition) -> None:
-        self._tell(EVENT, transition.timestamp, transition_fields(transition))
+    def _publish_transition(self, transition: Transition) -> None:
+        self._publish_json(EVENT, transition.timestamp, transition_fields(transition))

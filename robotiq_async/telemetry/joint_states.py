@@ -1,6 +1,6 @@
 """sensor_msgs/msg/JointState as ROS 2 puts it on the wire (CDR, little endian), without ROS.
 
-The names never change, so what stands before the numbers is made once.
+The names never change, so the bytes before the numbers are encoded once.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ MSG: builtin_interfaces/Time
 int32 sec
 uint32 nanosec
 """
-"""The definition with everything it needs, in the form that MCAP calls ros2msg."""
+"""The message definition and those it refers to, in the format that MCAP calls ros2msg."""
 
 _ENCAPSULATION: Final = b"\x00\x01\x00\x00"
 _STAMP: Final = Struct("<iI")
 
 
 class JointStateEncoder:
-    """Encodes joint states of the eleven joints."""
+    """Encodes joint states of the eleven joints of the hand."""
 
     def __init__(self, frame_id: str = "palm") -> None:
-        """Prepare everything but time and numbers."""
+        """Encode everything but the stamp and the numbers."""
         body = bytearray(_STAMP.size)
         _add_string(body, frame_id)
         _align(body, 4)
@@ -62,13 +62,13 @@ class JointStateEncoder:
         velocities: Sequence[float],
         efforts: Sequence[float],
     ) -> bytes:
-        """One message.
+        """Encode one message.
 
         Args:
-            nanoseconds: since 1970.
-            positions: radians, eleven of them.
-            velocities: radians a second, eleven of them.
-            efforts: eleven of them.
+            nanoseconds: stamp, since 1970.
+            positions: radians, one for each joint.
+            velocities: radians per second, one for each joint.
+            efforts: motor currents in ampere, one for each joint.
         """
         stamp = _STAMP.pack(*divmod(nanoseconds, 1_000_000_000))
         count = len(JOINTS)

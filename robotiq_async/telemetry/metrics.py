@@ -1,10 +1,10 @@
-"""Figures of long-running hands for Prometheus. Needs the extra ``metrics`` (prometheus-client).
+"""Metrics of long-running hands for Prometheus. Needs the extra ``metrics`` (prometheus-client).
 
     async with serve_metrics(hand, port=9100):
         ...
 
-The figures are taken when somebody asks for them and cost nothing in between. They count from the hand's last
-start, as :attr:`Hand.statistics` does; Prometheus knows such resets.
+They are collected when Prometheus scrapes them and cost nothing in between. They count from the hand's last
+start, as :attr:`Hand.statistics` does; Prometheus expects counters that start over.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from ..session.statistics import Statistics
 from ..wire.checks import check_int
 
 LOOPBACK: Final = "127.0.0.1"
-PATIENCE_S: Final = 5.0
-"""How long whoever asks waits for a loop that is held up."""
+TIMEOUT_S: Final = 5.0
+"""How long a scrape waits for an event loop that is blocked."""
 
 _COUNTERS: Final = {
     "polls": "Statuses read.",
     "writes": "Requests acknowledged.",
-    "overruns": "Ticks of the polling that were missed and skipped.",
+    "overruns": "Polling ticks that were missed and skipped.",
     "reconnects": "Times the link was opened again.",
-    "foreign_commands": "Times another client was seen to command the gripper.",
+    "foreign_commands": "Times another client was seen commanding the gripper.",
     "faults": "Times the gripper reported a minor or a major fault.",
 }
 _GAUGES: Final = {
@@ -43,30 +43,30 @@ _GAUGES: Final = {
     "period_p99": "99th percentile of the time between two polls.",
     "round_trip_p50": "Median time from a read to its reply.",
     "round_trip_p99": "99th percentile of the time from a read to its reply.",
-    "longest_stall": "Longest time the event loop was held up.",
+    "longest_stall": "Longest time the event loop was blocked.",
 }
 
 
 class HandCollector(Collector):
-    """Gives a hand's figures to a registry of yours."""
+    """Collects the metrics of hands for a registry of your own."""
 
     def __init__(self, hands: Iterable[Hand]) -> None:
-        """Must be made in the event loop that the hands run in.
+        """Create it in the event loop that the hands run in.
 
         Args:
-            hands: each is told from the others by its label ``hand``, its address.
+            hands: the label ``hand`` of each is its address.
         """
         self._hands = list(hands)
         self._loop = asyncio.get_running_loop()
 
     def describe(self) -> Iterable[Metric]:
-        """Nothing: a registry would ask for figures at once otherwise, and stop the loop it waits for."""
+        """Nothing: a registry would collect at once otherwise, and block the event loop that it waits for."""
         return []
 
     def collect(self) -> Iterator[Metric]:
-        """The figures; called in a thread of the server's, taken in the loop."""
+        """Collect; called in a thread of the server, which has it done in the event loop."""
         asking = asyncio.run_coroutine_threadsafe(self._figures(), self._loop)
-        figures = asking.result(PATIENCE_S)
+        figures = asking.result(TIMEOUT_S)
         for name, meaning in _COUNTERS.items():
             counter = CounterMetricFamily(f"robotiq_{name}", meaning, labels=["hand"])
             for address, (_, statistics) in figures.items():
@@ -95,9 +95,9 @@ class HandCollector(Collector):
 async def serve_metrics(
     *hands: Hand, port: int = 9100, host: str = LOOPBACK
 ) -> AsyncIterator[tuple[str, int]]:
-    """Serve the figures of hands over HTTP while the block runs; gives host and port.
+    """Serve the metrics of hands over HTTP while the block runs; yields host and port.
 
-    There is no password: who listens on another interface than loopback shows the figures to everybody there.
+    There is no password: on another interface than loopback, everybody there can read them.
 
     Args:
         hands: at least one.

@@ -1,4 +1,4 @@
-"""What is told of a hand in JSON, to files and to programs, and the schemas of it."""
+"""What happens to a hand as JSON objects, for files and for other programs, and their schemas."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ SCHEMAS: Final = {
         moves={"type": "object", "additionalProperties": _INTEGER},
     ),
 }
-"""JSON Schemas of what is told."""
+"""A JSON Schema for each kind of object."""
 
 
 def printable(text: str) -> str:
@@ -90,7 +90,7 @@ def printable(text: str) -> str:
 
 
 def status_fields(status: RobotiqStatus) -> Fields:
-    """A status."""
+    """The object for a status."""
     return {
         "monotonic": _seconds(status.timestamp),
         "sequence": status.sequence,
@@ -112,7 +112,7 @@ def status_fields(status: RobotiqStatus) -> Fields:
 
 
 def command_fields(sent: SentRequest) -> Fields:
-    """A request that was written."""
+    """The object for a request that was written."""
     request = sent.request
     return {
         "monotonic": _seconds(sent.timestamp),
@@ -128,13 +128,13 @@ def command_fields(sent: SentRequest) -> Fields:
     }
 
 
-def beginning_fields(state: State, now: float) -> Fields:
-    """The state in which somebody began to listen."""
+def initial_state_fields(state: State, now: float) -> Fields:
+    """The event that opens a feed: the state the hand is in."""
     return {"monotonic": _seconds(now), "kind": "state", "target": state.name}
 
 
 def transition_fields(transition: Transition) -> Fields:
-    """A change of state."""
+    """The event for a change of state."""
     return {
         "monotonic": _seconds(transition.timestamp),
         "kind": "transition",
@@ -145,7 +145,7 @@ def transition_fields(transition: Transition) -> Fields:
 
 
 def fault_fields(status: RobotiqStatus) -> Fields:
-    """The fault of a status in which it has come, or gone (NONE)."""
+    """The event for a fault that has appeared, or cleared (NONE); the status is the first that shows it."""
     fault = status.fault
     return {
         "monotonic": _seconds(status.timestamp),
@@ -158,11 +158,11 @@ def fault_fields(status: RobotiqStatus) -> Fields:
 
 
 def state_fields(hand: Hand, now: float) -> Fields:
-    """State and figures of a hand; fault and age of the last status only while these are known.
+    """State and statistics of a hand; the fault and the age of the last status only while they are known.
 
     Args:
         hand: the hand.
-        now: by the clock of the statuses.
+        now: monotonic seconds.
     """
     fields: Fields = {"address": hand.address, "state": hand.state.name, **asdict(hand.statistics)}
     try:
@@ -178,7 +178,7 @@ def state_fields(hand: Hand, now: float) -> Fields:
 
 
 def efforts(status: RobotiqStatus) -> list[float]:
-    """Currents in ampere, at the joints that the motors turn first; torques are not known."""
+    """Motor currents in ampere, each at the joint its motor drives first; torques are not known."""
     scissor = status.current_ma(Finger.SCISSOR) / 1000
     one, two, middle = (status.current_ma(finger) / 1000 for finger in PREFIX)
     return [scissor, one, 0.0, 0.0, scissor, two, 0.0, 0.0, middle, 0.0, 0.0]

@@ -37,13 +37,13 @@ from .feed import JOINTS, TOPICS, Feed, Message, Topic
 from .raw_output import write_all
 
 FLUSH_S: Final = 0.5
-"""Between two writes to the disk."""
+"""Seconds between two writes to the disk."""
 DISK_S: Final = 10.0
-"""What a disk may take for the last of it."""
+"""How long the last write may take."""
 
 
 class _Outbox:
-    """What the MCAP writer writes to: keeps the bytes until they are taken to the disk."""
+    """What the MCAP writer writes to: keeps the bytes until a thread writes them to the disk."""
 
     def __init__(self) -> None:
         self._waiting: list[bytes] = []
@@ -97,16 +97,16 @@ class Recorder:
 
     @property
     def missed(self) -> int:
-        """Statuses that were not taken in time; a loop that is held up polls none: see ``overruns``."""
+        """Statuses that were dropped unrecorded; a blocked event loop polls none: see ``overruns``."""
         return self._feed.missed
 
     @property
     def size(self) -> int:
-        """Bytes of the file, about."""
+        """Approximate size of the file in bytes."""
         return self._outbox.tell()
 
     async def __aenter__(self) -> Self:
-        """Open the file and begin.
+        """Create the file and start recording.
 
         Raises:
             RecordingError: the file is there already, or cannot be made.
@@ -127,7 +127,7 @@ class Recorder:
         except OSError as error:
             raise RecordingError(f"{self.path}: {error.strerror}") from error
         self._begin()
-        self._feed.begin()
+        self._feed.start()
         self._saving = loop.create_task(self._save_again_and_again(), name="robotiq_async recorder")
         return self
 
@@ -174,7 +174,7 @@ class Recorder:
                     await self._over.wait()
 
     async def _end(self) -> None:
-        await self._feed.end()
+        await self._feed.stop()
         self._over.set()
         try:
             async with asyncio.timeout(DISK_S):
@@ -189,7 +189,7 @@ class Recorder:
             self._fail(error.strerror)
 
     async def _save(self) -> None:
-        """Take to the disk what waits; a failure ends the recording."""
+        """Write what waits to the disk; a failure ends the recording."""
         data = self._outbox.take()
         try:
             await in_a_thread(lambda: self._write(data))

@@ -1,4 +1,4 @@
-"""The commands that another program may call by name, with arguments as a JSON object."""
+"""The commands of a hand as services: called by name, with arguments in a JSON object."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ Arguments = Mapping[str, Any]
 _BYTE: Final = {"type": "integer", "minimum": 0, "maximum": 255}
 _FINGERS: Final = {"type": "string", "description": "ABC, or A,B, or scissor, or all"}
 RESPONSE: Final = {"type": "object", "properties": {"outcome": {"type": "string"}}}
-"""JSON Schema of every answer: how it ended, in words."""
+"""JSON Schema of every response: how the command ended, in words."""
 
 
 @dataclass(frozen=True, slots=True)
 class Service:
-    """One command.
+    """A command that other programs can call.
 
     Attributes:
         name: as it is called, ``/gripper/move``.
         arguments: each with its JSON Schema.
         required: those that must be given.
-        run: does it; gives how it ended, in words.
+        run: carries it out; returns how it ended, in words.
     """
 
     name: str
@@ -48,11 +48,11 @@ class Service:
         }
 
     async def call(self, operator: Operator, payload: bytes) -> str:
-        """Carry out a request; gives how it ended, in words.
+        """Carry out a request; returns how it ended, in words.
 
         Args:
-            operator: who asks.
-            payload: a JSON object with the arguments; nothing is the empty one.
+            operator: carries it out.
+            payload: a JSON object with the arguments; an empty payload stands for an empty object.
 
         Raises:
             ValueError: malformed, or an argument that is missing, unknown or outside its range.
@@ -79,7 +79,7 @@ class Service:
 
 
 def _of(action: Action) -> Service:
-    """The service of an action; a dangerous one has to be confirmed."""
+    """The service for an action; a dangerous one must be confirmed."""
 
     async def run(operator: Operator, arguments: Arguments) -> str:
         if action.warning and arguments["confirm"] is not True:

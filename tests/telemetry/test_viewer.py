@@ -271,7 +271,7 @@ async def test_calls_that_come_while_it_is_left_move_nothing() -> None:
 
             insisting = asyncio.create_task(insist())
             await seen(hand, moving=True)
-        assert not viewer._serving
+        assert not viewer._calls
         await seen(hand, moving=False)
         requests = hand.requests()
         await insisting
@@ -305,7 +305,7 @@ async def test_what_comes_after_the_end_is_refused(operator: Operator) -> None:
     viewer = Viewer(operator.hand, port=0, operator=operator)
     async with viewer:
         pass
-    with pytest.raises(ViewerError, match="no more calls"):
+    with pytest.raises(ViewerError, match="no more calls are accepted"):
         await viewer._serve(SERVICES["/gripper/close"], b"{}")
     assert not operator.has_moved
 
@@ -367,12 +367,12 @@ async def test_a_halt_finds_its_way_through_a_crowd() -> None:
                 await one.ask(number, "recover", {"confirm": True})
             while len(one.answers) < 4:
                 await one.read()
-            assert all("16 calls wait" in str(answer) for answer in one.answers.values())
+            assert all("16 calls are in progress" in str(answer) for answer in one.answers.values())
             assert await one.call("halt") == "every axis stands still"
 
 
 async def test_an_operator_of_another_hand_is_refused(operator: Operator) -> None:
-    with pytest.raises(ValueError, match="operator must be at"):
+    with pytest.raises(ValueError, match="operator must have <RobotiqHand"):
         Viewer(RobotiqHand(), operator=operator)
 
 
