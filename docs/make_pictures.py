@@ -20,7 +20,7 @@ if __name__ == "__main__":
 
 from robotiq_async import Finger, RobotiqHand, State  # noqa: E402
 from robotiq_async.actions import ACTIONS, Operator  # noqa: E402
-from robotiq_async.cli.log_capture import told  # noqa: E402
+from robotiq_async.cli.log_capture import forwarded_warnings  # noqa: E402
 from robotiq_async.cli.tui.screen import Monitor  # noqa: E402
 from robotiq_async.measure.plots import plot_recording  # noqa: E402
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer  # noqa: E402
@@ -41,7 +41,7 @@ async def main() -> None:
         operator = Operator(hand)
         await hand.start()
         screen = Monitor(operator)
-        with told(screen.remark):
+        with forwarded_warnings(screen.write_log):
             async with screen.run_test(size=(100, 28)):
                 await grasp(screen, operator, gripper)
                 await fault(screen, operator, gripper)
@@ -86,7 +86,7 @@ async def grasp(screen: Monitor, operator: Operator, gripper: SimulatedGripper) 
     closing = asyncio.ensure_future(operator.act(ACTIONS["close"]))
     await asyncio.sleep(3)
     save(screen, "monitor")
-    screen.remark(f"close: {await closing}", "bold")
+    screen.write_log(f"close: {await closing}", "bold")
 
 
 async def fault(screen: Monitor, operator: Operator, gripper: SimulatedGripper) -> None:

@@ -1,4 +1,4 @@
-"""What the library's log says while a command runs."""
+"""The library's log while a command runs."""
 
 from __future__ import annotations
 
@@ -10,46 +10,46 @@ from typing import TextIO
 
 
 def forget(stream: TextIO) -> None:
-    """Nobody reads this any more: let its last flush, at the interpreter's end, not fail over that."""
+    """Redirect a stream that nobody reads any more to the null device: its last flush must not fail."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
-class _Teller(logging.Handler):
-    """Tells messages."""
+class _Forwarder(logging.Handler):
+    """Calls a function with the message of each record."""
 
-    def __init__(self, tell: Callable[[str], object]) -> None:
+    def __init__(self, to: Callable[[str], object]) -> None:
         super().__init__(logging.WARNING)
-        self._tell = tell
+        self._to = to
 
     def emit(self, record: logging.LogRecord) -> None:
         try:
-            self._tell(record.getMessage())
-        except Exception:  # noqa: BLE001  # whoever listens must not hurt who speaks: the hand's own task
+            self._to(record.getMessage())
+        except Exception:  # noqa: BLE001  # it is called in the hand's own task, which must not end
             self.handleError(record)
 
 
 @contextmanager
-def collected() -> Iterator[list[str]]:
-    """Collect the library's warnings instead of printing them between the lines of the command."""
+def collected_warnings() -> Iterator[list[str]]:
+    """Collect the library's warnings, to be printed when the command has ended."""
     messages: list[str] = []
-    with told(messages.append):
+    with forwarded_warnings(messages.append):
         yield messages
 
 
 @contextmanager
-def told(tell: Callable[[str], object]) -> Iterator[None]:
-    """Tell the library's warnings at once, and nowhere else while this lasts; those of foxglove-sdk too."""
+def forwarded_warnings(to: Callable[[str], object]) -> Iterator[None]:
+    """Forward the library's warnings, and those of foxglove-sdk, to a function, and to no outer one."""
     foxglove = logging.getLogger("foxglove")
-    log, teller = logging.getLogger("robotiq_async"), _Teller(tell)
-    others = [handler for handler in log.handlers if isinstance(handler, _Teller)]
+    log, forwarder = logging.getLogger("robotiq_async"), _Forwarder(to)
+    others = [handler for handler in log.handlers if isinstance(handler, _Forwarder)]
     for other in others:
         log.removeHandler(other)
-    log.addHandler(teller)
-    foxglove.addHandler(teller)
+    log.addHandler(forwarder)
+    foxglove.addHandler(forwarder)
     try:
         yield
     finally:
-        foxglove.removeHandler(teller)
-        log.removeHandler(teller)
+        foxglove.removeHandler(forwarder)
+        log.removeHandler(forwarder)
         for other in others:
             log.addHandler(other)

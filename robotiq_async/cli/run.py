@@ -20,7 +20,7 @@ from ..errors import RobotiqError
 from ..telemetry.payloads import printable
 from .app import build
 from .failures import CommandError, UsageError
-from .log_capture import collected, forget
+from .log_capture import collected_warnings, forget
 
 _ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 SUCCESS, FAILURE, WRONG_USAGE, SIGNALLED = 0, 1, 2, 128
@@ -29,10 +29,10 @@ SUCCESS, FAILURE, WRONG_USAGE, SIGNALLED = 0, 1, 2, 128
 def run(arguments: Sequence[str]) -> int:
     """Run the sub-command that the arguments name and return the exit code."""
     _mend_streams()
-    with collected() as remarks, _Signals() as signals:
+    with collected_warnings() as warnings, _Signals() as signals:
         code, problem = _outcome(arguments, signals)
     # A failure is one line, whatever it holds: it is read in logs and by scripts.
-    lines = remarks if problem is None else ["; ".join((problem, *remarks))]
+    lines = warnings if problem is None else ["; ".join((problem, *warnings))]
     try:
         for line in lines:
             print("robotiq-async:", printable(" ".join(line.split())), file=sys.stderr, flush=True)
@@ -52,7 +52,7 @@ def _mend_streams() -> None:
 
 
 def _outcome(arguments: Sequence[str], signals: _Signals) -> tuple[int, str | None]:
-    """The exit code and the reason, if there is one to tell."""
+    """The exit code, and the reason if there is one."""
     try:
         command, bound, _ = build().parse_args(arguments, print_error=False, exit_on_error=False)
         outcome = command(*bound.args, **bound.kwargs)

@@ -1,4 +1,4 @@
-"""The monitor without a screen: lines for people, or a JSON object a line for programs."""
+"""The monitor without a screen: lines of text for people, lines of JSON for programs."""
 
 from __future__ import annotations
 
@@ -17,64 +17,64 @@ from ..telemetry.feed import compact
 from ..telemetry.payloads import Fields, fault_fields, status_fields, transition_fields
 from ..telemetry.raw_output import write_all
 from ..wire.status import RobotiqStatus
-from .log_capture import told
+from .log_capture import forwarded_warnings
 from .text import clock, event_line, status_line
 
 if TYPE_CHECKING:
     from ..protocol import Hand
 
 BUFFER: Final = 4000
-"""Statuses kept for a reader that is slow: twenty seconds."""
-JSON_BEAT_S: Final = 0.02
-WATCH_BEAT_S: Final = 0.1
-EVENTS: Final = ("transition", "fault", "remark")
+"""Statuses kept for a slow reader: twenty seconds."""
+JSON_INTERVAL_S: Final = 0.02
+WATCH_INTERVAL_S: Final = 0.1
+EVENTS: Final = ("transition", "fault", "log")
 
-Form = Callable[[list[Fields]], list[str]]
+Formatter = Callable[[list[Fields]], list[str]]
 
 
 async def print_objects(hand: Hand, buffer: int = BUFFER) -> None:
-    """Every status, transition and fault as a JSON object a line, until the hand ends; ``kind`` tells which.
+    """Print every status, transition and fault as a line of JSON until the hand is stopped.
 
-    ``time`` is in seconds since 1970. A reader that is slow loses the oldest statuses; an object of the kind
-    ``missed`` tells how many. What the library has to say is of the kind ``remark``.
+    ``kind`` says what a line is about, ``time`` is in seconds since 1970. A slow reader loses the oldest
+    statuses; a line of the kind ``missed`` has their number. Warnings of the library are of the kind ``log``.
     """
-    await _print(_Story(hand, buffer), lambda told: [compact(each).decode() for each in told], JSON_BEAT_S)
+    await _print(_History(hand, buffer), _json_lines, JSON_INTERVAL_S)
 
 
 async def watch(hand: Hand) -> None:
-    """The state now; then every transition and fault, and the newest status if it shows something new."""
+    """Print the state; then every transition and fault, and the newest status if it shows something new."""
     await in_a_thread(lambda: _write(f"{clock(time.time())} state    {hand.state.name}\n".encode()))
-    await _print(_Story(hand, BUFFER), _Words(), WATCH_BEAT_S)
+    await _print(_History(hand, BUFFER), _TextLines(), WATCH_INTERVAL_S)
 
 
-async def _print(story: _Story, form: Form, beat: float) -> None:
-    with told(story.remark):
+async def _print(history: _History, formatter: Formatter, interval: float) -> None:
+    with forwarded_warnings(history.add_warning):
         ended = False
         while not ended:
-            ended = story.has_ended  # and once more for what has come with the end
-            if lines := form(list(story.go_on())):
+            ended = history.has_ended  # and once more for what has come with the end
+            if lines := formatter(list(history.new())):
                 data = "".join(f"{line}\n" for line in lines).encode()
-                # Whoever reads may be slow: a full pipe must not hold up the loop that polls, nor the end.
+                # The reader may be slow: a full pipe must not block the event loop that polls, nor the end.
                 await in_a_thread(lambda: _write(data))  # noqa: B023  # awaited before it changes
-            await asyncio.sleep(beat)
+            await asyncio.sleep(interval)
 
 
 def _write(data: bytes) -> None:
     write_all(sys.stdout.fileno(), data)
 
 
-class _Story:
+class _History:
     """What happens to a hand, in the order in which it happened."""
 
     def __init__(self, hand: Hand, buffer: int) -> None:
         self._hand = hand
-        self._remarks: deque[tuple[float, str]] = deque(maxlen=BUFFER)
+        self._warnings: deque[tuple[float, str]] = deque(maxlen=BUFFER)
         self._statuses = hand.statuses(buffer)
         self._transitions = hand.transitions()
         self._state = hand.state
         self._fault = Fault.NONE
         self._missed = 0
-        # Happenings carry a monotonic clock; people and files go by the world's.
+        # Timestamps are monotonic; people and files go by wall-clock time.
         self._epoch = time.time() - now()
 
     @property
@@ -82,15 +82,15 @@ class _Story:
         """Whether nothing more will come."""
         return self._hand.state is State.SHUTDOWN
 
-    def remark(self, words: str) -> None:
-        """What the library has to say; at any time."""
-        self._remarks.append((time.time(), words))
+    def add_warning(self, message: str) -> None:
+        """Add a warning of the library; at any time."""
+        self._warnings.append((time.time(), message))
 
-    def go_on(self) -> Iterator[Fields]:
-        """What has happened since the last time."""
-        while self._remarks:
-            at, words = self._remarks.popleft()
-            yield {"kind": "remark", "time": at, "words": words}
+    def new(self) -> Iterator[Fields]:
+        """What has happened since the last call."""
+        while self._warnings:
+            at, message = self._warnings.popleft()
+            yield {"kind": "log", "time": at, "message": message}
         if self._statuses.missed > self._missed:
             yield {"kind": "missed", "time": time.time(), "count": self._statuses.missed - self._missed}
             self._missed = self._statuses.missed
@@ -107,15 +107,19 @@ class _Story:
                 yield stamp | fault_fields(each)
 
 
-class _Words:
-    """Lines for people."""
+def _json_lines(new: list[Fields]) -> list[str]:
+    return [compact(each).decode() for each in new]
+
+
+class _TextLines:
+    """Makes lines of text of what has happened."""
 
     def __init__(self) -> None:
         self._shown = ""
 
-    def __call__(self, told: list[Fields]) -> list[str]:
-        lines = [f"{clock(each['time'])} {event_line(each)}" for each in told if each["kind"] in EVENTS]
-        newest = next((each for each in reversed(told) if each["kind"] == "status"), None)
+    def __call__(self, new: list[Fields]) -> list[str]:
+        lines = [f"{clock(each['time'])} {event_line(each)}" for each in new if each["kind"] in EVENTS]
+        newest = next((each for each in reversed(new) if each["kind"] == "status"), None)
         if newest is not None and (line := status_line(newest)) != self._shown:
             self._shown = line
             lines.append(f"{clock(newest['time'])} {line}")

@@ -1,4 +1,4 @@
-"""What happens to a hand, a line each, for people."""
+"""What happens to a hand as lines of text."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from ..enums import AXES, ObjectStatus
 from ..telemetry.payloads import Fields
 
 NOTHING: Final = "-"
-"""What stands for an object status that tells nothing."""
+"""Stands for an object status that means nothing."""
 _NAMES: Final = [str(axis.name) for axis in AXES]
 
 
 def clock(seconds: float) -> str:
-    """A time of the world's clock, as people here read it, to the millisecond."""
+    """The local time of day, to the millisecond, of seconds since 1970."""
     return f"{datetime.fromtimestamp(seconds).astimezone():%H:%M:%S.%f}"[:-3]
 
 
 def status_line(fields: Fields) -> str:
-    """A status: every axis."""
+    """The line for a status: position and object status of every axis."""
     axes = (f"{name}={fields[name]['position']} {_object_status(fields, name)}" for name in _NAMES)
     return f"status   {' '.join(axes)}"
 
@@ -30,7 +30,7 @@ def _object_status(fields: Fields, name: str) -> str:
 
 
 def object_status(reported: str, *, is_moving: bool) -> str:
-    """What an axis does, or ``-`` where what it reports tells nothing.
+    """The object status of an axis, or ``-`` where it means nothing.
 
     The gripper reports IN_MOTION also of an axis that was never told to go.
 
@@ -42,16 +42,16 @@ def object_status(reported: str, *, is_moving: bool) -> str:
 
 
 def command_line(fields: Fields) -> str:
-    """A request that was written."""
+    """The line for a request that was written."""
     axes = (f"{n}={fields[n]['position']}@{fields[n]['speed']}/{fields[n]['force']}" for n in _NAMES)
     bits = f"act={fields['activate']:d} go={fields['go']:d} release={fields['release']:d}"
     return f"command  {bits} {' '.join(axes)}{'' if fields['acknowledged'] else ' NOT ACKNOWLEDGED'}"
 
 
 def event_line(fields: Fields) -> str:
-    """The state at the beginning, a transition, a fault, or what the library has to say."""
-    if fields["kind"] == "remark":
-        return f"remark   {fields['words']}"
+    """The line for the initial state, a transition, a fault, or a warning of the library."""
+    if fields["kind"] == "log":
+        return f"log      {fields['message']}"
     if fields["kind"] == "state":
         return f"state    {fields['target']}"
     if fields["kind"] == "fault":
@@ -59,9 +59,9 @@ def event_line(fields: Fields) -> str:
     return f"state    {fields['source']} -> {fields['target']} ({fields['trigger']})"
 
 
-IN_WORDS: Final[dict[str, Callable[[Fields], str]]] = {
+FORMATTERS: Final[dict[str, Callable[[Fields], str]]] = {
     "/gripper/status": status_line,
     "/gripper/command": command_line,
     "/gripper/event": event_line,
 }
-"""By topic."""
+"""What makes a line of a message, by topic."""

@@ -124,10 +124,10 @@ async def test_a_lost_gripper_is_a_state_and_comes_back(active: Operator, server
         assert pilot.app.is_running
 
 
-async def test_what_the_library_remarks_comes_into_the_log(operator: Operator) -> None:
+async def test_warnings_of_the_library_come_into_the_log(operator: Operator) -> None:
     async with shown(operator) as pilot:
         assert isinstance(pilot.app, Monitor)
-        pilot.app.remark("polling is late")
+        pilot.app.write_log("polling is late")
         await until(pilot, lambda: "polling is late" in log(pilot))
 
 
@@ -151,7 +151,7 @@ async def test_of_the_currents_between_two_paints_the_highest_is_shown(active: O
         strong = RobotiqStatus((*still[:2], still[2] & 0xFF00 | 9, *still[3:]))
         peaks = [strong.current_ma(axis) for axis in AXES]
         assert max(peaks) == 90
-        pilot.app._look([strong, active.hand.status])
+        pilot.app._see([strong, active.hand.status])
         assert "   90 mA" in pilot.app.query_one(Axes).render().plain
 
 

@@ -70,7 +70,7 @@ async def test_watch_prints_what_changes(
         lines = []
         while "A=100 AT_POSITION" not in (line := await shell.read_line(process)):
             lines.append(line)
-        assert {line[13:].split()[0] for line in lines} <= {"status", "remark"}
+        assert {line[13:].split()[0] for line in lines} <= {"status", "log"}
         assert any("another client commands" in line for line in lines), "this test is that client"
         gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
         told: set[str] = set()
@@ -95,7 +95,7 @@ async def test_a_hand_that_has_ended_ends_it(
 
 
 def test_what_the_library_says_is_an_object_too() -> None:
-    assert event_line({"kind": "remark", "words": "polling is late"}) == "remark   polling is late"
+    assert event_line({"kind": "log", "message": "polling is late"}) == "log      polling is late"
 
 
 async def test_it_only_looks(shell: Shell, server: SimulatorServer, gripper: SimulatedGripper) -> None:

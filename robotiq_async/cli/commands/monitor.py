@@ -13,7 +13,7 @@ from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..arguments import USUAL, Address, Byte, Link, need
 from ..consent import forget_keys
 from ..failures import CommandError, UsageError
-from ..log_capture import forget, told
+from ..log_capture import forget, forwarded_warnings
 
 SCREEN_S: Final = 1.0
 """What the screen may take to leave the terminal as it was."""
@@ -91,7 +91,7 @@ async def _screen(address: str, link: Link, speed: int, force: int) -> None:
         screen = Monitor(operator)
         forget_keys()
         showing = asyncio.ensure_future(screen.run_async())
-        with told(screen.remark):
+        with forwarded_warnings(screen.write_log):
             await asyncio.wait({showing})
     finally:
         # First the fingers: a screen whose terminal is gone may take its time, or not come back at all.

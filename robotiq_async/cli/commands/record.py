@@ -15,7 +15,7 @@ from cyclopts import Parameter
 from ...telemetry.payloads import printable
 from ..arguments import USUAL, Address, Link, need
 from ..failures import CommandError, UsageError
-from ..text import IN_WORDS, clock
+from ..text import FORMATTERS, clock
 
 if TYPE_CHECKING:
     from ...protocol import Hand
@@ -120,9 +120,9 @@ def replay(
         return
     shown, is_empty = "", True
     for entry in _in_order(entry for entry in read_recording(file) if entry.is_json):
-        if entry.topic not in IN_WORDS:
+        if entry.topic not in FORMATTERS:
             continue
-        line = printable(entry.read(IN_WORDS[entry.topic]))
+        line = printable(entry.read(FORMATTERS[entry.topic]))
         if entry.topic == "/gripper/status":
             if line == shown:
                 continue

@@ -59,7 +59,7 @@ async def view(
     need("foxglove", "view")
     from ...telemetry.viewer import Viewer
     from ..connect import make_operator, operated
-    from ..log_capture import told
+    from ..log_capture import forwarded_warnings
 
     if not is_loopback(host):
         what = "see this gripper" if read_only else "see this gripper and COMMAND it"
@@ -68,7 +68,7 @@ async def view(
         operator = make_operator(address, link, speed=speed, force=force)
         viewer = Viewer(operator.hand, host=host, port=port, operator=None if read_only else operator)
         # In this order no viewer delays the stop of the fingers.
-        with told(_tell):
+        with forwarded_warnings(_tell):
             async with viewer, operated(operator, _tell):
                 print(viewer.url, flush=True)
                 await asyncio.Event().wait()

@@ -1,7 +1,7 @@
-"""A driver of textual's that never waits for the terminal.
+"""A driver for textual that never blocks on the terminal.
 
-Textual's own hands its output to a thread, and waits when that is behind: a terminal that does not read any
-more (a stalled ssh, a window that is gone) would hold up the loop that polls the gripper, and the end.
+Textual's own hands its output to a thread, and waits when that falls behind: a terminal that has stopped
+reading (a stalled ssh, a window that is gone) would block the event loop that polls the gripper, and the end.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from textual.drivers.linux_driver import LinuxDriver
 from ...telemetry.raw_output import write_all
 
 BACKLOG: Final = 30
-"""Writes that may wait for the terminal; what comes then is dropped."""
+"""Writes queued for the terminal; further ones are dropped."""
 CLOSING_S: Final = 0.5
-"""What the terminal may take for the last of them."""
+"""How long closing waits for the terminal."""
 
 
-class UnhurriedDriver(LinuxDriver):
+class NonblockingDriver(LinuxDriver):
     """Drops what the terminal does not take.
 
     Attributes:
-        is_behind: whether something was dropped; the screen is to be painted anew when :meth:`has_caught_up`.
+        is_behind: whether something was dropped; repaint the screen when it :meth:`has_caught_up`.
     """
 
     def __init__(
@@ -37,7 +37,7 @@ class UnhurriedDriver(LinuxDriver):
         mouse: bool = True,
         size: tuple[int, int] | None = None,
     ) -> None:
-        """As textual's."""
+        """Take the arguments of textual's own driver."""
         super().__init__(app, debug=debug, mouse=mouse, size=size)
         self.is_behind = False
         self._waiting: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
@@ -45,11 +45,11 @@ class UnhurriedDriver(LinuxDriver):
 
     @property
     def has_caught_up(self) -> bool:
-        """Whether nothing waits."""
+        """Whether the queue is empty."""
         return self._waiting.empty()
 
     def write(self, data: str) -> None:
-        """Hand over to the terminal."""
+        """Queue output for the terminal."""
         if not self._thread.is_alive() and self._thread.ident is None:
             self._thread.start()
         if self._waiting.qsize() >= BACKLOG:
@@ -58,7 +58,7 @@ class UnhurriedDriver(LinuxDriver):
             self._waiting.put(data.encode())
 
     def close(self) -> None:
-        """Hand over the last of it, if the terminal takes it."""
+        """Write what is queued, if the terminal takes it."""
         super().close()  # its thread has nothing to do and ends at once
         self._waiting.put(None)
         if self._thread.is_alive():

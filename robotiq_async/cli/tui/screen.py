@@ -25,20 +25,20 @@ from ..text import clock, event_line
 from .widgets import Axes, Line, Question, link_text, state_text
 
 if sys.platform == "win32":
-    DRIVER, UNHURRIED = None, ()
+    DRIVER, NONBLOCKING = None, ()
 else:
-    from .nonblocking_driver import UnhurriedDriver
+    from .nonblocking_driver import NonblockingDriver
 
-    DRIVER, UNHURRIED = UnhurriedDriver, UnhurriedDriver
+    DRIVER, NONBLOCKING = NonblockingDriver, NonblockingDriver
 
 FRAMES: Final = 12
-"""Paints a second."""
+"""How often the screen is painted, per second."""
 FIGURES_S: Final = 0.5
-"""Between two looks at the figures of the polling."""
+"""Between two updates of the polling statistics."""
 BUFFER: Final = 400
 """Statuses kept for the next paint: two seconds."""
 STEP: Final = 16
-"""Of speed and force, for one press of a key."""
+"""Change of speed or force for one press of a key."""
 LOG_LINES: Final = 2000
 
 KEYS: Final = """\
@@ -47,7 +47,7 @@ a activate  r reset  l release  v recover                             q quit"""
 
 
 class Monitor(App[None]):
-    """The screen."""
+    """Shows the hand of an operator, who moves it by keys."""
 
     ENABLE_COMMAND_PALETTE = False
     ALLOW_SELECT = False  # Ctrl-C would copy what is selected, and not quit.
@@ -80,12 +80,12 @@ class Monitor(App[None]):
     ]
 
     def __init__(self, operator: Operator) -> None:
-        """Prepare a screen for somebody at a hand that has been started."""
+        """Prepare the screen; the hand of the operator must have been started."""
         super().__init__(driver_class=DRIVER)
         self._operator = operator
         self._hand = operator.hand
         self._lines: deque[tuple[float, str, str]] = deque(maxlen=LOG_LINES)
-        """For the log, at the next paint: when, what, how."""
+        """For the log, at the next paint: time, text, style."""
         self._statuses = operator.hand.statuses(BUFFER)
         self._transitions = operator.hand.transitions()
         self._newest = operator.hand.status
@@ -99,7 +99,7 @@ class Monitor(App[None]):
         self._polls = (now(), operator.hand.statistics.polls)
 
     def compose(self) -> ComposeResult:
-        """From top to bottom."""
+        """The widgets, from top to bottom."""
         yield self._top
         yield self._axes
         yield self._figures
@@ -108,38 +108,38 @@ class Monitor(App[None]):
         yield Static(KEYS, id="keys", markup=False)
 
     def on_mount(self) -> None:
-        """Begin to paint."""
-        self.remark("Watching. Nothing has been written to the gripper.", "")
-        self._look([self._newest])
+        """Start painting."""
+        self.write_log("Watching. Nothing has been written to the gripper.", "")
+        self._see([self._newest])
         self._paint_state()
         self._paint_figures()
         self.set_interval(1 / FRAMES, self._paint)
         self.set_interval(FIGURES_S, self._paint_figures)
 
-    # -- what is shown ---------------------------------------------------------------------------------
+    # -- painting -------------------------------------------------------------------------------------
 
-    def remark(self, words: str, style: str = "yellow", when: float | None = None) -> None:
-        """A line for the log, at any time; ``when`` by the hand's clock."""
-        self._lines.append((now() if when is None else when, words, style))
+    def write_log(self, text: str, style: str = "yellow", when: float | None = None) -> None:
+        """Add a line to the log, at any time; ``when`` in monotonic seconds."""
+        self._lines.append((now() if when is None else when, text, style))
 
     def _paint(self) -> None:
-        """Show what has come since the last time; of the statuses, the newest."""
+        """Show what is new since the last paint; of the statuses, the newest."""
         driver = self._driver
-        if isinstance(driver, UNHURRIED) and driver.is_behind:
+        if isinstance(driver, NONBLOCKING) and driver.is_behind:
             if not driver.has_caught_up:
                 return  # nobody sees it
             driver.is_behind = False
             self.refresh(layout=True)
-        self._look(self._statuses.drain())
+        self._see(self._statuses.drain())
         for each in self._transitions.drain():
-            self.remark(event_line(transition_fields(each)), "", each.timestamp)
+            self.write_log(event_line(transition_fields(each)), "", each.timestamp)
         epoch = time.time() - now()
-        for when, words, style in sorted(self._lines):
-            self._history.write(Text(f"{clock(epoch + when)} {words}", style), expand=True)
+        for when, text, style in sorted(self._lines):
+            self._history.write(Text(f"{clock(epoch + when)} {text}", style), expand=True)
         self._lines.clear()
         self._paint_state()
 
-    def _look(self, statuses: Iterable[RobotiqStatus]) -> None:
+    def _see(self, statuses: Iterable[RobotiqStatus]) -> None:
         peaks = dict.fromkeys(AXES, -1)
         for status in statuses:
             self._newest = status
@@ -148,13 +148,13 @@ class Monitor(App[None]):
             if status.fault != self._fault:
                 self._fault = status.fault
                 style = "bold" if status.fault else ""
-                self.remark(event_line(fault_fields(status)), style, status.timestamp)
+                self.write_log(event_line(fault_fields(status)), style, status.timestamp)
         self._axes.show(self._newest, peaks)
 
     def _paint_state(self) -> None:
         state, age = self._hand.state, now() - self._newest.timestamp
         self._top.show(state_text(self._hand.address, state, self._newest, age))
-        self._axes.show_age(state is State.DISCONNECTED)
+        self._axes.show_stale(state is State.DISCONNECTED)
 
     def _paint_figures(self) -> None:
         figures, at = self._hand.statistics, now()
@@ -165,7 +165,7 @@ class Monitor(App[None]):
         held_up, self._overruns = figures.overruns > self._overruns, figures.overruns
         self._figures.show(link_text(figures, rate, held_up, operator.speed, operator.force))
 
-    # -- what keys do ----------------------------------------------------------------------------------
+    # -- keys -----------------------------------------------------------------------------------------
 
     def action_act(self, name: str) -> None:
         """Carry out an action; a dangerous one only after a yes."""
@@ -193,8 +193,8 @@ class Monitor(App[None]):
         async def carry_out() -> None:
             # Painted with the next paint: a key that is held would paint thirty times a second.
             try:
-                self.remark(f"{name}: {await work()}", "bold")
+                self.write_log(f"{name}: {await work()}", "bold")
             except RobotiqError as error:
-                self.remark(f"{name}: {error}", "bold red")
+                self.write_log(f"{name}: {error}", "bold red")
 
         _: Worker[None] = self.run_worker(carry_out)

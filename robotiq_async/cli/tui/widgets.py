@@ -1,4 +1,4 @@
-"""The parts of the monitor's screen; each shows what it is given and knows nothing of a hand's life."""
+"""The parts of the monitor's screen. Each shows what it is given; none has access to a hand."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from ...wire.status import RobotiqStatus
 from ..text import NOTHING, object_status
 
 HISTORY: Final = 60
-"""Currents kept: five seconds."""
+"""Currents kept, one per paint: five seconds."""
 FULL: Final = 255
 READING_S: Final = 0.3
-"""Keys that were typed before a question could be read are no answer to it."""
+"""A yes counts only after this time: it may have been typed before the question could be read."""
 SMALL_MA: Final = 500
-"""Currents below this do not fill their column: the noise of a standing motor is no mountain."""
+"""Lower bound of the scale of the currents: the noise of a motor at rest does not fill it."""
 STILL: Final = 4
-"""An axis that has not moved for so many paints stands."""
+"""Number of paints without a change after which an axis counts as at rest."""
 LEVELS: Final = "▁▂▃▄▅▆▇█"
 FIXED: Final = 47
-"""Columns of a line that are not pictures."""
+"""Columns of a line that are neither bar nor sparkline."""
 _OBJECT: Final = {
     ObjectStatus.IN_MOTION: ("moving", "cyan"),
     ObjectStatus.CONTACT_OPENING: ("CONTACT opening", "bold yellow"),
@@ -40,35 +40,35 @@ _CALM: Final = (State.RUNNING_IDLE, State.RUNNING_CC)
 
 
 class Line(Static):
-    """A text of a fixed size that is painted only when it is another one: painting is the dear part."""
+    """A text of a fixed size. Painting is expensive, so it is painted only when it has changed."""
 
     _text = Text()
 
     def show(self, text: Text) -> None:
-        """Change it."""
+        """Show another text."""
         if text != self._text:
             self._text = text
             self.update(text, layout=False)
 
 
 class Axes(Widget):
-    """A line for each axis: position and request, what it does, its current now and in the last seconds.
+    """A line for each axis: position and request, object status, current now and in the last seconds.
 
-    One widget that draws all of it: a screen of many takes five times as long to paint, and the loop that
+    One widget draws all of it: many small ones take five times as long to paint, and the event loop that
     paints is the one that polls.
     """
 
     def __init__(self) -> None:
-        """Nothing to show yet."""
+        """Begin with a status of zeros."""
         super().__init__(id="axes")
         self._status = RobotiqStatus((0,) * 8)
         self._currents = {axis: deque([0] * HISTORY, maxlen=HISTORY) for axis in AXES}
         self._still = dict.fromkeys(AXES, STILL)
-        """Paints since an axis was elsewhere."""
+        """Number of paints since the position of an axis changed."""
         self._stale = False
 
     def show(self, status: RobotiqStatus, peaks_ma: Mapping[Finger, int]) -> None:
-        """A status, and the highest currents since the last time; -1 when nothing has come."""
+        """Show a status, and the highest currents since the last paint; -1 where there was no status."""
         for axis in AXES:
             self._currents[axis].append(peaks_ma[axis])
             same = status.position(axis) == self._status.position(axis)
@@ -76,15 +76,15 @@ class Axes(Widget):
         self._status = status
         self.refresh()
 
-    def show_age(self, stale: bool) -> None:
-        """Whether what is shown is no longer true."""
+    def show_stale(self, stale: bool) -> None:
+        """Dim the lines while what they show is out of date."""
         if stale != self._stale:
             self._stale = stale
             self.refresh()
 
     def render(self) -> Text:
-        """The lines."""
-        # What is left of the width goes to the two columns that are pictures.
+        """A heading, and a line for each axis."""
+        # What is left of the width is shared by bar and sparkline.
         bar = max((self.size.width - FIXED) // 2, 8)
         where, current = (f"{words:{bar}.{bar}}" for words in ("position, ▼ request", "current, 5 s"))
         head = Text(f"axis     {where}   counts   {'':15} {current}      now", "dim")
@@ -116,7 +116,7 @@ class Axes(Widget):
 
 
 def position_bar(position: int, requested: int, width: int) -> Text:
-    """Where an axis is (the bar) and where it is asked to go (the mark); counts, 0..255."""
+    """The position of an axis (the bar) and its requested position (the mark), in counts."""
     filled, mark = round(position / FULL * width), round(requested / FULL * (width - 1))
     cells = ["█"] * filled + ["·"] * (width - filled)
     cells[mark] = "▼"
@@ -127,9 +127,9 @@ def position_bar(position: int, requested: int, width: int) -> Text:
 
 
 def sparkline(values: Sequence[int], width: int) -> str:
-    """Currents in mA, their peaks in so many columns; the top is the highest, or half an ampere.
+    """Currents in mA as a line of bars, each the peak of its column; full scale is 0.5 A or the highest.
 
-    Where there was none (-1) nothing is drawn.
+    Where there is none (-1) the column stays empty.
     """
     count, top = len(values), max(SMALL_MA, *values)
     columns = min(width, count)
@@ -140,13 +140,13 @@ def sparkline(values: Sequence[int], width: int) -> str:
 
 
 def state_text(address: str, state: State, status: RobotiqStatus, age: float) -> Text:
-    """State and fault, a line each.
+    """Two lines: the state of the hand, and the fault of the gripper.
 
     Args:
         address: of the gripper.
         state: of the hand.
-        status: the last one.
-        age: its age in seconds.
+        status: the newest.
+        age: of the status, in seconds.
     """
     lost = state is State.DISCONNECTED
     colours = "white on red" if lost else "black on green" if state in _CALM else "black on yellow"
@@ -176,7 +176,15 @@ def _doing(state: State, status: RobotiqStatus) -> str:
 
 
 def link_text(figures: Statistics, rate: float, held_up: bool, speed: int, force: int) -> Text:
-    """How the polling goes, whether it was held up lately, and what the next motion is asked to be like."""
+    """Two lines: polling statistics, and the speed and force of the next motion.
+
+    Args:
+        figures: of the hand.
+        rate: polls per second, lately.
+        held_up: whether polls were overrun since the last update.
+        speed: of the next motion.
+        force: of the next motion.
+    """
     jitter = 1000 * (figures.period_p99 - figures.period_p50)
     text = Text(f"{rate:.1f} Hz  jitter {jitter:.2f} ms  ", "dim")
     text.append(
@@ -193,7 +201,7 @@ def link_text(figures: Statistics, rate: float, held_up: bool, speed: int, force
 
 
 class Question(ModalScreen[bool]):
-    """Asks before something dangerous. Halting goes on working meanwhile."""
+    """Asks before a dangerous action. Halting works meanwhile."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         ("y", "answer(True)", "yes"),
@@ -202,28 +210,28 @@ class Question(ModalScreen[bool]):
     ]
 
     def __init__(self, question: str, warning: str) -> None:
-        """Prepare the question."""
+        """Keep question and warning."""
         super().__init__()
         self.is_open = False
-        """Whether a yes counts: not before somebody can have read the question."""
+        """Whether a yes counts: not before the question can have been read."""
         self._question = question
         self._warning = warning
 
     def compose(self) -> ComposeResult:
-        """The question."""
+        """Question, warning and keys."""
         text = Text(f"{self._question}\n\n", "bold")
         text.append(self._warning, "bold yellow")
         text.append("\n\ny yes    n no    space halt")
         yield Static(text, id="question")
 
     def on_mount(self) -> None:
-        """Begin to listen in a moment."""
+        """Let a yes count in a moment."""
         self.set_timer(READING_S, self._open)
 
     def _open(self) -> None:
         self.is_open = True
 
     def action_answer(self, answer: bool) -> None:
-        """Yes or no."""
+        """Close with the answer, unless it is a yes too early."""
         if self.is_open or not answer:
             self.dismiss(answer)
