@@ -1,4 +1,4 @@
-"""What a person asks of a hand through a program: a key of the monitor, a button of a viewer."""
+"""What a person makes a hand do through a program: with a key of the monitor, a button of a viewer."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ from .errors import MoveSupersededError, NotStartedError
 from .protocol import Hand
 from .session.clock import now
 
-ENDING: Final = frozenset({"halt", "reset", "release"})
-"""Whoever asks for one of these wants no recovery to go on by itself."""
+CANCELS_RECOVERY: Final = frozenset({"halt", "reset", "release"})
+"""Actions after which no recovery may go on by itself."""
 
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """One thing to ask for, without arguments.
+    """Something a person can make a hand do, without arguments.
 
     Attributes:
         name: one word.
-        what: it in a few words.
-        run: does it; gives how it ended, in words.
+        what: what it does, in a few words.
+        run: carries it out; returns how it ended, in words.
         moves: whether fingers move, or may let go.
-        warning: what happens that nobody may expect; a person is asked first. Empty: nothing.
+        warning: a consequence that may surprise; a person is asked first. Empty if there is none.
     """
 
     name: str
@@ -52,48 +52,48 @@ class Action:
 
 
 class Operator:
-    """A person at a hand, and whether this person has moved anything.
+    """A person who operates a hand; knows whether this person has moved anything.
 
     Attributes:
         hand: the hand.
-        speed: what the axes get, 0..255.
-        force: what the axes get, 0..255.
+        speed: of all axes, 0..255, as last set by this person.
+        force: of all axes, 0..255, as last set by this person.
     """
 
     def __init__(self, hand: Hand, *, speed: int = DEFAULT_SPEED, force: int = DEFAULT_FORCE) -> None:
-        """Listen to what is written; asks for nothing.
+        """Listen to the requests of the hand; nothing is written.
 
         Args:
             hand: started before or after.
-            speed: what the hand was made with.
-            force: what the hand was made with.
+            speed: what the hand was constructed with.
+            force: what the hand was constructed with.
         """
         self.hand = hand
         self.speed = speed
         self.force = force
         self._requests = hand.requests(1)
         self._asking = 0
-        """Motions asked for that have not ended."""
+        """Number of motions under way that this person has asked for."""
         self._moved = False
         self._changing = asyncio.Lock()
         self._recoveries: set[asyncio.Future[str]] = set()
 
     @property
     def has_moved(self) -> bool:
-        """Whether anything was written while something that moves was asked for, or may be right now."""
+        """Whether a request was written while a motion of this person was under way, or may be right now."""
         self._listen()
-        # A request that is on its way is told of only when its fate is known.
+        # A request is published only when it is known whether it was acknowledged.
         return self._moved or self._asking > 0
 
     async def act(self, action: Action) -> str:
-        """Carry out an action; gives how it ended, in words.
+        """Carry out an action; returns how it ended, in words.
 
-        When cancelled, a move is held; a sequence that has begun (activation, release, reset) goes on.
+        When cancelled, a move is held; a sequence under way (activation, release, reset) goes on.
 
         Raises:
             RobotiqError: it could not be carried out.
         """
-        if action.name in ENDING:
+        if action.name in CANCELS_RECOVERY:
             for recovery in self._recoveries:
                 recovery.cancel()
         if not action.moves:
@@ -102,7 +102,7 @@ class Operator:
             return await (self._recover(action) if action.name == "recover" else action.run(self.hand))
 
     async def _recover(self, action: Action) -> str:
-        """It waits for faults and goes on by itself: nobody who has halted since may be surprised by that."""
+        """Recover until something else is asked for: it waits for a fault to clear, then moves by itself."""
         work = asyncio.ensure_future(action.run(self.hand))
         self._recoveries.add(work)
         try:
@@ -111,24 +111,24 @@ class Operator:
             work.cancel()
             self._recoveries.discard(work)
         if work.cancelled():
-            raise MoveSupersededError("something else was asked for meanwhile")
+            raise MoveSupersededError("another action took over")
         return work.result()
 
     async def move(
         self, position: int, fingers: Finger, *, speed: int | None = None, force: int | None = None
     ) -> str:
-        """Move axes; gives how it ended, in words.
+        """Move axes; returns how that ended, in words.
 
         Raises:
             TypeError, ValueError, RobotiqError: as :meth:`Hand.move`.
         """
         with self._counted():
-            return in_words(await self.hand.move(position, fingers, speed=speed, force=force))
+            return describe(await self.hand.move(position, fingers, speed=speed, force=force))
 
     async def leave(self) -> str:
-        """Stop the hand, and the fingers only if this person has moved them; tells what became of them.
+        """Stop the hand, and the fingers only if this person has moved them; returns what became of them.
 
-        Ends as :meth:`Hand.stop` does.
+        As bounded as :meth:`Hand.stop`.
         """
         has_moved, rests = self.has_moved, self.hand.state in (State.RESET, State.ATR_DONE)
         began = now()
@@ -140,7 +140,7 @@ class Operator:
         return "The fingers had been moved from here and may STILL MOVE: the gripper was not seen to stop."
 
     async def set_speed(self, value: int) -> str:
-        """Set the speed of all axes, also of a motion under way; gives it in words.
+        """Set the speed of all axes, also of a motion under way; returns it as text.
 
         Raises:
             TypeError, ValueError, RobotiqError: as :meth:`Hand.set_speed`.
@@ -150,7 +150,7 @@ class Operator:
         return str(value)
 
     async def set_force(self, value: int) -> str:
-        """Set the force of all axes; more tightens a grip. Gives it in words.
+        """Set the force of all axes; more tightens a grip. Returns it as text.
 
         Raises:
             TypeError, ValueError, RobotiqError: as :meth:`Hand.set_force`.
@@ -160,7 +160,7 @@ class Operator:
         return str(value)
 
     async def change_speed(self, by: int) -> str:
-        """Set the speed of all axes so much higher, or as high as it can be; one change after the other.
+        """Change the speed of all axes, within 0..255; concurrent changes add up.
 
         Raises:
             RobotiqError: as :meth:`set_speed`.
@@ -169,7 +169,7 @@ class Operator:
             return await self.set_speed(max(0, min(self.speed + by, SPEED_MAX)))
 
     async def change_force(self, by: int) -> str:
-        """Set the force of all axes so much higher, or as high as it can be; one change after the other.
+        """Change the force of all axes, within 0..255; concurrent changes add up.
 
         Raises:
             RobotiqError: as :meth:`set_force`.
@@ -179,14 +179,14 @@ class Operator:
 
     @contextmanager
     def _counted(self) -> Iterator[None]:
-        """Around something that moves: what is written meanwhile is its doing."""
+        """Around a motion: whatever is written meanwhile counts as caused by it."""
         self._listen()
         self._requests = self.hand.requests(1)  # the one before ends when the hand is stopped
         self._asking += 1
         try:
             yield
         except asyncio.CancelledError:
-            self._moved = True  # what it has begun may be written yet
+            self._moved = True  # its request may still be written
             raise
         finally:
             self._listen()
@@ -197,7 +197,7 @@ class Operator:
             self._moved |= self._asking > 0
 
     def _stands_still(self, since: float) -> bool:
-        """Whether the gripper has shown since then that nothing moves it: no go, activation or release."""
+        """Whether a status since then shows that nothing moves: no go, activation or release."""
         try:
             status = self.hand.status
         except NotStartedError:
@@ -206,8 +206,8 @@ class Operator:
         return status.timestamp >= since and not busy and status.fault is not Fault.AUTOMATIC_RELEASE
 
 
-def in_words(result: MoveResult) -> str:
-    """How a move ended: ``A at 241, B CONTACT_CLOSING at 130, C at 241; 2.31 s``."""
+def describe(result: MoveResult) -> str:
+    """Describe how a move ended: ``A at 241, B CONTACT_CLOSING at 130, C at 241; 2.31 s``."""
     ends = []
     for axis in AXES:
         if axis in result.outcomes:
@@ -217,16 +217,16 @@ def in_words(result: MoveResult) -> str:
 
 
 async def _open(hand: Hand) -> str:
-    return in_words(await hand.open())
+    return describe(await hand.open())
 
 
 async def _close(hand: Hand) -> str:
-    return in_words(await hand.close())
+    return describe(await hand.close())
 
 
 def _width(position: int) -> Callable[[Hand], Awaitable[str]]:
     async def run(hand: Hand) -> str:
-        return in_words(await hand.move(position, Finger.SCISSOR))
+        return describe(await hand.move(position, Finger.SCISSOR))
 
     return run
 
@@ -284,4 +284,4 @@ _ALL: Final = (
     ),
 )
 ACTIONS: Final = MappingProxyType({action.name: action for action in _ALL})
-"""Every action by its name."""
+"""The actions by name."""

@@ -1,6 +1,6 @@
-"""What is wrong with my connection? One finding after the other, each with what to do about it.
+"""What is wrong with my connection? Finding after finding, each with advice.
 
-Reads only: nothing is written, nothing moves, and a gripper that other programs use is not disturbed.
+It only reads: nothing is written, nothing moves, and other clients of the gripper are not disturbed.
 """
 
 from __future__ import annotations
@@ -24,22 +24,22 @@ from .wire.registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap
 from .wire.status import RobotiqStatus
 
 REACH_S: Final = 3.0
-"""For a name to be resolved, and for a port to answer."""
+"""Timeout for resolving the name, and for connecting to the port."""
 ANSWER_S: Final = 0.5
 PROBES: Final = 300
-"""Reads that round trip and rate are taken from."""
+"""Reads from which round trip and rate are determined."""
 WATCH_S: Final = 2.0
-"""How long another client is looked out for."""
+"""How long to watch for another client."""
 TRIES: Final = 3
-"""Of the usual unit and registers, before others are tried."""
+"""Attempts with the usual unit id and registers, before others are tried."""
 UNITS: Final = (2, 9, 1, 0, 255)
 """Unit ids that are tried when the usual one does not answer."""
 SLOW_S: Final = 0.005
-"""A round trip above this does not fit into 200 Hz."""
+"""The period of 200 Hz: a longer round trip does not fit."""
 
 
 class Level(Enum):
-    """How bad a finding is."""
+    """Severity of a finding."""
 
     GOOD = "ok"
     DOUBT = "warn"
@@ -48,13 +48,13 @@ class Level(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One line of the examination.
+    """The result of one check.
 
     Attributes:
-        level: how bad it is.
-        what: what was looked at.
-        found: what was found.
-        advice: what to do about it; empty when nothing is to be done.
+        level: severity.
+        what: what was checked.
+        found: the result.
+        advice: what to do about it; empty if there is nothing to do.
     """
 
     level: Level
@@ -67,11 +67,11 @@ Report = Callable[[Finding], None]
 
 
 class _GiveUpError(Exception):
-    """There is nothing more to examine."""
+    """No further check is possible."""
 
 
 async def examine(address: Address, report: Report, *, device_id: int | None = None) -> None:
-    """Examine a connection; tells each finding as soon as it is there, and never raises for a bad one.
+    """Examine a connection; reports each finding at once, and never raises for a bad one.
 
     Args:
         address: the gripper.
@@ -99,7 +99,7 @@ async def examine(address: Address, report: Report, *, device_id: int | None = N
 
 
 async def _reach(address: Address, report: Report) -> None:
-    """Resolve the name and knock at the port."""
+    """Resolve the name and connect to the port."""
     try:
         async with asyncio.timeout(REACH_S):
             found = await addresses_of(address.host, address.port)
@@ -117,7 +117,7 @@ async def _reach(address: Address, report: Report) -> None:
         report(Finding(Level.BAD, "port", f"{address.port} does not answer within {REACH_S:g} s", advice))
         raise _GiveUpError from error
     except OSError as error:
-        advice = "Somebody is there, but serves no Modbus on this port: is it the right address and port?"
+        advice = "The host is up, but nothing listens on this port: is it the right address and port?"
         if not isinstance(error, ConnectionRefusedError):
             advice = "There is no way to it: check cable, IP address and subnet mask of this computer."
         report(Finding(Level.BAD, "port", f"{address.port}: {error.strerror or error}", advice))
@@ -162,8 +162,8 @@ async def _answer(address: Address, usual: RegisterMap, report: Report) -> Trans
         except BaseException:
             await link.close()
             raise
-        _tell_answer(usual, registers, tries, report)
-        _tell_doubts(status, report)
+        _report_answer(usual, registers, tries, report)
+        _report_doubts(status, report)
         return link
     assert first is not None
     report(Finding(Level.BAD, "Modbus", str(first), _advice_for_silence(first)))
@@ -171,7 +171,7 @@ async def _answer(address: Address, usual: RegisterMap, report: Report) -> Trans
 
 
 def _candidates(address: Address, usual: RegisterMap) -> list[RegisterMap]:
-    """What to try: the usual again and again, for replies get lost; other units; other registers."""
+    """What to try: the usual several times, for replies get lost; then other units, other registers."""
     if address.kind == "sim":
         return [usual]
     others = [replace(usual, device_id=unit) for unit in UNITS]
@@ -190,7 +190,7 @@ def _link(address: Address, registers: RegisterMap) -> Transport:
     return ModbusTransport(address, registers, connect_timeout=REACH_S, response_timeout=ANSWER_S)
 
 
-def _tell_answer(usual: RegisterMap, found: RegisterMap, tries: int, report: Report) -> None:
+def _report_answer(usual: RegisterMap, found: RegisterMap, tries: int, report: Report) -> None:
     answers = Finding(Level.GOOD, "Modbus", "answers")
     if found == usual and tries > 1:
         advice = "Replies get lost or damaged: look at cable and switch, and for another client."
@@ -215,8 +215,8 @@ def _tell_answer(usual: RegisterMap, found: RegisterMap, tries: int, report: Rep
     report(where)
 
 
-def _tell_doubts(status: RobotiqStatus, report: Report) -> None:
-    """Whether what answers can be a gripper at all."""
+def _report_doubts(status: RobotiqStatus, report: Report) -> None:
+    """Doubt that what answers is a gripper at all."""
     if len(set(status.registers)) == 1:
         found = f"all registers read {status.registers[0]}, which those of a gripper never do"
         advice = "The gripper behind the fieldbus may be without power, or this is another device."
@@ -240,7 +240,7 @@ def _advice_for_silence(error: RobotiqConnectionError) -> str:
 
 
 async def _timing(link: Transport, report: Report) -> None:
-    """How quickly it answers, and how often it can be asked."""
+    """Round trip, and the rate of reads that it allows."""
     loop = asyncio.get_running_loop()
     times, began = [], loop.time()
     for _ in range(PROBES):
@@ -252,11 +252,11 @@ async def _timing(link: Transport, report: Report) -> None:
     rate = len(times) / (loop.time() - began)
     times.sort()
     p50, p99 = percentile(times, 0.5), percentile(times, 0.99)
-    found = f"{1000 * p50:.1f} ms, {1000 * p99:.1f} ms at worst but 1 in 100"
+    found = f"{1000 * p50:.1f} ms, 99th percentile {1000 * p99:.1f} ms"
     if p99 < SLOW_S:
         report(Finding(Level.GOOD, "round trip", found))
     else:
-        advice = "Too slow for 200 Hz at times: a wired network, or a larger poll_interval."
+        advice = "Too slow for 200 Hz at times: use a wired network, or a larger poll_interval."
         report(Finding(Level.DOUBT, "round trip", found, advice))
     enough = rate >= 1 / SLOW_S
     advice = "" if enough else f"Pass poll_interval={max(0.01, math.ceil(100 / rate) / 100):g}."
@@ -287,7 +287,7 @@ def _state(status: RobotiqStatus, report: Report) -> None:
 
 
 async def _others(link: Transport, report: Report) -> None:
-    """Whether requests change although this program writes none."""
+    """Whether the requests change although this program writes none."""
     loop = asyncio.get_running_loop()
     until, seen = loop.time() + WATCH_S, set()
     while loop.time() < until:

@@ -1,4 +1,4 @@
-"""The list of sub-commands."""
+"""The command line, built from its sub-commands."""
 
 from __future__ import annotations
 

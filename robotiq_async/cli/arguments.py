@@ -17,7 +17,7 @@ from .failures import CommandError, UsageError, usage
 
 
 def need(module: str, extra: str, instead: str = "") -> None:
-    """Refuse when an extra is not installed; ``instead`` names another way out.
+    """Refuse to go on without a module of an extra; ``instead`` names an alternative.
 
     Raises:
         CommandError: it is not.
@@ -78,7 +78,7 @@ Fingers = Annotated[
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Link:
-    """How a gripper is reached that is not set up as usual; doctor finds out."""
+    """How to reach a gripper that is not set up as usual; the command doctor finds out."""
 
     device_id: Annotated[Unit | None, Parameter(help="Modbus unit id (default: 2 on TCP, 9 serial).")] = None
     request_address: Annotated[

@@ -40,7 +40,7 @@ def make_hand(
 
 
 def make_operator(address: str, link: Link, *, speed: int, force: int) -> Operator:
-    """Somebody at a hand that is not started.
+    """The operator of a hand that is not started.
 
     Raises:
         UsageError: a malformed address.
@@ -51,12 +51,12 @@ def make_operator(address: str, link: Link, *, speed: int, force: int) -> Operat
 
 @asynccontextmanager
 async def connected(address: str, link: Link = USUAL, *, halt: bool) -> AsyncIterator[Hand]:
-    """A hand that has been read and not yet written to.
+    """A started hand; nothing has been written to the gripper.
 
     Args:
         address: the gripper.
         link: how it is reached.
-        halt: whether leaving stops the fingers; a command that only looks leaves them alone.
+        halt: whether leaving stops the fingers; False for a command that only reads.
 
     Raises:
         UsageError: a malformed address.
@@ -72,13 +72,13 @@ async def connected(address: str, link: Link = USUAL, *, halt: bool) -> AsyncIte
 
 @asynccontextmanager
 async def operated(operator: Operator, tell: Callable[[str], object]) -> AsyncIterator[None]:
-    """Start the hand of a person; nothing is written until this person asks.
+    """Start the hand of an operator; nothing is written until the operator acts.
 
-    Leaving stops the fingers only if this person has moved them.
+    Leaving stops the fingers only if the operator has moved them.
 
     Args:
-        operator: the person.
-        tell: is told in the end what has become of the fingers.
+        operator: of the hand.
+        tell: is called in the end with what became of the fingers.
 
     Raises:
         RobotiqError: no gripper there, or a link that failed.

@@ -13,7 +13,7 @@ from ..wire.status import RobotiqStatus
 from .waiters import Waiter, fail
 
 MARGIN_S: Final = 2.0
-"""Added to twice the expected time for the default time-out of a move."""
+"""Added to twice the expected time for the default timeout of a move."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -131,7 +131,7 @@ class Observation:
 
         Raises:
             TypeError: not a State.
-            ValueError: no state, or a malformed time-out.
+            ValueError: no state, or a malformed timeout.
             StateTimeoutError: not reached in time.
             NotStartedError: the hand is not started, or was stopped meanwhile.
             RobotiqConnectionError: the hand gave up on its link.

@@ -36,7 +36,7 @@ class Recovery(Observation):
         Raises:
             GripperFaultError: a fault is latched (see :meth:`recover`), or the activation ended in one.
             NotActivatedError: the gripper was reset meanwhile.
-            ActivationTimeoutError: not finished within the activation time-out.
+            ActivationTimeoutError: not finished within the activation timeout.
             RobotiqError: not possible now, or the link went down.
         """
         session = self._asked()
@@ -103,7 +103,7 @@ class Recovery(Observation):
 
         Raises:
             StateTimeoutError: not active in time.
-            ActivationTimeoutError: the new activation took longer than the activation time-out.
+            ActivationTimeoutError: the new activation took longer than the activation timeout.
             GripperFaultError: the new activation ended in a fault.
             NotActivatedError: the gripper was reset during the new activation.
             RobotiqError: the link went down, or the hand was stopped.

@@ -70,7 +70,7 @@ class RobotiqHand(Commands):
             force: what the axes get until set otherwise, 0..255.
             request_address: first request register; by default 0 over TCP and 0x03E8 over RTU.
             status_address: first status register; by default 0 over TCP and 0x07D0 over RTU.
-            calibration: how fast this gripper is: default time-outs of moves come from it. None for the
+            calibration: how fast this gripper is: default timeouts of moves come from it. None for the
                 thesis's gripper.
 
         Raises:
@@ -123,7 +123,7 @@ class RobotiqHand(Commands):
             RuntimeError: not in a running asyncio event loop.
             InvalidStateError: this hand is started already, or another one runs on the same gripper.
             NotStartedError: stop() was called meanwhile.
-            ConnectFailedError: nobody answers within the connect time-out.
+            ConnectFailedError: nobody answers within the connect timeout.
             RobotiqConnectionError: somebody answers, but not a gripper; or the link went down again.
             GripperFaultError: the activation that was begun ended in a fault.
             NotActivatedError: the gripper was reset during the activation that was begun.

@@ -45,7 +45,7 @@ from .frames import Expected, expected_reply, show
 from .host_names import addresses_of, why_no_socket
 from .pdus import ReadRequest, WriteRequest, register
 
-# pymodbus logs its send and receive history at ERROR on every time-out; what matters of it is said in our
+# pymodbus logs its send and receive history at ERROR on every timeout; what matters of it is said in our
 # exceptions. Whoever sets a level on its logger gets what they ask for.
 _pymodbus_log = logging.getLogger("pymodbus.logging")
 if _pymodbus_log.level == logging.NOTSET:
@@ -305,7 +305,7 @@ class ModbusTransport:
             raise ConnectFailedError(str(self._address), why) from error
 
     def _make_client(self, host: str) -> AsyncModbusTcpClient | AsyncModbusSerialClient:
-        # timeout=None: wait_for becomes a plain await, and the watchdogs above are the only time-outs.
+        # timeout=None: wait_for becomes a plain await, and the watchdogs above are the only timeouts.
         options: dict[str, Any] = {
             "retries": 0,
             "reconnect_delay": 0,

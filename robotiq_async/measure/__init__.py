@@ -1,1 +1,1 @@
-"""What the values 0..255 mean on one's own gripper: measurements and their pictures."""
+"""What the values 0..255 mean on your own gripper: measurements and plots of them."""

@@ -1,7 +1,7 @@
-"""Measuring one's own gripper as the thesis did in its chapter 6: closing times, and the force of a grasp.
+"""Measurements of your own gripper, as in chapter 6 of the thesis: closing times, and the force of a grasp.
 
-The gripper's own clock may be faster than the program's (a simulated one): ``speedup`` turns times into the
-gripper's. Both campaigns save after every row, so that an interrupted one goes on where it was.
+The gripper's own clock may be faster than the program's (a simulated one): ``speedup`` converts times into
+the gripper's. Both campaigns save after every row, so that an interrupted one can be resumed.
 """
 
 from __future__ import annotations
@@ -35,16 +35,16 @@ from ..session.clock import now
 REST_S: Final = 0.3
 """Between two runs, in the gripper's time: a finger that has just stopped may still swing."""
 ATTEMPTS: Final = 20
-"""So often a run is measured again in which the event loop was held up."""
+"""Attempts at a run: one in which the event loop was blocked is repeated."""
 TOLERATED: Final = 0.01
-"""Share of a run for which it may be, and two polls more."""
+"""Share of a run for which it may have been blocked, apart from two polls."""
 OPEN_BELOW: Final = 12
 CLOSED_ABOVE: Final = 234
-"""Counts that tell a full closing; open reads 6-7, closed 240 or more."""
+"""Limits, in counts, of a full closing; open reads 6-7, closed 240 or more."""
 GRASP_S: Final = 1.0
-"""How long a grasp is watched once the fingers have stopped, in the gripper's time."""
+"""How long a grasp is recorded after the fingers have stopped, in the gripper's time."""
 CURRENT_MA: Final = 2550
-"""The highest current that a status can tell."""
+"""The highest current that a status can report."""
 FINGERS: Final = (Finger.A, Finger.B, Finger.C)
 _CURRENTS_HEADER: Final = ["force_value", "run", "time_ms", "a_ma", "b_ma", "c_ma"]
 
@@ -58,12 +58,12 @@ Currents = dict[int, list[list[Sample]]]
 
 
 def speed_values(step: int = 4) -> list[int]:
-    """Every so many values from 0, and 255: slowest first."""
+    """Speed values in steps from 0, and 255: slowest first."""
     return sorted({*range(0, 256, step), 255})
 
 
 def force_values(step: int = 25) -> list[int]:
-    """Every so many values from 0, up by two steps at a time and down through those in between."""
+    """Force values in steps from 0: every second one upwards, those in between downwards."""
     values = list(range(0, 256, step))
     return values[::2] + values[1::2][::-1]
 
@@ -74,7 +74,7 @@ def force_values(step: int = 25) -> list[int]:
 async def time_closing(hand: Hand, speed: int, fingers: Finger, speedup: float = 1.0) -> float:
     """Open fully and at full speed, then close at a speed: seconds from the command until nothing moves.
 
-    A run in which the event loop was held up is measured again. When cancelled, the fingers stop.
+    A run in which the event loop was blocked is repeated. When cancelled, the fingers stop.
 
     Args:
         hand: the gripper.
@@ -110,7 +110,7 @@ async def time_closing(hand: Hand, speed: int, fingers: Finger, speedup: float =
 
 
 def expected_seconds(speed: int) -> float:
-    """About how long one run takes, in the gripper's time: for progress bars."""
+    """Estimate of the duration of one run, in the gripper's time: for progress bars."""
     return closing_time(speed) + closing_time(255) + REST_S
 
 
@@ -118,7 +118,7 @@ def expected_seconds(speed: int) -> float:
 
 
 async def grasp(hand: Hand, force: int, speed: int, speedup: float = 1.0) -> list[Sample]:
-    """Open, then close on what lies between the fingers: the currents from the command on.
+    """Open, then close on what lies between the fingers; returns the currents from the command on.
 
     The fingers stay closed, for the scale to be read. When cancelled, they stop.
 
@@ -150,7 +150,7 @@ async def grasp(hand: Hand, force: int, speed: int, speedup: float = 1.0) -> lis
 def _watching(
     hand: Hand, take: Callable[[int, int, int, int], None], began: float, speedup: float
 ) -> Iterator[None]:
-    """Hand on every poll of a block."""
+    """Sample the currents at every poll of a block."""
     statuses = hand.statuses(buffer=10_000)
 
     async def watch() -> None:
@@ -178,14 +178,14 @@ def peak_currents(runs: list[list[Sample]]) -> tuple[int, int, int]:
 
 @dataclass
 class Campaign:
-    """A table in a file that fills row by row.
+    """A table in a file that is filled row by row.
 
     Attributes:
         path: the file; it is read if it is there.
         layout: of the table.
-        origin: what was measured and how; kept beside the table, and no other may go on with it.
-        values: the rows that are wanted, in the order they are measured in.
-        runs: columns.
+        origin: what was measured and how; kept beside the table, which only the same origin can resume.
+        values: the rows, in the order of measurement.
+        runs: number of columns.
         table: what has been measured so far.
     """
 
@@ -197,10 +197,10 @@ class Campaign:
     table: Table = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Take up what is there.
+        """Resume the table if the file exists.
 
         Raises:
-            TableError: the file is there and is not such a table, or there is no place for it.
+            TableError: the file exists and is not such a table, or it cannot be created.
         """
         if not self.path.parent.is_dir():
             raise TableError(self.path, None, f"there is no folder {self.path.parent}")
@@ -249,22 +249,22 @@ class Campaign:
 
 
 def speed_campaign(path: Path, step: int = 4, runs: int = 3, **origin: str) -> Campaign:
-    """Closing times for every so many speed values."""
+    """A campaign of closing times, for speed values in steps."""
     return Campaign(path, SPEED, speed_values(step), runs, origin)
 
 
 def force_campaign(path: Path, step: int = 25, runs: int = 3, **origin: str) -> Campaign:
-    """Scale readings for every so many force values."""
+    """A campaign of scale readings, for force values in steps."""
     return Campaign(path, FORCE, force_values(step), runs, origin)
 
 
 def origin_beside(path: Path) -> Path:
-    """Where it is kept what a table was measured on, and how."""
+    """The file beside a table that holds its origin."""
     return path.with_name(f"{path.name}.origin.csv")
 
 
 def read_origin(path: Path) -> dict[str, str]:
-    """What a table was measured on, and how; empty when nobody knows.
+    """Read the origin of a table; empty if it has none.
 
     Raises:
         TableError: the file beside the table cannot be read.
@@ -276,7 +276,7 @@ def read_origin(path: Path) -> dict[str, str]:
 
 
 def write_origin(path: Path, origin: dict[str, str]) -> None:
-    """Keep it.
+    """Write the origin of a table into the file beside it.
 
     Raises:
         OSError: it cannot be written.
@@ -288,7 +288,7 @@ def write_origin(path: Path, origin: dict[str, str]) -> None:
 
 
 def read_currents(path: Path) -> Currents:
-    """The currents of grasps, as :func:`write_currents` writes them.
+    """Read the currents of grasps, as :func:`write_currents` writes them.
 
     Raises:
         TableError: the file cannot be read, or is not one of currents.
@@ -319,7 +319,7 @@ def read_currents(path: Path) -> Currents:
 
 
 def write_currents(path: Path, currents: Currents) -> None:
-    """Put the currents of grasps into a file; what was there before is replaced at once.
+    """Write the currents of grasps into a file, which is replaced at once.
 
     Raises:
         OSError: it cannot be written; the file is what it was.

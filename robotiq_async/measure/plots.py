@@ -1,4 +1,4 @@
-"""Pictures of measurements, as PNG and SVG. Needs the extra ``plot`` (matplotlib)."""
+"""Plots of measurements and recordings, as PNG and SVG. Needs the extra ``plot`` (matplotlib)."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ if TYPE_CHECKING:
 OURS: Final = "#0b6ea8"
 THEIRS: Final = "#d1731f"
 COLOURS: Final = ("#0b6ea8", "#2a8f4c", "#b03a6b")
-"""Of the fingers A, B and C."""
+"""Colours of the fingers A, B and C."""
 WIDTHS: Final = {"A": 4.2, "B": 2.6, "C": 1.1, "SCISSOR": 1.4}
-"""Of the lines in the picture of a recording."""
+"""Line widths in the plot of a recording."""
 DRAWN: Final = ("position", "requested", "current_ma")
 LABEL: Final = 0.012
 """Width of a label, as a share of the picture's."""
 LONGEST: Final = 80
 """Characters of a label."""
 SHOWN_FORCES: Final = (0, 125, 250)
-"""Whose currents are drawn over time."""
+"""Force values whose currents are drawn over time."""
 
 Event = tuple[float, str, bool]
 """When, what, and whether it is about a fault."""

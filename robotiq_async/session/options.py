@@ -25,7 +25,7 @@ CONNECT_TIMEOUT_S: Final = 2.0
 RESPONSE_TIMEOUT_S: Final = 0.4
 """Two of these, a read in flight and a write, still end within the second that a write may take."""
 ACTIVATION_TIMEOUT_S: Final = 20.0
-"""What clients of the real gripper wait for (registers.md of the project's sources)."""
+"""What drivers that ran on hardware wait for."""
 HINTS: Final = {
     "tcp": " (two grippers behind one gateway: give each of the hands its device_id)",
     "rtu": " (a serial port has one owner, whatever the device_id: two would read each other's replies)",

@@ -255,7 +255,7 @@ class Session:
         Args:
             states: what is waited for.
             timeout: seconds; None for as long as it takes.
-            what: the sentence for a time-out.
+            what: the sentence for a timeout.
             ask: asks for it.
             failing: states that mean it will not come.
 

@@ -1,6 +1,6 @@
 """Wakes the owner tasks of a loop, each at absolute deadlines of its own.
 
-A loop's own timers are no good for 200 Hz: epoll rounds their time-outs up to a millisecond, and uvloop's
+A loop's own timers are no good for 200 Hz: epoll rounds their timeouts up to a millisecond, and uvloop's
 clock is one. On Linux the next deadline is therefore kept by the kernel, in a timerfd that the running loop
 watches like a socket; elsewhere, and in a loop that has a clock of its own, by the loop's timers. All
 hands of a loop share one: whoever is due is woken together, and a busy loop is not woken more often for it.

@@ -119,7 +119,7 @@ def check_number(name: str, value: object, low: float, high: float, what: str = 
 
 
 def check_timeout(name: str, value: object) -> float | None:
-    """A time-out: None for no limit, or seconds above 0.
+    """A timeout: None for no limit, or seconds above 0.
 
     Raises:
         TypeError: not None and not a number.

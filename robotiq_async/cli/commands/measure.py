@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from ...simulator import SimulatedGripper
 
 SPEEDUP = 15.0
-"""How much faster the simulated gripper of sim:// is, unless told otherwise."""
+"""How much faster than real time the simulated gripper of sim:// runs by default."""
 POLL_S = 0.001
-"""Poll interval with a simulated gripper that is faster: its time is to be told as finely."""
+"""Poll interval with a simulated gripper that is faster than real time, to resolve its time as finely."""
 
 Runs = Annotated[int, Parameter(metavar="N")]
 Speedup = Annotated[float | None, Parameter(metavar="FACTOR")]
@@ -87,7 +87,7 @@ async def gripper(
 
 
 def load_rich() -> None:
-    """Import what takes a tenth of a second: not while a hand polls."""
+    """Import rich now: it takes a tenth of a second, in which a hand could not poll."""
     import rich.progress  # noqa: F401
 
 
@@ -192,6 +192,6 @@ def refused() -> Iterator[None]:
 
 
 def told(files: list[Path]) -> None:
-    """Say what was written."""
+    """Print the names of the files that were written."""
     for file in files:
         print(file)

@@ -59,11 +59,11 @@ def force(
         surface: What the fingers touch: the scale itself, or foam around it.
         output: The readings (default: force_SURFACE_grams.csv); currents and plots have its name.
         scale: A table of readings, in place of typing them.
-        step: Every so many force values.
-        runs: So many grasps at each.
-        speed: Of the closing.
-        speedup: How much faster the gripper of sim:// is (default: 15); times are its own.
-        no_plot: Draw nothing.
+        step: Distance between force values.
+        runs: Grasps at each force value.
+        speed: Speed of the closing.
+        speedup: How much faster than real time sim:// runs (default: 15); times are simulated ones.
+        no_plot: Draw no plots.
         yes: Do not ask.
     """
     path = output or Path(f"force_{surface}_grams.csv")
@@ -127,7 +127,7 @@ async def _measure(
 
 
 def currents_beside(output: Path) -> Path:
-    """Where the currents go."""
+    """The file beside the readings that holds the currents."""
     return output.with_name(f"{output.stem}_currents.csv")
 
 
@@ -157,7 +157,7 @@ def _place_scale(simulated: SimulatedGripper, surface: str) -> None:
 def _scale(
     address: str, surface: Literal["foam", "rigid"], readings: Table | None, values: list[int], runs: int
 ) -> Callable[[int, int], Awaitable[int]]:
-    """Where the readings come from.
+    """The source of the readings.
 
     Raises:
         CommandError: the table lacks some that are needed.

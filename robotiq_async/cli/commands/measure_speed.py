@@ -48,12 +48,12 @@ def speed(
         robotiq-async measure speed 192.168.1.11 --step 25 --runs 1
 
     Args:
-        output: The table; the plot has its name.
-        step: Every so many speed values.
-        runs: So many closings at each.
+        output: The table; the plot is named after it.
+        step: Distance between speed values.
+        runs: Closings at each speed value.
         fingers: The axes that move: ABC, A,B, all.
-        speedup: How much faster the gripper of sim:// is (default: 15); times are its own.
-        no_plot: Draw nothing.
+        speedup: How much faster than real time sim:// runs (default: 15); times are simulated ones.
+        no_plot: Draw no plot.
         yes: Do not ask.
     """
     if Finger.SCISSOR in fingers:

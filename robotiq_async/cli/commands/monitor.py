@@ -16,7 +16,7 @@ from ..failures import CommandError, UsageError
 from ..log_capture import forget, forwarded_warnings
 
 SCREEN_S: Final = 1.0
-"""What the screen may take to leave the terminal as it was."""
+"""How long the screen may take to restore the terminal."""
 
 
 async def monitor(
@@ -39,7 +39,7 @@ async def monitor(
     ] [ force, v recover, a activate, r reset, l release in a fault, q quit. The last
     four before q ask first. Quitting stops the fingers only if they were moved from here.
 
-    Without a terminal, in a pipe say, it prints what --json prints, and only looks.
+    Without a terminal, in a pipe say, it prints what --json prints.
 
     For example:
 
@@ -48,10 +48,10 @@ async def monitor(
         robotiq-async monitor --json 192.168.1.11 | jq .A.position
 
     Args:
-        speed: What the axes get with the first command from here: what they have is not known.
-        force: The same. A grip that was made with more is loosened.
-        watch: Only look, and print a line for whatever changes, until Ctrl-C.
-        as_json: Only look, and print every poll and event as a JSON object a line.
+        speed: Speed of all axes from the first command on; the present one cannot be read.
+        force: Force of all axes from the first command on. A grip made with more loosens.
+        watch: Print a line for every change, until Ctrl-C; take no commands.
+        as_json: Print every poll and event as a line of JSON; take no commands.
     """
     if watch and as_json:
         raise UsageError("--watch and --json exclude each other")

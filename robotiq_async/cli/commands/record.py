@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ...telemetry.recordings import Entry
 
 NEARBY = 100
-"""Entries that are put in order."""
+"""Number of entries that are sorted by time together."""
 
 
 async def record(
@@ -84,7 +84,7 @@ def _tell_figures(recorder: Recorder, hand: Hand) -> None:
 
 
 async def _watch(recorder: Recorder) -> None:
-    """Say how it goes until it fails."""
+    """Show progress until the recording fails."""
     failing = asyncio.ensure_future(recorder.failure())
     try:
         while not failing.done():
@@ -109,8 +109,8 @@ def replay(
         robotiq-async replay grasp.mcap
 
     Args:
-        file: The recording; a broken one is read as far as it goes.
-        as_picture: Draw it in place of printing it, as the command plot does.
+        file: The recording; a truncated one is read up to where it breaks off.
+        as_picture: Draw a plot instead, as the command plot does.
     """
     need("mcap", "record")
     from ...telemetry.recordings import read_recording
@@ -134,7 +134,7 @@ def replay(
 
 
 def _in_order(entries: Iterator[Entry]) -> Iterator[Entry]:
-    """By time: what different streams told lies in the file some milliseconds out of order."""
+    """Sorted by time: messages of different streams are some milliseconds out of order in the file."""
     waiting: list[tuple[int, int, Entry]] = []
     for number, entry in enumerate(entries):
         heappush(waiting, (entry.nanoseconds, number, entry))
@@ -145,15 +145,15 @@ def _in_order(entries: Iterator[Entry]) -> Iterator[Entry]:
 
 
 def recover(file: Path, target: Path | None = None, /) -> None:
-    """Make a recording whole whose program was killed.
+    """Repair a recording whose program was killed.
 
     For example:
 
         robotiq-async recover grasp.mcap
 
     Args:
-        file: The broken recording; it is left as it is.
-        target: The whole one (default: FILE.recovered.mcap).
+        file: The truncated recording; it is not changed.
+        target: The repaired one (default: FILE.recovered.mcap).
     """
     need("mcap", "record")
     from ...telemetry.recordings import recover as save
@@ -174,7 +174,7 @@ def plot(file: Path, picture: Path | None = None, /) -> None:
 
     Args:
         file: The recording.
-        picture: The picture's name without suffix (default: that of the recording).
+        picture: Name of the plot without suffix (default: that of the recording).
     """
     need("mcap", "record")
     need("matplotlib", "plot")

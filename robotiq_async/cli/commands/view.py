@@ -48,10 +48,10 @@ async def view(
     Args:
         port: TCP port; 0 takes a free one.
         host: Interface to listen on. Another one than 127.0.0.1 lets others in.
-        read_only: Show, and take no commands.
-        speed: What the axes get with the first command from here: what they have is not known.
-        force: The same. A grip that was made with more is loosened.
-        layout: Write the layout that goes with it to a file, for Foxglove to import, and end.
+        read_only: Take no commands.
+        speed: Speed of all axes from the first command on; the present one cannot be read.
+        force: Force of all axes from the first command on. A grip made with more loosens.
+        layout: Write the matching layout to a file, for Foxglove to import, and exit.
     """
     if layout is not None:
         _write(layout)
