@@ -1,66 +1,16 @@
 """Asyncio-native client for the Robotiq 3-Finger gripper (S-Model).
 
-The map; each module imports only what stands above it::
+What a program needs is imported from here. Where it comes from, and what stands around it::
 
-    version      the version
-    enums        the names of the field                        no I/O, no clock,
-    errors       everything that is raised                     no event loop
-    checks       argument checks
-    frozen       a mapping that stays as it is made
-    registers    the bit fields, as data
-    status       RobotiqStatus, decoded from eight registers
-    request      Request, encoded into eight registers
-    log          the logger, which never fails
-    closing_time the thesis's closing times
-    machine      states, triggers and the table of both
-    procedures   activation, reset, release, shutdown as generators
-    echo         what was written and what the gripper shows of it
-    adoption     what an axis was asked to do by somebody else
-    ledger       what the gripper has been asked, as far as is known
-    desk         what callers have asked for
-    compose      the next image, from what callers have asked
-    kinematics   joint angles from the positions of the axes
-    motion       moves and their results
-    core         decides what to write, learns from what is read
-    ------------------------------------------------------------
-    clock        the time of what happens                      asyncio from here on
-    address      which gripper
-    places       what all ways to write an address have in common
-    claims       who owns which gripper in this process
-    reply        every byte of a reply, checked
-    messages     what is asked and answered, as pymodbus knows it
-    ending       work that ends well
-    names        what the name of a host stands for
-    link         transports; the only module, messages aside, that uses pymodbus
-    worker       calls of somebody else's code, bounded in time
-    guard        transports of somebody else's, held to what a hand relies on
-    simulated    the transport of sim://
-    statistics   figures about the polling
-    event_loop   the loop a hand belongs to
-    streams      async iterators
-    timerfd      Linux's timer that is watched like a socket
-    tick         the beat of the polling
-    owner        the one task that owns the link
-    runs         tables of measured runs, in CSV files
-    calibration  what the values 0..255 mean
-    options      checked options of a hand
-    waiting      callers that wait for a state
-    hand         RobotiqHand
-    actions      what a person asks of a hand
-    payloads     what is told of a hand in JSON
-    jointstate   joint states as ROS 2 encodes them
-    feed         everything about a hand as messages
-    recorder     everything about a hand in an MCAP file; needs mcap
-    recording    what such a file holds
-    services     commands by name, with arguments in JSON
-    viewer       a hand for Foxglove; needs foxglove-sdk
-    metrics      figures for Prometheus; needs prometheus-client
-    doctor       what is wrong with a connection
-    measuring    closing times, force and current of a grasp
-    plots        pictures of measurements; needs matplotlib
-    ------------------------------------------------------------
-    simulator    a simulated gripper and its Modbus servers (shares enums, registers, status, request)
-    cli          the command line
+    hand, protocol           RobotiqHand, and what every hand can do
+    session                  the task that polls, from start() to stop()
+    control                  what to write next: state machine, moves, adoption
+    link                     addresses, transports, Modbus: the bytes
+    wire                     status and request, decoded and encoded
+    calibration, kinematics  what the values mean: mm/s, N, joint angles
+    actions, telemetry       operating a hand; recordings, viewers and metrics of one
+    measure, doctor          measurements of a gripper; what is wrong with a connection
+    simulator, cli           a simulated gripper with its servers; the command line
 
 Nothing of this has run on real hardware yet.
 """
@@ -153,3 +103,8 @@ __all__ = [
     "Transport",
     "Trigger",
 ]
+
+
+def __dir__() -> list[str]:
+    """The public names, without the modules that they come from."""
+    return sorted([*__all__, "__version__"])

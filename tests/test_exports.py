@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import inspect
 import itertools
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -118,6 +119,17 @@ def test_a_star_import_brings_exactly_the_exports() -> None:
     names: dict[str, object] = {}
     exec("from robotiq_async import *", names)
     assert set(names) - {"__builtins__"} == set(robotiq_async.__all__)
+
+
+def test_dir_shows_the_public_names_only() -> None:
+    assert dir(robotiq_async) == sorted([*robotiq_async.__all__, "__version__"])
+
+
+def test_the_map_of_the_package_names_every_room() -> None:
+    root = Path(robotiq_async.__file__).parent
+    rooms = {path.parent.name for path in root.glob("*/__init__.py")}
+    assert robotiq_async.__doc__ is not None
+    assert rooms <= set(re.findall(r"\w+", robotiq_async.__doc__))
 
 
 def test_the_package_has_a_version() -> None:
