@@ -71,14 +71,14 @@ async def connected(address: str, link: Link = USUAL, *, halt: bool) -> AsyncIte
 
 
 @asynccontextmanager
-async def operated(operator: Operator, tell: Callable[[str], object]) -> AsyncIterator[None]:
+async def operated(operator: Operator, report: Callable[[str], object]) -> AsyncIterator[None]:
     """Start the hand of an operator; nothing is written until the operator acts.
 
     Leaving stops the fingers only if the operator has moved them.
 
     Args:
         operator: of the hand.
-        tell: is called in the end with what became of the fingers.
+        report: is called in the end with what became of the fingers.
 
     Raises:
         RobotiqError: no gripper there, or a link that failed.
@@ -87,4 +87,4 @@ async def operated(operator: Operator, tell: Callable[[str], object]) -> AsyncIt
     try:
         yield
     finally:
-        tell(await operator.leave())
+        report(await operator.leave())

@@ -89,7 +89,7 @@ class Recovered:
     """What :func:`recover` has found.
 
     Attributes:
-        messages: so many messages were saved.
+        messages: number of messages saved.
         is_whole: whether the file was whole to begin with.
     """
 

@@ -32,7 +32,7 @@ async def view(
 
     Nothing moves until a service is called. What is printed is the address to open there
     (Open connection, Foxglove WebSocket). Status, commands, events and joint states are
-    the topics of a recording; /gripper/state tells state, fault and how the polling goes.
+    the topics of a recording; /gripper/state has state, fault and statistics.
 
     There is no password. Whoever reaches the port may call a service, and so may a web
     page that is open in a browser on the same machine: --read-only has no services.

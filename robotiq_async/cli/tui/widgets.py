@@ -107,9 +107,9 @@ class Axes(Widget):
 
     def _does(self, axis: Finger) -> Text:
         reported = self._status.finger_status(axis)
-        told = object_status(reported.name, is_moving=axis in self._status.moving)
+        shown = object_status(reported.name, is_moving=axis in self._status.moving)
         # In an activation and in a release axes move of which the status as a whole says that they do not.
-        if told == NOTHING and self._still[axis] >= STILL:
+        if shown == NOTHING and self._still[axis] >= STILL:
             return Text(f"{NOTHING:15}", "dim")
         words, style = _OBJECT[reported]
         return Text(f"{words:15}", style)
