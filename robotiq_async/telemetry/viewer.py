@@ -192,7 +192,6 @@ class Viewer:
         data = compact(state_fields(self._hand, at))
         self._channels[STATE].log(data, log_time=self._feed.nanoseconds(at))
 
-
     async def _publish_periodically(self) -> None:
         while True:
             self._publish_state()
