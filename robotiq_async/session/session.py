@@ -69,7 +69,7 @@ class Session:
             InvalidStateError: the address is owned already.
         """
         self._options = options
-        self._is_over = False
+        self._is_over = True  # until its task runs
         self._loop = asyncio.get_running_loop()
         self.machine = machine
         self._claim()
@@ -94,6 +94,7 @@ class Session:
             publish_request=channels.requests.push,
         )
         machine.fire(Trigger.ASK_START)
+        self._is_over = False
         self._task = self._loop.create_task(self._poller.run(), name="robotiq_async poller")
         self._task.add_done_callback(self._end)
 

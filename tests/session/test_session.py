@@ -1,0 +1,206 @@
+"""One run of a hand: who owns the address, who is told of its end, and what can be waited for."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import replace
+
+import pytest
+
+from robotiq_async.calibration.closing_time import closing_time
+from robotiq_async.control.state_machine import StateMachine
+from robotiq_async.enums import Finger, State
+from robotiq_async.errors import (
+    ConnectFailedError,
+    ConnectionLostError,
+    InvalidStateError,
+    NotStartedError,
+)
+from robotiq_async.session.options import Options
+from robotiq_async.session.reconnecting import ReconnectPolicy
+from robotiq_async.session.session import Session
+from robotiq_async.session.streams import Channels
+from tests.session.wire import Wire
+from tests.virtual import virtual
+
+LOST = ConnectionLostError("unplugged")
+
+
+class Run:
+    """What outlives a session, and the means to make one."""
+
+    def __init__(self, key: str = "wire", policy: ReconnectPolicy | None = None) -> None:
+        self.wire = Wire()
+        self.machine = StateMachine()
+        self.channels = Channels()
+        self.options = Options(
+            make_transport=lambda: self.wire,
+            address="wire",
+            key=key,
+            poll_interval=0.01,
+            activation_timeout=20.0,
+            policy=policy,
+            speed=128,
+            force=64,
+            closing_time=closing_time,
+        )
+
+    def session(self, *, activate: bool = False, first_sequence: int = 0) -> Session:
+        return Session(
+            self.options, self.machine, self.channels, activate=activate, first_sequence=first_sequence
+        )
+
+
+@asynccontextmanager
+async def running(
+    *, active: bool = True, policy: ReconnectPolicy | None = None
+) -> AsyncIterator[tuple[Run, Session]]:
+    """A session at a gripper that is active, or was just switched on."""
+    here = Run(policy=policy)
+    if active:
+        await here.wire.activate()
+    session = here.session()
+    await session.connected()
+    yield here, session
+    await session.stop(halt=True)
+
+
+# -- who owns the address ----------------------------------------------------------------------------------
+
+
+@virtual
+async def test_an_address_has_one_session_at_a_time() -> None:
+    async with running() as (_, first):
+        with pytest.raises(InvalidStateError, match="a hand runs on wire already"):
+            Run().session()
+        other = Run(key="another wire").session()
+        await other.connected()
+        await other.stop(halt=False)
+        await first.stop(halt=False)
+        again = Run().session()
+        await again.connected()
+        await again.stop(halt=False)
+
+
+@virtual
+async def test_a_session_that_could_not_begin_leaves_the_address_free() -> None:
+    here = Run()
+
+    def fail() -> Wire:
+        raise ZeroDivisionError
+
+    broken = replace(here.options, make_transport=fail)
+    with pytest.raises(ZeroDivisionError):
+        Session(broken, here.machine, here.channels, activate=False, first_sequence=0)
+    await begins_and_ends(here)
+
+
+@virtual
+async def test_the_numbers_of_statuses_go_on_from_session_to_session() -> None:
+    here = Run()
+    first = here.session(first_sequence=5)
+    await first.connected()
+    await asyncio.sleep(0.1)
+    await first.stop(halt=False)
+    assert first.next_sequence == 5 + first.counters.polls > 10
+    second = here.session(first_sequence=first.next_sequence)
+    await second.connected()
+    assert second.controller.status is not None
+    assert second.controller.status.sequence == first.next_sequence
+    assert second.counters.polls == 1
+    await second.stop(halt=False)
+
+
+# -- its end -----------------------------------------------------------------------------------------------
+
+
+@virtual
+async def test_a_session_is_over_when_it_was_stopped_and_may_be_stopped_again() -> None:
+    async with running() as (here, session):
+        assert not session.is_over
+        session.check_running()
+        await session.stop(halt=True)
+        assert session.is_over
+        assert here.machine.state is State.SHUTDOWN
+        with pytest.raises(NotStartedError):
+            session.check_running()
+
+
+@virtual
+async def test_a_stop_that_is_cancelled_stops_all_the_same() -> None:
+    async with running() as (here, session):
+        session.controller.command(Finger.ABC, 200, 0, None)
+        await asyncio.sleep(0.1)
+        stopping = asyncio.create_task(session.stop(halt=True))
+        await asyncio.sleep(0)
+        stopping.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await stopping
+        assert session.is_over
+        assert not here.wire.gripper.is_moving
+
+
+@virtual
+async def test_a_first_contact_that_fails_is_the_end() -> None:
+    here = Run()
+    here.wire.failing["open"] = ConnectFailedError("wire", "refused")
+    session = here.session()
+    with pytest.raises(ConnectFailedError):
+        await session.connected()
+    await session.stop(halt=False)
+    assert session.is_over
+
+
+@virtual
+async def test_who_waits_when_a_session_ends_is_told_why() -> None:
+    async with running() as (here, session):
+        state = asyncio.create_task(session.reach({State.FAULT}, None, what="never"))
+        position = asyncio.create_task(
+            session.answered(lambda waiter: session.controller.command(Finger.A, 100, None, None, waiter))
+        )
+        stream = here.channels.transitions.open(None)
+        await asyncio.sleep(0)
+        await session.stop(halt=False)
+        for task in (state, position):
+            with pytest.raises(NotStartedError, match="the hand was stopped"):
+                await task
+        assert [each.target async for each in stream][-2:] == [State.DO_SHUTDOWN, State.SHUTDOWN]
+
+
+@virtual
+async def test_who_waits_when_a_hand_gives_up_on_its_link_is_told_why() -> None:
+    async with running() as (here, session):
+        state = asyncio.create_task(session.reach({State.FAULT}, None, what="never"))
+        stream = here.channels.statuses.open(1)
+        here.wire.failing["read"] = here.wire.failing["open"] = LOST
+        with pytest.raises(ConnectionLostError, match="the link is down: unplugged") as caught:
+            await state
+        assert caught.value.__cause__ is LOST
+        with pytest.raises(ConnectionLostError, match="unplugged"):
+            async for _ in stream:
+                pass
+        with pytest.raises(ConnectionLostError, match="unplugged"):
+            session.check_running()
+
+
+@virtual
+async def test_who_waits_when_the_task_fails_is_told_too(caplog: pytest.LogCaptureFixture) -> None:
+    """A bug must not leave anybody waiting for ever."""
+    async with running() as (_, session):
+        state = asyncio.create_task(session.reach({State.FAULT}, None, what="never"))
+        await asyncio.sleep(0)
+        session.controller.command(Finger.A, 256, None, None)  # checked above; here it has no place in a byte
+        with pytest.raises(ConnectionLostError, match="internal error: ValueError"):
+            await state
+        assert session.is_over
+    (record,) = [each for each in caplog.records if each.levelno == logging.CRITICAL]
+    assert "the task that owns the link failed" in record.getMessage()
+
+
+async def begins_and_ends(here: Run) -> None:
+    session = here.session()
+    await session.connected()
+    await session.stop(halt=False)
