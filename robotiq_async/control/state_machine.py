@@ -151,7 +151,7 @@ TABLE: Final[dict[State, Row]] = {
         }
     ),
     State.DO_SHUTDOWN: _OFF | {Trigger.STOPPED: State.SHUTDOWN},
-    State.SHUTDOWN: _OFF | {Trigger.ASK_START: State.DISCONNECTED},
+    State.SHUTDOWN: _OFF | {Trigger.ASK_START: State.DISCONNECTED, Trigger.STOPPED: _IGNORED},
 }
 """For every state and trigger the state that follows, IGNORED, or the error."""
 

@@ -299,9 +299,10 @@ class Poller:
             if scope.cancelled_caught:
                 log.warning("the gripper did not confirm in time that the fingers were stopped")
         finally:
-            self._tick.close()
-            await self._transport.close()
-            self._controller.stopped()
+            if not self._is_abandoned:
+                self._tick.close()
+                await self._transport.close()
+                self._controller.stopped()
 
     async def _stop_fingers(self) -> None:
         """Clear rGTO and see it; until the time is over. Unlike a motion, a stop may be sent again."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -12,6 +13,7 @@ import pytest
 
 from robotiq_async.calibration.closing_time import closing_time
 from robotiq_async.control.state_machine import StateMachine
+from robotiq_async.control.triggers import Trigger
 from robotiq_async.enums import Finger, State
 from robotiq_async.errors import (
     ConnectFailedError,
@@ -24,7 +26,7 @@ from robotiq_async.session.reconnecting import ReconnectPolicy
 from robotiq_async.session.session import Session
 from robotiq_async.session.streams import Channels
 from tests.session.wire import Wire
-from tests.virtual import virtual
+from tests.virtual import VirtualLoop, run, virtual
 
 LOST = ConnectionLostError("unplugged")
 
@@ -198,6 +200,95 @@ async def test_who_waits_when_the_task_fails_is_told_too(caplog: pytest.LogCaptu
         assert session.is_over
     (record,) = [each for each in caplog.records if each.levelno == logging.CRITICAL]
     assert "the task that owns the link failed" in record.getMessage()
+
+
+# -- a loop that is closed under it ------------------------------------------------------------------------
+
+
+@pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning")
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+class TestClosedLoop:
+    @pytest.mark.parametrize("state", [State.RUNNING_IDLE, State.DO_SHUTDOWN, State.SHUTDOWN])
+    def test_it_counts_as_over_once_it_is_abandoned(self, state: State) -> None:
+        """In SHUTDOWN the task had ended, and nobody had come round to seeing it: the next start failed."""
+        here, session = in_a_loop_that_is_closed(state)
+        assert session.lost_its_loop
+        with pytest.raises(NotStartedError, match="was closed"):
+            session.check_running()
+
+        async def abandon() -> None:
+            session.abandon()
+            assert session.is_over
+            assert not session.lost_its_loop
+            assert here.machine.state is State.SHUTDOWN
+            await begins_and_ends(here)
+
+        run(abandon)
+        gc.collect()
+
+    @pytest.mark.parametrize("state", [State.RUNNING_IDLE, State.DO_SHUTDOWN, State.SHUTDOWN])
+    def test_what_is_left_of_it_leaves_the_next_run_alone(self, state: State) -> None:
+        """When the old task was thrown away, it shut down the state of the hand under the new one."""
+        here, session = in_a_loop_that_is_closed(state)
+
+        async def again() -> None:
+            nonlocal session
+            session.abandon()
+            session = here.session()
+            await session.connected()
+            await asyncio.sleep(0.1)
+            polls = session.counters.polls
+            gc.collect()
+            await asyncio.sleep(0.1)
+            assert here.machine.state is State.RUNNING_IDLE
+            assert here.wire.is_open
+            assert session.counters.polls == pytest.approx(polls + 10, abs=1)
+            session.controller.command(Finger.A, 100, None, None)
+            await session.stop(halt=False)
+
+        run(again)
+
+    def test_its_address_is_free(self) -> None:
+        _, session = in_a_loop_that_is_closed(State.RUNNING_IDLE)
+
+        async def again() -> None:
+            other = Run().session()
+            await other.connected()
+            session.abandon()
+            with pytest.raises(InvalidStateError):
+                Run().session()
+            await other.stop(halt=False)
+
+        run(again)
+        gc.collect()
+
+
+def in_a_loop_that_is_closed(state: State) -> tuple[Run, Session]:
+    """A session whose loop was closed in the turn in which the hand came to a state."""
+    loop = VirtualLoop()
+
+    async def begin() -> tuple[Run, Session]:
+        here = Run()
+        await here.wire.activate()
+        session = here.session()
+        changed = here.machine.changed
+
+        def stop_the_loop(source: State, target: State, trigger: Trigger) -> None:
+            changed(source, target, trigger)
+            if target is state:
+                loop.stop()
+
+        here.machine.changed = stop_the_loop
+        return here, session
+
+    here, session = loop.run_until_complete(begin())
+    if state is not State.RUNNING_IDLE:
+        stopping = session.stop(halt=state is State.DO_SHUTDOWN)
+        loop.call_later(0.1, lambda: loop.create_task(stopping))
+    loop.run_forever()
+    assert here.machine.state is state
+    loop.close()
+    return here, session
 
 
 async def begins_and_ends(here: Run) -> None:
