@@ -5,14 +5,10 @@ from __future__ import annotations
 import asyncio
 import gc
 import logging
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 from dataclasses import replace
 
 import pytest
 
-from robotiq_async.calibration.closing_time import closing_time
-from robotiq_async.control.state_machine import StateMachine
 from robotiq_async.control.triggers import Trigger
 from robotiq_async.enums import Finger, State
 from robotiq_async.errors import (
@@ -21,54 +17,10 @@ from robotiq_async.errors import (
     InvalidStateError,
     NotStartedError,
 )
-from robotiq_async.session.options import Options
-from robotiq_async.session.reconnecting import ReconnectPolicy
 from robotiq_async.session.session import Session
-from robotiq_async.session.streams import Channels
+from tests.session.sessions import LOST, Run, running
 from tests.session.wire import Wire
 from tests.virtual import VirtualLoop, run, virtual
-
-LOST = ConnectionLostError("unplugged")
-
-
-class Run:
-    """What outlives a session, and the means to make one."""
-
-    def __init__(self, key: str = "wire", policy: ReconnectPolicy | None = None) -> None:
-        self.wire = Wire()
-        self.machine = StateMachine()
-        self.channels = Channels()
-        self.options = Options(
-            make_transport=lambda: self.wire,
-            address="wire",
-            key=key,
-            poll_interval=0.01,
-            activation_timeout=20.0,
-            policy=policy,
-            speed=128,
-            force=64,
-            closing_time=closing_time,
-        )
-
-    def session(self, *, activate: bool = False, first_sequence: int = 0) -> Session:
-        return Session(
-            self.options, self.machine, self.channels, activate=activate, first_sequence=first_sequence
-        )
-
-
-@asynccontextmanager
-async def running(
-    *, active: bool = True, policy: ReconnectPolicy | None = None
-) -> AsyncIterator[tuple[Run, Session]]:
-    """A session at a gripper that is active, or was just switched on."""
-    here = Run(policy=policy)
-    if active:
-        await here.wire.activate()
-    session = here.session()
-    await session.connected()
-    yield here, session
-    await session.stop(halt=True)
-
 
 # -- who owns the address ----------------------------------------------------------------------------------
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Sequence
 
-from robotiq_async.errors import RobotiqConnectionError
+from robotiq_async.errors import ResponseTimeoutError, RobotiqConnectionError
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.wire.registers import Registers
 from robotiq_async.wire.request import Request
 
 EXCHANGE_S = 0.001
+SILENCE_S = 0.4
+"""How long a transport waits for an answer."""
 
 
 class Wire:
@@ -19,11 +21,11 @@ class Wire:
     Attributes:
         calls: what was asked of it, in order.
         failing: the calls that fail, and with what; until taken out.
-        silent: the calls that never end.
+        silent: the calls that are not answered.
     """
 
-    def __init__(self) -> None:
-        self.gripper = SimulatedGripper(asyncio.get_running_loop().time)
+    def __init__(self, speedup: float = 1.0) -> None:
+        self.gripper = SimulatedGripper(asyncio.get_running_loop().time, speedup=speedup)
         self.is_open = False
         self.calls: list[str] = []
         self.failing: dict[str, RobotiqConnectionError] = {}
@@ -48,7 +50,9 @@ class Wire:
     async def _carry(self, what: str) -> None:
         self.calls.append(what)
         if what in self.silent:
-            await asyncio.Event().wait()
+            await asyncio.sleep(SILENCE_S)
+            self.is_open = False
+            raise ResponseTimeoutError("no answer")
         await asyncio.sleep(EXCHANGE_S)
         if what in self.failing:
             self.is_open = False

@@ -1,0 +1,58 @@
+"""A session at a wire without a network, and what outlives it."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from robotiq_async.calibration.closing_time import closing_time
+from robotiq_async.control.state_machine import StateMachine
+from robotiq_async.errors import ConnectionLostError
+from robotiq_async.session.options import Options
+from robotiq_async.session.reconnecting import ReconnectPolicy
+from robotiq_async.session.session import Session
+from robotiq_async.session.streams import Channels
+from tests.session.wire import Wire
+
+LOST = ConnectionLostError("unplugged")
+
+
+class Run:
+    """What outlives a session, and the means to make one."""
+
+    def __init__(
+        self, key: str = "wire", policy: ReconnectPolicy | None = None, speedup: float = 1.0
+    ) -> None:
+        self.wire = Wire(speedup)
+        self.machine = StateMachine()
+        self.channels = Channels()
+        self.options = Options(
+            make_transport=lambda: self.wire,
+            address="wire",
+            key=key,
+            poll_interval=0.01,
+            activation_timeout=20.0,
+            policy=policy,
+            speed=128,
+            force=64,
+            closing_time=closing_time,
+        )
+
+    def session(self, *, activate: bool = False, first_sequence: int = 0) -> Session:
+        return Session(
+            self.options, self.machine, self.channels, activate=activate, first_sequence=first_sequence
+        )
+
+
+@asynccontextmanager
+async def running(
+    *, active: bool = True, policy: ReconnectPolicy | None = None, speedup: float = 1.0
+) -> AsyncIterator[tuple[Run, Session]]:
+    """A session at a gripper that is active, or was just switched on."""
+    here = Run(policy=policy, speedup=speedup)
+    if active:
+        await here.wire.activate()
+    session = here.session()
+    await session.connected()
+    yield here, session
+    await session.stop(halt=True)

@@ -1,0 +1,210 @@
+"""What a caller waits for beside the task that polls, and how it is told that it will not come."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from robotiq_async.enums import Fault, Finger, State
+from robotiq_async.errors import (
+    ActivationTimeoutError,
+    ConnectionLostError,
+    GripperFaultError,
+    NotActivatedError,
+    NotStartedError,
+    StateTimeoutError,
+)
+from robotiq_async.session.reconnecting import ReconnectPolicy
+from tests.session.sessions import LOST, running
+from tests.virtual import virtual
+
+# -- an acknowledgement ------------------------------------------------------------------------------------
+
+
+@virtual
+async def test_who_asks_is_answered_when_the_gripper_has_acknowledged() -> None:
+    async with running() as (here, session):
+        asked = here.wire.calls.count("write")
+        await session.answered(lambda waiter: session.controller.command(Finger.A, 100, None, None, waiter))
+        assert here.wire.calls.count("write") == asked + 1
+
+
+@virtual
+async def test_what_is_refused_is_told_at_once() -> None:
+    async with running(active=False) as (here, session):
+        with pytest.raises(NotActivatedError):
+            await session.answered(
+                lambda waiter: session.controller.command(Finger.A, 100, None, None, waiter)
+            )
+        assert "write" not in here.wire.calls
+
+
+@virtual
+async def test_who_asks_is_told_that_the_link_went_down_before_the_acknowledgement() -> None:
+    async with running(policy=ReconnectPolicy()) as (here, session):
+        here.wire.failing["write"] = LOST
+        with pytest.raises(ConnectionLostError, match="before this was done: unplugged") as caught:
+            await session.answered(
+                lambda waiter: session.controller.command(Finger.A, 100, None, None, waiter)
+            )
+        assert caught.value.__cause__ is LOST
+        here.wire.failing.clear()
+
+
+# -- a state -----------------------------------------------------------------------------------------------
+
+
+@virtual
+async def test_a_state_that_is_reached_is_returned_also_when_it_lasts_no_time() -> None:
+    async with running() as (_, session):
+        reached = await session.reach(
+            {State.RUNNING_CC},
+            1.0,
+            what="never",
+            ask=lambda: session.controller.command(Finger.A, 100, None, None),
+        )
+        assert reached is State.RUNNING_CC
+
+
+@virtual
+async def test_a_state_that_is_not_reached_in_time_is_said_with_the_one_that_is() -> None:
+    async with running() as (_, session):
+        with pytest.raises(StateTimeoutError, match=r"no fault came within 0\.5 s \(now RUNNING_IDLE\)"):
+            await session.reach({State.FAULT}, 0.5, what="no fault came")
+
+
+@virtual
+async def test_a_state_that_means_it_will_not_come_is_an_error() -> None:
+    async with running() as (here, session):
+        reaching = asyncio.create_task(
+            session.reach(
+                {State.ATR_DONE}, 9.0, what="", failing={State.FAULT: lambda: GripperFaultError(Fault(0x0E))}
+            )
+        )
+        await asyncio.sleep(0.1)
+        here.wire.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+        with pytest.raises(GripperFaultError):
+            await reaching
+
+
+@virtual
+async def test_nobody_waits_for_what_was_refused() -> None:
+    async with running() as (_, session):
+        with pytest.raises(NotActivatedError):
+            await session.reach({State.WF_ATR}, 1.0, what="", ask=refuse)
+        assert not session._waiters._waiters
+
+
+def refuse() -> None:
+    raise NotActivatedError("no")
+
+
+# -- an activation -----------------------------------------------------------------------------------------
+
+
+@virtual
+async def test_an_activation_is_waited_for_until_the_gripper_is_active() -> None:
+    async with running(active=False) as (here, session):
+        await session.activated(session.controller.activate)
+        assert here.machine.state is State.RUNNING_IDLE
+
+
+@virtual
+async def test_where_nothing_is_under_way_nothing_is_waited_for() -> None:
+    async with running(active=False) as (here, session):
+        await session.activated()
+        assert here.machine.state is State.RESET
+
+
+@virtual
+async def test_an_activation_of_ours_must_not_end_in_a_fault() -> None:
+    async with running(active=False) as (here, session):
+        here.wire.gripper.fail_activation = True
+        with pytest.raises(GripperFaultError) as caught:
+            await session.activated(session.controller.activate)
+        assert caught.value.fault is Fault.ACTIVATION_FAULT
+
+
+@virtual
+async def test_an_activation_of_others_that_ends_in_a_fault_is_over_too() -> None:
+    """The hand is left there, so that it can be recovered."""
+    async with running(active=False) as (here, session):
+        here.wire.gripper.fail_activation = True
+        here.wire.gripper.write(0, [0x0100])
+        await asyncio.sleep(0.1)
+        assert here.machine.state is State.WF_ACTIVATION
+        await session.activated()
+        assert here.machine.state is State.FAULT
+
+
+@virtual
+async def test_an_activation_that_takes_too_long_says_so() -> None:
+    async with running(active=False, speedup=0.1) as (_, session):
+        with pytest.raises(ActivationTimeoutError, match="the activation was not finished within 20 s"):
+            await session.activated(session.controller.activate)
+
+
+@virtual
+@pytest.mark.parametrize("how", ["reset", "power", "link"])
+async def test_an_activation_that_comes_to_nothing_says_why(how: str) -> None:
+    async with running(active=False, policy=ReconnectPolicy()) as (here, session):
+        activating = asyncio.create_task(session.activated(session.controller.activate))
+        await asyncio.sleep(1)
+        match how:
+            case "reset":
+                session.controller.reset()
+            case "power":
+                here.wire.gripper.power_cycle()
+            case "link":
+                here.wire.failing["read"] = LOST
+        error = ConnectionLostError if how == "link" else NotActivatedError
+        words = {"reset": "took over", "power": "was reset during the activation", "link": "link is down"}
+        with pytest.raises(error, match=words[how]):
+            await activating
+        here.wire.failing.clear()
+
+
+# -- the next status ---------------------------------------------------------------------------------------
+
+
+@virtual
+async def test_the_next_status_is_one_that_was_not_there_before() -> None:
+    async with running() as (_, session):
+        before = session.controller.status
+        await session.next_status()
+        assert session.controller.status is not before
+
+
+@virtual
+async def test_who_waits_for_the_next_status_is_told_of_a_lost_link() -> None:
+    """A stream of statuses waits out a lost link; who wants to know what the gripper does now does not."""
+    async with running(policy=ReconnectPolicy()) as (here, session):
+        here.wire.failing["read"] = here.wire.failing["open"] = LOST
+        with pytest.raises(ConnectionLostError, match="the link is down"):
+            await session.next_status()
+        here.wire.failing.clear()
+
+
+@virtual
+async def test_who_waits_for_the_next_status_is_told_of_the_end() -> None:
+    async with running() as (_, session):
+        waiting = asyncio.create_task(session.next_status())
+        await asyncio.sleep(0)
+        await session.stop(halt=False)
+        with pytest.raises(NotStartedError):
+            await waiting
+
+
+# -- what is told of it ------------------------------------------------------------------------------------
+
+
+@virtual
+async def test_changes_of_state_are_told_and_faults_are_counted() -> None:
+    async with running() as (here, session):
+        stream = here.channels.transitions.open(None)
+        for _ in range(2):
+            here.wire.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.1)
+            await asyncio.sleep(0.3)
+        assert [each.target for each in stream.drain()] == [State.FAULT, State.RUNNING_IDLE] * 2
+        assert session.counters.faults == 2
