@@ -202,15 +202,6 @@ class Session:
         if self._loop.is_closed():
             raise NotStartedError("the event loop that the hand ran in was closed: start() it again")
 
-    def check_connected(self) -> None:
-        """Refuse what needs the link.
-
-        Raises:
-            ConnectionLostError: the link is down.
-        """
-        if self.machine.state is State.DISCONNECTED:
-            raise self.link_lost()
-
     def link_lost(self) -> RobotiqConnectionError:
         """The error that tells that the link is down, and why if that is known."""
         failure = self._poller.failure
