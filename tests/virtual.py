@@ -1,6 +1,6 @@
 """An event loop whose time is not real: it jumps ahead when nothing is left to do.
 
-Seconds of polling pass in milliseconds, a time-out takes no time, two runs take the same course, and
+Seconds of polling pass in milliseconds, a timeout takes no time, two runs take the same course, and
 whoever waits for something that will never come is found out at once. Connections made in such a loop
 are made of memory; real descriptors (the fake serial line) work too, as long as what is written to one
 can be read from the other at once.

@@ -122,11 +122,7 @@ class Controller:
             waiter.set_result(None)
 
     def activate(self) -> None:
-        """Begin an activation, unless the gripper is active or activating.
-
-        Raises:
-            RobotiqError: not possible now.
-        """
+        """Begin an activation, unless the gripper is active or activating; raises why it is not possible."""
         if self.machine.fire(Trigger.ASK_ACTIVATE, self.status):
             self._begin_activation()
 
@@ -172,9 +168,10 @@ class Controller:
 
         An activation that this hand began is taken back (rACT = 0): clearing rGTO would not stop it.
         """
-        sequence = reset(self._shadow.at_rest) if self._activating else shutdown(self._last_image)
-        moves = self.status is not None and self._last_image(self.status) is not None
-        self._begin(sequence, is_stop=self._activating or moves)
+        if self._activating:
+            self._begin(reset(self._shadow.at_rest), is_stop=True)
+        elif self.status is not None:
+            self._begin(shutdown(self._last_image), is_stop=self._last_image(self.status) is not None)
 
     # -- what is known ---------------------------------------------------------------------------------
 

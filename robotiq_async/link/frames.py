@@ -29,7 +29,7 @@ class Expected(NamedTuple):
 
     Attributes:
         start: how the good reply begins: header, function code and what must follow it.
-        size: bytes of the good reply, check sum included. (The check sum itself is left to pymodbus.)
+        size: bytes of the good reply, checksum included. (The checksum itself is left to pymodbus.)
         refusal: how an exception reply begins: header and function code.
         refusal_size: bytes of an exception reply.
     """
@@ -79,7 +79,7 @@ def _expected_over_tcp(request: bytes) -> Expected:
 
 
 def _expected(request: bytes, checksum: int) -> Expected:
-    """The same for a frame that begins with the unit and ends with a check sum of so many bytes."""
+    """The same for a frame that begins with the unit and ends with a checksum of so many bytes."""
     at = 1
     function = request[at]
     if function == 16:

@@ -299,7 +299,7 @@ class Poller:
             if scope.cancelled_caught:
                 log.warning("the gripper did not confirm in time that the fingers were stopped")
         finally:
-            if not self._is_abandoned:
+            if not self._loop.is_closed():
                 self._tick.close()
                 await self._transport.close()
                 self._controller.stopped()

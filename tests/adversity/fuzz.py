@@ -121,7 +121,7 @@ def decoder(count: int, seed: int = 1) -> dict[str, int]:
         verdict = _verdict(rng, request, given, serial)
         figures[verdict] += 1
         if verdict == "accepted":
-            # The check sum is left to pymodbus, which sees the frame next.
+            # The checksum is left to pymodbus, which sees the frame next.
             assert serial or answers(request, given, serial), (request.hex(), given.hex())
             if request[1 if serial else 7] != WRITE and len(given) == len(reply) and len(given) > 20:
                 check_possible(given[3:19] if serial else given[9:25])

@@ -180,7 +180,7 @@ def test_a_result_does_not_change_with_what_is_seen_later() -> None:
     assert dict(result.peak_current_ma) == {A: 0}
 
 
-# -- the default time-out ----------------------------------------------------------------------------------
+# -- the default timeout ----------------------------------------------------------------------------------
 
 SLOWEST_S, FASTEST_S = 10.021, (2097 + 2122 + 2137) / 3000
 """A full closing, 6 to 241 (thesis, table A1.1, mean of three runs)."""

@@ -456,7 +456,7 @@ async def test_a_held_up_loop_is_noticed_and_survived(
     overruns = hand.statistics.overruns
     with caplog.at_level(logging.WARNING, logger="robotiq_async"):
         for _ in range(2):
-            time.sleep(0.6)  # noqa: ASYNC251  # longer than the response time-out
+            time.sleep(0.6)  # noqa: ASYNC251  # longer than the response timeout
             await asyncio.sleep(0.02)
     await moving
     statistics = hand.statistics

@@ -31,7 +31,7 @@ class Case:
         return expected_reply(self.request, serial=self.serial)
 
 
-# The check sums of the serial frames are the ones of the Modbus specification's algorithm; they are not
+# The checksums of the serial frames are the ones of the Modbus specification's algorithm; they are not
 # looked at here.
 CASES = {
     "tcp read": Case(
@@ -132,7 +132,7 @@ def test_two_good_replies_at_once_are_refused(case: Case) -> None:
 @every_case
 @given(values=st.binary(min_size=16, max_size=16))
 def test_the_values_that_are_read_are_not_looked_at(case: Case, values: bytes) -> None:
-    """There is nothing to compare them with; TCP or the check sum of RTU vouches for them."""
+    """There is nothing to compare them with; TCP or the checksum of RTU vouches for them."""
     if case.function == 16:
         return
     start = case.checked.stop

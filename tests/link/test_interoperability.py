@@ -72,7 +72,7 @@ async def test_a_reply_that_waits_while_the_loop_is_held_up_is_an_answer() -> No
         for _ in range(5):
             reading = asyncio.create_task(transport.read())
             await asyncio.sleep(0)  # the request is on its way
-            time.sleep(0.3)  # noqa: ASYNC251  # three times the time-out
+            time.sleep(0.3)  # noqa: ASYNC251  # three times the timeout
             assert len(await reading) == 8
             assert transport.is_open
     finally:

@@ -430,7 +430,7 @@ async def test_a_burst_is_no_answer_and_no_silence(size: int, begins_well: bool)
         began = time.monotonic()
         with pytest.raises(ProtocolError) as caught:
             await transport.read()
-        assert time.monotonic() - began < 0.09, "in less than the time-out"
+        assert time.monotonic() - began < 0.09, "in less than the timeout"
         assert len(str(caught.value)) < 300
         assert not transport.is_open
 

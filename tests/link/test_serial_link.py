@@ -40,7 +40,7 @@ class Device:
         """Replies to be kept back from here on."""
         self.kept: list[bytes] = []
         self.spoil = False
-        """Whether check sums are wrong from here on."""
+        """Whether checksums are wrong from here on."""
         asyncio.get_running_loop().add_reader(descriptor, self._ready)
         self._inbox = b""
 

@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager
 from robotiq_async.calibration.closing_time import closing_time
 from robotiq_async.control.state_machine import StateMachine
 from robotiq_async.errors import ConnectionLostError
+from robotiq_async.session.claims import Gripper
 from robotiq_async.session.options import Options
 from robotiq_async.session.reconnecting import ReconnectPolicy
 from robotiq_async.session.session import Session
@@ -29,7 +30,7 @@ class Run:
         self.options = Options(
             make_transport=lambda: self.wire,
             address="wire",
-            key=key,
+            gripper=lambda: Gripper(key),
             poll_interval=0.01,
             activation_timeout=20.0,
             policy=policy,

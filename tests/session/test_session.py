@@ -28,7 +28,7 @@ from tests.virtual import VirtualLoop, run, virtual
 @virtual
 async def test_an_address_has_one_session_at_a_time() -> None:
     async with running() as (_, first):
-        with pytest.raises(InvalidStateError, match="a hand runs on wire already"):
+        with pytest.raises(InvalidStateError, match="another hand runs on wire already"):
             Run().session()
         other = Run(key="another wire").session()
         await other.connected()

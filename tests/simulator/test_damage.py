@@ -68,7 +68,7 @@ def test_a_reply(pdu: str, is_to_a_write: bool) -> None:
         assert reply.is_to_a_write is is_to_a_write
 
 
-# The PDU or the unit is wrong; length and check sum fit it.
+# The PDU or the unit is wrong; length and checksum fit it.
 
 
 @pytest.mark.parametrize(

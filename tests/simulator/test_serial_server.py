@@ -124,7 +124,7 @@ async def test_partial_write_and_read_back(server: AttentiveServer, line: Line) 
 
 
 async def test_reading_and_writing_at_once(server: AttentiveServer, line: Line) -> None:
-    """The manual's example of function 23, but for the check sum it prints under the request."""
+    """The manual's example of function 23, but for the checksum it prints under the request."""
     request = bytes.fromhex("17 07d0 0002 03e9 0002 04 00e6 3cc8")
     assert with_crc(b"\x09" + bytes.fromhex("17 04 e000 0000"))[-2:] == bytes.fromhex("4727"), "as printed"
     assert await line.ask(request, 6) == bytes.fromhex("17 04 0000 0000")

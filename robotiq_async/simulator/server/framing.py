@@ -64,7 +64,7 @@ def take_tcp(inbox: bytearray) -> Frame | None:
 def take_rtu(inbox: bytearray) -> Frame | None:
     """The first complete frame, taken out of the inbox; None while it is incomplete.
 
-    After a function code that is not served, or a wrong check sum, there is no telling where the frame ends:
+    After a function code that is not served, or a wrong checksum, there is no telling where the frame ends:
     the inbox is emptied.
     """
     size = _rtu_size(inbox)

@@ -54,6 +54,6 @@ def _begins_anew(pause: float, data: bytes) -> bool:
     """Whether bytes are the beginning of a frame and not the rest of one, judged by the pause before them.
 
     In between, when it may be the line or the machine that paused, a whole request is a beginning: by
-    chance the rest of a frame has its check sum once in 65,536 times.
+    chance the rest of a frame has its checksum once in 65,536 times.
     """
     return pause > LONGEST_PAUSE_S or (pause > SILENCE_S and take_rtu(bytearray(data)) is not None)

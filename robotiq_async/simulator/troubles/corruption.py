@@ -1,6 +1,6 @@
 """What can be done to the bytes of one reply, on either kind of link. No I/O: a reply in, bytes out.
 
-Apart from what a function is named after, the frame it makes is in order: length and check sum are made
+Apart from what a function is named after, the frame it makes is in order: length and checksum are made
 anew, so that a client which finds it out has looked at the right thing.
 """
 
@@ -137,7 +137,7 @@ def wrong_echo(reply: Reply, value: float) -> Parts:
 
 
 def wrong_checksum(reply: Reply, value: float) -> Parts:
-    """One bit of the check sum is wrong."""
+    """One bit of the checksum is wrong."""
     return ((0.0, reply.frame[:-1] + bytes((reply.frame[-1] ^ 1,))),)
 
 

@@ -84,7 +84,7 @@ KINDS: Final[dict[str, Kind]] = {
     "wrong-echo": Kind(
         "a reply to a write names another register", _EVENT, damage=damage.wrong_echo, on="write"
     ),
-    "wrong-checksum": Kind("a reply has a wrong check sum", _EVENT, damage=damage.wrong_checksum, link="rtu"),
+    "wrong-checksum": Kind("a reply has a wrong checksum", _EVENT, damage=damage.wrong_checksum, link="rtu"),
     "exception": Kind(
         "a request is answered by exception VALUE", _EVENT, 4, 1, 255, damage.refusal, link="tcp"
     ),
