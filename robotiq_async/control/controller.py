@@ -206,10 +206,7 @@ class Controller:
     def see(self, status: RobotiqStatus, asked: float | None = None) -> None:
         """Take in a status, read after everything that was acknowledged so far.
 
-        Args:
-            status: the status.
-            asked: when its request was sent, in monotonic seconds; None for the time of the reply. After
-                the loop was held up that is long before the reply was looked at.
+        ``asked`` is when it was asked for, in monotonic seconds; None for the time of the reply.
         """
         self.status = status
         self._shadow.see(status, status.timestamp if asked is None else asked)
@@ -238,6 +235,11 @@ class Controller:
             self._shadow.see_arrivals(status)
             if self._callers.moves:
                 self._callers.moves.see(status, self._shadow.acts)
+
+    @property
+    def has_request(self) -> bool:
+        """Whether there may be something to write."""
+        return self.machine.is_busy or not self._callers.pending.is_empty
 
     @property
     def is_urgent(self) -> bool:

@@ -48,7 +48,7 @@ SHUTDOWN_S: Final = 1.2
 SHUTDOWN_PAUSE_S: Final = 0.05
 """Between two attempts at that."""
 READS: Final = 3
-"""At most so often a status that was asked for in a loop that was held up is asked for again."""
+"""At most so often the status is read in a cycle that has something to write, in a loop that is held up."""
 LATE_S: Final = 0.05
 """Later than this a poll is worth a warning; on a busy machine a few milliseconds are usual."""
 LATE_WARNING_S: Final = 1.0
@@ -211,10 +211,13 @@ class Poller:
 
     async def _cycle(self) -> None:
         """Read, decide, write. A stop is written before that, too: the gripper may hear without answering."""
-        if self._controller.is_urgent and not self._is_held_up():
+        controller = self._controller
+        if controller.is_urgent and not self._is_held_up():
             await self._write()
         for _ in range(READS):
             await self._poll_once()
+            if not controller.has_request:
+                return
             if not self._is_held_up():
                 break
         await self._write()

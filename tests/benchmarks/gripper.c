@@ -47,11 +47,12 @@ static void serve(int fd) {
     }
     memcpy(out, in, HEADER);
     int length;
-    if (size == 12 && in[HEADER] == 4) {
+    if (size == 12 && in[HEADER] == 4 && in[HEADER + 4] <= BYTES / 2) {
+        unsigned char bytes = (unsigned char)(2 * in[HEADER + 4]);
         out[HEADER] = 4;
-        out[HEADER + 1] = BYTES;
-        memcpy(out + HEADER + 2, status[gripper_of[fd]], BYTES);
-        length = HEADER + 2 + BYTES;
+        out[HEADER + 1] = bytes;
+        memcpy(out + HEADER + 2, status[gripper_of[fd]], bytes);
+        length = HEADER + 2 + bytes;
     } else if (size == 29 && in[HEADER] == 16) {
         take(gripper_of[fd], in + HEADER + 6);
         memcpy(out + HEADER, in + HEADER, 5);
