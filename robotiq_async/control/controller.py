@@ -317,10 +317,10 @@ class Controller:
         return image
 
     def _after_sequence(self, status: RobotiqStatus) -> None:
-        if not self._step:
-            self._activating = False  # what it was to begin from was gone: nothing was sent
-            return
-        is_ours = self._shadow.restart(status)
+        if self._step:
+            is_ours = self._shadow.restart(status)
+        else:  # what it was to begin from was gone: nothing was sent
+            self._activating, is_ours = False, self._shadow.is_ours(status)
         if self.machine.state in _COMMANDED and not is_ours:
             self._take_over(status)
         if self._activating:

@@ -146,7 +146,7 @@ class RequestShadow:
 
     def lost(self) -> None:
         """The link is down: what others do meanwhile is not seen."""
-        self._adoption = None
+        self._image, self._adoption = self.base, None
         self._writes.lost()
 
     # -- what is read ----------------------------------------------------------------------------------

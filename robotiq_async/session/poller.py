@@ -323,8 +323,10 @@ class Poller:
 
     async def _stop_fingers_once(self) -> None:
         if not self._transport.is_open:
-            # A gripper that lost its client goes on moving.
+            # A gripper that lost its client goes on moving; one that lost its power meanwhile would be
+            # activated by what was known of it before.
             await self._transport.open()
+            await self._poll_once()
         self._controller.shut_down()
         while True:
             await self._cycle()

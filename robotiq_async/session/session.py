@@ -146,7 +146,7 @@ class Session:
         self._waiters = StateWaiters()
         self._channels.end()
         self.machine.fire(Trigger.ASK_STOP)
-        self.machine.fire(Trigger.STOPPED)
+        self.controller.stopped()
 
     def _claim(self) -> None:
         gripper = self._options.gripper

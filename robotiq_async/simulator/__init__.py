@@ -1,29 +1,15 @@
 """A simulated gripper, and servers that put it on a wire.
 
-=====================  ====================================================================
-module                 what it holds
-=====================  ====================================================================
-``gripper``            :class:`SimulatedGripper`: clock, registers, objects, faults, power
-``controller``         the firmware: activation, modes, release, faults, who drives which axis
-``control``            what a request asks of the axes, and the fixed sequences, as data
-``axis``               one axis: motion, stops, contacts
-``motor``              what its motor draws
-``spread``             what is not exact about it
-``faults``             the faults that are present, and when they end
-``report``             the status registers
-``server``             :class:`SimulatorServer`: Modbus TCP
-``serial_server``      :class:`SerialSimulatorServer`: Modbus RTU on a serial line
-``serial_connection``  where a frame ends on it
-``endpoint``           what both servers have in common
-``bank``               which register is found at which address
-``connection``         one client; ``framing`` cuts its bytes into requests
-``replies``            lost, late and mangled replies, switched by hand
-``trouble``            what can go wrong, as data and as words: :class:`Trouble`, :func:`parse_troubles`
-``adversary``          makes troubles happen, one at a time or by a plan
-``damage``             what troubles do to the bytes of a reply
-=====================  ====================================================================
+==============  ===========================================================================
+room            what it holds
+==============  ===========================================================================
+``physics``     :class:`SimulatedGripper`: axes, contacts, faults, power, and the words it reports
+``server``      :class:`SimulatorServer` (Modbus TCP), :class:`SerialSimulatorServer` (Modbus RTU)
+``troubles``    what can go wrong, as data and as words: :class:`Trouble`, :func:`parse_troubles`
+``functions``   the Modbus functions that are served
+==============  ===========================================================================
 
-The physics (the first eight) import neither pymodbus nor asyncio.
+The physics imports neither pymodbus nor asyncio.
 """
 
 from .physics.gripper import SimulatedGripper

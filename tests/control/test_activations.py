@@ -54,6 +54,40 @@ def test_an_activation_is_called_off_when_others_have_activated_meanwhile() -> N
     assert scan.latest.contacts == Finger.ABC
 
 
+def test_a_halt_right_after_an_activation_that_was_called_off_lets_nothing_go() -> None:
+    """It was made from an image in which rACT had never been set, and so reset the gripper."""
+    scan = Scan()
+    scan.connect(activate=False)
+    scan.gripper.place_object(Finger.ABC, 150)
+    scan.gripper.write(0, [0x0100])
+    scan.now += 6
+    scan.gripper.write(0, going_to(255))
+    scan.now += 3
+    scan.controller.activate()
+    scan.step()
+    scan.halt()
+    request = scan.controller.decide(scan.now)
+    assert request is not None
+    assert (request.activate, request.go) == (True, False)
+
+
+def test_a_stop_after_a_lost_link_writes_what_the_gripper_has() -> None:
+    """An adopted gripper's requests were forgotten with the link, and the first image of all was written."""
+    scan = Scan()
+    scan.gripper.write(0, Request(activate=True).registers)
+    scan.now += 10
+    scan.gripper.write(0, going_to(200))
+    scan.now += 1
+    scan.connect(activate=False)
+    scan.run(0.1)
+    scan.controller.lost(None)
+    scan.connect(activate=False)
+    scan.controller.stop()
+    scan.controller.shut_down()
+    scan.step()
+    assert [request.position for request in scan.last_image.axes[:3]] == [200, 200, 200]
+
+
 @pytest.mark.parametrize("how", ["position", "speed"])
 def test_another_client_that_writes_during_our_activation_is_noticed_at_its_end(how: str) -> None:
     scan = Scan()

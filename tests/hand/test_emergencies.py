@@ -12,6 +12,7 @@ from robotiq_async import (
     Fault,
     InvalidStateError,
     NotActivatedError,
+    ReconnectPolicy,
     RobotiqHand,
     State,
 )
@@ -206,3 +207,21 @@ async def test_a_command_is_written_after_a_read() -> None:
         wire.asked.clear()
         await hand.set_position(200)
         assert wire.asked[:2] == ["read", "go"]
+
+
+async def test_a_stop_over_a_new_link_does_not_activate_a_gripper_that_lost_its_power(
+    server: SimulatorServer, gripper: SimulatedGripper
+) -> None:
+    """It was written on the status from before: rACT was still set there."""
+    hand = RobotiqHand(server.address, reconnect=ReconnectPolicy(first_delay=5.0))
+    await hand.start()
+    await hand.set_position(255)
+    server.refuse()
+    server.cut()
+    await hand.wait_for_state(State.DISCONNECTED)
+    gripper.power_cycle()
+    writes = len(gripper.writes)
+    await server.accept()
+    await hand.stop()
+    assert not [write for write in gripper.writes[writes:] if write.registers[0] & 0x0100]
+    assert not gripper.is_moving

@@ -250,6 +250,26 @@ class TestClosedLoop:
 
         asyncio.run(again())
 
+    def test_a_sequence_of_the_first_start_does_not_go_on_in_the_second(self, address: str) -> None:
+        """It activated a gripper that the second start was to leave as it is."""
+        hand = RobotiqHand(address)
+        loop = asyncio.new_event_loop()
+        loop.run_until_complete(hand.start(activate=False))
+        asking = loop.create_task(hand.activate())
+        loop.run_until_complete(asyncio.sleep(0))
+        assert hand.state is State.DO_ACTIVATION
+        loop.close()
+        del asking
+
+        async def again() -> None:
+            await hand.start(activate=False)
+            for _ in range(5):
+                assert not (await anext(hand.statuses())).activation_echo
+            assert hand.state is State.RESET
+            await hand.stop()
+
+        asyncio.run(again())
+
     def test_every_other_call_says_so(self, place: str) -> None:
         hand = abandoned(place)
         for name, call in CALLS.items():
