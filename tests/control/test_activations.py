@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async import Fault, Finger, InvalidStateError, MoveSupersededError, NotActivatedError, State
+from robotiq_async.control.triggers import Trigger
 from robotiq_async.wire.request import Request
 from tests.control.other_client import going_to, reset_and_activated_by_another
 from tests.control.scan import POLL_S, Scan
@@ -185,3 +186,33 @@ def test_after_a_release_and_another_clients_reset_no_command_releases_again(sca
     written = len(scan.written)
     scan.moved(60, B)
     assert not any(Request.from_registers(image).release for image in scan.written[written:])
+
+
+def test_a_gripper_that_is_active_or_activating_is_not_activated_again(scan: Scan) -> None:
+    written = len(scan.written)
+    scan.controller.activate()
+    scan.run(0.1)
+    assert len(scan.written) == written
+    assert not scan.controller.machine.is_busy
+    scan.controller.reset()
+    scan.until(lambda: scan.state is State.RESET)
+    scan.controller.activate()
+    scan.run(0.1)
+    written = len(scan.written)
+    scan.controller.activate()
+    scan.until(lambda: scan.state is State.RUNNING_IDLE)
+    assert len(scan.written) == written
+
+
+def test_a_halt_ends_an_activation_as_a_reset_does() -> None:
+    scan = Scan()
+    scan.connect()
+    scan.run(1)
+    assert scan.gripper.is_moving
+    scan.controller.reset(Trigger.ASK_HALT)
+    scan.controller.reset()  # it is about to be sent already
+    scan.until(lambda: scan.state is State.RESET)
+    assert not scan.gripper.is_moving
+    assert [trigger for _, target, trigger in scan.transitions if target is State.DO_RESET] == [
+        Trigger.ASK_HALT
+    ]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from robotiq_async import Finger, NotActivatedError
+from robotiq_async import ConnectionLostError, Finger, NotActivatedError
+from tests.control.other_client import going_to
 from tests.control.scan import Scan
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
@@ -63,3 +64,35 @@ def test_a_command_does_not_activate_a_gripper_that_was_reset_since_the_last_pol
     assert isinstance(asked.error, NotActivatedError)
     assert len(scan.written) == writes
     assert not scan.latest.activation_echo
+
+
+def test_the_default_timeout_goes_by_the_speed_an_axis_has_or_is_about_to_get(scan: Scan) -> None:
+    usual = scan.controller.move_timeout(241, A, None)
+    scan.controller.command(A, None, 0, None)
+    slow = scan.controller.move_timeout(241, A, None)
+    assert slow > usual
+    scan.run(0.5)
+    assert scan.controller.move_timeout(241, A, None) == slow, "it has it by now"
+    assert scan.controller.move_timeout(241, B, None) == usual
+
+
+def test_what_cannot_move_has_no_timeout() -> None:
+    scan = Scan()
+    with pytest.raises(ConnectionLostError):
+        scan.controller.move_timeout(241, A, 0)
+    scan.connect(activate=False)
+    with pytest.raises(NotActivatedError):
+        scan.controller.move_timeout(241, A, 0)
+
+
+def test_before_the_first_status_nothing_moves_and_nothing_is_written() -> None:
+    scan = Scan()
+    assert not scan.controller.is_moving
+    assert scan.controller.decide(scan.now) is None
+
+
+def test_a_gripper_that_is_not_active_moves_when_a_status_says_so(scan: Scan) -> None:
+    scan.gripper.write(0, going_to(200))
+    scan.run(0.5)
+    scan.controller.lost(None)
+    assert scan.controller.is_moving, "as far as is known"

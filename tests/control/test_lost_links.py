@@ -229,3 +229,34 @@ def test_a_speed_that_was_not_acknowledged_is_not_taken_for_the_axis_s_own(scan:
     scan.run(0.6)
     image = Request.from_registers(scan.written[-1])
     assert (image.axes[1].speed, image.axes[1].force) == (128, 64)
+
+
+@pytest.mark.parametrize("link_is_back", [False, True])
+def test_a_move_cancelled_as_its_link_was_lost_is_held_though_it_had_ended(link_is_back: bool) -> None:
+    """Its caller never saw the error, and knows nothing of a motion that goes on."""
+    scan = started()
+    move, told = scan.move(200, A, speed=0)
+    scan.run(0.5)
+    scan.controller.lost(None)
+    assert isinstance(told.error, ConnectionLostError)
+    if link_is_back:
+        scan.now += 0.05
+        scan.connect(activate=False)
+    scan.controller.abandon(move, unseen=True)
+    at = scan.positions()[A]
+    if not link_is_back:
+        scan.now += 0.05
+        scan.connect(activate=False)
+    scan.run(10)
+    assert abs(scan.positions()[A] - at) <= 4
+
+
+def test_a_move_that_was_given_up_after_its_error_was_seen_goes_on(scan: Scan) -> None:
+    move, _ = scan.move(200, A, speed=0)
+    scan.run(0.5)
+    scan.controller.lost(None)
+    scan.controller.abandon(move)
+    scan.now += 0.05
+    scan.connect(activate=False)
+    scan.run(10)
+    assert scan.positions()[A] >= 198

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import pytest
+
 from robotiq_async import Finger, Mode, NotStartedError, State
 from robotiq_async.wire.request import Request
-from tests.control.other_client import activated_by_another, asked
+from tests.control.other_client import activated_by_another, asked, image
 from tests.control.scan import POLL_S, Scan
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
@@ -84,3 +88,32 @@ def test_stop_does_not_take_back_an_activation_that_never_arrived_and_that_other
     scan.run(0.5)
     scan.stop()
     assert scan.status().activation_echo
+
+
+def test_the_shutdown_clears_rgto_and_changes_nothing_else(scan: Scan) -> None:
+    scan.move(200, A, speed=7, force=9)
+    scan.run(0.5)
+    before = scan.last_image
+    scan.stop()
+    assert scan.last_image == replace(before, go=False)
+
+
+def test_the_shutdown_leaves_what_another_client_has_just_asked(scan: Scan) -> None:
+    """Its request has not been seen before: from ours the fingers would be sent back."""
+    scan.moved(100, A)
+    scan.gripper.write(0, image({A: 90, B: 80, C: 70, S: 60}))
+    scan.now += 0.05
+    scan.stop()
+    assert not scan.gripper.is_moving
+    assert [scan.last_image.position(axis) for axis in (A, B, C, S)] == [90, 80, 70, 60]
+    assert not scan.last_image.go
+
+
+def test_a_shutdown_that_nobody_answers_is_over_when_its_time_is(scan: Scan) -> None:
+    scan.controller.stop()
+    scan.controller.shut_down()
+    scan.controller.stopped()
+    assert scan.state is State.SHUTDOWN
+    assert not scan.controller.machine.is_busy
+    with pytest.raises(NotStartedError):
+        scan.command(A, position=3)
