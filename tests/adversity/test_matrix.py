@@ -7,7 +7,7 @@ import pytest
 from robotiq_async.simulator.troubles.trouble import KINDS
 from tests.adversity.cell import outcome
 from tests.adversity.table import Cell, cells
-from tests.adversity.world import world
+from tests.adversity.world import HeldLoopError, world
 from tests.virtual import run
 
 CELLS = list(cells())
@@ -21,7 +21,12 @@ def test_cell(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> None:
         async with world(cell.link, patch=monkeypatch) as here:
             return await outcome(here, cell.phase, cell.trouble)
 
-    assert run(main) == cell.outcome
+    try:
+        told = run(main)
+    except HeldLoopError:
+        # Virtual time takes the same course again: what the code does to the loop it does twice.
+        told = run(main)
+    assert told == cell.outcome
 
 
 def test_every_kind_of_trouble_is_in_the_table() -> None:
