@@ -12,17 +12,20 @@
     |   +-- StateTimeoutError (TimeoutError)    a state that was never reached
     |   +-- MoveTimeoutError (TimeoutError)     .status
     |   +-- MoveSupersededError                 another command took over an axis of this move
+    |   +-- ControlLostError                    on another host: somebody else commands the gripper, or nobody
+    |   +-- NotAllowedError                     on another host: the fleet's access rules say no
     +-- RobotiqConnectionError (ConnectionError)
     |   +-- ConnectFailedError                  refused, unreachable, no such port; .address
     |   +-- ConnectionLostError
     |   +-- ResponseTimeoutError (TimeoutError)
     |   +-- ProtocolError                       exception reply, wrong function, length or echo
+    |   +-- AgentError                          the agent of another host did not carry it out
     +-- RecordingError                          a recording that cannot be written, or read
     +-- ViewerError                             a viewer that cannot be served
     +-- MeasuringError                          a measurement that went wrong
 
-The last three concern neither gripper nor link: the hand goes on. They stand here alone, and not among the
-names of the package.
+The last three concern neither gripper nor link: the hand goes on. They, and the three about other hosts,
+stand here and not among the names of the package.
 
 Bad arguments are plain ValueError and TypeError: they are the program's mistake, not the gripper's.
 """
@@ -117,6 +120,14 @@ class MoveSupersededError(RobotiqStateError):
     """Another command took over an axis of this move; its other axes run on."""
 
 
+class ControlLostError(RobotiqStateError):
+    """Commanding a gripper on another host takes a lease, and this hand does not hold it, or no longer."""
+
+
+class NotAllowedError(RobotiqStateError):
+    """The access rules of the fleet do not let this client do that."""
+
+
 class RobotiqConnectionError(RobotiqError, ConnectionError):
     """The link to the gripper failed."""
 
@@ -144,6 +155,10 @@ class ResponseTimeoutError(RobotiqConnectionError, TimeoutError):
 
 class ProtocolError(RobotiqConnectionError):
     """A reply that is not the answer: an exception, a wrong function, length, echo or transaction."""
+
+
+class AgentError(RobotiqConnectionError):
+    """The agent of another host did not carry out a request, for a reason of its own."""
 
 
 class RecordingError(RobotiqError):

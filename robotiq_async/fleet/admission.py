@@ -1,0 +1,100 @@
+"""Admission: which requests are carried out. Pure: the caller says what time it is.
+
+Nothing is carried out twice, late, out of turn, for a lease that has ended, for another run of the agent or
+by the wrong gripper; a request that is refused says why.
+"""
+
+from __future__ import annotations
+
+from ..errors import AgentError, ControlLostError
+from .envelope import Call
+from .lease import Holder, Lease
+
+
+class Admission:
+    """What one gripper lets in.
+
+    Attributes:
+        lease: who may command.
+    """
+
+    def __init__(self, base: str, epoch: int, lease: Lease) -> None:
+        """Serve the gripper of this base key, in this run of the agent."""
+        self.lease = lease
+        self._base = base
+        self._epoch = epoch
+        self._newest = 0
+        """Number of the newest request let in under the present lease."""
+
+    def check_meant(self, call: Call) -> None:
+        """Refuse what is meant for another gripper, or another run of the agent.
+
+        Raises:
+            AgentError: it is.
+        """
+        if call.to != self._base:
+            raise AgentError(f"a request for {call.to} was carried to {self._base}; nothing was done")
+        if call.epoch not in (0, self._epoch):
+            raise AgentError("the agent has been started anew since this was asked; nothing was done")
+
+    def admit(self, call: Call, now: float) -> None:
+        """Let a command in, and count it, or say why not. The caller has ended a lease that has expired.
+
+        Raises:
+            ControlLostError: it is not the holder's, or it was on its way for too long.
+            AgentError: a later one came first.
+        """
+        self._check_holder(call, now)
+        if call.number <= self._newest:
+            raise AgentError("a later request overtook this one; nothing was done")
+        self._newest = call.number
+        self.lease.renew(call.seen)
+
+    def acquire(self, call: Call, label: str, now: float, *, take: bool) -> int:
+        """Give the lease to a client; returns its number.
+
+        Raises:
+            ControlLostError: another client holds it, or the request was on its way for too long.
+        """
+        self._check_fresh(call, now)
+        holder = self.lease.holder
+        if holder is not None and holder.client != call.client and not take:
+            raise ControlLostError(f"{holder.label} commands the gripper")
+        self._newest = call.number
+        return self.lease.grant(Holder(call.client, label), call.seen)
+
+    def renew(self, call: Call, now: float) -> None:
+        """Prolong the lease.
+
+        Raises:
+            ControlLostError: as :meth:`admit`.
+        """
+        self._check_holder(call, now)
+        self.lease.renew(call.seen)
+
+    def is_of_holder(self, call: Call) -> bool:
+        """Whether a request comes from who holds the lease, under this lease."""
+        holder = self.lease.holder
+        return holder is not None and holder.client == call.client and self.lease.number == call.lease
+
+    def bar(self, call: Call) -> None:
+        """Let nothing in any more that the holder asked before this."""
+        self._newest = max(self._newest, call.number)
+
+    def _check_holder(self, call: Call, now: float) -> None:
+        if not self.is_of_holder(call):
+            holder = self.lease.holder
+            whose = (
+                "nobody commands the gripper" if holder is None else f"{holder.label} commands the gripper"
+            )
+            if holder is not None and holder.client == call.client:
+                whose = "it was asked under an earlier lease"
+            raise ControlLostError(f"{whose}; nothing was done")
+        self._check_fresh(call, now)
+
+    def _check_fresh(self, call: Call, now: float) -> None:
+        if not self.lease.is_fresh(call.seen, now):
+            raise ControlLostError(
+                f"the request was on its way for {now - call.seen:.1f} s, longer than the window of "
+                f"{self.lease.window:g} s; nothing was done"
+            )

@@ -1,0 +1,83 @@
+"""Lease: who may command a gripper, and until when. Pure: the caller says what time it is.
+
+The time is the agent's own, and it never counts from the arrival of a message: a holder proves with each
+message which stamp of the agent it has heard, and holds the lease until ``window`` seconds after that stamp.
+So a message that was stuck in the network prolongs nothing, and a link that is dead in one direction ends the
+lease as well as one that is dead in both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+WINDOW_S: Final = 1.0
+"""How long a holder stays one without having proven to hear the agent."""
+WINDOW_MIN_S: Final = 0.1
+WINDOW_MAX_S: Final = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Holder:
+    """Who commands.
+
+    Attributes:
+        client: tells one client from all others; made up at random by the client.
+        label: the client's words about itself: user, host, process.
+    """
+
+    client: str
+    label: str
+
+
+class Lease:
+    """The right to command one gripper.
+
+    Attributes:
+        window: seconds.
+        number: counts the changes of holder, also the change to nobody. A request names the number of the
+            lease it was made under, and no other is carried out.
+        holder: who holds it; None for nobody.
+    """
+
+    def __init__(self, window: float = WINDOW_S) -> None:
+        """Nobody's yet."""
+        self.window = window
+        self.number = 0
+        self.holder: Holder | None = None
+        self._proven = 0.0
+
+    @property
+    def expires(self) -> float:
+        """The agent's time at which the lease ends unless it is renewed; only while somebody holds it."""
+        return self._proven + self.window
+
+    def has_expired(self, now: float) -> bool:
+        """Whether a lease is held that nobody has renewed in time."""
+        return self.holder is not None and now > self.expires
+
+    def is_fresh(self, seen: float, now: float) -> bool:
+        """Whether whoever has heard of ``seen`` has heard it within the window, and not from the future."""
+        return now - self.window <= seen <= now
+
+    def grant(self, holder: Holder, seen: float) -> int:
+        """Give the lease to a holder, whoever has it now; returns its number."""
+        self.number += 1
+        self.holder = holder
+        self._proven = seen
+        return self.number
+
+    def is_held_under(self, number: int) -> bool:
+        """Whether this is the number of a lease that somebody holds."""
+        return self.holder is not None and number == self.number
+
+    def renew(self, seen: float) -> None:
+        """The holder has proven to have heard a stamp of the agent; an older one changes nothing."""
+        self._proven = max(self._proven, seen)
+
+    def end(self) -> Holder | None:
+        """Take the lease from whoever holds it; returns who that was."""
+        holder, self.holder = self.holder, None
+        if holder is not None:
+            self.number += 1
+        return holder

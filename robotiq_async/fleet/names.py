@@ -1,0 +1,96 @@
+"""Which gripper, on which host, at which site: addresses, and the keys of what is said about it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Final, Self
+from zlib import crc32
+
+SCHEME: Final = "zenoh://"
+ROOT: Final = "robotiq/v1"
+"""Every key begins with it; the number is the version of the protocol (docs/reference/fleet-protocol.md)."""
+FORM: Final = "zenoh://SITE/HOST/GRIPPER"
+_NAME: Final = re.compile(r"[A-Za-z0-9_.-]{1,64}")
+
+
+def check_name(what: str, name: object) -> str:
+    """The name of a site, a host or a gripper: 1..64 of ``A-Z a-z 0-9 _ . -``, so never a wildcard.
+
+    Raises:
+        TypeError: not a string.
+        ValueError: empty, too long, or with another character.
+    """
+    if not isinstance(name, str):
+        raise TypeError(f"{what} must be a string, got {name!r}")
+    if not _NAME.fullmatch(name):
+        raise ValueError(f"{what} must be 1..64 of the characters A-Z a-z 0-9 _ . -, got {name!r}")
+    return name
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class GripperName:
+    """One gripper of a fleet.
+
+    Attributes:
+        site: the site's name.
+        host: the name of the host whose agent owns the gripper.
+        gripper: the gripper's name on that host.
+    """
+
+    site: str
+    host: str
+    gripper: str
+
+    def __post_init__(self) -> None:
+        """Refuse what is no name.
+
+        Raises:
+            TypeError, ValueError: as :func:`check_name`.
+        """
+        for part in self.__slots__:
+            check_name(part, getattr(self, part))
+
+    @classmethod
+    def parse(cls, address: object) -> Self:
+        """The gripper that an address names.
+
+        Raises:
+            TypeError: not a string.
+            ValueError: malformed; the message shows the form.
+        """
+        if not isinstance(address, str):
+            raise TypeError(f"address must be a string, got {address!r}; accepted: {FORM}")
+        parts = address.removeprefix(SCHEME).split("/")
+        if not address.startswith(SCHEME) or len(parts) != 3:
+            raise ValueError(f"malformed address {address!r}; accepted: {FORM}")
+        return cls(*parts)
+
+    @classmethod
+    def of_key(cls, key: str) -> Self:
+        """The gripper that a key is about.
+
+        Raises:
+            ValueError: no key of ours.
+        """
+        if not key.startswith(f"{ROOT}/") or key.count("/") < 5:
+            raise ValueError(f"not a key of a gripper: {key!r}")
+        return cls(*key.split("/")[2:5])
+
+    @property
+    def base(self) -> str:
+        """What every key of the gripper begins with."""
+        return f"{ROOT}/{self.site}/{self.host}/{self.gripper}"
+
+    @property
+    def mark(self) -> int:
+        """32 bits that tell the gripper in binary messages: the CRC-32 of :attr:`base`."""
+        return crc32(self.base.encode())
+
+    def key(self, *parts: str) -> str:
+        """A key of the gripper."""
+        return "/".join((self.base, *parts))
+
+    def __str__(self) -> str:
+        """The address."""
+        return f"{SCHEME}{self.site}/{self.host}/{self.gripper}"

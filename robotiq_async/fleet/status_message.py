@@ -1,0 +1,106 @@
+"""The status of a gripper on its way to readers: 60 bytes, two hundred times a second.
+
+| bytes | what |
+|--|--|
+| B | version of the layout |
+| B | state, by its place in ``State`` |
+| B | flags: 1 a status was read, 2 the axes move, 4 somebody holds the lease |
+| x | |
+| I | which gripper: the CRC-32 of its base key |
+| I | number of the lease |
+| I | number of the newest event |
+| Q | epoch: random, anew with each start of the agent |
+| Q | sequence of the status |
+| d | the agent's time at which this was sent, in seconds |
+| f | age of the status when it was sent, in seconds |
+| 8H | the eight status registers |
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import Final, NamedTuple
+
+from ..enums import State
+from ..errors import ProtocolError
+from ..wire.registers import Registers
+
+_LAYOUT: Final = struct.Struct("<BBBxIIIQQdf8H")
+VERSION: Final = 1
+SIZE: Final = _LAYOUT.size
+_STATES: Final = tuple(State)
+_PLACES: Final = {state: place for place, state in enumerate(_STATES)}
+_READ, _MOVES, _HELD = 1, 2, 4
+
+
+class StatusMessage(NamedTuple):
+    """What an agent says about a gripper in one moment.
+
+    Attributes:
+        mark: which gripper it is about (see :attr:`~robotiq_async.fleet.names.GripperName.mark`).
+        epoch: random, anew with each start of the agent.
+        stamp: the agent's time at which this was sent, in seconds.
+        state: of the agent's hand.
+        lease: number of the lease.
+        is_held: whether somebody holds it.
+        events: number of the newest event; whoever knows of fewer has missed some.
+        is_moving: whether an axis moves, or will because of a command that does not act yet.
+        sequence: of the status, as the agent's hand counts; meaningless without registers.
+        age: seconds from the gripper's reply to ``stamp``.
+        registers: the status; None if none has been read yet.
+    """
+
+    mark: int
+    epoch: int
+    stamp: float
+    state: State
+    lease: int
+    is_held: bool
+    events: int
+    is_moving: bool
+    sequence: int
+    age: float
+    registers: Registers | None
+
+    def pack(self) -> bytes:
+        """The message as bytes."""
+        flags = _READ * (self.registers is not None) | _MOVES * self.is_moving | _HELD * self.is_held
+        return _LAYOUT.pack(
+            VERSION,
+            _PLACES[self.state],
+            flags,
+            self.mark,
+            self.lease,
+            self.events,
+            self.epoch,
+            self.sequence,
+            self.stamp,
+            self.age,
+            *(self.registers or (0,) * 8),
+        )
+
+
+def unpack(data: bytes) -> StatusMessage:
+    """The message in bytes.
+
+    Raises:
+        ProtocolError: not such a message, or one of another version.
+    """
+    if len(data) != SIZE or data[0] != VERSION:
+        raise ProtocolError(f"not a status of version {VERSION}: {data[:8].hex()} ({len(data)} bytes)")
+    _, place, flags, mark, lease, events, epoch, sequence, stamp, age, *registers = _LAYOUT.unpack(data)
+    if place >= len(_STATES):
+        raise ProtocolError(f"a status in a state that does not exist: {place}")
+    return StatusMessage(
+        mark=mark,
+        epoch=epoch,
+        stamp=stamp,
+        state=_STATES[place],
+        lease=lease,
+        is_held=bool(flags & _HELD),
+        events=events,
+        is_moving=bool(flags & _MOVES),
+        sequence=sequence,
+        age=age,
+        registers=tuple(registers) if flags & _READ else None,
+    )

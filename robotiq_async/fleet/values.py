@@ -1,0 +1,191 @@
+"""What travels as JSON: errors, results, transitions, requests, statistics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from typing import Any, Final
+
+from .. import errors
+from ..control.motion import MoveResult
+from ..control.triggers import Trigger
+from ..enums import Fault, Finger, ObjectStatus, State
+from ..errors import AgentError, ProtocolError, RobotiqError
+from ..session.statistics import Statistics
+from ..session.streams import SentRequest, Transition
+from ..wire.request import Request
+from ..wire.status import RobotiqStatus
+
+Fields = dict[str, Any]
+Clock = Callable[[float], float]
+"""Makes a time of this process of a time of the agent."""
+
+_KINDS: Final = {
+    name: kind
+    for name, kind in vars(errors).items()
+    if isinstance(kind, type) and issubclass(kind, RobotiqError)
+} | {"TypeError": TypeError, "ValueError": ValueError}
+
+
+# -- statuses ----------------------------------------------------------------------------------------------
+
+
+def status_fields(status: RobotiqStatus) -> Fields:
+    """The object for a status."""
+    return {"registers": status.registers, "timestamp": status.timestamp, "sequence": status.sequence}
+
+
+def read_status(fields: Mapping[str, Any], clock: Clock) -> RobotiqStatus:
+    """The status in an object.
+
+    Raises:
+        KeyError, TypeError, ValueError: there is none.
+    """
+    return RobotiqStatus.from_registers(
+        fields["registers"], timestamp=clock(fields["timestamp"]), sequence=fields["sequence"]
+    )
+
+
+# -- errors ------------------------------------------------------------------------------------------------
+
+
+def error_fields(error: Exception) -> Fields:
+    """The object for an error: its kind, its message, and what it knows."""
+    fields: Fields = {"kind": type(error).__name__, "message": str(error)}
+    state: State | None = getattr(error, "state", None)
+    fault: Fault | None = getattr(error, "fault", None)
+    status: RobotiqStatus | None = getattr(error, "status", None)
+    if state is not None:
+        allowed = getattr(error, "allowed", frozenset[State]())
+        fields |= {"state": state.value, "allowed": sorted(each.value for each in allowed)}
+    if fault is not None:
+        fields["fault"] = int(fault)
+    if status is not None:
+        fields["status"] = status_fields(status)
+    if hasattr(error, "address"):
+        fields["address"] = error.address
+    return fields
+
+
+def read_error(fields: Fields, clock: Clock) -> Exception:
+    """The error in an object; one of a kind that is not known here is an AgentError."""
+    try:
+        kind, message = _KINDS.get(fields["kind"]), str(fields["message"])
+        if kind is None:
+            return AgentError(f"{fields['kind']}: {message}")
+        error: Exception = kind.__new__(kind)
+        error.args = (message,)
+        known: dict[str, object] = {}
+        if "state" in fields:
+            known["state"] = State(fields["state"])
+            known["allowed"] = frozenset(map(State, fields["allowed"]))
+        if "fault" in fields:
+            known["fault"] = Fault(fields["fault"])
+        if "status" in fields:
+            known["status"] = read_status(fields["status"], clock)
+        if "address" in fields:
+            known["address"] = str(fields["address"])
+        vars(error).update(known)
+    except (KeyError, TypeError, ValueError) as malformed:
+        unreadable = ProtocolError(f"the agent sent an error that cannot be read: {fields!r:.200}")
+        unreadable.__cause__ = malformed
+        return unreadable
+    return error
+
+
+# -- results -----------------------------------------------------------------------------------------------
+
+
+def result_fields(result: MoveResult | None) -> Fields | None:
+    """The object for what a command returns."""
+    if result is None:
+        return None
+    return {
+        "outcomes": {str(int(axis)): int(how) for axis, how in result.outcomes.items()},
+        "positions": {str(int(axis)): at for axis, at in result.positions.items()},
+        "contacts": int(result.contacts),
+        "duration": result.duration,
+        "peak_current_ma": {str(int(axis)): peak for axis, peak in result.peak_current_ma.items()},
+        "status": status_fields(result.status),
+    }
+
+
+def read_result(fields: Mapping[str, Any], clock: Clock) -> MoveResult:
+    """The result of a move in an object.
+
+    Raises:
+        KeyError, TypeError, ValueError: there is none.
+    """
+    return MoveResult(
+        outcomes={Finger(int(axis)): ObjectStatus(how) for axis, how in fields["outcomes"].items()},
+        positions={Finger(int(axis)): int(at) for axis, at in fields["positions"].items()},
+        contacts=Finger(fields["contacts"]),
+        duration=float(fields["duration"]),
+        peak_current_ma={Finger(int(axis)): int(peak) for axis, peak in fields["peak_current_ma"].items()},
+        status=read_status(fields["status"], clock),
+    )
+
+
+# -- what happens ------------------------------------------------------------------------------------------
+
+
+def transition_fields(transition: Transition) -> Fields:
+    """The object for a change of state."""
+    return {
+        "kind": "transition",
+        "source": transition.source.value,
+        "target": transition.target.value,
+        "trigger": transition.trigger.name,
+        "timestamp": transition.timestamp,
+    }
+
+
+def read_transition(fields: Mapping[str, Any], clock: Clock) -> Transition:
+    """The change of state in an object.
+
+    Raises:
+        KeyError, TypeError, ValueError: there is none.
+    """
+    return Transition(
+        source=State(fields["source"]),
+        target=State(fields["target"]),
+        trigger=Trigger[fields["trigger"]],
+        timestamp=clock(fields["timestamp"]),
+    )
+
+
+def request_fields(sent: SentRequest) -> Fields:
+    """The object for an image that was written."""
+    return {
+        "kind": "request",
+        "registers": sent.request.registers,
+        "timestamp": sent.timestamp,
+        "acknowledged": sent.acknowledged,
+    }
+
+
+def read_request(fields: Mapping[str, Any], clock: Clock) -> SentRequest:
+    """The image that was written in an object.
+
+    Raises:
+        KeyError, TypeError, ValueError: there is none.
+    """
+    return SentRequest(
+        request=Request.from_registers(fields["registers"]),
+        timestamp=clock(fields["timestamp"]),
+        acknowledged=bool(fields["acknowledged"]),
+    )
+
+
+def statistics_fields(statistics: Statistics) -> Fields:
+    """The object for a snapshot of the polling."""
+    return asdict(statistics)
+
+
+def read_statistics(fields: Mapping[str, Any]) -> Statistics:
+    """The snapshot of the polling in an object; figures that are not known here are left out.
+
+    Raises:
+        KeyError, TypeError, ValueError: there is none.
+    """
+    return Statistics(**{name: fields[name] for name in Statistics.__dataclass_fields__})

@@ -1,0 +1,228 @@
+"""The bus over zenoh; nothing of zenoh goes beyond this file.
+
+zenoh calls back in threads of its own. Nothing is done there: what came is put into a mailbox, and the event
+loop is woken once for all that lies in it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+import zenoh
+from zenoh.handlers import Callback
+
+from ..errors import ConnectFailedError
+from ..log import log
+from .bus import Question, Reply, Undo, Urgency
+
+CLOSE_S: Final = 1.0
+_PRIORITY: Final = {
+    Urgency.STOP: zenoh.Priority.REAL_TIME,
+    Urgency.COMMAND: zenoh.Priority.INTERACTIVE_HIGH,
+    Urgency.NEWS: zenoh.Priority.DATA,
+}
+_EXPRESS: Final = (Urgency.STOP, Urgency.COMMAND)
+"""Not batched with others."""
+
+
+async def open_bus(configuration: Mapping[str, object], what: str) -> ZenohBus:
+    """Open a session.
+
+    Args:
+        configuration: zenoh's.
+        what: is opened, for the message.
+
+    Raises:
+        ConnectFailedError: it cannot be opened: an address in use, a malformed certificate.
+    """
+    config = zenoh.Config.from_json5(json.dumps(configuration))
+    opening = asyncio.ensure_future(asyncio.to_thread(zenoh.open, config))
+    try:
+        session = await asyncio.shield(opening)
+    except zenoh.ZError as error:
+        raise ConnectFailedError(what, " ".join(str(error).split())) from error
+    except asyncio.CancelledError:
+        opening.add_done_callback(_close_opened)
+        raise
+    return ZenohBus(session)
+
+
+def _close_opened(opening: asyncio.Future[zenoh.Session]) -> None:
+    if not opening.cancelled() and opening.exception() is None:
+        opening.result().close()  # type: ignore[no-untyped-call]
+
+
+class Mailbox:
+    """Carries what other threads bring into the event loop, in its order."""
+
+    def __init__(self) -> None:
+        """Belong to the running loop."""
+        self._loop = asyncio.get_running_loop()
+        self._letters: deque[Callable[[], None]] = deque()
+        self._is_due = False
+
+    def put(self, letter: Callable[[], None]) -> None:
+        """Have something called in the loop. From any thread."""
+        self._letters.append(letter)
+        if not self._is_due:
+            self._is_due = True
+            with contextlib.suppress(RuntimeError):  # the loop has been closed
+                self._loop.call_soon_threadsafe(self._open)
+
+    def _open(self) -> None:
+        self._is_due = False
+        # No more than lies there now: the rest of the loop has its turn.
+        for _ in range(len(self._letters)):
+            letter = self._letters.popleft()
+            try:
+                letter()
+            except Exception:  # noqa: BLE001  # the next letter is another's
+                log.exception("a message of the fleet could not be handled")
+        if self._letters and not self._is_due:
+            self._is_due = True
+            self._loop.call_soon(self._open)
+
+
+class _Question:
+    """A query that has arrived."""
+
+    def __init__(self, query: zenoh.Query) -> None:
+        self._query = query
+        self.key = str(query.key_expr)
+        self.payload = b"" if query.payload is None else query.payload.to_bytes()
+
+    def reply(self, payload: bytes, attachment: bytes = b"") -> None:
+        with contextlib.suppress(zenoh.ZError), self._query as query:  # the asker is gone
+            query.reply(self.key, payload, attachment=attachment)
+
+
+class _Reply:
+    """A reply that has come back."""
+
+    def __init__(self, sample: zenoh.Sample) -> None:
+        self.payload = sample.payload.to_bytes()
+        self.attachment = b"" if sample.attachment is None else sample.attachment.to_bytes()
+
+
+class ZenohBus:
+    """An open session."""
+
+    def __init__(self, session: zenoh.Session) -> None:
+        """Use an open session from the running loop."""
+        self._session = session
+        self._mailbox = Mailbox()
+        self._closing: asyncio.Future[None] | None = None
+
+    def publisher(self, key: str, urgency: Urgency) -> Callable[[bytes], None]:
+        """See :class:`~robotiq_async.fleet.bus.Bus`."""
+        publisher = self._session.declare_publisher(
+            key,
+            priority=_PRIORITY[urgency],
+            # A reader that stands still must not hold up the loop that polls.
+            congestion_control=zenoh.CongestionControl.DROP,
+            express=urgency in _EXPRESS,
+        )
+
+        def publish(payload: bytes) -> None:
+            with contextlib.suppress(zenoh.ZError):  # closed meanwhile
+                publisher.put(payload)
+
+        return publish
+
+    def subscribe(self, expression: str, listener: Callable[[str, bytes], None]) -> Undo:
+        """See :class:`~robotiq_async.fleet.bus.Bus`."""
+
+        def deliver(sample: zenoh.Sample) -> None:
+            self._mailbox.put(lambda: listener(str(sample.key_expr), sample.payload.to_bytes()))
+
+        return self._undo(self._session.declare_subscriber(expression, _direct(deliver)))
+
+    def serve(self, expression: str, handler: Callable[[Question], None]) -> Undo:
+        """See :class:`~robotiq_async.fleet.bus.Bus`."""
+
+        def deliver(query: zenoh.Query) -> None:
+            self._mailbox.put(lambda: handler(_Question(query)))
+
+        return self._undo(self._session.declare_queryable(expression, _direct(deliver)))
+
+    async def ask(self, key: str, payload: bytes, *, timeout: float, urgency: Urgency) -> Reply | None:
+        """See :class:`~robotiq_async.fleet.bus.Bus`."""
+        answered: asyncio.Future[Reply | None] = asyncio.get_running_loop().create_future()
+
+        def take(reply: Reply | None) -> None:
+            if not answered.done():
+                answered.set_result(reply)
+
+        def arrive(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                sample = reply.ok
+                self._mailbox.put(lambda: take(_Reply(sample)))
+
+        def end() -> None:
+            self._mailbox.put(lambda: take(None))
+
+        try:
+            self._session.get(
+                key,
+                Callback(arrive, end, indirect=False),
+                payload=payload,
+                timeout=timeout,
+                priority=_PRIORITY[urgency],
+                express=True,
+                target=zenoh.QueryTarget.BEST_MATCHING,
+                consolidation=zenoh.ConsolidationMode.NONE,
+                congestion_control=zenoh.CongestionControl.DROP,
+            )
+        except zenoh.ZError:
+            return None  # closed
+        return await answered
+
+    def announce(self, key: str) -> Undo:
+        """See :class:`~robotiq_async.fleet.bus.Bus`."""
+        return self._undo(self._session.liveliness().declare_token(key))
+
+    async def announced(self, expression: str, *, timeout: float) -> list[str]:
+        """See :class:`~robotiq_async.fleet.bus.Bus`."""
+
+        def find() -> list[str]:
+            replies = self._session.liveliness().get(expression, timeout=timeout)
+            return [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
+
+        try:
+            return await asyncio.to_thread(find)
+        except zenoh.ZError:
+            return []
+
+    def watch(self, expression: str, listener: Callable[[str, bool], None]) -> Undo:
+        """See :class:`~robotiq_async.fleet.bus.Bus`."""
+
+        def deliver(sample: zenoh.Sample) -> None:
+            key, is_there = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
+            self._mailbox.put(lambda: listener(key, is_there))
+
+        liveliness = self._session.liveliness()
+        return self._undo(liveliness.declare_subscriber(expression, _direct(deliver), history=True))
+
+    async def close(self) -> None:
+        """See :class:`~robotiq_async.fleet.bus.Bus`."""
+        if self._closing is None:
+            self._closing = asyncio.ensure_future(asyncio.to_thread(self._session.close))
+        with contextlib.suppress(TimeoutError, zenoh.ZError):
+            await asyncio.wait_for(asyncio.shield(self._closing), CLOSE_S)
+
+    def _undo(self, declared: Any) -> Undo:  # noqa: ANN401  # each kind has a class of its own
+        def undo() -> None:
+            with contextlib.suppress(zenoh.ZError):
+                declared.undeclare()
+
+        return undo
+
+
+def _direct(deliver: Callable[[Any], None]) -> Any:  # noqa: ANN401
+    """Called in zenoh's own thread: the thread that it would take instead does not end with the program."""
+    return Callback(deliver, indirect=False)
