@@ -23,17 +23,18 @@
     +-- RecordingError                          a recording that cannot be written, or read
     +-- ViewerError                             a viewer that cannot be served
     +-- MeasuringError                          a measurement that went wrong
+    +-- NotAllStoppedError                      the halt of a fleet; .outcomes
 
-The last three concern neither gripper nor link: the hand goes on. They, and the three about other hosts,
-stand here and not among the names of the package.
+The three before the last concern neither gripper nor link: the hand goes on. They, and those about other
+hosts, stand here and not among the names of the package.
 
 Bad arguments are plain ValueError and TypeError: they are the program's mistake, not the gripper's.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, Any
 
 from .enums import Fault, State
 
@@ -121,7 +122,17 @@ class MoveSupersededError(RobotiqStateError):
 
 
 class ControlLostError(RobotiqStateError):
-    """Commanding a gripper on another host takes a lease, and this hand does not hold it, or no longer."""
+    """Commanding a gripper on another host takes a lease, and this hand does not hold it, or no longer.
+
+    Attributes:
+        reason: why not, in a word: "held" by somebody else, "taken" or "halted" by somebody else, "expired"
+            for it was not renewed in time, "released" by this hand, "late" for one request, or "closed".
+    """
+
+    def __init__(self, message: str, reason: str) -> None:
+        """Keep the reason."""
+        self.reason = reason
+        super().__init__(message)
 
 
 class NotAllowedError(RobotiqStateError):
@@ -171,3 +182,16 @@ class ViewerError(RobotiqError):
 
 class MeasuringError(RobotiqError):
     """What was measured is not what was to be measured."""
+
+
+class NotAllStoppedError(RobotiqError):
+    """Not every gripper of a fleet was seen to stop: some MAY STILL MOVE.
+
+    Attributes:
+        outcomes: for each gripper how its halt ended; "stopped" is the good end.
+    """
+
+    def __init__(self, message: str, outcomes: Mapping[Any, str]) -> None:
+        """Keep the outcomes."""
+        self.outcomes = dict(outcomes)
+        super().__init__(message)

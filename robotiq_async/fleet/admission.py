@@ -6,9 +6,14 @@ by the wrong gripper; a request that is refused says why.
 
 from __future__ import annotations
 
+from typing import Final
+
 from ..errors import AgentError, ControlLostError
 from .envelope import Call
 from .lease import Holder, Lease
+
+_CLIENTS: Final = 1000
+"""Clients that are remembered for repeated requests for the lease."""
 
 
 class Admission:
@@ -25,6 +30,8 @@ class Admission:
         self._epoch = epoch
         self._newest = 0
         """Number of the newest request let in under the present lease."""
+        self._asked: dict[str, int] = {}
+        """For each client, the number of the newest request for the lease."""
 
     def check_meant(self, call: Call) -> None:
         """Refuse what is meant for another gripper, or another run of the agent.
@@ -50,16 +57,32 @@ class Admission:
         self._newest = call.number
         self.lease.renew(call.seen)
 
-    def acquire(self, call: Call, label: str, now: float, *, take: bool) -> int:
-        """Give the lease to a client; returns its number.
+    def is_repeated(self, call: Call) -> bool:
+        """Whether a request for the lease has come before, and its sender holds the lease because of it.
 
         Raises:
-            ControlLostError: another client holds it, or the request was on its way for too long.
+            AgentError: it has come before, and the lease is another's by now.
         """
-        self._check_fresh(call, now)
+        before = self._asked.pop(call.client, -1)
+        self._asked[call.client] = max(before, call.number)
+        if len(self._asked) > _CLIENTS:
+            del self._asked[next(iter(self._asked))]
+        if call.number > before:
+            return False
         holder = self.lease.holder
-        if holder is not None and holder.client != call.client and not take:
-            raise ControlLostError(f"{holder.label} commands the gripper")
+        if holder is None or holder.client != call.client or call.number < before:
+            raise AgentError("the request for the lease came again; nothing was done")
+        return True
+
+    def acquire(self, call: Call, label: str) -> int:
+        """Give the lease to a client; returns its number. The caller has ended what has to end.
+
+        Raises:
+            ControlLostError: another client holds it.
+        """
+        holder = self.lease.holder
+        if holder is not None:
+            raise ControlLostError(f"{holder.label} commands the gripper", "held")
         self._newest = call.number
         return self.lease.grant(Holder(call.client, label), call.seen)
 
@@ -81,20 +104,24 @@ class Admission:
         """Let nothing in any more that the holder asked before this."""
         self._newest = max(self._newest, call.number)
 
-    def _check_holder(self, call: Call, now: float) -> None:
-        if not self.is_of_holder(call):
-            holder = self.lease.holder
-            whose = (
-                "nobody commands the gripper" if holder is None else f"{holder.label} commands the gripper"
-            )
-            if holder is not None and holder.client == call.client:
-                whose = "it was asked under an earlier lease"
-            raise ControlLostError(f"{whose}; nothing was done")
-        self._check_fresh(call, now)
+    def check_fresh(self, call: Call, now: float) -> None:
+        """Refuse what was on its way for too long.
 
-    def _check_fresh(self, call: Call, now: float) -> None:
+        Raises:
+            ControlLostError: it was.
+        """
         if not self.lease.is_fresh(call.seen, now):
             raise ControlLostError(
                 f"the request was on its way for {now - call.seen:.1f} s, longer than the window of "
-                f"{self.lease.window:g} s; nothing was done"
+                f"{self.lease.window:g} s; nothing was done",
+                "late",
             )
+
+    def _check_holder(self, call: Call, now: float) -> None:
+        if not self.is_of_holder(call):
+            holder, reason = self.lease.holder, self.lease.end_of(call.lease)
+            who = holder.label if holder is not None and holder.client != call.client else "nobody"
+            raise ControlLostError(
+                f"the lease has ended ({reason}), {who} commands the gripper now; nothing was done", reason
+            )
+        self.check_fresh(call, now)

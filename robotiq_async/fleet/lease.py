@@ -15,6 +15,8 @@ WINDOW_S: Final = 1.0
 """How long a holder stays one without having proven to hear the agent."""
 WINDOW_MIN_S: Final = 0.1
 WINDOW_MAX_S: Final = 10.0
+_KEPT: Final = 64
+"""So many numbers back it is known why a lease ended."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +48,7 @@ class Lease:
         self.number = 0
         self.holder: Holder | None = None
         self._proven = 0.0
+        self._ends: dict[int, str] = {}
 
     @property
     def expires(self) -> float:
@@ -61,23 +64,25 @@ class Lease:
         return now - self.window <= seen <= now
 
     def grant(self, holder: Holder, seen: float) -> int:
-        """Give the lease to a holder, whoever has it now; returns its number."""
+        """Give a lease that nobody holds to a client; returns its number."""
         self.number += 1
         self.holder = holder
         self._proven = seen
         return self.number
 
-    def is_held_under(self, number: int) -> bool:
-        """Whether this is the number of a lease that somebody holds."""
-        return self.holder is not None and number == self.number
-
     def renew(self, seen: float) -> None:
         """The holder has proven to have heard a stamp of the agent; an older one changes nothing."""
         self._proven = max(self._proven, seen)
 
-    def end(self) -> Holder | None:
+    def end(self, reason: str) -> Holder | None:
         """Take the lease from whoever holds it; returns who that was."""
         holder, self.holder = self.holder, None
         if holder is not None:
+            self._ends[self.number] = reason
+            self._ends.pop(self.number - _KEPT, None)
             self.number += 1
         return holder
+
+    def end_of(self, number: int) -> str:
+        """Why the lease of a number ended."""
+        return self._ends.get(number, "expired")

@@ -25,6 +25,8 @@ _KINDS: Final = {
     for name, kind in vars(errors).items()
     if isinstance(kind, type) and issubclass(kind, RobotiqError)
 } | {"TypeError": TypeError, "ValueError": ValueError}
+_WORDS: Final = ("address", "reason")
+"""What errors know in words."""
 
 
 # -- statuses ----------------------------------------------------------------------------------------------
@@ -62,8 +64,9 @@ def error_fields(error: Exception) -> Fields:
         fields["fault"] = int(fault)
     if status is not None:
         fields["status"] = status_fields(status)
-    if hasattr(error, "address"):
-        fields["address"] = error.address
+    for name in _WORDS:
+        if hasattr(error, name):
+            fields[name] = getattr(error, name)
     return fields
 
 
@@ -83,8 +86,7 @@ def read_error(fields: Fields, clock: Clock) -> Exception:
             known["fault"] = Fault(fields["fault"])
         if "status" in fields:
             known["status"] = read_status(fields["status"], clock)
-        if "address" in fields:
-            known["address"] = str(fields["address"])
+        known |= {name: str(fields[name]) for name in _WORDS if name in fields}
         vars(error).update(known)
     except (KeyError, TypeError, ValueError) as malformed:
         unreadable = ProtocolError(f"the agent sent an error that cannot be read: {fields!r:.200}")

@@ -1,0 +1,140 @@
+"""Agent: serves the hands of one host to other hosts."""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+import time
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from ..errors import AgentError
+from ..hand import RobotiqHand
+from ..log import log
+from ..session.clock import now
+from .bus import Bus, Question, Undo
+from .envelope import Answer
+from .lease import WINDOW_S
+from .names import ROOT, GripperName
+from .served_hand import ServedHand
+from .values import error_fields
+
+SUMMARY_S: Final = 1.0
+BEATS: Final = 5
+"""So many signs of life in a window, also when nothing happens."""
+LOOK_S: Final = 0.3
+"""How long another agent has to show itself: a router may not have told yet."""
+EPOCH_BITS: Final = 53
+"""Of an epoch: those who read JSON have doubles."""
+
+
+class Agent:
+    """Owns the hands of one host and serves them, each with a task of its own.
+
+    Attributes:
+        hands: what is served, by the name of the gripper.
+        epoch: random: tells this run of the agent from all others.
+    """
+
+    def __init__(
+        self, site: str, host: str, hands: Mapping[str, RobotiqHand], bus: Bus, *, window: float = WINDOW_S
+    ) -> None:
+        """Serve hands that are not started over an open bus; nothing is sent yet.
+
+        Args:
+            site: the site's name.
+            host: this host's name.
+            hands: by the names of their grippers.
+            bus: is left open.
+            window: of the leases, in seconds; see :class:`~robotiq_async.fleet.lease.Lease`.
+        """
+        self.epoch = secrets.randbits(EPOCH_BITS)
+        self._bus = bus
+        self._window = window
+        self._prefix = f"{ROOT}/{site}/{host}"
+        self.hands = {
+            name: ServedHand(GripperName(site, host, name), hand, bus, epoch=self.epoch, window=window)
+            for name, hand in hands.items()
+        }
+
+    async def run(self, ready: Callable[[], object] = lambda: None) -> None:
+        """Serve until cancelled; then the fingers are stopped and the links closed.
+
+        Grippers that cannot be reached are tried again and again. What moves when the agent has connected
+        is held: whoever set it going is not there any more.
+
+        Args:
+            ready: is called when requests are answered from now on.
+
+        Raises:
+            AgentError: another agent serves one of the grippers.
+        """
+        undo: list[Undo] = []
+        try:
+            await self._refuse_if_served()
+            undo += [self._bus.announce(each.name.key("alive", str(self.epoch))) for each in self._all]
+            undo.append(self._bus.watch(f"{self._prefix}/*/alive/*", self._see_agent))
+            undo += [
+                self._bus.serve(f"{self._prefix}/*/{verb}", self._hear)
+                for verb in ("info", "lease", "halt", "cmd/*")
+            ]
+            ready()
+            async with asyncio.TaskGroup() as group:
+                for each in self._all:
+                    group.create_task(each.run())
+                group.create_task(self._tell())
+        finally:
+            for take_back in reversed(undo):
+                take_back()
+
+    @property
+    def _all(self) -> list[ServedHand]:
+        return list(self.hands.values())
+
+    async def _refuse_if_served(self) -> None:
+        await asyncio.sleep(LOOK_S)
+        for key in await self._bus.announced(f"{self._prefix}/*/alive/*", timeout=LOOK_S):
+            name = GripperName.of_key(key)
+            if name.gripper in self.hands:
+                raise AgentError(f"another agent serves {name} already: nothing was done")
+
+    def _see_agent(self, key: str, is_there: bool) -> None:
+        if is_there and not key.endswith(f"/{self.epoch}"):
+            name = GripperName.of_key(key)
+            if name.gripper in self.hands:
+                log.error("another agent serves %s too: one of them has to go", name)
+                self.hands[name.gripper].news.add({"kind": "conflict", "key": key})
+
+    def _hear(self, question: Question) -> None:
+        name = GripperName.of_key(question.key)
+        served = self.hands.get(name.gripper)
+        if served is None:
+            error = AgentError(f"no gripper of this name here: {name}; there are: {', '.join(self.hands)}")
+            question.reply(Answer(name.base, 0, self.epoch, error=error_fields(error)).pack())
+        else:
+            served.hear(question.key.removeprefix(f"{name.base}/"), question)
+
+    async def _tell(self) -> None:
+        """Signs of life, summaries, and an eye on the clock."""
+        interval = self._window / BEATS
+        summary_due, slept = now(), _asleep()
+        while True:
+            for each in self._all:
+                each.news.beat(interval)
+            if now() >= summary_due:
+                summary_due += SUMMARY_S
+                for each in self._all:
+                    each.news.send_summary()
+            # The clock that everything goes by stands still while the machine is suspended.
+            if _asleep() - slept > self._window:
+                slept = _asleep()
+                for each in self._all:
+                    each.end_lease("expired")
+            await asyncio.sleep(interval)
+
+
+def _asleep() -> float:
+    """Seconds for which the machine has been suspended since it was started; 0 where nobody can tell."""
+    if not hasattr(time, "CLOCK_BOOTTIME"):
+        return 0.0
+    return time.clock_gettime(time.CLOCK_BOOTTIME) - time.clock_gettime(time.CLOCK_MONOTONIC)

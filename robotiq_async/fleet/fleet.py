@@ -1,0 +1,233 @@
+"""Fleet: who is there, how they are, and the halt for all of them."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import secrets
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import Any, Final, Self
+
+from ..enums import Fault, State
+from ..errors import NotAllStoppedError, RobotiqError
+from ..log import log
+from ..session.clock import now
+from ..session.event_loop import running_loop
+from ..session.streams import Channel, Stream
+from .bus import Bus, Undo, Urgency
+from .envelope import Call, unpack_answer
+from .names import ROOT, GripperName, check_name
+from .remote_address import Route, default_route
+from .remote_hand import RemoteHand
+from .remote_session import label
+
+HALT_S: Final = 2.0
+ATTEMPT_S: Final = 0.3
+LOOK_S: Final = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """A gripper of a fleet, as of its last summary.
+
+    Attributes:
+        name: which one.
+        is_there: whether an agent serves it now.
+        agents: how many serve it: more than one is a mistake.
+        state: of the agent's hand; None before the first summary.
+        fault: the fault the gripper reports; None if it is not known.
+        is_moving: whether an axis moves.
+        holder: who commands it; None for nobody.
+        problem: why the agent cannot reach the gripper; empty if it can.
+        address: of the gripper, as its agent reaches it.
+        heard_at: monotonic seconds at which the summary came.
+    """
+
+    name: GripperName
+    is_there: bool = False
+    agents: int = 0
+    state: State | None = None
+    fault: Fault | None = None
+    is_moving: bool = False
+    holder: str | None = None
+    problem: str = ""
+    address: str = ""
+    heard_at: float = field(default=0.0, compare=False)
+
+
+class Fleet:
+    """All grippers of a site, or of all sites, that agents serve.
+
+    Use it as ``async with Fleet("lab") as fleet:``. It reads, and it halts; commanding one gripper is what
+    :meth:`hand` is for.
+    """
+
+    def __init__(
+        self, site: str | None = None, *, route: Route | None = None, bus: Bus | None = None
+    ) -> None:
+        """Opens nothing and needs no running loop.
+
+        Args:
+            site: the site's name; None for all sites.
+            route: how to get to agents; None for what the environment says, else agents on this machine.
+            bus: an open session to share; it stays open. None opens one.
+
+        Raises:
+            TypeError, ValueError: not a name.
+        """
+        self._site = "*" if site is None else check_name("site", site)
+        self._route = route
+        self._shared = bus
+        self._bus: Bus | None = None
+        self._undo: list[Undo] = []
+        self._members: dict[GripperName, Member] = {}
+        self._tokens: dict[GripperName, set[str]] = {}
+        self._changes: Channel[Member] = Channel()
+
+    async def __aenter__(self) -> Self:
+        """Begin to listen, and find who is there already.
+
+        Raises:
+            RuntimeError: not in a running asyncio event loop.
+            RobotiqError: no session could be opened.
+        """
+        self._changes.reopen(running_loop())
+        self._bus = bus = self._shared or await self._open()
+        base = f"{ROOT}/{self._site}/*/*"
+        self._undo = [
+            bus.subscribe(f"{base}/summary", self._hear),
+            bus.watch(f"{base}/alive/*", self._see),
+        ]
+        await self._look()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Listen no longer."""
+        for undo in self._undo:
+            undo()
+        self._changes.end()
+        bus, self._bus = self._bus, None
+        if bus is not None and bus is not self._shared:
+            await bus.close()
+
+    @property
+    def members(self) -> Mapping[GripperName, Member]:
+        """Who was seen since the beginning, also those that have left."""
+        return dict(sorted(self._members.items()))
+
+    def changes(self) -> Stream[Member]:
+        """Every member whenever something about it changes: it joins, leaves, moves, fails."""
+        return self._changes.open(None)
+
+    def hand(self, name: GripperName | str, *, control: bool = True) -> RemoteHand:
+        """A hand on one of the grippers, over the session of this fleet; it is not started.
+
+        Raises:
+            ValueError: a malformed address.
+            RuntimeError: the fleet is not entered.
+        """
+        return RemoteHand(str(name), control=control, bus=self._entered())
+
+    async def halt_all(self) -> Mapping[GripperName, str]:
+        """Stop every gripper that is or was there; returns for each how that ended: "stopped".
+
+        It is no safety function: a network may be down when it is needed.
+
+        Raises:
+            NotAllStoppedError: one was not seen to stop, or there is none at all.
+            RuntimeError: the fleet is not entered.
+        """
+        await self._look()
+        names = list(self._members)
+        outcomes = dict(zip(names, await asyncio.gather(*map(self._halt, names)), strict=True))
+        if not names:
+            raise NotAllStoppedError("no gripper is heard of: nothing was stopped", {})
+        failed = {name: how for name, how in outcomes.items() if how != "stopped"}
+        if failed:
+            words = "; ".join(f"{name}: {how}" for name, how in failed.items())
+            raise NotAllStoppedError(f"not stopped: {words}", outcomes)
+        return outcomes
+
+    async def _halt(self, name: GripperName) -> str:
+        """Ask until answered."""
+        bus, client, deadline = self._entered(), secrets.token_hex(8), now() + HALT_S
+        number = 0
+        while (left := deadline - now()) > 0:
+            number += 1
+            call = Call(name.base, client, number=number, arguments={"label": label()})
+            asked = now()
+            reply = await bus.ask(
+                name.key("halt"), call.pack(), timeout=min(left, ATTEMPT_S), urgency=Urgency.STOP
+            )
+            if reply is not None:
+                try:
+                    answer = unpack_answer(reply.payload)
+                    if answer.to == name.base and answer.number == number:
+                        answer.outcome(lambda stamp: stamp)
+                        return "stopped"
+                except (RobotiqError, TypeError, ValueError) as error:
+                    return f"refused: {error}"
+            await asyncio.sleep(max(0.0, min(0.05, asked + ATTEMPT_S - now())))
+        return "no answer"
+
+    # -- inside ----------------------------------------------------------------------------------------
+
+    async def _open(self) -> Bus:
+        from .configuration import client_configuration  # noqa: PLC0415  # needs the extra
+        from .zenoh_bus import open_bus  # noqa: PLC0415
+
+        return await open_bus(client_configuration(self._route or default_route()), f"fleet {self._site}")
+
+    def _entered(self) -> Bus:
+        if self._bus is None:
+            raise RuntimeError("the fleet is not entered: use 'async with Fleet(...)'")
+        return self._bus
+
+    async def _look(self) -> None:
+        for key in await self._entered().announced(f"{ROOT}/{self._site}/*/*/alive/*", timeout=LOOK_S):
+            self._see(key, True)
+
+    def _see(self, key: str, is_there: bool) -> None:
+        """A token of an agent has come or gone."""
+        try:
+            name = GripperName.of_key(key)
+        except ValueError:
+            return
+        tokens = self._tokens.setdefault(name, set())
+        (tokens.add if is_there else tokens.discard)(key)
+        self._change(name, is_there=bool(tokens), agents=len(tokens))
+
+    def _hear(self, _key: str, payload: bytes) -> None:
+        """A summary: the payload says which gripper it is about, for the key may be a wrong one."""
+        try:
+            summary = json.loads(payload)
+            name = GripperName.of_key(f"{summary['to']}/summary")
+            fault = summary["fault"]
+            what: dict[str, Any] = {
+                "state": State(summary["state"]),
+                "fault": None if fault is None else Fault(fault),
+                "is_moving": bool(summary["is_moving"]),
+                "holder": summary["holder"],
+                "problem": str(summary["problem"]),
+                "address": str(summary["address"]),
+            }
+        except (KeyError, TypeError, ValueError) as error:
+            log.warning("a summary that cannot be read was dropped: %s: %r", error, payload[:100])
+            return
+        if self._site in ("*", name.site):
+            self._change(name, heard_at=now(), **what)
+
+    def _change(self, name: GripperName, **what: Any) -> None:  # noqa: ANN401
+        before = self._members.get(name) or Member(name)
+        fields = {each: getattr(before, each) for each in Member.__slots__} | what
+        self._members[name] = after = Member(**fields)
+        if after != before:
+            self._changes.push(after)
+
+    def __iter__(self) -> Iterator[Member]:
+        """The members."""
+        return iter(self.members.values())

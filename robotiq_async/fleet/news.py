@@ -1,0 +1,132 @@
+"""News: what an agent tells of one hand, to whoever listens.
+
+Statuses and events go out under one key, in the order in which they happened. A status is dropped rather than
+waited for; events are numbered, every status says how many there are, and whoever has missed some asks.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import deque
+from typing import Any, Final
+
+from ..enums import State
+from ..errors import RobotiqError
+from ..hand import RobotiqHand
+from ..session.clock import now
+from ..session.streams import SentRequest, Transition
+from ..wire.status import RobotiqStatus
+from .bus import Bus, Urgency
+from .lease import Lease
+from .names import GripperName
+from .status_message import StatusMessage
+from .values import Fields, request_fields, statistics_fields, transition_fields
+
+KEPT: Final = 2000
+"""Events that are kept for those who have missed them: 10 s of a loop that commands at 200 Hz."""
+
+
+class News:
+    """What is told of one hand.
+
+    Attributes:
+        problem: why the gripper cannot be reached, in words; empty if it can.
+    """
+
+    def __init__(self, name: GripperName, hand: RobotiqHand, bus: Bus, epoch: int, lease: Lease) -> None:
+        """Tell of this hand; nothing is sent yet."""
+        self.problem = ""
+        self._name = name
+        self._hand = hand
+        self._epoch = epoch
+        self._lease = lease
+        self._send = bus.publisher(name.key("feed"), Urgency.NEWS)
+        self._send_summary = bus.publisher(name.key("summary"), Urgency.NEWS)
+        self._events: deque[Fields] = deque(maxlen=KEPT)
+        self._count = 0
+        self._sent_at = 0.0
+
+    def hear(self, what: RobotiqStatus | Transition | SentRequest) -> None:
+        """The hand has read, done or written something."""
+        if isinstance(what, RobotiqStatus):
+            self.send_status()
+        elif isinstance(what, Transition):
+            self.add(transition_fields(what))
+        else:
+            self.add(request_fields(what))
+
+    def add(self, event: Fields) -> None:
+        """Something happened."""
+        self._count += 1
+        event = {"index": self._count, **event}
+        self._events.append(event)
+        self._send(json.dumps({**self._head(), "events": [event]}).encode())
+        self.send_status()
+
+    def events_since(self, index: int) -> list[Fields]:
+        """The events after one, as far as they are kept."""
+        return [event for event in self._events if event["index"] > index]
+
+    def send_status(self) -> None:
+        """Tell where the hand is."""
+        self._sent_at = now()
+        self._send(self.status_message())
+
+    def beat(self, interval: float) -> None:
+        """Tell that there is somebody, unless something was told within an interval."""
+        if now() - self._sent_at >= interval:
+            self.send_status()
+
+    def status_message(self) -> bytes:
+        """Where the hand is."""
+        stamp, status = now(), self._status()
+        return StatusMessage(
+            mark=self._name.mark,
+            epoch=self._epoch,
+            stamp=stamp,
+            state=self._hand.state,
+            lease=self._lease.number,
+            is_held=self._lease.holder is not None,
+            events=self._count,
+            is_moving=self._is_moving(),
+            sequence=0 if status is None else status.sequence,
+            age=0.0 if status is None else stamp - status.timestamp,
+            registers=None if status is None else status.registers,
+        ).pack()
+
+    def send_summary(self) -> None:
+        """Tell what an overview shows."""
+        self._send_summary(json.dumps(self.summary()).encode())
+
+    def summary(self) -> Fields:
+        """What an overview shows."""
+        holder, status = self._lease.holder, self._status()
+        return {
+            **self._head(),
+            "to": self._name.base,
+            "stamp": now(),
+            "address": self._hand.address,
+            "state": self._hand.state.value,
+            "fault": None if status is None else int(status.fault),
+            "is_moving": self._is_moving(),
+            "holder": None if holder is None else holder.label,
+            "problem": self.problem,
+            "statistics": statistics_fields(self._hand.statistics),
+        }
+
+    def _head(self) -> dict[str, Any]:
+        return {"mark": self._name.mark, "epoch": self._epoch}
+
+    def _status(self) -> RobotiqStatus | None:
+        try:
+            return self._hand.status
+        except RobotiqError:
+            return None
+
+    def _is_moving(self) -> bool:
+        if self._hand.state in (State.DISCONNECTED, State.SHUTDOWN):
+            return False
+        try:
+            return self._hand.is_moving
+        except RobotiqError:
+            return False

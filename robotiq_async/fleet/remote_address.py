@@ -1,0 +1,69 @@
+"""Addresses of hands on other hosts, with how to get there."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+from urllib.parse import parse_qsl
+
+from .configuration import LOOPBACK
+from .names import SCHEME, GripperName
+
+FORM: Final = "zenoh://SITE/HOST/GRIPPER[?connect=tls/HOST:7447][&keys=FOLDER]"
+CONNECT_VARIABLE: Final = "ROBOTIQ_ASYNC_CONNECT"
+KEYS_VARIABLE: Final = "ROBOTIQ_ASYNC_KEYS"
+_OPTIONS: Final = frozenset({"connect", "keys", "insecure"})
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """How to get to agents.
+
+    Attributes:
+        connect: zenoh endpoints of agents or routers.
+        keys: folder with the certificates of this client; None for none.
+        insecure: whether to go beyond loopback without certificates.
+    """
+
+    connect: tuple[str, ...] = (LOOPBACK,)
+    keys: Path | None = None
+    insecure: bool = False
+
+
+def default_route() -> Route:
+    """The route that the environment names, else loopback."""
+    connect = tuple(filter(None, os.environ.get(CONNECT_VARIABLE, "").split(",")))
+    keys = os.environ.get(KEYS_VARIABLE)
+    return Route(connect or (LOOPBACK,), Path(keys) if keys else None)
+
+
+def is_remote(address: object) -> bool:
+    """Whether an address is one of a hand on another host."""
+    return isinstance(address, str) and address.startswith(SCHEME)
+
+
+def parse_remote_address(address: object) -> tuple[GripperName, Route]:
+    """The gripper, and how to get there; what the address does not say the environment does.
+
+    Raises:
+        TypeError: not a string.
+        ValueError: malformed; the message shows the form.
+    """
+    if not isinstance(address, str):
+        raise TypeError(f"address must be a string, got {address!r}; accepted: {FORM}")
+    plain, _, query = address.partition("?")
+    try:
+        name = GripperName.parse(plain)
+        pairs = parse_qsl(query, strict_parsing=True) if query else []
+    except ValueError as error:
+        raise ValueError(f"malformed address {address!r}: {error}; accepted: {FORM}") from None
+    unknown = [option for option, _ in pairs if option not in _OPTIONS]
+    if unknown:
+        raise ValueError(f"malformed address {address!r}: no option {unknown[0]!r}; accepted: {FORM}")
+    usual = default_route()
+    connect = tuple(value for option, value in pairs if option == "connect")
+    folders = [value for option, value in pairs if option == "keys"]
+    insecure = any(option == "insecure" and value == "1" for option, value in pairs)
+    return name, Route(connect or usual.connect, Path(folders[-1]) if folders else usual.keys, insecure)

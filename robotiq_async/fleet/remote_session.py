@@ -1,0 +1,430 @@
+"""One run of a remote hand, from its start to its stop: what it hears, what it asks, and its lease."""
+
+from __future__ import annotations
+
+import asyncio
+import getpass
+import json
+import os
+import secrets
+import socket
+from collections.abc import Coroutine, Mapping
+from contextlib import suppress
+from typing import Any, Final
+
+from ..concurrency import wait_shielded
+from ..enums import State
+from ..errors import (
+    AgentError,
+    ConnectFailedError,
+    ConnectionLostError,
+    ControlLostError,
+    NotAllowedError,
+    NotStartedError,
+    ProtocolError,
+    RobotiqError,
+)
+from ..log import log
+from ..session.clock import now
+from ..session.event_loop import check_loop
+from ..session.state_waiters import StateWaiters
+from ..session.statistics import Counters, Statistics
+from ..session.streams import Channels
+from .bus import Bus, Reply, Undo, Urgency
+from .envelope import Call, unpack_answer
+from .lease import WINDOW_S
+from .mirror import Mirror
+from .names import GripperName
+from .status_message import unpack
+from .values import Fields, read_statistics
+
+RENEWALS: Final = 5
+"""So often in a window the lease is renewed, and silence looked for."""
+ANSWER_S: Final = 0.5
+"""For an answer that the agent gives at once; asked again within the time that there is."""
+CONNECT_S: Final = 5.0
+HALT_S: Final = 2.0
+RELEASE_S: Final = 1.5
+
+
+class NoAnswerError(ConnectionLostError):
+    """No answer came; whether it was carried out is not known."""
+
+
+class RemoteSession:
+    """One run. Everything happens in the event loop it was made in.
+
+    Attributes:
+        mirror: what has been heard.
+        waiters: who waits for a state.
+        is_in_control: whether this hand holds the lease, as far as it knows.
+        is_over: whether the run has ended.
+        lost: why control was lost; None while it is held, or was never asked for.
+    """
+
+    def __init__(self, name: GripperName, bus: Bus, channels: Channels, *, wants_control: bool) -> None:
+        """Begin to listen."""
+        self.name = name
+        self.loop = asyncio.get_running_loop()
+        self.waiters = StateWaiters()
+        self.mirror = Mirror(name.mark, channels, self.waiters.reached)
+        self.is_over = False
+        self.is_in_control = False
+        self.lost: ControlLostError | None = None
+        self.statistics: Statistics = Counters().snapshot(0)
+        self._bus = bus
+        self._channels = channels
+        self._wants_control = wants_control
+        self._client = secrets.token_hex(8)
+        self._lease = 0
+        self._window = WINDOW_S
+        self._number = 0
+        self._heard_at = 0.0
+        self._silence: asyncio.Future[None] = self.loop.create_future()
+        """Done when the agent falls silent; another one when it is heard again."""
+        self._tasks: set[asyncio.Task[Any]] = set()
+        self._is_catching_up = False
+        self._renewing: asyncio.Task[Any] | None = None
+        channels.reopen(self.loop)
+        # One wildcard, and every payload says what it is about: samples may come under the wrong key.
+        self._undo: Undo = bus.subscribe(name.key("*"), self._hear)
+
+    # -- start and end ---------------------------------------------------------------------------------
+
+    async def connect(self, timeout: float) -> None:
+        """Wait until the agent is heard, and acquire the lease if that is wanted.
+
+        Raises:
+            ConnectFailedError: nobody there.
+            NotAllowedError: the agent is there, and does not answer.
+            ControlLostError: another client commands the gripper.
+            ConnectFailedError: the agent does not reach the gripper.
+        """
+        deadline = now() + timeout
+        while not await self._ask_info(deadline):
+            if now() >= deadline:
+                await self._give_up()
+            await asyncio.sleep(0.05)
+        if self._wants_control:
+            await self.acquire()
+        self.spawn(self._keep())
+        await self._wait_for_gripper(deadline)
+
+    async def _wait_for_gripper(self, deadline: float) -> None:
+        """Wait until the agent has reached the gripper.
+
+        Raises:
+            ConnectFailedError: it has not.
+        """
+        known = set(State) - {State.DISCONNECTED, State.SHUTDOWN, State.DO_SHUTDOWN}
+        if self.mirror.state in known:
+            return
+        with self.waiters.watching(known, {}) as reached:
+            try:
+                async with asyncio.timeout(max(ANSWER_S, deadline - now())):
+                    await reached
+            except TimeoutError:
+                problem = (await self.ask("info", timeout=ANSWER_S))["problem"]
+                raise ConnectFailedError(
+                    str(self.name), f"its agent does not reach the gripper: {problem or 'the link is down'}"
+                ) from None
+
+    async def _ask_info(self, deadline: float) -> bool:
+        """Whether the agent has answered."""
+        try:
+            info = await self.ask("info", timeout=min(ANSWER_S, max(0.05, deadline - now())))
+        except (NoAnswerError, NotAllowedError):
+            return False
+        self._window = float(info["window"])
+        self.statistics = read_statistics(info["statistics"])
+        return True
+
+    async def _give_up(self) -> None:
+        """Say what can be told apart of why nobody answered."""
+        keys = await self._bus.announced(self.name.key("alive", "*"), timeout=ANSWER_S)
+        if keys:
+            raise NotAllowedError(f"{self.name}: the agent is there, and does not answer: access denied")
+        raise ConnectFailedError(
+            str(self.name),
+            "no agent of it is heard: none runs, or the network or a certificate is in the way",
+        )
+
+    async def close(self, failure: NotStartedError, *, halt: bool) -> None:
+        """End the run; within two seconds, also when cancelled meanwhile."""
+        self.is_over = True
+        work = asyncio.ensure_future(self._close(failure, halt=halt))
+        await wait_shielded(work)
+        work.result()
+
+    async def _close(self, failure: NotStartedError, *, halt: bool) -> None:
+        if self.is_in_control:
+            self.is_in_control = False
+            try:
+                await self.ask("lease", {"what": "release", "halt": halt}, timeout=RELEASE_S)
+            except RobotiqError as error:
+                log.warning(
+                    "%s: the agent did not acknowledge the end (%s): it holds what moves", self.name, error
+                )
+        self._undo()
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        if not self._silence.done():
+            self._silence.cancel()
+        self.waiters.fail(lambda: failure)
+        self._channels.end()
+
+    def check_running(self) -> None:
+        """Refuse what only a hand that runs can do.
+
+        Raises:
+            NotStartedError: it does not.
+        """
+        if self.is_over:
+            raise NotStartedError("the hand was stopped")
+
+    def check_loop(self) -> None:
+        """Refuse a call from another thread or event loop.
+
+        Raises:
+            RuntimeError: it is one.
+        """
+        check_loop(self.loop, "the hand")
+
+    # -- what is heard ---------------------------------------------------------------------------------
+
+    def _hear(self, _key: str, payload: bytes) -> None:
+        try:
+            if payload[:1] == b"{":
+                self._hear_fields(json.loads(payload))
+            else:
+                self._hear_status(payload, in_turn=True)
+        except (ProtocolError, ValueError, KeyError, TypeError) as error:
+            log.warning("%s: %s", self.name, error)
+
+    def _hear_status(self, payload: bytes, *, in_turn: bool) -> None:
+        message = unpack(payload)
+        if self.mirror.is_about_another(message.mark):
+            return
+        if self.mirror.epoch not in (0, message.epoch):
+            self._lose_control("closed", "the agent was started anew")
+        self._heard_at = now()
+        self.mirror.hear(message, self._heard_at, in_turn=in_turn)
+        if self._silence.done() and not self._silence.cancelled():
+            self._silence = self.loop.create_future()
+        if self.is_in_control and message.lease > self._lease and in_turn:
+            self.spawn(self._renew())  # it says why
+        if message.events > self.mirror.events and in_turn:
+            self._catch_up()  # an event was dropped on the way
+
+    def _hear_fields(self, fields: Mapping[str, Any]) -> None:
+        if self.mirror.is_about_another(fields["mark"]):
+            return
+        if "statistics" in fields:
+            self.statistics = read_statistics(fields["statistics"])
+        elif fields["epoch"] == self.mirror.epoch and self.mirror.hear_events(fields["events"]):
+            self._catch_up()
+
+    def _catch_up(self) -> None:
+        if not self._is_catching_up and not self.is_over:
+            self._is_catching_up = True
+            self.spawn(self._fetch_events())
+
+    async def _fetch_events(self) -> None:
+        """Ask for the events that were missed."""
+        try:
+            while self.mirror.newest is not None and self.mirror.newest.events > self.mirror.events:
+                info = await self.ask("info", {"since": self.mirror.events}, timeout=ANSWER_S)
+                events = info["events"]
+                if info["epoch"] == self.mirror.epoch and events:
+                    self.mirror.skip_events(events[0]["index"] - 1)
+                    self.mirror.hear_events(events)
+                await asyncio.sleep(0.02)
+        except (RobotiqError, KeyError, TypeError) as error:
+            log.info("%s: missed events could not be fetched: %s", self.name, error)
+        finally:
+            self._is_catching_up = False
+
+    async def _keep(self) -> None:
+        """Look for silence, renew the lease, and acquire it again when that is due."""
+        interval, woken = self._window / RENEWALS, now()
+        while True:
+            await asyncio.sleep(interval)
+            late, woken = now() - woken - interval, now()
+            # After a hold-up of this loop, what has arrived meanwhile is heard first.
+            if late < interval and woken - self._heard_at > self._window:
+                self._fall_silent(woken)
+            if self.is_in_control and (self._renewing is None or self._renewing.done()):
+                self._renewing = self.spawn(self._renew())
+            elif self._wants_control and not self.is_in_control and not self.mirror.is_silent:
+                with suppress(RobotiqError):
+                    await self.acquire()
+
+    def _fall_silent(self, at: float) -> None:
+        if self.mirror.is_silent:
+            return
+        log.warning("%s: the agent is silent", self.name)
+        self.mirror.fall_silent(at)
+        self._lose_control("expired", "the agent is silent")
+        self._silence.set_result(None)
+
+    # -- control ---------------------------------------------------------------------------------------
+
+    async def acquire(self, *, take: bool = False) -> None:
+        """Get the lease.
+
+        Raises:
+            ControlLostError: another client holds it, and it is not to be taken away.
+            RobotiqError: the agent did not answer.
+        """
+        what = {"what": "take" if take else "acquire", "label": label()}
+        value = await self.ask("lease", what, timeout=ANSWER_S)
+        self._lease = value["lease"]
+        self.is_in_control, self._wants_control, self.lost = True, True, None
+
+    async def release(self, *, halt: bool) -> None:
+        """Give the lease back.
+
+        Raises:
+            RobotiqError: the agent did not answer, or the fingers were not seen to stop.
+        """
+        self._wants_control = False
+        if self.is_in_control:
+            self._lose_control("released", "it was given back")
+            await self.ask("lease", {"what": "release", "halt": halt}, timeout=RELEASE_S)
+
+    async def _renew(self) -> None:
+        with suppress(RobotiqError):
+            await self.ask("lease", {"what": "renew"}, timeout=self._window)
+
+    def _lose_control(self, reason: str, why: str) -> None:
+        if not self.is_in_control:
+            return
+        self.is_in_control = False
+        # After a halt or a take of somebody else nobody takes it back without having been asked to.
+        self._wants_control = self._wants_control and reason not in ("taken", "halted", "held", "released")
+        self.lost = ControlLostError(f"{self.name} is not commanded from here any more: {why}", reason)
+        if reason != "released":
+            log.warning("%s", self.lost)
+
+    def check_control(self) -> None:
+        """Refuse commands of a hand that only reads, or has lost the lease.
+
+        Raises:
+            ConnectionLostError: the agent is silent.
+            ControlLostError: the hand does not hold the lease.
+        """
+        if self.mirror.is_silent:
+            raise ConnectionLostError(f"{self.name}: the agent is silent: nothing was asked")
+        if not self.is_in_control:
+            lost = self.lost
+            if lost is None:
+                raise ControlLostError("this hand only reads: acquire() the lease first", "released")
+            raise ControlLostError(str(lost), lost.reason)
+
+    # -- asking ----------------------------------------------------------------------------------------
+
+    async def ask(
+        self,
+        verb: str,
+        arguments: Fields | None = None,
+        *,
+        timeout: float,
+        urgency: Urgency = Urgency.COMMAND,
+    ) -> Any:  # noqa: ANN401  # what each request returns
+        """Ask the agent, once.
+
+        Raises:
+            NoAnswerError: no answer; it may have been carried out.
+            NotAllowedError: nobody answers to that, and the agent is there.
+            RobotiqError, TypeError, ValueError: what the agent answered.
+        """
+        return await self.send(self.call(arguments), verb, timeout=timeout, urgency=urgency)
+
+    def call(self, arguments: Fields | None = None) -> Call:
+        """The next request."""
+        self._number += 1
+        mirror = self.mirror
+        return Call(
+            self.name.base,
+            self._client,
+            mirror.epoch,
+            self._lease,
+            self._number,
+            mirror.stamp,
+            arguments or {},
+        )
+
+    async def send(self, call: Call, verb: str, *, timeout: float, urgency: Urgency) -> Any:  # noqa: ANN401
+        """Send a request and wait for its answer. Raises what :meth:`ask` does."""
+        asked_at = now()
+        asking = asyncio.ensure_future(
+            self._bus.ask(self.name.key(verb), call.pack(), timeout=timeout, urgency=urgency)
+        )
+        try:
+            # A halt is asked for also when nothing has been heard for a while.
+            awaited: set[asyncio.Future[Any]] = {asking}
+            if urgency is not Urgency.STOP:
+                awaited.add(self._silence)
+            await asyncio.wait(awaited, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            asking.cancel()
+        if not asking.done() or asking.cancelled():
+            self.check_running()
+            raise NoAnswerError(f"{self.name}: the agent fell silent; {verb} may have been carried out")
+        reply = asking.result()
+        if reply is None:
+            self._refuse_silence(verb, at_once=now() - asked_at < timeout / 2)
+        return self._read(reply, call, verb)
+
+    def _refuse_silence(self, verb: str, *, at_once: bool) -> None:
+        self.check_running()
+        if at_once and not self.mirror.is_silent:
+            raise NotAllowedError(f"{self.name}: nobody there answers to {verb}: access denied")
+        raise NoAnswerError(f"{self.name}: no answer in time; {verb} may have been carried out")
+
+    def _read(self, reply: Reply | None, call: Call, verb: str) -> Any:  # noqa: ANN401
+        assert reply is not None
+        answer = unpack_answer(reply.payload)
+        if answer.to != self.name.base or answer.number not in (0, call.number):
+            self.mirror.misrouted += 1
+            raise AgentError(f"{self.name}: the answer to {verb} was another's; it may have been carried out")
+        if reply.attachment:
+            self._hear_status(reply.attachment, in_turn=False)
+        try:
+            return answer.outcome(self.mirror.clock)
+        except ControlLostError as error:
+            if verb != "halt" and error.reason != "late" and call.lease == self._lease:
+                self._lose_control(error.reason, str(error))
+            raise
+
+    def call_off(self, call: Call) -> None:
+        """Nobody waits for a request any more: what it set going is to be held."""
+        if self.is_in_control and not self.is_over:
+            cancel = self.ask("cmd/cancel", {"number": call.number}, timeout=self._window)
+
+            async def ask() -> None:
+                with suppress(RobotiqError):  # then the lease ends, and the agent holds by itself
+                    await cancel
+
+            self.spawn(ask())
+
+    def spawn(self, work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
+        """Do something beside; it ends with the run."""
+        task = self.loop.create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return task
+
+    def current_state(self) -> State:
+        """Where the hand is."""
+        return State.SHUTDOWN if self.is_over else self.mirror.state
+
+
+def label() -> str:
+    """What this client is called by people."""
+    try:
+        user = getpass.getuser()
+    except (OSError, KeyError):
+        user = "somebody"
+    return f"{user}@{socket.gethostname()}:{os.getpid()}"

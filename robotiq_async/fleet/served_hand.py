@@ -1,0 +1,358 @@
+"""One hand of an agent: it answers requests, and holds what moves when nobody commands any more."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Coroutine
+from contextlib import suppress
+from typing import Any, Final, TypeVar
+
+from ..control.motion import MoveResult
+from ..control.state_machine import RUNNING
+from ..enums import Finger
+from ..errors import AgentError, ControlLostError, RobotiqConnectionError, RobotiqError
+from ..hand import RobotiqHand
+from ..log import log
+from ..session.clock import now
+from ..version import __version__
+from .admission import Admission
+from .bus import Bus, Question
+from .envelope import Answer, Call, failure, unpack_call
+from .lease import Lease
+from .names import GripperName
+from .news import News
+from .values import Fields, result_fields
+
+RETRY_S: Final = 1.0
+"""From one attempt to reach a gripper that is not there to the next."""
+COMMANDS: Final = frozenset(
+    {"set_position", "set_speed", "set_force", "move", "hold", "activate", "reset", "atr", "recover"}
+)
+"""What a holder may ask for: the method of a hand of that name. Beside them there are command and cancel."""
+T = TypeVar("T")
+_REMEMBERED: Final = 256
+"""Requests whose answers are kept for repetitions."""
+
+
+_Work = Callable[[], Coroutine[Any, Any, MoveResult | None]]
+
+
+class _Request:
+    """Something under way, or answered already: a repetition gets the same answer.
+
+    Attributes:
+        reason: why it was called off; empty if it was not, or by its caller.
+    """
+
+    def __init__(self, name: str, call: Call, question: Question) -> None:
+        self.name = name
+        self.call = call
+        self.questions = [question]
+        self.answer: bytes | None = None
+        self.task: asyncio.Task[MoveResult | None] | None = None
+        self.reason = ""
+
+    def call_off(self, reason: str = "") -> None:
+        """Cancel it, if it is still under way."""
+        if self.task is not None and not self.task.done():
+            self.reason = reason
+            self.task.cancel()
+
+
+class ServedHand:
+    """Serves one hand. Everything happens in the agent's event loop.
+
+    Attributes:
+        name: the gripper's.
+        news: what is told of it.
+    """
+
+    def __init__(self, name: GripperName, hand: RobotiqHand, bus: Bus, *, epoch: int, window: float) -> None:
+        """Serve a hand that is not started."""
+        self.name = name
+        self._hand = hand
+        self._epoch = epoch
+        self._lease = Lease(window)
+        self._admission = Admission(name.base, epoch, self._lease)
+        self.news = News(name, hand, bus, epoch, self._lease)
+        self._requests: dict[int, _Request] = {}
+        self._commanded = Finger(0)
+        """The axes that the holder has commanded."""
+        self._tasks: set[asyncio.Task[Any]] = set()
+        self._expiry: asyncio.TimerHandle | None = None
+
+    async def run(self) -> None:
+        """Keep the hand running, with or without its gripper, until cancelled; then stop the fingers."""
+        remove = self._hand.add_listener(self.news.hear)
+        try:
+            while True:
+                await self._run_once()
+        finally:
+            self.end_lease("closed")
+            await self._hand.stop()
+            remove()
+            if self._expiry is not None:
+                self._expiry.cancel()
+            for task in self._tasks:
+                task.cancel()
+            await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    async def _run_once(self) -> None:
+        try:
+            await self._hand.start(activate=False)
+            self.news.problem = ""
+            await self._hold_what_moves()
+            async for _ in self._hand.transitions():
+                pass
+        except RobotiqError as error:
+            if str(error) != self.news.problem:
+                log.warning("%s: %s", self.name, error)
+            self.news.problem = str(error)
+            await self._hand.stop(halt=False)
+            await asyncio.sleep(RETRY_S)
+
+    async def _hold_what_moves(self) -> None:
+        """Whoever set going what moves now is not there any more: an agent that was killed, perhaps."""
+        if self._hand.state in RUNNING and self._hand.is_moving:
+            log.warning("%s: the fingers moved when the agent started; they are held", self.name)
+            with suppress(RobotiqConnectionError):
+                await self._hand.hold(Finger.ALL)
+
+    # -- requests --------------------------------------------------------------------------------------
+
+    def hear(self, verb: str, question: Question) -> None:
+        """A request has arrived."""
+        try:
+            call = unpack_call(question.payload)
+        except RobotiqError as error:
+            call = Call(self.name.base, "")
+            question.reply(failure(call, self._epoch, error).pack())
+            return
+        try:
+            self._admission.check_meant(call)
+            self._expire()
+            value = self._answer(verb, call, question)
+        except (RobotiqError, TypeError, ValueError) as error:
+            log.info("%s: %s refused: %s", self.name, verb, error)
+            self._reply(question, failure(call, self._epoch, error))
+        else:
+            if value is not None:
+                self._reply(question, Answer(call.to, call.number, self._epoch, value))
+
+    def _answer(self, verb: str, call: Call, question: Question) -> Fields | None:
+        """The answer, or None if it comes later."""
+        match verb.split("/"):
+            case ["info"]:
+                return self._info(call)
+            case ["lease"]:
+                return self._change_lease(call, question)
+            case ["halt"]:
+                self._halt(call, question)
+            case ["cmd", name]:
+                self._command(name, call, question)
+            case _:
+                raise AgentError(f"no request of the name {verb!r}")
+        return None
+
+    def _reply(self, question: Question, answer: Answer) -> None:
+        # The newest status goes with it, for answers overtake statuses.
+        question.reply(answer.pack(), self.news.status_message())
+
+    def _info(self, call: Call) -> Fields:
+        since = call.arguments.get("since", -1)
+        holder = self._lease.holder
+        return {
+            **self.news.summary(),
+            "version": __version__,
+            "window": self._lease.window,
+            "client": None if holder is None else holder.client,
+            "events": self.news.events_since(since) if type(since) is int and since >= 0 else [],
+        }
+
+    # -- the lease -------------------------------------------------------------------------------------
+
+    def _change_lease(self, call: Call, question: Question) -> Fields | None:
+        what = call.arguments.get("what")
+        if what == "renew":
+            self._admission.renew(call, now())
+        elif what in ("acquire", "take"):
+            self._admission.check_fresh(call, now())
+            self._grant(call, take=what == "take")
+        elif what == "release":
+            self._admission.renew(call, now())
+            self._release(call, question)
+            return None
+        else:
+            raise AgentError(f"no request of a lease of the name {what!r}")
+        return {"lease": self._lease.number, "window": self._lease.window}
+
+    def _grant(self, call: Call, *, take: bool) -> None:
+        if self._admission.is_repeated(call):
+            return
+        holder = self._lease.holder
+        label = str(call.arguments.get("label", "somebody"))[:200]
+        if holder is not None and (take or holder.client == call.client):
+            # Of the same client: it has lost the thread, and what it asked before is not to go on.
+            self.end_lease("expired" if holder.client == call.client else "taken", label)
+        number = self._admission.acquire(call, label)
+        log.info("%s: %s commands the gripper", self.name, label)
+        self.news.add({"kind": "lease", "number": number, "holder": label, "reason": "granted"})
+        self._watch_expiry()
+
+    def _release(self, call: Call, question: Question) -> None:
+        leaves = call.arguments.get("halt") is False
+        if leaves:
+            self._commanded = Finger(0)
+            self._requests = {at: each for at, each in self._requests.items() if each.name != "move"}
+        self.end_lease("released")
+
+        async def release() -> None:
+            if not leaves:
+                await self._hand.halt()
+
+        self._start(_Request("release", call, question), release)
+
+    def end_lease(self, reason: str, by: str = "") -> None:
+        """Take the lease from whoever holds it: what it commanded and still moves is held, grips stay."""
+        holder = self._lease.end(reason)
+        if holder is None:
+            return
+        log.log(
+            logging.INFO if reason == "released" else logging.WARNING,
+            "%s: %s commands the gripper no longer: %s%s",
+            self.name,
+            holder.label,
+            reason,
+            f" by {by}" if by else "",
+        )
+        for request in self._requests.values():
+            request.call_off(reason)
+        self._requests.clear()
+        axes, self._commanded = self._commanded, Finger(0)
+        if axes:
+            self._spawn(self._hold(axes))
+        self.news.add({"kind": "lease", "number": self._lease.number, "holder": None, "reason": reason})
+
+    async def _hold(self, axes: Finger) -> None:
+        try:
+            await self._hand.hold(axes)
+        except RobotiqError as error:
+            log.warning("%s: the fingers could not be held: %s", self.name, error)
+
+    def _expire(self) -> None:
+        if self._lease.has_expired(now()):
+            self.end_lease("expired")
+
+    def _watch_expiry(self) -> None:
+        """Look again when the lease ends unless it is renewed."""
+        if self._expiry is not None:
+            self._expiry.cancel()
+            self._expiry = None
+        self._expire()
+        if self._lease.holder is not None:
+            delay = max(0.001, self._lease.expires - now() + 0.001)
+            self._expiry = asyncio.get_running_loop().call_later(delay, self._watch_expiry)
+
+    # -- commands --------------------------------------------------------------------------------------
+
+    def _halt(self, call: Call, question: Question) -> None:
+        """From anyone, always, and as often as it is asked."""
+        if self._admission.is_of_holder(call):
+            self._admission.bar(call)
+        else:
+            # Or a control loop would undo it in ten milliseconds.
+            self.end_lease("halted", str(call.arguments.get("label", "somebody"))[:200])
+        self._start(_Request("halt", call, question), self._hand.halt)
+
+    def _command(self, name: str, call: Call, question: Question) -> None:
+        known = self._requests.get(call.number)
+        if known is not None and self._admission.is_of_holder(call):
+            self._repeat(known, question)
+            return
+        if name == "cancel":
+            self._cancel(call, question)
+            return
+        work = self._work(name, call)
+        self._admission.admit(call, now())
+        self._commanded |= _axes(name, call.arguments)
+        request = self._requests[call.number] = _Request(name, call, question)
+        if len(self._requests) > _REMEMBERED:
+            self._forget()
+        self._start(request, work)
+
+    def _work(self, name: str, call: Call) -> _Work:
+        if name == "command":
+            return lambda: self._set(call.arguments)
+        if name not in COMMANDS:
+            raise AgentError(f"no command of the name {name!r}")
+        method = getattr(self._hand, name)
+        return lambda: method(**call.arguments)
+
+    async def _set(self, arguments: Fields) -> None:
+        """What :meth:`RobotiqHand.command` does, for several axes at once."""
+        axes = {Finger(int(mask)): changes for mask, changes in arguments["axes"].items()}
+        for mask, changes in axes.items():
+            self._hand.command(mask, **changes)
+
+    def _repeat(self, request: _Request, question: Question) -> None:
+        log.info("%s: request %d came again", self.name, request.call.number)
+        if request.answer is None:
+            request.questions.append(question)
+        else:
+            question.reply(request.answer, self.news.status_message())
+
+    def _cancel(self, call: Call, question: Question) -> None:
+        """Call off a command of the holder; the axes it moves are held."""
+        self._admission.renew(call, now())
+        request = self._requests.get(call.arguments.get("number", -1))
+        if request is not None:
+            request.call_off()
+        else:
+            # It may have been overtaken: it is not to be let in when it comes.
+            self._admission.bar(Call(call.to, call.client, number=int(call.arguments.get("number", 0))))
+        self._reply(question, Answer(call.to, call.number, self._epoch, {}))
+
+    def _start(self, request: _Request, work: _Work) -> None:
+        request.task = self._spawn(work())
+        # Not in the task itself: one that is cancelled before it has begun never runs.
+        request.task.add_done_callback(lambda task: self._finish(request, task))
+
+    def _finish(self, request: _Request, task: asyncio.Task[MoveResult | None]) -> None:
+        call, error = request.call, None if task.cancelled() else task.exception()
+        if task.cancelled():
+            reason = request.reason or "released"
+            error = ControlLostError(f"called off: {request.reason or 'by the caller'}", reason)
+        elif isinstance(error, Exception) and not isinstance(error, RobotiqError | TypeError | ValueError):
+            log.error("%s: %s failed", self.name, request.name, exc_info=error)
+            error = AgentError(f"the agent failed: {error!r}")
+        if isinstance(error, Exception):
+            answer = failure(call, self._epoch, error)
+        else:
+            answer = Answer(call.to, call.number, self._epoch, result_fields(task.result()) or {})
+        request.answer = answer.pack()
+        for question in request.questions:
+            question.reply(request.answer, self.news.status_message())
+        request.questions.clear()
+
+    def _forget(self) -> None:
+        """The oldest requests that have been answered."""
+        for number in sorted(self._requests)[: _REMEMBERED // 2]:
+            if self._requests[number].answer is not None:
+                del self._requests[number]
+
+    def _spawn(self, work: Coroutine[Any, Any, T]) -> asyncio.Task[T]:
+        task = asyncio.get_running_loop().create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return task
+
+
+def _axes(name: str, arguments: Fields) -> Finger:
+    """The axes that a command addresses; all of them if it does not say."""
+    masks = arguments.get("axes", {}) if name == "command" else [arguments.get("fingers", 15)]
+    axes = Finger(0)
+    for mask in masks:
+        with suppress(TypeError, ValueError):
+            axes |= Finger(int(mask) & 15)
+    return axes

@@ -1,0 +1,76 @@
+"""A gripper, its agent and a client on another host, in one virtual loop."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from robotiq_async import RobotiqHand
+from robotiq_async.fleet.agent import Agent
+from robotiq_async.fleet.remote_hand import RemoteHand
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.wire.request import AxisRequest, Request
+from tests.fleet.network import MemoryBus, Network
+
+SPEEDUP = 5.0
+
+
+@dataclass
+class Lab:
+    """All there is in one test.
+
+    Attributes:
+        gripper: is active.
+        local: the agent's hand.
+    """
+
+    network: Network
+    gripper: SimulatedGripper
+    server: SimulatorServer
+    local: RobotiqHand
+    agent: Agent
+    serving: asyncio.Task[None]
+
+    def client(self, name: str = "client", **options: Any) -> RemoteHand:
+        """A remote hand that is not started."""
+        return RemoteHand("zenoh://lab/cell/left", bus=self.network.bus(name), **options)
+
+    async def end_agent(self) -> None:
+        self.serving.cancel()
+        await asyncio.gather(self.serving, return_exceptions=True)
+
+
+async def activate_beforehand(gripper: SimulatedGripper) -> None:
+    """Leave the gripper active and open, as another client would."""
+    axes = (AxisRequest(0, 255, 64),) * 3 + (AxisRequest(128, 255, 64),)
+    gripper.write(0, Request(activate=True, axes=axes).registers)
+    await asyncio.sleep(10)
+    gripper.write(0, Request(activate=True, go=True, axes=axes).registers)
+    await asyncio.sleep(10)
+
+
+@asynccontextmanager
+async def lab(*, window: float = 1.0, active: bool = True) -> AsyncIterator[Lab]:
+    """An agent that serves zenoh://lab/cell/left, and a network named by the buses "agent" and "client"."""
+    loop = asyncio.get_running_loop()
+    network = Network()
+    gripper = SimulatedGripper(loop.time, speedup=SPEEDUP, device_cycle=0.005 * SPEEDUP, spread=False)
+    async with SimulatorServer(gripper) as server:
+        if active:
+            await activate_beforehand(gripper)
+        hand = RobotiqHand(server.address)
+        agent = Agent("lab", "cell", {"left": hand}, network.bus("agent"), window=window)
+        ready = asyncio.Event()
+        serving = asyncio.create_task(agent.run(ready.set))
+        try:
+            await ready.wait()
+            yield Lab(network, gripper, server, hand, agent, serving)
+        finally:
+            serving.cancel()
+            await asyncio.gather(serving, return_exceptions=True)
+
+
+__all__ = ["Lab", "MemoryBus", "activate_beforehand", "lab"]

@@ -1,0 +1,32 @@
+"""A hand on another host, when nothing goes wrong."""
+
+from __future__ import annotations
+
+import asyncio
+
+from robotiq_async import Finger, State
+from tests.fleet.lab import lab
+from tests.virtual import virtual
+
+
+@virtual
+async def test_a_move() -> None:
+    async with lab() as here, here.client() as hand:
+        assert hand.state is State.RUNNING_IDLE
+        result = await hand.move(100, Finger.A)
+        assert abs(result.positions[Finger.A] - 100) <= 2
+        assert hand.status.position(Finger.A) == result.positions[Finger.A]
+        assert not hand.is_moving
+
+
+@virtual
+async def test_a_cancelled_move_is_held() -> None:
+    async with lab() as here, here.client() as hand:
+        moving = asyncio.create_task(hand.move(200, Finger.A, speed=0))
+        while not here.gripper.is_moving:
+            await asyncio.sleep(0.001)
+        moving.cancel()
+        await asyncio.gather(moving, return_exceptions=True)
+        await asyncio.sleep(0.1)
+        assert not here.gripper.is_moving
+        assert here.gripper.position(Finger.A) < 50
