@@ -7,6 +7,7 @@ from typing import Final
 
 PORT: Final = 7447
 LOOPBACK: Final = f"tcp/127.0.0.1:{PORT}"
+LOOPBACK_TLS: Final = f"tls/127.0.0.1:{PORT}"
 LINK_LEASE_MS: Final = 1000
 """A side that is frozen or unplugged is noticed after this time; zenoh's own default is ten seconds."""
 
