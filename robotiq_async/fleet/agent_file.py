@@ -24,9 +24,10 @@ from ..session.options import (
     check_options,
 )
 from ..wire.checks import check_seconds
+from .access_list import AccessList
 from .configuration import LOOPBACK, LOOPBACK_TLS
 from .endpoints import check_connect, check_listen
-from .key_folder import check_key_folder
+from .key_folder import ACCESS, check_key_folder
 from .lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
 from .names import SCHEME, check_name
 from .toml_lines import Names, line_of
@@ -162,7 +163,9 @@ class _Reader:
             return None
         if not isinstance(value, str) or not value or "\0" in value:
             raise TypeError(f"keys must be the path of a folder, got {value!r}")
-        return check_key_folder(self._path.parent / value)
+        folder = check_key_folder(self._path.parent / value)
+        AccessList.read_file(folder / ACCESS)
+        return folder
 
     def _grippers(self, tables: object) -> dict[str, GripperSettings]:
         with self._blaming(_GRIPPERS):

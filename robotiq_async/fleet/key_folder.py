@@ -1,4 +1,4 @@
-"""The folder that a machine gets: the authority's certificate, its own, its key, and who else there is."""
+"""The folder of keys that a machine gets."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ AUTHORITY: Final = "ca.pem"
 CERTIFICATE: Final = "cert.pem"
 KEY: Final = "key.pem"
 """Secret: whoever has it is the one whose name is in the certificate."""
+ACCESS: Final = "access.toml"
+"""Which client may do what; only agents have it."""
 
 
 def check_key_folder(folder: Path) -> Path:
