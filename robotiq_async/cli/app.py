@@ -9,6 +9,7 @@ from cyclopts import App
 from .. import __version__
 from .commands.demo import demo
 from .commands.doctor import doctor
+from .commands.fleet_keys import keys as fleet_keys
 from .commands.measure_force import force as measure_force
 from .commands.measure_speed import speed as measure_speed
 from .commands.monitor import monitor
@@ -39,6 +40,14 @@ def build() -> App:
     for command in COMMANDS:
         app.command(command)
     app.command(_measure())
+    app.command(_fleet())
+    return app
+
+
+def _fleet() -> App:
+    """Hands on other hosts."""
+    app = App(name="fleet", help="Hands on other hosts, and their keys.", help_format="plaintext")
+    app.command(fleet_keys)
     return app
 
 

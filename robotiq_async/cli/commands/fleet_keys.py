@@ -1,0 +1,140 @@
+"""``robotiq-async fleet keys``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+from cyclopts import Parameter
+
+from ..arguments import need
+from ..failures import CommandError, UsageError, usage
+
+if TYPE_CHECKING:
+    from ...fleet.access_list import Role
+
+DAYS: Final = 825
+_MAY: Final = {"read": "watch", "halt": "watch and halt", "operate": "watch, halt and command"}
+
+Names = Annotated[tuple[str, ...], Parameter(metavar="NAME", negative=())]
+Agents = Annotated[tuple[str, ...], Parameter(metavar="NAME[=HOST,...]", negative=())]
+
+
+def keys(
+    folder: Path,
+    /,
+    *,
+    agent: Agents = (),
+    read: Names = (),
+    halt: Names = (),
+    operate: Names = (),
+    days: Annotated[int, Parameter(metavar="N")] = DAYS,
+) -> None:
+    """Make the keys by which agents and clients know each other, and who may do what.
+
+    The first time it makes a certificate authority in FOLDER. Everybody else gets a
+    folder in it, to be carried to that machine: agents, clients that read, clients
+    that also halt, clients that operate. Nothing is overwritten. What is in those
+    folders opens the door: carry them as you would a password.
+
+    For example:
+
+        robotiq-async fleet keys keys --agent cell-1=192.168.1.20 --operate bob
+        robotiq-async fleet keys keys --read alice --halt panel --days 30
+
+    Args:
+        folder: The folder of the authority. It stays on your own machine.
+        agent: A host with grippers, and by what it is connected to (default: its name).
+        read: A client that watches.
+        halt: A client that watches and halts.
+        operate: A client that watches, halts and commands.
+        days: How long the certificates are valid (default: 825; the authority: ten years).
+    """
+    need("cryptography", "fleet")
+    from ...fleet.access_list import Role
+
+    clients = {Role.READ: read, Role.HALT: halt, Role.OPERATE: operate}
+    subjects = [_agent(text) for text in dict.fromkeys(agent)]
+    subjects += [Subject(role, name) for role, names in clients.items() for name in dict.fromkeys(names)]
+    _check(folder, subjects, days)
+    try:
+        _make(folder, subjects, days)
+    except (OSError, ValueError) as error:
+        raise CommandError(str(error)) from error
+
+
+@dataclass(frozen=True)
+class Subject:
+    """Who gets a certificate."""
+
+    role: Role
+    name: str
+    hosts: tuple[str, ...] = ()
+
+
+def _agent(text: str) -> Subject:
+    """An agent in an argument: NAME, or NAME=HOST,HOST."""
+    from ...fleet.access_list import Role
+
+    name, equals, hosts = text.partition("=")
+    return Subject(Role.AGENT, name, tuple(hosts.split(",")) if equals else (name,))
+
+
+def _check(folder: Path, subjects: list[Subject], days: int) -> None:
+    """Refuse what cannot be made before anything is written.
+
+    Raises:
+        UsageError: a name, a host or the days cannot be.
+        CommandError: something would be overwritten.
+    """
+    from ...fleet.access_list import check_subject
+    from ...fleet.authority import DAYS_MAX, check_host
+    from ...fleet.certificates import subject_folder
+
+    if not 1 <= days <= DAYS_MAX:
+        raise UsageError(f"--days must be an integer in 1..{DAYS_MAX}, got {days}")
+    if len({(subject.role, subject.name) for subject in subjects}) < len(subjects):
+        raise UsageError("an agent is named twice")
+    for subject in subjects:
+        with usage():
+            check_subject(subject.name)
+            for host in subject.hosts:
+                check_host(host)
+        path = subject_folder(folder, subject.name, subject.role)
+        if path.exists():
+            raise CommandError(f"{path} is there already: nothing was made")
+
+
+def _make(folder: Path, subjects: list[Subject], days: int) -> None:
+    """Make what is missing, and say of each folder where it goes.
+
+    Raises:
+        OSError, ValueError: the folder cannot be written, or is not an authority's.
+    """
+    from ...fleet.access_list import Role
+    from ...fleet.certificates import AUTHORITY_KEY, access_lists, has_authority, issue, make_authority
+
+    if not has_authority(folder):
+        print(f"{make_authority(folder)}: the authority. {AUTHORITY_KEY} beside it never leaves this folder.")
+    for subject in subjects:
+        path = issue(folder, subject.name, subject.role, hosts=subject.hosts, days=days)
+        print(f"{path}: {_destination(subject)}")
+    if any(subject.role is not Role.AGENT for subject in subjects):
+        _tell_lists(access_lists(folder))
+
+
+def _destination(subject: Subject) -> str:
+    from ...fleet.access_list import Role
+
+    if subject.role is Role.AGENT:
+        return f"for the agent on {subject.name}; clients connect to it by {', '.join(subject.hosts)}"
+    return f"for {subject.name}, who may {_MAY[subject.role.value]}"
+
+
+def _tell_lists(lists: list[Path]) -> None:
+    """Where the access list is, now that it has changed."""
+    own, *copies = lists
+    print(f"{own}: who may do what")
+    for copy in copies:
+        print(f"{copy}: the same; agents go by it from their next start on")

@@ -1,0 +1,259 @@
+"""FLEET.toml: which grippers an agent serves, under which names, and where it listens."""
+
+from __future__ import annotations
+
+import re
+import socket
+import tomllib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import MISSING, asdict, dataclass, field, fields
+from difflib import get_close_matches
+from itertools import combinations
+from pathlib import Path
+from typing import Any, Final
+
+from ..enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ..hand.robotiq_hand import RobotiqHand
+from ..session.options import (
+    ACTIVATION_TIMEOUT_S,
+    CONNECT_TIMEOUT_S,
+    POLL_INTERVAL_S,
+    RESPONSE_TIMEOUT_S,
+    Options,
+    check_options,
+)
+from ..wire.checks import check_seconds
+from .access_list import AccessList
+from .configuration import LOOPBACK, LOOPBACK_TLS
+from .endpoints import check_connect, check_listen
+from .key_folder import ACCESS, check_key_folder
+from .lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
+from .names import SCHEME, check_name
+from .toml_lines import Names, line_of
+
+_GRIPPERS: Final = "grippers"
+
+
+class AgentFileError(ValueError):
+    """A file that an agent cannot go by; the message names file, line, key, value and range."""
+
+
+@dataclass(frozen=True, slots=True)
+class GripperSettings:
+    """One gripper of an agent: what :class:`~robotiq_async.RobotiqHand` takes, under the same names."""
+
+    address: str
+    device_id: int | None = None
+    poll_interval: float = POLL_INTERVAL_S
+    connect_timeout: float = CONNECT_TIMEOUT_S
+    response_timeout: float = RESPONSE_TIMEOUT_S
+    activation_timeout: float = ACTIVATION_TIMEOUT_S
+    speed: int = DEFAULT_SPEED
+    force: int = DEFAULT_FORCE
+    request_address: int | None = None
+    status_address: int | None = None
+
+    def make_hand(self) -> RobotiqHand:
+        """A hand for the gripper; opens nothing.
+
+        Raises:
+            TypeError, ValueError: a value that :func:`read_agent_file` would have refused.
+        """
+        return RobotiqHand(**asdict(self))
+
+
+@dataclass(frozen=True, slots=True)
+class AgentSettings:
+    """Everything an agent goes by, checked.
+
+    Attributes:
+        site: the site's name.
+        grippers: by name.
+        host: the host's name; by default this machine's.
+        listen: endpoints of zenoh where clients come in.
+        connect: endpoints of zenoh to connect to: routers.
+        keys: folder with the agent's certificate and key; None for no encryption.
+        insecure: whether other machines may come in without.
+        window: seconds for which a lease holds without being renewed.
+    """
+
+    site: str
+    grippers: Mapping[str, GripperSettings]
+    host: str = field(default_factory=lambda: machine_name())
+    listen: tuple[str, ...] = (LOOPBACK,)
+    connect: tuple[str, ...] = ()
+    keys: Path | None = None
+    insecure: bool = False
+    window: float = WINDOW_S
+
+
+_OF_GRIPPER: Final = tuple(each.name for each in fields(GripperSettings))
+_OF_AGENT: Final = tuple(each.name for each in fields(AgentSettings))
+_DEFAULTS: Final[Mapping[str, Any]] = {
+    each.name: each.default for each in fields(GripperSettings) if each.default is not MISSING
+}
+
+
+def machine_name() -> str:
+    """The name of this machine, made fit for a key."""
+    return re.sub(r"[^A-Za-z0-9_.-]+", "-", socket.gethostname())[:64] or "host"
+
+
+def read_agent_file(path: str | Path) -> AgentSettings:
+    """What an agent is to serve, from a file.
+
+    Raises:
+        AgentFileError: the file cannot be read, or something in it cannot be meant.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise AgentFileError(f"cannot read {path}: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise AgentFileError(f"{path}: not UTF-8: {error.reason} at byte {error.start}") from error
+    return _Reader(path, text).settings()
+
+
+class _Reader:
+    """Reads one file; knows where its keys stand."""
+
+    def __init__(self, path: Path, text: str) -> None:
+        self._path = path
+        self._text = text
+
+    def settings(self) -> AgentSettings:
+        """Everything, checked."""
+        table = self._table()
+        self._check_keys_of(table, (), _OF_AGENT, needed=("site", _GRIPPERS))
+        with self._blaming("site"):
+            site = check_name("site", table["site"])
+        with self._blaming("host"):
+            host = check_name("host", table.get("host", machine_name()))
+        with self._blaming("window"):
+            window = check_seconds("window", table.get("window", WINDOW_S), WINDOW_MIN_S, WINDOW_MAX_S)
+        with self._blaming("insecure"):
+            insecure = _check_bool("insecure", table.get("insecure", False))
+        with self._blaming("keys"):
+            keys = self._keys(table.get("keys"))
+        default = [LOOPBACK if keys is None else LOOPBACK_TLS]
+        with self._blaming("listen"):
+            wanted = _check_list("listen", table.get("listen", default))
+            listen = check_listen(wanted, has_keys=keys is not None, insecure=insecure)
+        with self._blaming("connect"):
+            wanted = _check_list("connect", table.get("connect", []))
+            connect = check_connect(wanted, has_keys=keys is not None, insecure=insecure)
+        return AgentSettings(
+            site, self._grippers(table[_GRIPPERS]), host, listen, connect, keys, insecure, window
+        )
+
+    def _table(self) -> dict[str, Any]:
+        try:
+            return tomllib.loads(self._text)
+        except tomllib.TOMLDecodeError as error:
+            what, _, where = str(error).partition(" (at ")
+            where = f", {where.rstrip(')')}" if where else ""
+            raise AgentFileError(f"{self._path}{where}: not TOML: {what}") from error
+        except RecursionError as error:
+            raise AgentFileError(f"{self._path}: not TOML: nested too deeply") from error
+
+    def _keys(self, value: object) -> Path | None:
+        if value is None:
+            return None
+        if not isinstance(value, str) or not value or "\0" in value:
+            raise TypeError(f"keys must be the path of a folder, got {value!r}")
+        folder = check_key_folder(self._path.parent / value)
+        AccessList.read_file(folder / ACCESS)
+        return folder
+
+    def _grippers(self, tables: object) -> dict[str, GripperSettings]:
+        with self._blaming(_GRIPPERS):
+            if not isinstance(tables, dict) or not tables:
+                raise ValueError(f"a table for each gripper is needed: [grippers.left], got {tables!r}")
+        grippers, checked = {}, {}
+        for name, table in tables.items():
+            grippers[name], checked[name] = self._gripper(name, table)
+        for one, other in combinations(checked, 2):
+            if checked[one].gripper().may_be(checked[other].gripper()):
+                address = f"{grippers[other].address!r}{self._hint(checked[other])}"
+                raise self._error(
+                    (_GRIPPERS, other, "address"), f"address must be another than {one}'s, got {address}"
+                )
+        return grippers
+
+    def _hint(self, options: Options) -> str:
+        return options.gripper().hint.replace("hands", "grippers")
+
+    def _gripper(self, name: str, table: object) -> tuple[GripperSettings, Options]:
+        path = (_GRIPPERS, name)
+        with self._blaming(*path):
+            check_name("the name of a gripper", name)
+            if not isinstance(table, dict):
+                raise TypeError(f"{name} must be a table with an address: [grippers.{name}], got {table!r}")
+        self._check_keys_of(table, path, _OF_GRIPPER, needed=("address",))
+        address = table["address"]
+        with self._blaming(*path, "address"):
+            if isinstance(address, str) and address.startswith(SCHEME):
+                raise ValueError(f"address must be of a gripper on this host, got {address!r}")
+            _check_gripper(address, {})
+        for key, value in table.items():
+            with self._blaming(*path, key):
+                _check_gripper(address, {key: value})
+        return GripperSettings(**table), _check_gripper(address, table)
+
+    def _check_keys_of(
+        self,
+        table: Mapping[str, object],
+        path: Names,
+        known: tuple[str, ...],
+        needed: tuple[str, ...],
+    ) -> None:
+        """Refuse keys that nobody knows, and tables that lack some.
+
+        Raises:
+            AgentFileError: there are such, or it does.
+        """
+        for key in table:
+            if key not in known:
+                near = get_close_matches(key, known, 1)
+                hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
+                raise self._error((*path, key), f"nobody knows the key {key!r}; {hint}")
+        for key in needed:
+            if key not in table:
+                what = "[grippers.NAME], a table for each gripper" if key == _GRIPPERS else key
+                raise self._error(path, f"this is missing: {what}")
+
+    @contextmanager
+    def _blaming(self, *path: str) -> Iterator[None]:
+        """Around the check of a value: the error says where it stands."""
+        try:
+            yield
+        except (TypeError, ValueError) as error:
+            raise self._error(path, str(error)) from error
+
+    def _error(self, path: Names, message: str) -> AgentFileError:
+        line = line_of(self._text, path)
+        where = str(self._path) if line is None else f"{self._path}, line {line}"
+        if len(path) > 1:
+            where += f", in [{path[0]}.{path[1]}]"
+        return AgentFileError(f"{where}: {message}")
+
+
+def _check_gripper(address: object, given: Mapping[str, object]) -> Options:
+    if not isinstance(address, str):
+        raise TypeError(f"address must be a string, got {address!r}")
+    options = {key: value for key, value in given.items() if key != "address"}
+    return check_options(address, **{**_DEFAULTS, "reconnect": True, "calibration": None, **options})
+
+
+def _check_bool(name: str, value: object) -> bool:
+    if not isinstance(value, bool):
+        raise TypeError(f"{name} must be true or false, got {value!r}")
+    return value
+
+
+def _check_list(name: str, value: object) -> list[object]:
+    if not isinstance(value, list):
+        raise TypeError(f"{name} must be a list of endpoints, got {value!r}")
+    return value

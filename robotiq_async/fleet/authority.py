@@ -1,0 +1,158 @@
+"""A certificate authority in memory: its certificate, its key, and the certificates that it signs."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from ipaddress import ip_address
+from typing import Final, Self
+
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+
+DAYS_MAX: Final = 36500
+_SKEW: Final = timedelta(days=1)
+"""Valid so long before now: the clocks of other machines may be behind."""
+_LABELS: Final = re.compile(
+    r"(?=.{1,253}$)[A-Za-z0-9_]([A-Za-z0-9_-]{0,62})(\.[A-Za-z0-9_][A-Za-z0-9_-]{0,62})*"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """A certificate and its key, as PEM files hold them."""
+
+    certificate: bytes
+    key: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Authority:
+    """Who vouches.
+
+    Attributes:
+        certificate: what others go by.
+        key: signs.
+    """
+
+    certificate: x509.Certificate
+    key: ec.EllipticCurvePrivateKey
+
+    @classmethod
+    def make(cls, days: int) -> Self:
+        """A new one, valid for so many days."""
+        key = ec.generate_private_key(ec.SECP256R1())
+        name = _name("robotiq_async authority")
+        builder = _builder(name, name, key, datetime.now(UTC) + timedelta(days=days))
+        builder = builder.add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+        builder = builder.add_extension(_usage(signs_certificates=True), critical=True)
+        return cls(builder.sign(key, hashes.SHA256()), key)
+
+    @classmethod
+    def load(cls, pair: Pair) -> Self:
+        """One that was made before.
+
+        Raises:
+            ValueError: these are no certificate and its key.
+        """
+        certificate = x509.load_pem_x509_certificate(pair.certificate)
+        key = serialization.load_pem_private_key(pair.key, None)
+        if not isinstance(key, ec.EllipticCurvePrivateKey) or key.public_key() != certificate.public_key():
+            raise ValueError("the key is not that of the certificate")
+        return cls(certificate, key)
+
+    def pair(self) -> Pair:
+        """To be kept: the key is secret."""
+        return _pair(self.certificate, self.key)
+
+    def certify(self, common_name: str, days: int, server_names: Sequence[str] = ()) -> Pair:
+        """A new key, and a certificate for it.
+
+        Args:
+            common_name: whose it is.
+            days: how long it is valid.
+            server_names: host names and IP addresses under which it opens a server; with none it opens none.
+
+        Raises:
+            ValueError: the authority ends before, or no such host can be.
+        """
+        until = datetime.now(UTC) + timedelta(days=days)
+        if until > self.certificate.not_valid_after_utc:
+            raise ValueError(
+                f"days must be fewer: the authority ends on {self.certificate.not_valid_after_utc:%Y-%m-%d}, "
+                f"got {days}"
+            )
+        key = ec.generate_private_key(ec.SECP256R1())
+        builder = _builder(_name(common_name), self.certificate.subject, key, until)
+        builder = builder.add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+        builder = builder.add_extension(_usage(signs_certificates=False), critical=True)
+        builder = builder.add_extension(
+            x509.AuthorityKeyIdentifier.from_issuer_public_key(self.key.public_key()), critical=False
+        )
+        purposes = [ExtendedKeyUsageOID.CLIENT_AUTH]
+        if server_names:
+            purposes.append(ExtendedKeyUsageOID.SERVER_AUTH)
+            names = x509.SubjectAlternativeName([check_host(name) for name in server_names])
+            builder = builder.add_extension(names, critical=False)
+        builder = builder.add_extension(x509.ExtendedKeyUsage(purposes), critical=False)
+        return _pair(builder.sign(self.key, hashes.SHA256()), key)
+
+
+def check_host(host: str) -> x509.GeneralName:
+    """A host by which a server is connected to: a number or a name.
+
+    Raises:
+        ValueError: it is neither.
+    """
+    try:
+        return x509.IPAddress(ip_address(host))
+    except ValueError:
+        if not _LABELS.fullmatch(host) or re.fullmatch(r"[0-9.]+", host):
+            raise ValueError(f"a host must be a name or an IP address, got {host!r}") from None
+        return x509.DNSName(host)
+
+
+def _builder(
+    subject: x509.Name, issuer: x509.Name, key: ec.EllipticCurvePrivateKey, until: datetime
+) -> x509.CertificateBuilder:
+    return (
+        x509.CertificateBuilder()
+        .subject_name(subject)
+        .issuer_name(issuer)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(datetime.now(UTC) - _SKEW)
+        .not_valid_after(until)
+        .add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False)
+    )
+
+
+def _name(common_name: str) -> x509.Name:
+    return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, common_name)])
+
+
+def _usage(*, signs_certificates: bool) -> x509.KeyUsage:
+    return x509.KeyUsage(
+        digital_signature=not signs_certificates,
+        key_cert_sign=signs_certificates,
+        crl_sign=signs_certificates,
+        content_commitment=False,
+        key_encipherment=False,
+        data_encipherment=False,
+        key_agreement=False,
+        encipher_only=False,
+        decipher_only=False,
+    )
+
+
+def _pair(certificate: x509.Certificate, key: ec.EllipticCurvePrivateKey) -> Pair:
+    return Pair(
+        certificate.public_bytes(serialization.Encoding.PEM),
+        key.private_bytes(
+            serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
+        ),
+    )

@@ -1,0 +1,143 @@
+"""The folder of a certificate authority, and in it the folders that go to agents and clients.
+
+::
+
+    FOLDER/
+        ca.pem, ca.key      the authority; whoever has ca.key can let anybody in, so it goes nowhere
+        access.toml         which client may do what
+        agent-cell-1/       for the host cell-1: ca.pem, cert.pem, key.pem, access.toml
+        operate-bob/        for Bob: ca.pem, cert.pem, key.pem
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from ..wire.checks import check_int
+from .access_list import AccessList, Role, check_subject
+from .authority import DAYS_MAX, Authority, Pair
+from .key_folder import ACCESS, AUTHORITY, CERTIFICATE, KEY
+
+AUTHORITY_KEY: Final = "ca.key"
+AUTHORITY_DAYS: Final = 3650
+DAYS: Final = 825
+"""How long a certificate is valid; some systems accept none for longer."""
+HERE: Final = ("localhost", "127.0.0.1", "::1")
+"""By these every agent can be connected to on its own machine."""
+
+
+def has_authority(folder: Path) -> bool:
+    """Whether there is an authority in a folder, or a part of one."""
+    return any((folder / name).exists() for name in (AUTHORITY, AUTHORITY_KEY, ACCESS))
+
+
+def make_authority(folder: Path, *, days: int = AUTHORITY_DAYS) -> Path:
+    """Make a certificate authority with an empty access list.
+
+    Args:
+        folder: is made if it is not there.
+        days: how long it is valid.
+
+    Returns:
+        Its certificate.
+
+    Raises:
+        FileExistsError: there is one already.
+        OSError: the folder cannot be written.
+        TypeError, ValueError: days are not in 1..36500.
+    """
+    check_int("days", days, 1, DAYS_MAX)
+    if has_authority(folder):
+        raise FileExistsError(f"there is an authority in {folder} already")
+    pair = Authority.make(days).pair()
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    _write_new(folder / AUTHORITY_KEY, pair.key, secret=True)
+    _write_new(folder / AUTHORITY, pair.certificate)
+    _write_new(folder / ACCESS, AccessList().text().encode())
+    return folder / AUTHORITY
+
+
+def issue(folder: Path, name: str, role: Role, *, hosts: Sequence[str] = (), days: int = DAYS) -> Path:
+    """Make a key and a certificate for an agent or a client, and enter a client in the access lists.
+
+    Args:
+        folder: the authority's.
+        name: of the agent's host, or of the client.
+        role: what it may do.
+        hosts: names and IP addresses by which clients connect to the agent; loopback is added.
+        days: how long it is valid.
+
+    Returns:
+        The folder for that machine.
+
+    Raises:
+        FileExistsError: it is there already.
+        OSError: there is no authority, or the folder cannot be written.
+        TypeError, ValueError: no such name or host can be; days are not in 1..36500, or go beyond the
+            authority's; a client is given hosts; a file of the authority is malformed.
+    """
+    check_subject(name)
+    check_int("days", days, 1, DAYS_MAX)
+    if hosts and role is not Role.AGENT:
+        raise ValueError(f"hosts are for agents, and {name!r} is to be a client")
+    own = subject_folder(folder, name, role)
+    if own.exists():
+        raise FileExistsError(f"{own} is there already")
+    authority = _load(folder)
+    clients = AccessList.read_file(folder / ACCESS)
+    server_names = tuple(dict.fromkeys((*hosts, *HERE))) if role is Role.AGENT else ()
+    pair = authority.certify(role.common_name(name), days, server_names)
+    own.mkdir(mode=0o700)
+    _write_new(own / KEY, pair.key, secret=True)
+    _write_new(own / CERTIFICATE, pair.certificate)
+    _write_new(own / AUTHORITY, authority.pair().certificate)
+    if role is Role.AGENT:
+        _write_new(own / ACCESS, clients.text().encode())
+    elif name not in clients.of(role):
+        _enter(folder, clients.including(role, name))
+    return own
+
+
+def subject_folder(folder: Path, name: str, role: Role) -> Path:
+    """Where the keys of somebody are put."""
+    return folder / f"{role.value}-{name}"
+
+
+def access_lists(folder: Path) -> list[Path]:
+    """The access list of an authority, and the copies in its folders for agents."""
+    return [folder / ACCESS, *sorted(folder.glob(f"{Role.AGENT.value}-*/{ACCESS}"))]
+
+
+def _load(folder: Path) -> Authority:
+    """The authority in a folder.
+
+    Raises:
+        OSError: there is none.
+        ValueError: what is there is malformed.
+    """
+    try:
+        return Authority.load(Pair((folder / AUTHORITY).read_bytes(), (folder / AUTHORITY_KEY).read_bytes()))
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{folder / AUTHORITY} and {AUTHORITY_KEY}: {error}") from error
+
+
+def _enter(folder: Path, clients: AccessList) -> None:
+    """Write the access list wherever it is. Whenever it ends: a file has the old list or the new one."""
+    for path in access_lists(folder):
+        beside = path.with_suffix(".new")
+        beside.write_text(clients.text(), encoding="utf-8")
+        beside.replace(path)
+
+
+def _write_new(path: Path, data: bytes, *, secret: bool = False) -> None:
+    """Write a file that is not there yet; a secret one was never anybody else's to read.
+
+    Raises:
+        OSError: it is there, or cannot be written.
+    """
+    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600 if secret else 0o644)
+    with open(descriptor, "wb") as file:
+        file.write(data)

@@ -1,0 +1,48 @@
+"""On which line of a TOML file a key stands: the reader of the standard library does not tell."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator
+from typing import Final
+
+Names = tuple[str, ...]
+_KEY: Final = re.compile(r"""\s*((?:"[^"\n]*"|'[^'\n]*'|[A-Za-z0-9_.\s-])+)=""")
+
+
+def line_of(text: str, path: Names) -> int | None:
+    """The line, counted from 1, of the key or the table at a path.
+
+    For what stands inside an inline table or an array that is the line where this begins. None if it is not
+    certain: the search looks at lines one by one, and a text of several lines may hold what looks like a key.
+    """
+    for length in range(len(path), 0, -1):
+        lines = [number for number, found in _keys(text) if found == path[:length]]
+        if lines:
+            return lines[0] if len(lines) == 1 else None
+    return None
+
+
+def _keys(text: str) -> Iterator[tuple[int, Names]]:
+    """The lines that begin with a key or are the header of a table, and its path."""
+    table: Names = ()
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.lstrip().startswith("["):
+            table = _path(line) or table
+            yield number, table
+        elif (found := _KEY.match(line)) is not None:
+            yield number, table + _path(f"{found[1]}= 0")
+
+
+def _path(line: str) -> Names:
+    """The names that a line nests, empty if it is none of TOML."""
+    try:
+        found: object = tomllib.loads(line)
+    except tomllib.TOMLDecodeError:
+        return ()
+    names: list[str] = []
+    while isinstance(found, dict) and found:
+        name, found = next(iter(found.items()))
+        names.append(name)
+    return tuple(names)

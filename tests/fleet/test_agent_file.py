@@ -1,0 +1,158 @@
+"""FLEET.toml: what is in it, and what is refused, in a line that says where."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from robotiq_async.fleet.agent_file import AgentFileError, AgentSettings, machine_name, read_agent_file
+from robotiq_async.fleet.configuration import LOOPBACK, LOOPBACK_TLS
+from robotiq_async.fleet.names import check_name
+
+LEFT = '[grippers.left]\naddress = "tcp://192.168.1.11"\n'
+GOOD = f'site = "lab"\nhost = "cell-1"\n{LEFT}'
+
+
+def read(folder: Path, text: str) -> AgentSettings:
+    file = folder / "FLEET.toml"
+    file.write_text(text, encoding="utf-8")
+    return read_agent_file(file)
+
+
+def put_keys(folder: Path) -> Path:
+    keys = folder / "cell-1"
+    keys.mkdir()
+    for name in ("ca.pem", "cert.pem", "key.pem"):
+        (keys / name).touch()
+    return keys
+
+
+def test_the_least_there_can_be_listens_on_this_machine_only(tmp_path: Path) -> None:
+    settings = read(tmp_path, f'site = "lab"\n{LEFT}')
+    assert settings == AgentSettings("lab", settings.grippers)
+    assert (settings.listen, settings.connect, settings.keys) == ((LOOPBACK,), (), None)
+    assert settings.host == machine_name() == check_name("host", settings.host)
+
+
+def test_everything(tmp_path: Path) -> None:
+    keys = put_keys(tmp_path)
+    settings = read(
+        tmp_path,
+        """
+        site = "lab"
+        host = "cell-1"
+        listen = ["tls/0.0.0.0:7447", "quic/[::]:7447"]
+        connect = ["tls/router.lab:7447"]
+        keys = "cell-1"
+        window = 2
+
+        [grippers]
+        right = {address = "rtu:///dev/ttyUSB0", response_timeout = 0.2, status_address = 2000}
+
+        [grippers.left]
+        address = "192.168.1.11"
+        device_id = 3
+        speed = 255
+        force = 0
+        poll_interval = 0.01
+        """,
+    )
+    assert settings.listen == ("tls/0.0.0.0:7447", "quic/[::]:7447")
+    assert (settings.host, settings.keys, settings.window) == ("cell-1", keys, 2.0)
+    assert list(settings.grippers) == ["right", "left"]
+    assert settings.grippers["left"].speed == 255
+    assert settings.grippers["right"].status_address == 2000
+    assert settings.grippers["left"].make_hand().address == "tcp://192.168.1.11:502"
+
+
+def test_with_keys_it_listens_encrypted(tmp_path: Path) -> None:
+    put_keys(tmp_path)
+    assert read(tmp_path, f'keys = "cell-1"\n{GOOD}').listen == (LOOPBACK_TLS,)
+
+
+def test_two_grippers_behind_one_gateway_and_any_number_of_simulated_ones(tmp_path: Path) -> None:
+    right = '[grippers.right]\naddress = "192.168.1.11:502"\ndevice_id = 4\n'
+    simulated = "".join(f'[grippers.s{n}]\naddress = "sim://"\n' for n in range(3))
+    assert len(read(tmp_path, f"{GOOD}device_id = 3\n{right}{simulated}").grippers) == 5
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", ["site", "missing"]),
+        ('site = "lab"', ["[grippers.NAME]", "missing"]),
+        ('site = "lab"\n[grippers]', ["line 2", "[grippers.left]"]),
+        ('site = "lab"\ngrippers = 3', ["line 2", "3"]),
+        ("site = 3\n" + LEFT, ["line 1", "site", "string", "3"]),
+        ('site = "a/b"\n' + LEFT, ["line 1", "site", "'a/b'", "A-Z"]),
+        ('host = "*"\nsite = "lab"\n' + LEFT, ["line 1", "host", "'*'"]),
+        ("window = 11\n" + GOOD, ["line 1", "window", "0.1..10", "11"]),
+        ("window = nan\n" + GOOD, ["line 1", "window", "nan"]),
+        ('insecure = "yes"\n' + GOOD, ["line 1", "insecure", "true or false", "'yes'"]),
+        ("windwo = 1\n" + GOOD, ["line 1", "'windwo'", "did you mean window?"]),
+        ("x = 1\n" + GOOD, ["line 1", "'x'", "site, grippers, host"]),
+        (GOOD + "sped = 1\n", ["line 5", "[grippers.left]", "'sped'", "did you mean speed?"]),
+        (GOOD + "speed = 300\n", ["line 5", "[grippers.left]", "speed", "0..255", "300"]),
+        (GOOD + "force = true\n", ["line 5", "force", "0..255", "True"]),
+        (GOOD + "device_id = 0\n", ["line 5", "device_id", "1..247"]),
+        (GOOD + 'poll_interval = "fast"\n', ["line 5", "poll_interval", "0.001..0.1", "'fast'"]),
+        (GOOD + "connect_timeout = 9\n", ["line 5", "connect_timeout", "0.01..5"]),
+        (GOOD + "response_timeout = 9\n", ["line 5", "response_timeout", "0.005..0.5"]),
+        (GOOD + "activation_timeout = 0\n", ["line 5", "activation_timeout", "0.01..120"]),
+        (GOOD + "request_address = 70000\n", ["line 5", "request_address", "0..65528"]),
+        (GOOD + "reconnect = false\n", ["line 5", "'reconnect'"]),
+        (GOOD + "[grippers.right]\nspeed = 3\n", ["line 5", "[grippers.right]", "address", "missing"]),
+        (GOOD + "[grippers.right]\naddress = 3\n", ["line 6", "address", "3"]),
+        (GOOD + '[grippers.right]\naddress = "ftp://x"\n', ["line 6", "address", "'ftp://x'", "rtu://"]),
+        (GOOD + '[grippers.right]\naddress = "zenoh://a/b/c"\n', ["line 6", "on this host", "zenoh://a/b/c"]),
+        (GOOD + '[grippers."r/t"]\naddress = "sim://"\n', ["line 5", "'r/t'", "A-Z"]),
+        (GOOD + '[grippers.right]\naddress = "192.168.1.11"\n', ["line 6", "left", "device_id"]),
+        (GOOD + '[grippers]\nright = "sim://"\n', ["[grippers.right]", "'sim://'"]),
+        ('listen = "tcp/127.0.0.1:1"\n' + GOOD, ["line 1", "listen", "list"]),
+        ('listen = ["tcp/0.0.0.0:7447"]\n' + GOOD, ["line 1", "tcp/0.0.0.0:7447", "keys", "insecure"]),
+        ('connect = ["tcp/lab:7447"]\n' + GOOD, ["line 1", "connect", "tcp/lab:7447", "insecure"]),
+        ('listen = ["tls/0.0.0.0:7447"]\n' + GOOD, ["line 1", "needs keys"]),
+        ('keys = "nowhere"\n' + GOOD, ["line 1", "keys", "ca.pem", "nowhere"]),
+        ("keys = 3\n" + GOOD, ["line 1", "keys", "folder", "3"]),
+        ('keys = "a\\u0000b"\n' + GOOD, ["line 1", "keys", "folder"]),
+        ("site = \n", ["line 1, column 8", "not TOML"]),
+        (GOOD + GOOD, [", line ", "not TOML"]),
+        ('site = "lab', ["not TOML"]),
+        ("site = " + "[" * 5000, ["not TOML"]),
+    ],
+)
+def test_a_bad_file_is_told_in_one_line(text: str, words: list[str], tmp_path: Path) -> None:
+    with pytest.raises(AgentFileError) as caught:
+        read(tmp_path, text)
+    message = str(caught.value)
+    assert "\n" not in message
+    for word in ("FLEET.toml", *words):
+        assert word in message
+
+
+def test_a_line_that_is_not_certain_is_not_told(tmp_path: Path) -> None:
+    """The search takes what stands in a text of several lines for keys."""
+    port = '[grippers.left]\naddress = """rtu:///dev/\nspeed = 3\n/x"""\nspeed = 300\n'
+    with pytest.raises(AgentFileError, match=r"FLEET\.toml, in \[grippers\.left\]: speed"):
+        read(tmp_path, f'site = "lab"\n{port}')
+
+
+def test_keys_and_an_open_door_exclude_each_other(tmp_path: Path) -> None:
+    put_keys(tmp_path)
+    with pytest.raises(AgentFileError, match="exclude"):
+        read(tmp_path, f'keys = "cell-1"\ninsecure = true\n{GOOD}')
+
+
+def test_with_keys_nothing_goes_unencrypted(tmp_path: Path) -> None:
+    put_keys(tmp_path)
+    with pytest.raises(AgentFileError, match=r"line 2.*tls/"):
+        read(tmp_path, f'keys = "cell-1"\nlisten = ["tcp/127.0.0.1:7447"]\n{GOOD}')
+
+
+def test_a_file_that_is_not_there_or_no_text(tmp_path: Path) -> None:
+    with pytest.raises(AgentFileError, match=r"cannot read .*FLEET\.toml: No such file"):
+        read_agent_file(tmp_path / "FLEET.toml")
+    (tmp_path / "FLEET.toml").write_bytes(b"site = '\xff'")
+    with pytest.raises(AgentFileError, match="UTF-8"):
+        read_agent_file(tmp_path / "FLEET.toml")
