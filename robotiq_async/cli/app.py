@@ -7,8 +7,10 @@ from typing import Final
 from cyclopts import App
 
 from .. import __version__
+from .commands.agent import agent
 from .commands.demo import demo
 from .commands.doctor import doctor
+from .commands.fleet import fleet, halt
 from .commands.fleet_keys import keys as fleet_keys
 from .commands.measure_force import force as measure_force
 from .commands.measure_speed import speed as measure_speed
@@ -19,16 +21,17 @@ from .commands.simulate import simulate
 from .commands.status import status
 from .commands.view import view
 
-COMMANDS: Final = (demo, simulate, status, move, monitor, view, doctor, record, replay, recover, plot)
+COMMANDS: Final = (demo, simulate, status, move, monitor, view, doctor, record, replay, recover, plot, agent)
 """A new sub-command is a module with a function of its name, and an entry here."""
 
 _HELP = """Control a Robotiq 3-Finger gripper, or a simulated one.
 
 Every command that talks to a gripper takes its address as the last argument:
 
-    tcp://192.168.1.11   Modbus TCP; tcp:// and the port (:502) may be left out
-    rtu:///dev/ttyUSB0   Modbus RTU on a serial line (extra serial)
-    sim://               the default: a gripper simulated inside the command
+    tcp://192.168.1.11    Modbus TCP; tcp:// and the port (:502) may be left out
+    rtu:///dev/ttyUSB0    Modbus RTU on a serial line (extra serial)
+    zenoh://lab/cell/left one that an agent on another host serves (extra fleet)
+    sim://                the default: a gripper simulated inside the command
 
 Nothing here has run on real hardware yet.
 """
@@ -45,8 +48,10 @@ def build() -> App:
 
 
 def _fleet() -> App:
-    """Hands on other hosts."""
-    app = App(name="fleet", help="Hands on other hosts, and their keys.", help_format="plaintext")
+    """The sub-command for hands on other hosts."""
+    app = App(name="fleet", help_format="plaintext")
+    app.default(fleet)
+    app.command(halt)
     app.command(fleet_keys)
     return app
 

@@ -12,6 +12,8 @@ from typing import Annotated, Final
 from cyclopts import Parameter, Token
 
 from ..enums import Finger
+from ..fleet.remote_address import is_remote, parse_remote_address
+from ..link.address import parse_address
 from ..wire.checks import parse_fingers
 from .failures import CommandError, UsageError, usage
 
@@ -34,6 +36,21 @@ def is_loopback(host: str) -> bool:
         return host.lower() == "localhost"
 
 
+def full_address(address: str) -> str:
+    """The full form of a gripper's address, wherever it is.
+
+    Raises:
+        UsageError: malformed.
+    """
+    with usage():
+        return str(parse_remote_address(address)[0] if is_remote(address) else parse_address(address))
+
+
+def is_simulated(address: str) -> bool:
+    """Whether the gripper is a simulated one inside the command."""
+    return full_address(address).startswith("sim:")
+
+
 def _integer(name: str, low: int, high: int) -> Callable[[object, Sequence[Token]], int]:
     """A converter for integers in low..high; ``name`` is for an argument that has no option name."""
 
@@ -54,7 +71,7 @@ def _fingers(_type: object, tokens: Sequence[Token]) -> Finger:
 
 Address = Annotated[
     str,
-    Parameter(help="The gripper: tcp://HOST[:PORT], rtu:///dev/ttyUSB0 or sim:// (a simulated one)."),
+    Parameter(help="The gripper: tcp://HOST[:PORT], rtu:///dev/ttyUSB0, zenoh://SITE/HOST/NAME or sim://."),
 ]
 Yes = Annotated[bool, Parameter(name=("--yes", "-y"), negative=())]
 Position = Annotated[int, Parameter(converter=_integer("POSITION", 0, 255))]

@@ -7,11 +7,13 @@ from contextlib import asynccontextmanager
 
 from ..actions import Operator
 from ..enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ..fleet.remote_address import is_remote
+from ..fleet.remote_hand import RemoteHand
 from ..hand import RobotiqHand
 from ..protocol import Hand
 from ..session.options import POLL_INTERVAL_S
-from .arguments import USUAL, Link
-from .failures import usage
+from .arguments import USUAL, Link, need
+from .failures import UsageError, usage
 
 
 def make_hand(
@@ -21,12 +23,27 @@ def make_hand(
     poll_interval: float = POLL_INTERVAL_S,
     speed: int = DEFAULT_SPEED,
     force: int = DEFAULT_FORCE,
+    control: bool | None = True,
 ) -> Hand:
     """A hand that is not started. No other place in the command line knows what kind of hand it is.
+
+    Args:
+        address: the gripper.
+        link: how it is reached.
+        poll_interval: seconds between polls.
+        speed: what the axes get until set otherwise.
+        force: what the axes get until set otherwise.
+        control: on another host, whether it is commanded; None for when the first command comes.
 
     Raises:
         UsageError: a malformed address.
     """
+    if is_remote(address):
+        need("zenoh", "fleet")
+        if link != USUAL:
+            raise UsageError("a gripper on another host is set up there: its agent's file has these options")
+        with usage():
+            return RemoteHand(address, control=control)
     with usage():
         return RobotiqHand(
             address,
@@ -45,7 +62,7 @@ def make_operator(address: str, link: Link, *, speed: int, force: int) -> Operat
     Raises:
         UsageError: a malformed address.
     """
-    hand = make_hand(address, link, speed=speed, force=force)
+    hand = make_hand(address, link, speed=speed, force=force, control=None)
     return Operator(hand, speed=speed, force=force)
 
 
@@ -62,7 +79,7 @@ async def connected(address: str, link: Link = USUAL, *, halt: bool) -> AsyncIte
         UsageError: a malformed address.
         RobotiqError: no gripper there, or a link that failed.
     """
-    hand = make_hand(address, link)
+    hand = make_hand(address, link, control=halt)
     try:
         await hand.start(activate=False)
         yield hand

@@ -10,8 +10,8 @@ import sys
 from contextlib import suppress
 from typing import TextIO
 
-from ..link.address import parse_address
-from .failures import CommandError, UsageError, usage
+from .arguments import full_address, is_simulated
+from .failures import CommandError, UsageError
 
 NOTE = "Nothing here has run on real hardware yet: keep a hand on the emergency stop."
 
@@ -28,9 +28,8 @@ def consent(address: str, what: str, *, yes: bool) -> None:
         UsageError: there is no terminal to ask at, or the address is malformed.
         CommandError: the answer is not yes.
     """
-    with usage():
-        gripper = parse_address(address)
-    if yes or gripper.kind == "sim":
+    gripper = full_address(address)
+    if yes or is_simulated(address):
         return
     screen = _screen()
     if screen is None:

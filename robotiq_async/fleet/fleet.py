@@ -177,10 +177,9 @@ class Fleet:
     # -- inside ----------------------------------------------------------------------------------------
 
     async def _open(self) -> Bus:
-        from .configuration import client_configuration  # noqa: PLC0415  # needs the extra
-        from .zenoh_bus import open_bus  # noqa: PLC0415
+        from .zenoh_bus import open_bus  # noqa: PLC0415  # needs the extra
 
-        return await open_bus(client_configuration(self._route or default_route()), f"fleet {self._site}")
+        return await open_bus((self._route or default_route()).configuration(), f"the fleet {self._site}")
 
     def _entered(self) -> Bus:
         if self._bus is None:

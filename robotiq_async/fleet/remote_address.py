@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 from urllib.parse import parse_qsl
 
-from .configuration import LOOPBACK
+from .configuration import LOOPBACK, client_configuration
 from .names import SCHEME, GripperName
 
 FORM: Final = "zenoh://SITE/HOST/GRIPPER[?connect=tls/HOST:7447][&keys=FOLDER]"
@@ -30,6 +30,14 @@ class Route:
     connect: tuple[str, ...] = (LOOPBACK,)
     keys: Path | None = None
     insecure: bool = False
+
+    def configuration(self) -> dict[str, object]:
+        """The configuration of a session that takes this route.
+
+        Raises:
+            TypeError, ValueError: a malformed or unprotected endpoint, or a folder that lacks a file.
+        """
+        return client_configuration(self.connect, keys=self.keys, insecure=self.insecure)
 
 
 def default_route() -> Route:

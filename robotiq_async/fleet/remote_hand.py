@@ -54,7 +54,7 @@ class RemoteHand:
         self,
         address: str,
         *,
-        control: bool = True,
+        control: bool | None = True,
         connect_timeout: float = CONNECT_S,
         bus: Bus | None = None,
     ) -> None:
@@ -64,7 +64,8 @@ class RemoteHand:
             address: ``zenoh://SITE/HOST/GRIPPER``; ``?connect=tls/HOST:7447&keys=FOLDER`` says how to get
                 there. What the address does not say the environment does (``ROBOTIQ_ASYNC_CONNECT``,
                 ``ROBOTIQ_ASYNC_KEYS``), and without that it is an agent on this machine.
-            control: False only reads (and halts); :meth:`acquire` gets the lease later.
+            control: True acquires the lease when the hand starts, None with the first command that is
+                awaited, False not at all: it only reads (and halts) unless :meth:`acquire` is called.
             connect_timeout: seconds for finding the agent, 0.1..60.
             bus: an open session to share; it stays open. None opens one.
 
@@ -72,8 +73,8 @@ class RemoteHand:
             TypeError: an option of the wrong type.
             ValueError: an option outside its range, or a malformed address.
         """
-        if not isinstance(control, bool):
-            raise TypeError(f"control must be True or False, got {control!r}")
+        if control is not None and not isinstance(control, bool):
+            raise TypeError(f"control must be True, False or None, got {control!r}")
         self._name, self._route = parse_remote_address(address)
         self._connect_timeout = check_seconds("connect_timeout", connect_timeout, 0.1, 60.0)
         self._control = control
@@ -118,7 +119,9 @@ class RemoteHand:
         if self._session is not None and not self._session.is_over and self._session.loop is loop:
             raise InvalidStateError("this hand is started already", self.state, {State.SHUTDOWN})
         bus = await self._open()
-        self._session = session = RemoteSession(self._name, bus, self._channels, wants_control=self._control)
+        self._session = session = RemoteSession(
+            self._name, bus, self._channels, wants_control=self._control is True
+        )
         self._outbox = Outbox(session)
         try:
             await session.connect(self._connect_timeout)
@@ -156,10 +159,9 @@ class RemoteHand:
     async def _open(self) -> Bus:
         if self._shared is not None:
             return self._shared
-        from .configuration import client_configuration  # noqa: PLC0415  # needs the extra
-        from .zenoh_bus import open_bus  # noqa: PLC0415
+        from .zenoh_bus import open_bus  # noqa: PLC0415  # needs the extra
 
-        self._own = await open_bus(client_configuration(self._route), str(self._name))
+        self._own = await open_bus(self._route.configuration(), str(self._name))
         return self._own
 
     async def _activate_if_reset(self) -> None:
@@ -338,7 +340,7 @@ class RemoteHand:
         await self._ask("hold", {"fingers": int(check_mask(fingers))}, COMMAND_S)
 
     async def halt(self) -> None:
-        """Stop every axis now; returns when the gripper shows it. Takes no lease, and is asked until answered.
+        """Stop every axis now; returns when the gripper shows it. Takes no lease; asked until answered.
 
         If somebody else commands the gripper, that one loses the lease.
 
@@ -534,10 +536,13 @@ class RemoteHand:
     async def _ask(self, name: str, arguments: Fields, timeout: float) -> Fields:
         """Have the agent's hand do something; when cancelled, the agent calls it off."""
         session = self._asked()
+        if self._control is None and not session.is_in_control and session.lost is None:
+            await session.acquire()
         session.check_control()
         call = session.call(arguments)
         try:
-            return await session.send(call, f"cmd/{name}", timeout=timeout, urgency=Urgency.COMMAND)
+            value: Fields = await session.send(call, f"cmd/{name}", timeout=timeout, urgency=Urgency.COMMAND)
         except asyncio.CancelledError:
             session.call_off(call)
             raise
+        return value

@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ...errors import MeasuringError
-from ...link.address import parse_address
-from ..arguments import need
+from ..arguments import is_simulated, need
 from ..consent import read_line
-from ..failures import CommandError, UsageError, usage
+from ..failures import CommandError, UsageError
 
 if TYPE_CHECKING:
     from ...measure.campaigns import Campaign
@@ -40,21 +39,20 @@ def check(address: str, output: Path, speedup: float | None, runs: int, step: in
         UsageError: an argument is out of range.
         CommandError: matplotlib is missing.
     """
-    with usage():
-        kind = parse_address(address).kind
+    simulated = is_simulated(address)
     if output.suffix != ".csv":
         raise UsageError(f"--output must be a file named .csv, got {str(output)!r}")
     if not 1 <= runs <= 100:
         raise UsageError(f"--runs must be an integer in 1..100, got {runs}")
     if not 1 <= step <= 255:
         raise UsageError(f"--step must be an integer in 1..255, got {step}")
-    if speedup is not None and kind != "sim":
+    if speedup is not None and not simulated:
         raise UsageError("--speedup is for sim:// only: the time of a real gripper cannot be changed")
     if speedup is not None and not 1 <= speedup <= 50:
         raise UsageError(f"--speedup must be a number in 1..50, got {speedup:g}")
     if plot:
         need("matplotlib", "plot", ", or pass --no-plot")
-    if kind != "sim":
+    if not simulated:
         return 1.0
     return SPEEDUP if speedup is None else speedup
 

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from ...enums import DEFAULT_SPEED
-from ...link.address import parse_address
-from ..arguments import Address, Byte, Yes
+from ..arguments import Address, Byte, Yes, full_address
 from ..consent import consent
 from ..failures import CommandError, UsageError
 from .measure import NoPlot, Runs, Speedup, asked, carry_out, check, gripper, load_rich, refused, told
@@ -75,7 +74,7 @@ def force(
 
     with refused():
         readings = None if scale is None else read_table(scale, FORCE)
-        origin = {"gripper": str(parse_address(address)), "surface": surface, "speed": str(speed)}
+        origin = {"gripper": full_address(address), "surface": surface, "speed": str(speed)}
         campaign = force_campaign(path, step, runs, **origin)
         currents = _currents_of(campaign)
     read_scale = _scale(address, surface, readings, campaign.left, runs)

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ...enums import Finger
-from ...link.address import parse_address
-from ..arguments import Address, Fingers, Yes
+from ..arguments import Address, Fingers, Yes, full_address
 from ..consent import consent
 from ..failures import UsageError
 from .measure import NoPlot, Runs, Speedup, carry_out, check, gripper, load_rich, refused, told
@@ -62,7 +61,7 @@ def speed(
     from ...measure.campaigns import speed_campaign
 
     with refused():
-        origin = {"gripper": str(parse_address(address)), "fingers": str(fingers.name)}
+        origin = {"gripper": full_address(address), "fingers": str(fingers.name)}
         campaign = speed_campaign(output, step, runs, **origin)
     if campaign.left:
         consent(address, WARNING.format(count=runs * len(campaign.left)), yes=yes)

@@ -1,0 +1,101 @@
+"""``robotiq-async agent``."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from ...log import log
+from ...telemetry.payloads import printable
+from ..arguments import need
+from ..failures import UsageError
+from ..log_capture import forwarded_warnings
+
+if TYPE_CHECKING:
+    from ...fleet.agent_file import AgentSettings
+
+
+async def agent(
+    file: Annotated[Path, Parameter(metavar="FLEET.toml")],
+    /,
+    *,
+    check: Annotated[bool, Parameter(negative=())] = False,
+) -> None:
+    """Serve the grippers of this host to other hosts, until Ctrl-C or SIGTERM.
+
+    FLEET.toml names the site, and each gripper with its address:
+
+        site = "lab"
+        [grippers.left]
+        address = "tcp://192.168.1.11"
+
+    Other programs then use zenoh://SITE/HOST/left as its address, on this machine, and
+    on others once there are keys (robotiq-async fleet keys). The addresses are printed
+    on standard output when the agent listens, one a line.
+
+    Whoever commands a gripper holds a lease. WHAT STILL MOVES WHEN A LEASE ENDS IS HELD,
+    and so is what moves when the agent starts. When the agent ends, the fingers stop;
+    when it is killed, nobody stops them. It is no safety function.
+
+    A gripper that cannot be reached is tried again every second.
+
+    For example:
+
+        robotiq-async agent FLEET.toml
+        robotiq-async agent --check FLEET.toml
+
+    Args:
+        check: Check the file, print what would be served, and end.
+    """
+    settings = _settings(file)
+    if not check:
+        need("zenoh", "fleet")
+        await _serve(settings)
+    else:
+        for name, gripper in settings.grippers.items():
+            print(f"zenoh://{settings.site}/{settings.host}/{name}  {gripper.address}")
+
+
+def _settings(file: Path) -> AgentSettings:
+    from ...fleet.agent_file import AgentFileError, read_agent_file
+
+    try:
+        return read_agent_file(file)
+    except AgentFileError as error:
+        raise UsageError(str(error)) from None
+
+
+async def _serve(settings: AgentSettings) -> None:
+    from ...fleet.agent import Agent
+    from ...fleet.configuration import agent_configuration
+    from ...fleet.zenoh_bus import open_bus
+
+    configuration = agent_configuration(
+        settings.site,
+        settings.host,
+        settings.listen,
+        settings.connect,
+        keys=settings.keys,
+        insecure=settings.insecure,
+    )
+    if settings.insecure:
+        _tell("anyone who reaches this host can command its grippers: there are no keys")
+    hands = {name: gripper.make_hand() for name, gripper in settings.grippers.items()}
+    bus = await open_bus(configuration, ", ".join(settings.listen))
+    try:
+        with forwarded_warnings(_tell):
+            served = Agent(settings.site, settings.host, hands, bus, window=settings.window)
+            await served.run(lambda: [print(each.name, flush=True) for each in served.hands.values()])
+    except asyncio.CancelledError:
+        log.info("the agent was told to end")  # and that is how this command ends well
+    finally:
+        await bus.close()
+
+
+def _tell(words: str) -> None:
+    # Some of the words are others'.
+    print("robotiq-async:", printable(words), file=sys.stderr, flush=True)
