@@ -65,7 +65,7 @@ class Reply:
         return ((0.0, self.frame[:4] + len(body).to_bytes(2, "big") + body),)
 
 
-Damage = Callable[[Reply, float], Parts]
+Corruption = Callable[[Reply, float], Parts]
 """Takes the reply and the value of the trouble (see trouble.py); says what is sent instead."""
 
 

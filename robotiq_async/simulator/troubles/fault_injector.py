@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from robotiq_async.wire.request import AxisRequest, Request
 
-from .corruption import Damage, Parts, Reply, delay
+from .corruption import Corruption, Parts, Reply, delay
 from .trouble import KINDS, Trouble
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class Ongoing:
     over: asyncio.Event = field(default_factory=asyncio.Event)
 
 
-class Adversary:
+class FaultInjector:
     """Whatever goes wrong with one simulator. Troubles may overlap.
 
     Of those that are about the same reply the oldest acts.
@@ -79,7 +79,7 @@ class Adversary:
         self.check([trouble])
         ongoing, kind = Ongoing(trouble), KINDS[trouble.kind]
         self._do(trouble)
-        if kind.damage is not None or kind.lasts == math.inf:
+        if kind.corruption is not None or kind.lasts == math.inf:
             self._ongoing.append(ongoing)
             if trouble.kind == "idle-reset":
                 self._await_request()
@@ -159,15 +159,15 @@ class Adversary:
             self._await_request()
         return heard
 
-    def damage(self, frame: bytes) -> Parts | None:
+    def corrupt(self, frame: bytes) -> Parts | None:
         """What is sent in place of a reply; None if nothing is wrong with it. A refusal is left as it is."""
         reply = Reply(frame, self._endpoint.link == "rtu")
         if reply.is_exception:
             return None
         write = reply.is_to_a_write
-        trouble = self._first(lambda each: _damage_of(each) is not None and each.is_about(write=write))
-        damage = None if trouble is None else _damage_of(trouble)
-        return None if trouble is None or damage is None else damage(reply, trouble.amount)
+        trouble = self._first(lambda each: _corruption_of(each) is not None and each.is_about(write=write))
+        corruption = None if trouble is None else _corruption_of(trouble)
+        return None if trouble is None or corruption is None else corruption(reply, trouble.amount)
 
     def _first(self, fits: Callable[[Trouble], bool]) -> Trouble | None:
         """The oldest trouble that fits; it has met one more, and is over if it was for once."""
@@ -253,6 +253,6 @@ class Adversary:
         return [each.trouble.kind for each in self._ongoing]
 
 
-def _damage_of(trouble: Trouble) -> Damage | None:
+def _corruption_of(trouble: Trouble) -> Corruption | None:
     """What a trouble does to a reply; a multiplexer is late, and that is not all it does."""
-    return delay if trouble.kind == "multiplexer" else KINDS[trouble.kind].damage
+    return delay if trouble.kind == "multiplexer" else KINDS[trouble.kind].corruption
