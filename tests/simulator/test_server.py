@@ -366,6 +366,26 @@ async def test_mangled_replies(server: SimulatorServer, client: RawClient) -> No
     assert (await client.ask(b"\x04\x00\x00\x00\x01"))[0] == 3
 
 
+async def test_each_word_about_replies_replaces_the_one_before(
+    server: SimulatorServer, client: RawClient
+) -> None:
+    server.policy = lambda _: None
+    server.replies.silence()
+    server.replies.drop()
+    client.writer.write(client.frame(b"\x06\x00\x01\x12\x34"))
+    await until_written(server)
+    assert (await client.ask(b"\x03\x00\x01\x00\x01")) == bytes.fromhex("03 02 1234"), "one was lost"
+    server.replies.mangle(lambda frame: frame[:7] + b"\x03" + frame[8:])
+    server.replies.drop(0)
+    assert (await client.ask(b"\x04\x00\x00\x00\x01"))[0] == 4
+
+
+async def test_a_refusal_is_lost_like_any_reply(server: SimulatorServer, client: RawClient) -> None:
+    server.replies.drop()
+    client.writer.write(client.frame(b"\x04\x00\x00\x00\x09"))
+    assert (await client.ask(b"\x04\x00\x00\x00\x01"))[0] == 4
+
+
 async def test_a_policy_decides_on_every_reply(server: SimulatorServer, client: RawClient) -> None:
     server.policy = lambda frame: [(0.0, frame), (0.0, frame)]
     await client.ask(b"\x04\x00\x00\x00\x01")

@@ -8,9 +8,10 @@ from collections import deque
 from typing import TYPE_CHECKING, ClassVar, Final, Self
 
 from ..physics.gripper import SimulatedGripper
+from ..troubles.corruption import ReplyPolicy, unchanged
 from ..troubles.fault_injector import FaultInjector
+from ..troubles.replies import Replies
 from .connection import Connection
-from .replies import Replies, ReplyPolicy
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
@@ -31,9 +32,9 @@ class SimulatorEndpoint(ABC):
 
     Attributes:
         gripper: what answers. It keeps its state when the server is stopped and started again.
-        replies: the misbehaviour that is in force unless ``policy`` is replaced.
         policy: decides what becomes of each reply that no trouble is about.
-        fault_injector: makes troubles happen.
+        fault_injector: makes troubles happen, and decides on requests and replies.
+        replies: gives it a policy, in a word.
     """
 
     link: ClassVar[Link]
@@ -43,9 +44,9 @@ class SimulatorEndpoint(ABC):
     def __init__(self, gripper: SimulatedGripper | None) -> None:
         """A server that is not started."""
         self.gripper = SimulatedGripper() if gripper is None else gripper
-        self.replies = Replies()
-        self.policy: ReplyPolicy = self.replies
+        self.policy: ReplyPolicy = unchanged
         self.fault_injector = FaultInjector(self)
+        self.replies = Replies(self)
         self._server: ModbusBaseServer | None = None
         self._left_over: deque[bytes] = deque(maxlen=_MOST_LEFT_OVER)
 
@@ -54,10 +55,7 @@ class SimulatorEndpoint(ABC):
         return self
 
     async def __aexit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc: BaseException | None,
-        traceback: TracebackType | None,
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         await self.stop()
 
@@ -136,8 +134,7 @@ class SimulatorEndpoint(ABC):
 
     def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
         """What to send for a reply."""
-        corrupted = self.fault_injector.corrupt(reply)
-        return self.policy(reply) if corrupted is None else corrupted
+        return self.fault_injector.deliver(reply)
 
     def undelivered(self, part: bytes) -> None:
         """Lose what a client that is gone was to be sent; a multiplexer has it for the newest or the next."""
