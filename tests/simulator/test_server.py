@@ -11,7 +11,7 @@ import pytest
 from pymodbus.client import AsyncModbusTcpClient
 
 from robotiq_async.enums import Finger
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.simulator.server.endpoint import connections
 from robotiq_async.wire.request import AxisRequest, Request
 from robotiq_async.wire.status import RobotiqStatus
@@ -437,6 +437,29 @@ async def test_stop_during_a_power_cycle(server: SimulatorServer) -> None:
     await cycle
     assert not server.is_running
     assert server.gripper.is_powered
+
+
+async def test_a_power_cycle_that_is_cancelled_ends(server: SimulatorServer) -> None:
+    """It left a gripper without power that nobody could connect to."""
+    cycle = asyncio.create_task(server.power_cycle(off_time=3600.0))
+    await asyncio.sleep(0)
+    assert not server.gripper.is_powered
+    cycle.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await cycle
+    async with raw_client(server) as again:
+        assert (await again.read_status()).is_reset
+
+
+async def test_after_a_power_cycle_a_trouble_that_lasts_goes_on(server: SimulatorServer) -> None:
+    """Whoever refused connections, it accepted them."""
+    async with server.fault_injector.making(Trouble("refuse")):
+        await server.power_cycle()
+        assert server.gripper.is_powered
+        with pytest.raises(ConnectionRefusedError):
+            await asyncio.open_connection("127.0.0.1", server.port)
+    async with raw_client(server) as again:
+        assert (await again.read_status()).is_reset
 
 
 async def test_a_gripper_without_power_answers_nobody(server: SimulatorServer, client: RawClient) -> None:
