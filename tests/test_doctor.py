@@ -164,7 +164,7 @@ async def test_a_function_that_no_option_helps_with(where: bytes) -> None:
 
 @pytest.mark.parametrize("words", ["drop", "wrong-function"])
 async def test_one_lost_reply_does_not_make_it_another_unit(words: str) -> None:
-    async with SimulatorServer() as server, server.adversary.making(Trouble(words)):
+    async with SimulatorServer() as server, server.fault_injector.making(Trouble(words)):
         found = await findings(server.address)
     assert found["unit id"] == Finding(Level.GOOD, "unit id", "2")
     assert found["Modbus"].found == "answers when asked 2 times"

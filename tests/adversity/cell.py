@@ -90,12 +90,12 @@ async def trouble(
         yield plug
         return
     (what,) = parse_troubles(words)
-    if on_write and KINDS[what.kind].damage is not None:
+    if on_write and KINDS[what.kind].corruption is not None:
         what = replace(what, on="write")
-    ongoing = await world.server.adversary.begin(what)
+    ongoing = await world.server.fault_injector.begin(what)
 
     async def end() -> None:
-        await world.server.adversary.end(ongoing)
+        await world.server.fault_injector.end(ongoing)
 
     try:
         yield end

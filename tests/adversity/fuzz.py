@@ -228,7 +228,7 @@ async def live(
     await asyncio.gather(commanding, return_exceptions=True)
     if commanding.done() and not commanding.cancelled():
         commanding.result()
-    server.policy = server.replies
+    server.replies.normal()
     await hand.stop()
     return {
         "replies": line.replies,

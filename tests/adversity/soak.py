@@ -3,9 +3,9 @@
     python -m tests.adversity.soak --minutes 30
 
 A hand, a simulated gripper and everything that watches them share one event loop. In cycles of some
-seconds two users move axes, cancel, halt and run control loops, while the adversary cuts, delays, damages
-and refuses, and the application holds up the loop now and then. After each cycle everything comes to rest
-and is compared. Exits with 1 when a promise was broken.
+seconds two users move axes, cancel, halt and run control loops, while the fault injector cuts, delays,
+corrupts and refuses, and the application holds up the loop now and then. After each cycle everything comes to
+rest and is compared. Exits with 1 when a promise was broken.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class Soak:
         # Two users, on axes of their own where there are enough: who shares an axis supersedes the other.
         masks = [axes & pair or axes for pair in (Finger.A | Finger.B, Finger.C | Finger.SCISSOR)]
         users = [self.user(mask, ends) for mask in masks]
-        await asyncio.gather(*users, self.adversary(ends), self.application(ends))
+        await asyncio.gather(*users, self.fault_injector(ends), self.application(ends))
         await self.bounded("rest", 60.0, self.rest())
         for axis, travel in self.world.travels().items():
             if axis not in axes and travel != before[axis] and not self.everything_moved:
@@ -159,7 +159,7 @@ class Soak:
             self.breach(f"{what} took {took:.2f} s")
         return result
 
-    async def adversary(self, ends: float) -> None:
+    async def fault_injector(self, ends: float) -> None:
         """One trouble after the other."""
         kinds = ON_ANY_LINK + (ON_TCP if self.line is None else [])
         while time.monotonic() < ends:
@@ -171,7 +171,7 @@ class Soak:
             self.figures["troubles"] += 1
             self.figures[f"trouble: {trouble.kind}"] += 1
             self.everything_moved |= trouble.kind in MOVES_EVERYTHING
-            async with self.world.server.adversary.making(trouble):
+            async with self.world.server.fault_injector.making(trouble):
                 await asyncio.sleep(self.rng.choice((0.02, 0.2, 0.8)))
                 if trouble.kind == "foreign":
                     self.writes.forget()

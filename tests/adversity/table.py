@@ -48,7 +48,7 @@ def variants(trouble: str) -> Iterator[tuple[str, str]]:
     (parsed,) = parse_troubles(trouble)
     kind = KINDS[parsed.kind]
     forms = [trouble]
-    if parsed.lasts is None and kind.damage is not None:
+    if parsed.lasts is None and kind.corruption is not None:
         forms = [f"{trouble} once", f"{trouble} for 60"]
     elif parsed.lasts is None and kind.lasts > 0:
         forms = [f"{trouble} for 60"]

@@ -108,7 +108,7 @@ def test_a_silent_gripper_is_given_up_on_also_in_a_loop_that_is_held_up_again_an
         async with world() as here:
             await here.activate_beforehand()
             await here.hand.start()
-            async with here.server.adversary.making(Trouble("silence")):
+            async with here.server.fault_injector.making(Trouble("silence")):
                 began = here.loop.time()
                 while here.hand.state is not State.DISCONNECTED:
                     here.loop.hold_up(0.05)

@@ -39,8 +39,8 @@ def test_it_is_found_reset_when_the_link_is_back(link: str, monkeypatch: pytest.
             moving = asyncio.create_task(here.hand.move(200, A, speed=0))
             await here.until_moving()
             writes = len(here.gripper.writes)
-            async with here.server.adversary.making(Trouble("idle-reset", 0.5)):
-                async with here.server.adversary.making(Trouble("silence")):
+            async with here.server.fault_injector.making(Trouble("idle-reset", 0.5)):
+                async with here.server.fault_injector.making(Trouble("silence")):
                     with pytest.raises(ConnectionLostError):
                         await moving
                     await asyncio.sleep(1)
@@ -63,7 +63,7 @@ def test_it_loses_its_activation_while_the_loop_is_held_up(
             moving = asyncio.create_task(here.hand.move(200, A, speed=0))
             await here.until_moving()
             writes = len(here.gripper.writes)
-            async with here.server.adversary.making(Trouble("idle-reset", 0.5)):
+            async with here.server.fault_injector.making(Trouble("idle-reset", 0.5)):
                 here.loop.hold_up(1.0)
                 if command:
                     here.hand.command(B, position=100)

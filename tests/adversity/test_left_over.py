@@ -47,7 +47,7 @@ def test_a_reply_that_is_left_over_moves_no_axis_that_nobody_addressed() -> None
         async with world() as here:
             await here.activate_beforehand()
             await send(here, 99, 200)
-            async with here.server.adversary.making(Trouble("multiplexer", 0.03)):
+            async with here.server.fault_injector.making(Trouble("multiplexer", 0.03)):
                 await ask_and_go(here)
                 await send(here, 40, 137)
                 with nobody_else_moves(here):
@@ -64,7 +64,7 @@ def test_after_what_was_left_over_the_next_start_finds_the_gripper() -> None:
     async def main() -> None:
         async with world() as here:
             await here.activate_beforehand()
-            async with here.server.adversary.making(Trouble("multiplexer", 0.03)):
+            async with here.server.fault_injector.making(Trouble("multiplexer", 0.03)):
                 await ask_and_go(here)
                 await asyncio.sleep(0.1)
                 with pytest.raises(ProtocolError, match="nobody asked for"):
@@ -85,10 +85,10 @@ def test_a_hand_comes_back_through_a_multiplexer(late: float) -> None:
         async with world() as here:
             await here.activate_beforehand()
             await here.hand.start()
-            async with here.server.adversary.making(Trouble("multiplexer", late)):
+            async with here.server.fault_injector.making(Trouble("multiplexer", late)):
                 await asyncio.sleep(1)
                 for _ in range(5):
-                    await here.server.adversary.begin(Trouble("close"))
+                    await here.server.fault_injector.begin(Trouble("close"))
                     await here.until_state(State.DISCONNECTED)
                     await here.hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
                     await asyncio.sleep(0.7)
@@ -105,7 +105,7 @@ def test_no_status_is_older_than_a_reply_may_be(late: float) -> None:
         async with world() as here:
             await here.activate_beforehand()
             await here.hand.start()
-            async with here.server.adversary.making(Trouble("multiplexer", late)):
+            async with here.server.fault_injector.making(Trouble("multiplexer", late)):
                 for position in range(20):
                     with contextlib.suppress(RobotiqConnectionError):
                         await here.hand.set_position(10 * position, A)

@@ -22,7 +22,7 @@ def test_a_cancelled_move_stops_also_when_the_link_fails_at_that_moment(trouble:
             await here.hand.start()
             moving = asyncio.create_task(here.hand.move(255, A, speed=0))
             await asyncio.sleep(0.3)
-            async with here.server.adversary.making(trouble):
+            async with here.server.fault_injector.making(trouble):
                 moving.cancel()
                 await asyncio.sleep(0.3)
             await asyncio.sleep(0.3)
@@ -41,7 +41,7 @@ def test_a_move_cancelled_in_the_turn_in_which_the_link_is_lost_is_stopped_or_to
             await here.hand.start()
             moving = asyncio.create_task(here.hand.move(255, A, speed=0))
             await asyncio.sleep(0.3)
-            await here.server.adversary.begin(Trouble("close"))
+            await here.server.fault_injector.begin(Trouble("close"))
             here.loop.after_turns(turns, moving.cancel)
             await asyncio.wait({moving})
             await asyncio.sleep(4)
@@ -59,12 +59,14 @@ def test_a_write_fails_within_a_second_on_a_slow_link(response_timeout: float) -
         async with world(response_timeout=response_timeout) as here:
             await here.activate_beforehand()
             await here.hand.start()
-            async with here.server.adversary.making(Trouble("delay", response_timeout - 0.01, on="read")):
+            async with here.server.fault_injector.making(
+                Trouble("delay", response_timeout - 0.01, on="read")
+            ):
                 await asyncio.sleep(1.0)
                 heard = len(here.server.heard)
                 await here.until(lambda: len(here.server.heard) > heard)
                 began = here.loop.time()
-                async with here.server.adversary.making(Trouble("drop", on="write")):
+                async with here.server.fault_injector.making(Trouble("drop", on="write")):
                     with pytest.raises(ConnectionLostError):
                         await here.hand.set_position(100)
                 assert here.loop.time() - began <= 1.0

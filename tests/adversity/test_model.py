@@ -212,9 +212,9 @@ class LiveUse(RuleBasedStateMachine):
     def the_link_fails(self, trouble: Trouble) -> None:
         async def fail() -> None:
             reconnects = self.hand.statistics.reconnects
-            ongoing = await self.world.server.adversary.begin(trouble)
+            ongoing = await self.world.server.fault_injector.begin(trouble)
             await asyncio.sleep(0.6)
-            await self.world.server.adversary.end(ongoing)
+            await self.world.server.fault_injector.end(ongoing)
             if self.hand.statistics.reconnects > reconnects:
                 writes = len(self.gripper.writes)
                 await asyncio.sleep(1.0)
@@ -225,7 +225,7 @@ class LiveUse(RuleBasedStateMachine):
     @rule(trouble=st.sampled_from(LASTING_TROUBLES), seconds=st.sampled_from([0.02, 0.7]))
     def something_goes_wrong(self, trouble: Trouble, seconds: float) -> None:
         async def go() -> None:
-            async with self.world.server.adversary.making(trouble):
+            async with self.world.server.fault_injector.making(trouble):
                 await asyncio.sleep(seconds)
             await asyncio.sleep(2.5)  # the longest pause before the next try is 2 s
 
@@ -235,7 +235,7 @@ class LiveUse(RuleBasedStateMachine):
     def another_client_writes(self, position: int) -> None:
         self.foreign += 1
         self.may_move = ALL
-        self.run(self.world.server.adversary.begin(Trouble("foreign", position)))
+        self.run(self.world.server.fault_injector.begin(Trouble("foreign", position)))
 
     # -- what must be so -------------------------------------------------------------------------------
 

@@ -47,7 +47,7 @@ def test_stop_over_a_new_link_leaves_what_others_have_activated_active() -> None
         async with world() as here:
             await here.hand.start(activate=False)
             here.gripper.place_object(Finger.ABC, 150)
-            async with here.server.adversary.making(Trouble("refuse")):
+            async with here.server.fault_injector.making(Trouble("refuse")):
                 await asyncio.sleep(0.3)
                 here.gripper.write(0, [0x0100])
                 await asyncio.sleep(3)

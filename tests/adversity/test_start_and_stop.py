@@ -57,7 +57,7 @@ def test_an_activation_of_ours_is_taken_back_also_after_the_link_blinked(how: st
                 await here.hand.start(activate=False)
             activating = asyncio.create_task(here.hand.start() if how == "start" else here.hand.activate())
             await here.until_moving()
-            await here.server.adversary.begin(Trouble("close"))
+            await here.server.fault_injector.begin(Trouble("close"))
             with pytest.raises(RobotiqError):
                 await activating
             if how == "stop":

@@ -104,7 +104,7 @@ async def test_a_stop_that_was_not_heard_is_sent_again(
     await hand.set_position(255)
     await until_moving(server, hand)
     (trouble,) = parse_troubles(what)
-    await server.adversary.begin(trouble)
+    await server.fault_injector.begin(trouble)
     await hand.stop()
     assert not server.gripper.is_moving
     assert not Request.from_registers(server.gripper.request_registers).go

@@ -16,7 +16,7 @@ from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, Sim
 from robotiq_async.simulator.server.connection import MOST_UNREAD, MOST_WAITING
 from robotiq_async.simulator.server.endpoint import connections
 from robotiq_async.simulator.server.serial_connection import MOST_UNSENT
-from tests.simulator.test_adversary import simulator, virtual
+from tests.simulator.test_fault_injector import simulator, virtual
 from tests.simulator.test_serial_server import Line, with_crc
 from tests.simulator.test_server import RawClient, raw_client
 from tests.virtual_line import VirtualLine
@@ -86,7 +86,7 @@ async def test_a_client_that_goes_away_while_it_has_to_wait() -> None:
 @virtual
 async def test_replies_that_are_sent_later_are_not_kept_without_limit() -> None:
     async with simulator() as server, raw_client(server) as client:
-        await server.adversary.begin(Trouble("delay", 10))
+        await server.fault_injector.begin(Trouble("delay", 10))
         client.writer.write(writes(client, 6_000))
         await asyncio.sleep(9)
         assert len(server.gripper.writes) == MOST_WAITING

@@ -11,7 +11,7 @@ import serial
 
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
 from robotiq_async.simulator.server.framing import Frame
-from tests.simulator.test_adversary import virtual
+from tests.simulator.test_fault_injector import virtual
 from tests.simulator.test_serial_server import with_crc
 from tests.virtual_line import VirtualLine
 

@@ -11,7 +11,7 @@ import pytest
 from pymodbus.client import AsyncModbusTcpClient
 
 from robotiq_async.enums import Finger
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.simulator.server.endpoint import connections
 from robotiq_async.wire.request import AxisRequest, Request
 from robotiq_async.wire.status import RobotiqStatus
@@ -366,6 +366,26 @@ async def test_mangled_replies(server: SimulatorServer, client: RawClient) -> No
     assert (await client.ask(b"\x04\x00\x00\x00\x01"))[0] == 3
 
 
+async def test_each_word_about_replies_replaces_the_one_before(
+    server: SimulatorServer, client: RawClient
+) -> None:
+    server.policy = lambda _: None
+    server.replies.silence()
+    server.replies.drop()
+    client.writer.write(client.frame(b"\x06\x00\x01\x12\x34"))
+    await until_written(server)
+    assert (await client.ask(b"\x03\x00\x01\x00\x01")) == bytes.fromhex("03 02 1234"), "one was lost"
+    server.replies.mangle(lambda frame: frame[:7] + b"\x03" + frame[8:])
+    server.replies.drop(0)
+    assert (await client.ask(b"\x04\x00\x00\x00\x01"))[0] == 4
+
+
+async def test_a_refusal_is_lost_like_any_reply(server: SimulatorServer, client: RawClient) -> None:
+    server.replies.drop()
+    client.writer.write(client.frame(b"\x04\x00\x00\x00\x09"))
+    assert (await client.ask(b"\x04\x00\x00\x00\x01"))[0] == 4
+
+
 async def test_a_policy_decides_on_every_reply(server: SimulatorServer, client: RawClient) -> None:
     server.policy = lambda frame: [(0.0, frame), (0.0, frame)]
     await client.ask(b"\x04\x00\x00\x00\x01")
@@ -417,6 +437,29 @@ async def test_stop_during_a_power_cycle(server: SimulatorServer) -> None:
     await cycle
     assert not server.is_running
     assert server.gripper.is_powered
+
+
+async def test_a_power_cycle_that_is_cancelled_ends(server: SimulatorServer) -> None:
+    """It left a gripper without power that nobody could connect to."""
+    cycle = asyncio.create_task(server.power_cycle(off_time=3600.0))
+    await asyncio.sleep(0)
+    assert not server.gripper.is_powered
+    cycle.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await cycle
+    async with raw_client(server) as again:
+        assert (await again.read_status()).is_reset
+
+
+async def test_after_a_power_cycle_a_trouble_that_lasts_goes_on(server: SimulatorServer) -> None:
+    """Whoever refused connections, it accepted them."""
+    async with server.fault_injector.making(Trouble("refuse")):
+        await server.power_cycle()
+        assert server.gripper.is_powered
+        with pytest.raises(ConnectionRefusedError):
+            await asyncio.open_connection("127.0.0.1", server.port)
+    async with raw_client(server) as again:
+        assert (await again.read_status()).is_reset
 
 
 async def test_a_gripper_without_power_answers_nobody(server: SimulatorServer, client: RawClient) -> None:

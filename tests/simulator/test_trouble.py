@@ -62,8 +62,8 @@ def troubles(draw: st.DrawFn) -> Trouble:
 
 def test_the_kinds_that_are_about_replies() -> None:
     """The lists above are all there are."""
-    damaging = {name for name, kind in KINDS.items() if kind.damage is not None}
-    assert damaging == {*REPLIES, "wrong-echo"}
+    corrupting = {name for name, kind in KINDS.items() if kind.corruption is not None}
+    assert corrupting == {*REPLIES, "wrong-echo"}
     assert {name for name, kind in KINDS.items() if kind.lasts == INF} == {
         *CONDITIONS,
         *("delay", "pieces", "silence"),

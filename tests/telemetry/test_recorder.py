@@ -88,7 +88,7 @@ async def test_a_request_tells_whether_it_was_acknowledged(gripper: SimulatedGri
         requests = hand.requests()
         await hand.set_speed(5)
         first = await anext(requests)
-        async with server.adversary.making(Trouble("drop", on="write")):
+        async with server.fault_injector.making(Trouble("drop", on="write")):
             with pytest.raises(ConnectionLostError):
                 await hand.set_speed(6)
         second = await anext(requests)

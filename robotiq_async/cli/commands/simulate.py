@@ -73,13 +73,13 @@ async def simulate(
         else:
             unit = RTU_REGISTERS.device_id if device_id is None else device_id
             server = SerialSimulatorServer(serial, gripper, device_id=unit)
-        server.adversary.check(plan)
+        server.fault_injector.check(plan)
     if serial is None and not is_loopback(host):
         print(f"robotiq-async: anyone who reaches {host} can command this gripper", file=sys.stderr)
     try:
         async with server:
             print(server.address, flush=True)
-            await server.adversary.run(plan, _tell)
+            await server.fault_injector.run(plan, _tell)
             await asyncio.Event().wait()
     except asyncio.CancelledError:
         pass  # Being told to stop is how this command ends well.

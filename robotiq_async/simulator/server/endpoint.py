@@ -8,9 +8,10 @@ from collections import deque
 from typing import TYPE_CHECKING, ClassVar, Final, Self
 
 from ..physics.gripper import SimulatedGripper
-from ..troubles.fault_injector import Adversary
+from ..troubles.corruption import ReplyPolicy, unchanged
+from ..troubles.fault_injector import FaultInjector
+from ..troubles.replies import Replies
 from .connection import Connection
-from .replies import Replies, ReplyPolicy
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
@@ -31,9 +32,9 @@ class SimulatorEndpoint(ABC):
 
     Attributes:
         gripper: what answers. It keeps its state when the server is stopped and started again.
-        replies: the misbehaviour that is in force unless ``policy`` is replaced.
         policy: decides what becomes of each reply that no trouble is about.
-        adversary: makes troubles happen.
+        fault_injector: makes troubles happen, and decides on requests and replies.
+        replies: gives it a policy, in a word.
     """
 
     link: ClassVar[Link]
@@ -43,9 +44,9 @@ class SimulatorEndpoint(ABC):
     def __init__(self, gripper: SimulatedGripper | None) -> None:
         """A server that is not started."""
         self.gripper = SimulatedGripper() if gripper is None else gripper
-        self.replies = Replies()
-        self.policy: ReplyPolicy = self.replies
-        self.adversary = Adversary(self)
+        self.policy: ReplyPolicy = unchanged
+        self.fault_injector = FaultInjector(self)
+        self.replies = Replies(self)
         self._server: ModbusBaseServer | None = None
         self._left_over: deque[bytes] = deque(maxlen=_MOST_LEFT_OVER)
 
@@ -54,10 +55,7 @@ class SimulatorEndpoint(ABC):
         return self
 
     async def __aexit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc: BaseException | None,
-        traceback: TracebackType | None,
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         await self.stop()
 
@@ -132,16 +130,15 @@ class SimulatorEndpoint(ABC):
 
     def hears(self, frame: Frame) -> bool:
         """Whether a request is heard, and meant for this gripper."""
-        return self._is_meant(frame.unit) and self.adversary.hears()
+        return self._is_meant(frame.unit) and self.fault_injector.hears()
 
     def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
         """What to send for a reply."""
-        damaged = self.adversary.damage(reply)
-        return self.policy(reply) if damaged is None else damaged
+        return self.fault_injector.deliver(reply)
 
     def undelivered(self, part: bytes) -> None:
         """Lose what a client that is gone was to be sent; a multiplexer has it for the newest or the next."""
-        if self._server is None or not self.adversary.is_multiplexed:
+        if self._server is None or not self.fault_injector.is_multiplexed:
             return
         present = [each for each in connections(self._server) if each.is_active()]
         if present:
@@ -151,7 +148,7 @@ class SimulatorEndpoint(ABC):
 
     def left_over(self) -> Iterable[bytes]:
         """What a new client is sent before it has asked for anything."""
-        parts = tuple(self._left_over) if self.adversary.is_multiplexed else ()
+        parts = tuple(self._left_over) if self.fault_injector.is_multiplexed else ()
         self._left_over.clear()
         return parts
 

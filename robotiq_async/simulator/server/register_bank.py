@@ -8,11 +8,7 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 
 from robotiq_async.wire.registers import REGISTER_COUNT, RTU_REGISTERS
 
-from ..functions import (
-    READ_HOLDING,
-    READ_INPUT,
-    READ_WRITE,
-)
+from ..functions import READ_HOLDING, READ_INPUT, READ_WRITE
 
 if TYPE_CHECKING:
     from pymodbus.constants import ExcCodes

@@ -11,6 +11,7 @@ from pymodbus.server import ModbusTcpServer
 from robotiq_async.wire.checks import check_int, check_seconds
 
 from ..functions import TCP_FUNCTIONS
+from ..troubles.trouble import Trouble
 from .connection import Connection
 from .endpoint import SimulatorEndpoint, hang_up
 from .framing import Frame, take_tcp
@@ -117,13 +118,9 @@ class SimulatorServer(SimulatorEndpoint):
             ValueError: off_time is negative or above an hour.
         """
         check_seconds("off_time", off_time, 0, _LONGEST_OFF)
-        self.refuse()
         self.cut()
-        self.gripper.power_off()
-        await asyncio.sleep(off_time / self.gripper.speedup)
-        self.gripper.power_on()
-        if self.is_running:
-            await self.accept()
+        async with self.fault_injector.making(Trouble("power-cut")):
+            await asyncio.sleep(off_time / self.gripper.speedup)
 
     def take(self, inbox: bytearray) -> Frame | None:
         """Cut the next request out of what has arrived."""

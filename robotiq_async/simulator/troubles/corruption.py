@@ -6,7 +6,7 @@ anew, so that a client which finds it out has looked at the right thing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from pymodbus.framer import FramerRTU
@@ -65,8 +65,19 @@ class Reply:
         return ((0.0, self.frame[:4] + len(body).to_bytes(2, "big") + body),)
 
 
-Damage = Callable[[Reply, float], Parts]
+Corruption = Callable[[Reply, float], Parts]
 """Takes the reply and the value of the trouble (see trouble.py); says what is sent instead."""
+
+ReplyPolicy = Callable[[bytes], Iterable[tuple[float, bytes]] | None]
+"""Takes the frame of one reply; gives what to send instead, as (delay in seconds, bytes), or None to hang up.
+
+An empty answer loses the reply. The request behind the reply has been carried out already.
+"""
+
+
+def unchanged(frame: bytes) -> Parts:
+    """The policy of a simulator that nobody gave one: the reply at once and as it is."""
+    return ((0.0, frame),)
 
 
 def delay(reply: Reply, value: float) -> Parts:

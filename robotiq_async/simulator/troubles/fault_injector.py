@@ -11,17 +11,13 @@ from typing import TYPE_CHECKING
 
 from robotiq_async.wire.request import AxisRequest, Request
 
-from .corruption import Damage, Parts, Reply, delay
+from .corruption import Reply
 from .trouble import KINDS, Trouble
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator
 
-    from ..server.endpoint import SimulatorEndpoint
-
-_SHUT = ("refuse", "power-cut")
-"""While one of these lasts nobody is let in."""
-_DEAF = ("silence", "accept-silence")
+    from .target import Target
 
 
 @dataclass(slots=True, eq=False)
@@ -39,17 +35,17 @@ class Ongoing:
     over: asyncio.Event = field(default_factory=asyncio.Event)
 
 
-class Adversary:
+class FaultInjector:
     """Whatever goes wrong with one simulator. Troubles may overlap.
 
-    Of those that are about the same reply the oldest acts.
+    Of those that are about the same reply the oldest acts; with none of them, the simulator's policy.
     """
 
-    def __init__(self, endpoint: SimulatorEndpoint) -> None:
+    def __init__(self, target: Target) -> None:
         """No trouble."""
-        self._endpoint = endpoint
+        self._target = target
         self._ongoing: list[Ongoing] = []
-        self._device_cycle = endpoint.gripper.device_cycle
+        self._device_cycle = target.gripper.device_cycle
         """What the gripper has when nothing makes it slow."""
         self._idle: asyncio.TimerHandle | None = None
         """When the gripper loses its activation unless a request comes before."""
@@ -66,8 +62,8 @@ class Adversary:
             ValueError: one of them does not.
         """
         for trouble in troubles:
-            if KINDS[trouble.kind].link not in (None, self._endpoint.link):
-                raise ValueError(f"{trouble.kind} does not fit a simulator on {self._endpoint.link}")
+            if KINDS[trouble.kind].link not in (None, self._target.link):
+                raise ValueError(f"{trouble.kind} does not fit a simulator on {self._target.link}")
 
     async def begin(self, trouble: Trouble) -> Ongoing:
         """Let a trouble begin now, whenever its plan would. :meth:`end` ends it.
@@ -79,7 +75,7 @@ class Adversary:
         self.check([trouble])
         ongoing, kind = Ongoing(trouble), KINDS[trouble.kind]
         self._do(trouble)
-        if kind.damage is not None or kind.lasts == math.inf:
+        if kind.corruption is not None or kind.lasts == math.inf:
             self._ongoing.append(ongoing)
             if trouble.kind == "idle-reset":
                 self._await_request()
@@ -145,39 +141,37 @@ class Adversary:
                 return
             await asyncio.sleep(began + trouble.every - loop.time())
 
-    # What the endpoint asks.
+    # What the simulator asks.
 
     @property
     def is_multiplexed(self) -> bool:
         """Whether clients share a connection to the gripper that outlives theirs."""
-        return "multiplexer" in self._kinds
+        return bool(self._lasting("multiplexer"))
 
     def hears(self) -> bool:
         """Whether the request that came in is heard."""
-        heard = self._first(lambda each: each.kind in _DEAF) is None
-        if heard:
-            self._await_request()
-        return heard
-
-    def damage(self, frame: bytes) -> Parts | None:
-        """What is sent in place of a reply; None if nothing is wrong with it. A refusal is left as it is."""
-        reply = Reply(frame, self._endpoint.link == "rtu")
-        if reply.is_exception:
-            return None
-        write = reply.is_to_a_write
-        trouble = self._first(lambda each: _damage_of(each) is not None and each.is_about(write=write))
-        damage = None if trouble is None else _damage_of(trouble)
-        return None if trouble is None or damage is None else damage(reply, trouble.amount)
-
-    def _first(self, fits: Callable[[Trouble], bool]) -> Trouble | None:
-        """The oldest trouble that fits; it has met one more, and is over if it was for once."""
         for ongoing in self._ongoing:
-            if fits(ongoing.trouble):
-                ongoing.hits += 1
-                if ongoing.trouble.duration == 0:
-                    self._forget(ongoing)
-                return ongoing.trouble
-        return None
+            if ongoing.trouble.kind in ("silence", "accept-silence"):
+                self._hit(ongoing)
+                return False
+        self._await_request()
+        return True
+
+    def deliver(self, frame: bytes) -> Iterable[tuple[float, bytes]] | None:
+        """What to send for a reply; None to hang up."""
+        reply = Reply(frame, self._target.link == "rtu")
+        for ongoing in self._ongoing:
+            parts = ongoing.trouble.corrupt(reply)
+            if parts is not None:
+                self._hit(ongoing)
+                return parts
+        return self._target.policy(frame)
+
+    def _hit(self, ongoing: Ongoing) -> None:
+        """A trouble has met one more; it is over if it was for once."""
+        ongoing.hits += 1
+        if ongoing.trouble.duration == 0:
+            self._forget(ongoing)
 
     def _forget(self, ongoing: Ongoing) -> None:
         self._ongoing.remove(ongoing)
@@ -187,15 +181,15 @@ class Adversary:
 
     def _do(self, trouble: Trouble) -> None:
         """What happens at the beginning."""
-        endpoint, gripper, amount = self._endpoint, self._endpoint.gripper, trouble.amount
+        target, gripper, amount = self._target, self._target.gripper, trouble.amount
         match trouble.kind:
             case "close":
-                endpoint.cut()
+                target.cut()
             case "reset" | "accept-silence":
-                endpoint.cut(reset=True)
+                target.cut(reset=True)
             case "refuse" | "power-cut":
-                endpoint.refuse()
-                endpoint.cut(reset=True)
+                target.refuse()
+                target.cut(reset=True)
                 if trouble.kind == "power-cut":
                     gripper.power_off()
             case "foreign":
@@ -204,7 +198,7 @@ class Adversary:
                 image = replace(image, individual_fingers=True, individual_scissor=True)
                 gripper.write(0, replace(image, go=True, axes=axes).registers)
             case "slow-device":
-                if "slow-device" not in self._kinds:
+                if not self._lasting("slow-device"):
                     self._device_cycle = gripper.device_cycle
                 gripper.device_cycle = amount * gripper.speedup
             case "interference":
@@ -216,43 +210,35 @@ class Adversary:
 
     async def _undo(self, trouble: Trouble) -> None:
         """What happens at the end; the troubles that go on keep their effect."""
-        endpoint, gripper = self._endpoint, self._endpoint.gripper
+        target, gripper = self._target, self._target.gripper
         match trouble.kind:
             case "refuse" | "power-cut":
-                if "power-cut" not in self._kinds:
+                if not self._lasting("power-cut"):
                     gripper.power_on()
-                if not any(kind in _SHUT for kind in self._kinds) and endpoint.is_running:
-                    await endpoint.accept()
+                if not self._lasting("refuse", "power-cut") and target.is_running:
+                    await target.accept()
             case "slow-device":
-                slow = [each.trouble.amount for each in self._ongoing if each.trouble.kind == "slow-device"]
-                gripper.device_cycle = slow[-1] * gripper.speedup if slow else self._device_cycle
+                slow = self._lasting("slow-device")
+                gripper.device_cycle = slow[-1].amount * gripper.speedup if slow else self._device_cycle
             case "idle-reset":
                 self._await_request()
             case "interference" | "fault":
                 gripper.clear_faults()
-                for each in self._ongoing:
-                    if each.trouble.kind in ("interference", "fault"):
-                        self._do(each.trouble)
+                for each in self._lasting("interference", "fault"):
+                    self._do(each)
 
     def _await_request(self) -> None:
         """Begin to wait for the next request, as long as the least patient trouble says."""
         if self._idle is not None:
             self._idle.cancel()
-        waits = [each.trouble.amount for each in self._ongoing if each.trouble.kind == "idle-reset"]
+        waits = [each.amount for each in self._lasting("idle-reset")]
         self._idle = asyncio.get_running_loop().call_later(min(waits), self._reset) if waits else None
 
     def _reset(self) -> None:
         """The gripper loses its activation, and keeps its power."""
-        gripper = self._endpoint.gripper
-        if gripper.is_powered:
-            gripper.power_off()
-            gripper.power_on()
+        if self._target.gripper.is_powered:
+            self._target.gripper.power_cycle()
 
-    @property
-    def _kinds(self) -> list[str]:
-        return [each.trouble.kind for each in self._ongoing]
-
-
-def _damage_of(trouble: Trouble) -> Damage | None:
-    """What a trouble does to a reply; a multiplexer is late, and that is not all it does."""
-    return delay if trouble.kind == "multiplexer" else KINDS[trouble.kind].damage
+    def _lasting(self, *kinds: str) -> list[Trouble]:
+        """The troubles of these kinds that last, oldest first."""
+        return [each.trouble for each in self._ongoing if each.trouble.kind in kinds]

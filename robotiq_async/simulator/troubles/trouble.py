@@ -18,10 +18,12 @@ from typing import Final, Literal, NamedTuple, get_args
 
 from robotiq_async.wire.checks import check_seconds
 
-from . import corruption as damage
-from .corruption import Damage
+from . import corruption
+from .corruption import Corruption, Parts, Reply
 
 LONGEST: Final = 86400.0
+_EVENT: Final = 0.0
+_CONDITION: Final = math.inf
 
 On = Literal["read", "write", "any"]
 Link = Literal["tcp", "rtu"]
@@ -36,62 +38,60 @@ class Kind(NamedTuple):
         value: what its value is when nothing is said; None where it has none.
         low: the least value.
         high: the greatest value.
-        damage: what it does to a reply, if that is what it does.
+        corruption: what it does to a reply, if that is what it does.
         on: the requests whose replies it can be about.
         link: the only kind of link it fits, if there is only one.
     """
 
     meaning: str
-    lasts: float
+    lasts: float = _EVENT
     value: float | None = None
     low: float = 0.0
     high: float = 0.0
-    damage: Damage | None = None
+    corruption: Corruption | None = None
     on: On = "any"
     link: Link | None = None
 
     @property
     def can_hit_once(self) -> bool:
         """Whether it makes sense to have it for a single reply or a single moment."""
-        return self.lasts == _EVENT or self.damage is not None or self is KINDS["silence"]
+        return self.lasts == _EVENT or self.corruption is not None or self is KINDS["silence"]
 
-
-_EVENT: Final = 0.0
-_CONDITION: Final = math.inf
 
 KINDS: Final[dict[str, Kind]] = {
     # Replies.
-    "delay": Kind("replies come VALUE seconds later", _CONDITION, 0.05, 0, 10, damage.delay),
+    "delay": Kind("replies come VALUE seconds later", _CONDITION, 0.05, 0, 10, corruption.delay),
     "late": Kind(
-        "a reply comes VALUE seconds later, after the client has given up", _EVENT, 0.7, 0, 10, damage.delay
+        "a reply comes VALUE seconds later, after the client has given up",
+        *(_EVENT, 0.7, 0, 10, corruption.delay),
     ),
-    "drop": Kind("a reply is lost; its request was carried out", _EVENT, damage=damage.drop),
-    "half": Kind("only the first half of a reply comes", _EVENT, damage=damage.half),
+    "drop": Kind("a reply is lost; its request was carried out", corruption=corruption.drop),
+    "half": Kind("only the first half of a reply comes", corruption=corruption.half),
     "pieces": Kind(
-        "replies come in three pieces, VALUE seconds apart", _CONDITION, 0.002, 0, 1, damage.pieces
+        "replies come in three pieces, VALUE seconds apart", _CONDITION, 0.002, 0, 1, corruption.pieces
     ),
-    "twice": Kind("a reply comes twice in one segment", _EVENT, damage=damage.twice),
-    "wrong-function": Kind("a reply is one to another function", _EVENT, damage=damage.wrong_function),
-    "wrong-length": Kind("a reply is one register short", _EVENT, damage=damage.wrong_length),
-    "wrong-count": Kind("a reply lies about how much it holds", _EVENT, damage=damage.wrong_count),
+    "twice": Kind("a reply comes twice in one segment", corruption=corruption.twice),
+    "wrong-function": Kind("a reply is one to another function", corruption=corruption.wrong_function),
+    "wrong-length": Kind("a reply is one register short", corruption=corruption.wrong_length),
+    "wrong-count": Kind("a reply lies about how much it holds", corruption=corruption.wrong_count),
     "wrong-transaction": Kind(
-        "a reply carries an old transaction number", _EVENT, damage=damage.wrong_transaction, link="tcp"
+        "a reply carries an old transaction number", corruption=corruption.wrong_transaction, link="tcp"
     ),
-    "wrong-unit": Kind("a reply comes from another unit", _EVENT, damage=damage.wrong_unit),
+    "wrong-unit": Kind("a reply comes from another unit", corruption=corruption.wrong_unit),
     "wrong-protocol": Kind(
-        "a reply is of another protocol than Modbus", _EVENT, damage=damage.wrong_protocol, link="tcp"
+        "a reply is of another protocol than Modbus", corruption=corruption.wrong_protocol, link="tcp"
     ),
     "wrong-echo": Kind(
-        "a reply to a write names another register", _EVENT, damage=damage.wrong_echo, on="write"
+        "a reply to a write names another register", corruption=corruption.wrong_echo, on="write"
     ),
-    "wrong-checksum": Kind("a reply has a wrong checksum", _EVENT, damage=damage.wrong_checksum, link="rtu"),
+    "wrong-checksum": Kind("a reply has a wrong checksum", corruption=corruption.wrong_checksum, link="rtu"),
     "exception": Kind(
-        "a request is answered by exception VALUE", _EVENT, 4, 1, 255, damage.refusal, link="tcp"
+        "a request is answered by exception VALUE", _EVENT, 4, 1, 255, corruption.refusal, link="tcp"
     ),
     # Requests and connections.
     "silence": Kind("requests are not heard; connections stay open", _CONDITION),
-    "reset": Kind("all connections are reset", _EVENT, link="tcp"),
-    "close": Kind("all connections are closed in order", _EVENT, link="tcp"),
+    "reset": Kind("all connections are reset", link="tcp"),
+    "close": Kind("all connections are closed in order", link="tcp"),
     "accept-silence": Kind(
         "connections are reset; new ones are accepted, not answered", _CONDITION, link="tcp"
     ),
@@ -110,7 +110,7 @@ KINDS: Final[dict[str, Kind]] = {
     "slow-device": Kind("requests take effect VALUE seconds after they came", _CONDITION, 0.2, 0, 10),
     "interference": Kind("the scissor is blocked: fault 0x0A, after 20 s 0x0E", _CONDITION),
     "fault": Kind("the gripper reports fault VALUE", _CONDITION, 9, 1, 15),
-    "release": Kind("the gripper releases automatically", _EVENT),
+    "release": Kind("the gripper releases automatically"),
 }
 """Every kind of trouble, by its name."""
 
@@ -150,7 +150,7 @@ class Trouble:
             _check_value(self.kind, known, self.value)
         if self.on not in get_args(On):
             raise ValueError(f"on must be read, write or any, got {self.on!r}")
-        if self.on != "any" and (known.damage is None or known.on not in ("any", self.on)):
+        if self.on != "any" and (known.corruption is None or known.on not in ("any", self.on)):
             raise ValueError(f"'on {self.on}' means nothing for {self.kind}")
         check_seconds("at", self.at, 0, LONGEST)
         if self.duration != math.inf:
@@ -174,6 +174,14 @@ class Trouble:
         """Whether it is about replies to writes, or to reads."""
         this: On = "write" if write else "read"
         return self.on in (this, "any") and KINDS[self.kind].on in (this, "any")
+
+    def corrupt(self, reply: Reply) -> Parts | None:
+        """What is sent in place of a reply; None if it is not about that one, or that one is a refusal."""
+        # A multiplexer is late, and that is not all it does.
+        kind = KINDS["delay" if self.kind == "multiplexer" else self.kind]
+        if kind.corruption is None or reply.is_exception or not self.is_about(write=reply.is_to_a_write):
+            return None
+        return kind.corruption(reply, self.amount)
 
     def __str__(self) -> str:
         """The trouble in words; :func:`parse_troubles` reads them."""

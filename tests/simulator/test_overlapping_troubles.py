@@ -9,7 +9,7 @@ import pytest
 from robotiq_async.enums import Fault
 from robotiq_async.simulator import SimulatorServer, Trouble, parse_troubles
 from robotiq_async.simulator import parse_troubles as plan_of
-from tests.simulator.test_adversary import cancelled, is_answered, is_let_in, simulator, status, virtual
+from tests.simulator.test_fault_injector import cancelled, is_answered, is_let_in, simulator, status, virtual
 from tests.simulator.test_server import raw_client
 
 
@@ -40,9 +40,9 @@ def test_an_unknown_kind_is_named(words: str) -> None:
         ("wrong-echo", "10 0000 0009 12" + "00" * 18),
     ],
 )
-async def test_a_damaged_refusal_is_sent(kind: str, request_: str) -> None:
+async def test_a_corrupted_refusal_is_sent(kind: str, request_: str) -> None:
     async with simulator() as server, raw_client(server) as client:
-        await server.adversary.begin(Trouble(kind))
+        await server.fault_injector.begin(Trouble(kind))
         client.writer.write(client.frame(bytes.fromhex(request_)))
         async with asyncio.timeout(5):
             assert await client.reader.read(100)
@@ -51,11 +51,11 @@ async def test_a_damaged_refusal_is_sent(kind: str, request_: str) -> None:
 @virtual
 async def test_two_slow_devices_are_both_undone() -> None:
     async with simulator() as server:
-        one = await server.adversary.begin(Trouble("slow-device", 0.2))
-        other = await server.adversary.begin(Trouble("slow-device", 0.5))
-        await server.adversary.end(one)
+        one = await server.fault_injector.begin(Trouble("slow-device", 0.2))
+        other = await server.fault_injector.begin(Trouble("slow-device", 0.5))
+        await server.fault_injector.end(one)
         assert server.gripper.device_cycle != 0.005, "the other one lasts"
-        await server.adversary.end(other)
+        await server.fault_injector.end(other)
         assert server.gripper.device_cycle == 0.005
 
 
@@ -71,8 +71,8 @@ async def test_two_slow_devices_are_both_undone() -> None:
 async def test_a_fault_outlasts_another(first: str, second: str, left: int) -> None:
     async with simulator() as server:
         (lasting,), (ending,) = plan_of(first), plan_of(second)
-        async with server.adversary.making(lasting):
-            async with server.adversary.making(ending):
+        async with server.fault_injector.making(lasting):
+            async with server.fault_injector.making(ending):
                 pass
             assert status(server).fault is Fault(left)
 
@@ -81,34 +81,34 @@ async def test_a_fault_outlasts_another(first: str, second: str, left: int) -> N
 @pytest.mark.parametrize("words", ["drop; silence at 100", "drop every 10"])
 async def test_cancelled_it_ends_what_has_met_nothing(words: str) -> None:
     async with simulator() as server, raw_client(server) as client:
-        plan = asyncio.create_task(server.adversary.run(plan_of(words)))
+        plan = asyncio.create_task(server.fault_injector.run(plan_of(words)))
         await asyncio.sleep(1)
         await cancelled(plan)
-        assert server.adversary.ongoing == ()
+        assert server.fault_injector.ongoing == ()
         assert await is_answered(client)
 
 
 @virtual
 async def test_a_plan_waits_for_what_happens_once() -> None:
     async with simulator() as server, raw_client(server) as client:
-        plan = asyncio.create_task(server.adversary.run(plan_of("drop")))
+        plan = asyncio.create_task(server.fault_injector.run(plan_of("drop")))
         await asyncio.sleep(100)
         assert not plan.done()
         assert not await is_answered(client)
         await plan
-        assert server.adversary.ongoing == ()
+        assert server.fault_injector.ongoing == ()
 
 
 @pytest.mark.parametrize("turns", range(5))
 async def test_cancelled_while_it_ends_clients_are_let_in_and_the_server_can_stop(turns: int) -> None:
     server = SimulatorServer()
     async with server:
-        begun = await server.adversary.begin(Trouble("refuse"))
-        ending = asyncio.create_task(server.adversary.end(begun))
+        begun = await server.fault_injector.begin(Trouble("refuse"))
+        ending = asyncio.create_task(server.fault_injector.end(begun))
         for _ in range(turns):
             await asyncio.sleep(0)
         await cancelled(ending)
-        await server.adversary.end(begun)
+        await server.fault_injector.end(begun)
         assert await is_let_in(server)
     assert not await is_let_in(server)
 
@@ -116,7 +116,7 @@ async def test_cancelled_while_it_ends_clients_are_let_in_and_the_server_can_sto
 @virtual
 async def test_a_reply_that_comes_later_is_not_overtaken() -> None:
     async with simulator() as server, raw_client(server) as client:
-        await server.adversary.begin(Trouble("late"))
+        await server.fault_injector.begin(Trouble("late"))
         requests = [client.frame(bytes.fromhex("04 0000 0008")), client.frame(bytes.fromhex("04 0000 0002"))]
         for request in requests:
             client.writer.write(request)

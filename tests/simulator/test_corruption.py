@@ -33,11 +33,11 @@ def rtu(pdu: str, *, unit: str = "09") -> bytes:
     return body + crc.to_bytes(2, "little")
 
 
-def damaged(kind: str, frame: bytes, *, serial: bool = False, value: float | None = None) -> Parts:
+def corrupted(kind: str, frame: bytes, *, serial: bool = False, value: float | None = None) -> Parts:
     """What a kind of trouble makes of a frame."""
-    damage = KINDS[kind].damage
-    assert damage is not None
-    return damage(Reply(frame, serial), Trouble(kind, value).amount)
+    corruption = KINDS[kind].corruption
+    assert corruption is not None
+    return corruption(Reply(frame, serial), Trouble(kind, value).amount)
 
 
 def at_once(frame: bytes) -> list[tuple[float, bytes]]:
@@ -93,15 +93,15 @@ def test_a_reply(pdu: str, is_to_a_write: bool) -> None:
     ],
 )
 def test_only_the_pdu_is_wrong(kind: str, pdu: str, wrong: str) -> None:
-    assert list(damaged(kind, tcp(pdu))) == at_once(tcp(wrong))
-    assert list(damaged(kind, rtu(pdu), serial=True)) == at_once(rtu(wrong))
+    assert list(corrupted(kind, tcp(pdu))) == at_once(tcp(wrong))
+    assert list(corrupted(kind, rtu(pdu), serial=True)) == at_once(rtu(wrong))
 
 
 @pytest.mark.parametrize("pdu", [READ, WRITE])
 @pytest.mark.parametrize(("unit", "wrong"), [("09", "0a"), ("00", "01"), ("ff", "00")])
 def test_only_the_unit_is_wrong(pdu: str, unit: str, wrong: str) -> None:
-    assert list(damaged("wrong-unit", tcp(pdu, unit=unit))) == at_once(tcp(pdu, unit=wrong))
-    assert list(damaged("wrong-unit", rtu(pdu, unit=unit), serial=True)) == at_once(rtu(pdu, unit=wrong))
+    assert list(corrupted("wrong-unit", tcp(pdu, unit=unit))) == at_once(tcp(pdu, unit=wrong))
+    assert list(corrupted("wrong-unit", rtu(pdu, unit=unit), serial=True)) == at_once(rtu(pdu, unit=wrong))
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def test_only_the_unit_is_wrong(pdu: str, unit: str, wrong: str) -> None:
     [(READ, None, "84 04"), (WRITE, None, "90 04"), (WRITE_ONE, 2, "86 02"), (READ, 255, "84 ff")],
 )
 def test_a_refusal_in_place_of_the_reply(pdu: str, value: int | None, refused: str) -> None:
-    assert list(damaged("exception", tcp(pdu), value=value)) == at_once(tcp(refused))
+    assert list(corrupted("exception", tcp(pdu), value=value)) == at_once(tcp(refused))
 
 
 # The frame around it is wrong.
@@ -121,18 +121,18 @@ def test_a_refusal_in_place_of_the_reply(pdu: str, value: int | None, refused: s
 )
 def test_only_the_transaction_is_wrong(pdu: str, transaction: str, wrong: str) -> None:
     frame, expected = tcp(pdu, transaction=transaction), tcp(pdu, transaction=wrong)
-    assert list(damaged("wrong-transaction", frame)) == at_once(expected)
+    assert list(corrupted("wrong-transaction", frame)) == at_once(expected)
 
 
 @pytest.mark.parametrize("pdu", [READ, WRITE])
 def test_only_the_protocol_is_wrong(pdu: str) -> None:
-    assert list(damaged("wrong-protocol", tcp(pdu))) == at_once(tcp(pdu, protocol="0001"))
+    assert list(corrupted("wrong-protocol", tcp(pdu))) == at_once(tcp(pdu, protocol="0001"))
 
 
 @pytest.mark.parametrize("pdu", [READ, WRITE])
 def test_only_the_checksum_is_wrong(pdu: str) -> None:
     frame = rtu(pdu)
-    ((delay, wrong),) = damaged("wrong-checksum", frame, serial=True)
+    ((delay, wrong),) = corrupted("wrong-checksum", frame, serial=True)
     assert delay == 0
     assert wrong[:-2] == frame[:-2]
     assert (int.from_bytes(wrong[-2:], "big") ^ int.from_bytes(frame[-2:], "big")).bit_count() == 1
@@ -151,17 +151,17 @@ on_every_frame = pytest.mark.parametrize(("frame", "serial"), FRAMES, ids=FRAME_
     [("delay", None, 0.05), ("delay", 0.3, 0.3), ("late", None, 0.7), ("late", 2, 2)],
 )
 def test_it_comes_later(frame: bytes, serial: bool, kind: str, value: float | None, delay: float) -> None:
-    assert list(damaged(kind, frame, serial=serial, value=value)) == [(delay, frame)]
+    assert list(corrupted(kind, frame, serial=serial, value=value)) == [(delay, frame)]
 
 
 @on_every_frame
 def test_it_does_not_come(frame: bytes, serial: bool) -> None:
-    assert list(damaged("drop", frame, serial=serial)) == []
+    assert list(corrupted("drop", frame, serial=serial)) == []
 
 
 @on_every_frame
 def test_it_comes_by_half(frame: bytes, serial: bool) -> None:
-    ((delay, part),) = damaged("half", frame, serial=serial)
+    ((delay, part),) = corrupted("half", frame, serial=serial)
     assert delay == 0
     assert frame.startswith(part)
     assert len(part) == len(frame) // 2
@@ -170,7 +170,7 @@ def test_it_comes_by_half(frame: bytes, serial: bool) -> None:
 @on_every_frame
 @pytest.mark.parametrize(("value", "apart"), [(None, 0.002), (0.3, 0.3), (0, 0)])
 def test_it_comes_in_three_pieces(frame: bytes, serial: bool, value: float | None, apart: float) -> None:
-    parts = damaged("pieces", frame, serial=serial, value=value)
+    parts = corrupted("pieces", frame, serial=serial, value=value)
     assert [delay for delay, _ in parts] == [0, apart, 2 * apart]
     assert all(len(part) >= 2 for _, part in parts)
     assert b"".join(part for _, part in parts) == frame
@@ -178,4 +178,4 @@ def test_it_comes_in_three_pieces(frame: bytes, serial: bool, value: float | Non
 
 @on_every_frame
 def test_it_comes_twice_in_one_segment(frame: bytes, serial: bool) -> None:
-    assert list(damaged("twice", frame, serial=serial)) == at_once(frame + frame)
+    assert list(corrupted("twice", frame, serial=serial)) == at_once(frame + frame)

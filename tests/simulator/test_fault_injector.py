@@ -62,7 +62,7 @@ async def carried_out(
 ) -> AsyncIterator[asyncio.Task[None]]:
     """A plan that is under way, with what it has told."""
     plan = asyncio.create_task(
-        server.adversary.run(plan_of(words), lambda trouble: told.append(str(trouble)))
+        server.fault_injector.run(plan_of(words), lambda trouble: told.append(str(trouble)))
     )
     try:
         yield plan
@@ -119,19 +119,19 @@ async def activate(server: SimulatorServer) -> None:
 @virtual
 async def test_the_lost_reply_to_a_write() -> None:
     async with simulator() as server, raw_client(server) as client:
-        lost = await server.adversary.begin(Trouble("drop", on="write"))
+        lost = await server.fault_injector.begin(Trouble("drop", on="write"))
         assert await is_answered(client)
         assert not await is_answered(client, write(5))
         assert server.gripper.request_registers[1] == 5, "it was carried out"
         assert await is_answered(client, write(6))
         assert lost.hits == 1
-        assert server.adversary.ongoing == ()
+        assert server.fault_injector.ongoing == ()
 
 
 @virtual
 async def test_the_lost_reply_to_a_read() -> None:
     async with simulator() as server, raw_client(server) as client:
-        await server.adversary.begin(Trouble("drop", on="read"))
+        await server.fault_injector.begin(Trouble("drop", on="read"))
         assert await is_answered(client, write(5))
         assert not await is_answered(client)
         assert await is_answered(client)
@@ -140,11 +140,11 @@ async def test_the_lost_reply_to_a_read() -> None:
 @virtual
 async def test_all_replies_are_lost_as_long_as_it_lasts() -> None:
     async with simulator() as server, raw_client(server) as client:
-        async with server.adversary.making(Trouble("drop", lasts=60)) as losing:
+        async with server.fault_injector.making(Trouble("drop", lasts=60)) as losing:
             assert [await is_answered(client) for _ in range(3)] == [False] * 3
-            assert server.adversary.ongoing == (losing,)
+            assert server.fault_injector.ongoing == (losing,)
             assert losing.hits == 3
-        assert server.adversary.ongoing == ()
+        assert server.fault_injector.ongoing == ()
         assert await is_answered(client)
 
 
@@ -152,14 +152,14 @@ async def test_all_replies_are_lost_as_long_as_it_lasts() -> None:
 async def test_the_oldest_trouble_acts() -> None:
     async with simulator() as server, raw_client(server) as client:
         loop = asyncio.get_running_loop()
-        older = await server.adversary.begin(Trouble("delay", 0.3, on="read"))
-        newer = await server.adversary.begin(Trouble("drop"))
+        older = await server.fault_injector.begin(Trouble("delay", 0.3, on="read"))
+        newer = await server.fault_injector.begin(Trouble("drop"))
         began = loop.time()
         assert await is_answered(client)
         assert loop.time() - began == pytest.approx(0.3, abs=0.01)
         assert (older.hits, newer.hits) == (1, 0)
         assert not await is_answered(client, write(5)), "the older one is not about writes"
-        assert server.adversary.ongoing == (older,)
+        assert server.fault_injector.ongoing == (older,)
 
 
 @virtual
@@ -172,7 +172,7 @@ async def test_the_policy_decides_on_replies_that_no_trouble_is_about() -> None:
             return [(0.0, reply)]
 
         server.policy = policy
-        async with server.adversary.making(Trouble("delay", 0.1, on="read")):
+        async with server.fault_injector.making(Trouble("delay", 0.1, on="read")):
             assert await is_answered(client)
             assert seen == []
             assert await is_answered(client, write(5))
@@ -183,7 +183,7 @@ async def test_the_policy_decides_on_replies_that_no_trouble_is_about() -> None:
 @virtual
 async def test_a_refused_request_was_carried_out() -> None:
     async with simulator() as server, raw_client(server) as client:
-        await server.adversary.begin(Trouble("exception", 6, on="write"))
+        await server.fault_injector.begin(Trouble("exception", 6, on="write"))
         assert await client.ask(write(5)) == b"\x86\x06"
         assert server.gripper.request_registers[1] == 5
 
@@ -194,7 +194,7 @@ async def test_a_refused_request_was_carried_out() -> None:
 @virtual
 async def test_in_silence_nothing_is_heard_and_connections_stay() -> None:
     async with simulator() as server, raw_client(server) as client:
-        async with server.adversary.making(Trouble("silence")) as silence:
+        async with server.fault_injector.making(Trouble("silence")) as silence:
             assert not await is_answered(client, write(5))
             assert not await is_answered(client)
             assert not await is_let_in(server), "new connections are accepted and not answered"
@@ -206,7 +206,7 @@ async def test_in_silence_nothing_is_heard_and_connections_stay() -> None:
 @virtual
 async def test_silence_for_once_is_one_request_that_is_not_heard() -> None:
     async with simulator() as server, raw_client(server) as client:
-        await server.adversary.begin(Trouble("silence", lasts=0))
+        await server.fault_injector.begin(Trouble("silence", lasts=0))
         assert not await is_answered(client, write(5))
         assert await is_answered(client, write(6))
         assert [each.registers[1] for each in server.gripper.writes] == [6]
@@ -217,7 +217,7 @@ async def test_connections_are_reset(kind: str) -> None:
     async with SimulatorServer() as server, raw_client(server) as one, raw_client(server) as other:
         await one.read_status()
         await other.read_status()
-        async with server.adversary.making(Trouble(kind)), asyncio.timeout(5):
+        async with server.fault_injector.making(Trouble(kind)), asyncio.timeout(5):
             for client in (one, other):
                 with pytest.raises(ConnectionResetError):
                     await client.reader.read()
@@ -227,7 +227,7 @@ async def test_connections_are_closed_in_order() -> None:
     async with SimulatorServer() as server, raw_client(server) as one, raw_client(server) as other:
         await one.read_status()
         await other.read_status()
-        await server.adversary.begin(Trouble("close"))
+        await server.fault_injector.begin(Trouble("close"))
         async with asyncio.timeout(5):
             assert [await client.reader.read() for client in (one, other)] == [b"", b""]
 
@@ -236,7 +236,7 @@ async def test_connections_are_closed_in_order() -> None:
 async def test_nobody_is_let_in_on_a_real_port_either(kind: str) -> None:
     async with SimulatorServer() as server:
         port = server.port
-        async with server.adversary.making(Trouble(kind)):
+        async with server.fault_injector.making(Trouble(kind)):
             with pytest.raises(ConnectionRefusedError):
                 await asyncio.open_connection("127.0.0.1", port)
         assert server.port == port
@@ -248,8 +248,8 @@ async def test_nobody_is_let_in_on_a_real_port_either(kind: str) -> None:
 @pytest.mark.parametrize("kind", ["reset", "close"])
 async def test_after_a_cut_new_connections_are_welcome(kind: str) -> None:
     async with simulator() as server, raw_client(server) as client:
-        await server.adversary.begin(Trouble(kind))
-        assert server.adversary.ongoing == ()
+        await server.fault_injector.begin(Trouble(kind))
+        assert server.fault_injector.ongoing == ()
         assert await is_let_in(server)
         with suppress(ConnectionResetError):
             assert await client.reader.read() == b""
@@ -258,7 +258,7 @@ async def test_after_a_cut_new_connections_are_welcome(kind: str) -> None:
 @virtual
 async def test_accepted_in_silence_and_answered_after_it() -> None:
     async with simulator() as server, raw_client(server) as before:
-        async with server.adversary.making(Trouble("accept-silence")):
+        async with server.fault_injector.making(Trouble("accept-silence")):
             with pytest.raises(ConnectionResetError):
                 await before.reader.read()
             async with raw_client(server) as client:
@@ -270,10 +270,10 @@ async def test_accepted_in_silence_and_answered_after_it() -> None:
 @virtual
 async def test_a_connection_made_in_silence_is_answered_when_it_is_over() -> None:
     async with simulator() as server:
-        silence = await server.adversary.begin(Trouble("accept-silence"))
+        silence = await server.fault_injector.begin(Trouble("accept-silence"))
         async with raw_client(server) as client:
             assert not await is_answered(client)
-            await server.adversary.end(silence)
+            await server.fault_injector.end(silence)
             assert await is_answered(client)
 
 
@@ -281,7 +281,7 @@ async def test_a_connection_made_in_silence_is_answered_when_it_is_over() -> Non
 async def test_refused_until_it_ends() -> None:
     async with simulator() as server:
         await activate(server)
-        async with server.adversary.making(Trouble("refuse")):
+        async with server.fault_injector.making(Trouble("refuse")):
             assert not await is_let_in(server)
             assert status(server).is_activated, "the gripper has its power"
         assert await is_let_in(server)
@@ -291,7 +291,7 @@ async def test_refused_until_it_ends() -> None:
 async def test_without_power_the_gripper_forgets_everything() -> None:
     async with simulator() as server:
         await activate(server)
-        async with server.adversary.making(Trouble("power-cut")):
+        async with server.fault_injector.making(Trouble("power-cut")):
             assert not server.gripper.is_powered
             assert not await is_let_in(server)
         assert server.gripper.is_powered
@@ -306,12 +306,12 @@ async def test_without_power_the_gripper_forgets_everything() -> None:
 @pytest.mark.parametrize("in_order", [True, False])
 async def test_refused_until_the_last_of_two_ends(first: str, second: str, in_order: bool) -> None:
     async with simulator() as server:
-        begun = [await server.adversary.begin(Trouble(kind)) for kind in (first, second)]
+        begun = [await server.fault_injector.begin(Trouble(kind)) for kind in (first, second)]
         ending, lasting = begun if in_order else begun[::-1]
-        await server.adversary.end(ending)
+        await server.fault_injector.end(ending)
         assert not await is_let_in(server)
         assert server.gripper.is_powered == (lasting.trouble.kind == "refuse")
-        await server.adversary.end(lasting)
+        await server.fault_injector.end(lasting)
         assert await is_let_in(server)
         assert server.gripper.is_powered
 
@@ -319,8 +319,8 @@ async def test_refused_until_the_last_of_two_ends(first: str, second: str, in_or
 @virtual
 async def test_silence_goes_on_after_refusal() -> None:
     async with simulator() as server:
-        async with server.adversary.making(Trouble("silence")):
-            async with server.adversary.making(Trouble("refuse")):
+        async with server.fault_injector.making(Trouble("silence")):
+            async with server.fault_injector.making(Trouble("refuse")):
                 pass
             assert not await is_let_in(server)
         assert await is_let_in(server)
@@ -338,7 +338,7 @@ async def ask_and_go(server: SimulatorServer, pdu: bytes = READ) -> bytes:
 @virtual
 async def test_a_multiplexer_hands_late_replies_to_the_next_client() -> None:
     async with simulator() as server:
-        await server.adversary.begin(Trouble("multiplexer", 0.1))
+        await server.fault_injector.begin(Trouble("multiplexer", 0.1))
         request = await ask_and_go(server)
         await asyncio.sleep(1)
         async with raw_client(server) as client:
@@ -353,7 +353,7 @@ async def test_a_multiplexer_hands_late_replies_to_the_next_client() -> None:
 async def test_a_multiplexer_hands_a_late_reply_to_whoever_is_connected_then() -> None:
     async with simulator() as server:
         loop = asyncio.get_running_loop()
-        await server.adversary.begin(Trouble("multiplexer"))
+        await server.fault_injector.begin(Trouble("multiplexer"))
         began = loop.time()
         await ask_and_go(server, write(5))
         assert server.gripper.request_registers[1] == 5, "it was carried out"
@@ -366,7 +366,7 @@ async def test_a_multiplexer_hands_a_late_reply_to_whoever_is_connected_then() -
 @pytest.mark.parametrize("kind", ["multiplexer", "delay"])
 async def test_without_a_multiplexer_replies_of_clients_that_are_gone_are_lost(kind: str) -> None:
     async with simulator() as server:
-        async with server.adversary.making(Trouble(kind, 0.1)):
+        async with server.fault_injector.making(Trouble(kind, 0.1)):
             await ask_and_go(server)
             await asyncio.sleep(0.2 if kind == "multiplexer" else 0)
         await asyncio.sleep(0.2)
@@ -377,7 +377,7 @@ async def test_without_a_multiplexer_replies_of_clients_that_are_gone_are_lost(k
 @virtual
 async def test_a_multiplexer_keeps_no_more_than_a_hundred_replies() -> None:
     async with simulator() as server:
-        await server.adversary.begin(Trouble("multiplexer", 0.1))
+        await server.fault_injector.begin(Trouble("multiplexer", 0.1))
         async with raw_client(server) as client:
             client.writer.write(b"".join(client.frame(READ) for _ in range(300)))
             await asyncio.sleep(0.05)
@@ -391,9 +391,9 @@ async def test_a_multiplexer_keeps_no_more_than_a_hundred_replies() -> None:
 @pytest.mark.parametrize("kind", ["refuse", "power-cut"])
 async def test_ending_it_does_not_start_a_server_that_was_stopped(kind: str) -> None:
     async with simulator() as server:
-        begun = await server.adversary.begin(Trouble(kind))
+        begun = await server.fault_injector.begin(Trouble(kind))
         await server.stop()
-        await server.adversary.end(begun)
+        await server.fault_injector.end(begun)
         assert not server.is_running
         assert server.gripper.is_powered
         assert not await is_let_in(server)
@@ -408,8 +408,8 @@ async def test_another_client_sends_all_axes_somewhere(value: int | None, positi
     async with simulator() as server:
         await activate(server)
         assert ACTIVE.mode is Mode.BASIC
-        await server.adversary.begin(Trouble("foreign", value))
-        assert server.adversary.ongoing == ()
+        await server.fault_injector.begin(Trouble("foreign", value))
+        assert server.fault_injector.ongoing == ()
         image = Request.from_registers(server.gripper.request_registers)
         assert image.activate
         assert image.go
@@ -423,7 +423,7 @@ async def test_another_client_sends_all_axes_somewhere(value: int | None, positi
 @pytest.mark.parametrize(("value", "seconds"), [(None, 0.2), (1.5, 1.5)])
 async def test_requests_to_a_slow_device_take_effect_later(value: float | None, seconds: float) -> None:
     async with simulator(speedup=5, device_cycle=0.02) as server:
-        async with server.adversary.making(Trouble("slow-device", value)):
+        async with server.fault_injector.making(Trouble("slow-device", value)):
             server.gripper.write(0, Request(activate=True).registers)
             await asyncio.sleep(seconds - 0.01)
             assert not status(server).activation_echo
@@ -436,7 +436,7 @@ async def test_requests_to_a_slow_device_take_effect_later(value: float | None, 
 async def test_the_scissor_is_blocked() -> None:
     async with simulator() as server:
         await activate(server)
-        async with server.adversary.making(Trouble("interference")):
+        async with server.fault_injector.making(Trouble("interference")):
             assert status(server).fault is Fault.SCISSOR_INTERFERENCE
             await asyncio.sleep(19.9)
             assert status(server).fault is Fault.SCISSOR_INTERFERENCE
@@ -453,7 +453,7 @@ async def test_the_scissor_is_blocked() -> None:
 async def test_a_fault_is_reported(value: int | None, fault: Fault) -> None:
     async with simulator() as server:
         await activate(server)
-        async with server.adversary.making(Trouble("fault", value)):
+        async with server.fault_injector.making(Trouble("fault", value)):
             await asyncio.sleep(60)
             assert status(server).fault is fault
         assert status(server).fault is Fault.NONE
@@ -463,8 +463,8 @@ async def test_a_fault_is_reported(value: int | None, fault: Fault) -> None:
 async def test_the_gripper_releases() -> None:
     async with simulator() as server:
         await activate(server)
-        await server.adversary.begin(Trouble("release"))
-        assert server.adversary.ongoing == ()
+        await server.fault_injector.begin(Trouble("release"))
+        assert server.fault_injector.ongoing == ()
         assert status(server).fault is Fault.AUTOMATIC_RELEASE
         await asyncio.sleep(60)
         assert status(server).fault is Fault.AUTOMATIC_RELEASE_DONE
@@ -474,7 +474,7 @@ async def test_the_gripper_releases() -> None:
 async def test_an_idle_gripper_loses_its_activation() -> None:
     async with simulator() as server, raw_client(server) as client:
         await activate(server)
-        async with server.adversary.making(Trouble("idle-reset", 2)):
+        async with server.fault_injector.making(Trouble("idle-reset", 2)):
             await asyncio.sleep(1.9)
             for _ in range(5):
                 assert await is_answered(client), "a request, whatever it asks"
@@ -496,7 +496,10 @@ async def test_an_idle_gripper_loses_its_activation() -> None:
 async def test_what_is_not_heard_is_no_request(silent: Trouble, is_reset: bool) -> None:
     async with simulator() as server, raw_client(server) as client:
         await activate(server)
-        async with server.adversary.making(Trouble("idle-reset", 2)), server.adversary.making(silent):
+        async with (
+            server.fault_injector.making(Trouble("idle-reset", 2)),
+            server.fault_injector.making(silent),
+        ):
             for _ in range(5):
                 assert not await is_answered(client)
             assert status(server).is_reset is is_reset
@@ -504,8 +507,8 @@ async def test_what_is_not_heard_is_no_request(silent: Trouble, is_reset: bool) 
 
 @virtual
 async def test_an_idle_gripper_without_power_stays_without() -> None:
-    async with simulator() as server, server.adversary.making(Trouble("power-cut")):
-        async with server.adversary.making(Trouble("idle-reset", 1)):
+    async with simulator() as server, server.fault_injector.making(Trouble("power-cut")):
+        async with server.fault_injector.making(Trouble("idle-reset", 1)):
             await asyncio.sleep(5)
         assert not server.gripper.is_powered
 
@@ -514,8 +517,8 @@ async def test_an_idle_gripper_without_power_stays_without() -> None:
 async def test_the_least_patient_of_two_counts() -> None:
     async with simulator() as server:
         await activate(server)
-        async with server.adversary.making(Trouble("idle-reset", 9)):
-            async with server.adversary.making(Trouble("idle-reset", 2)):
+        async with server.fault_injector.making(Trouble("idle-reset", 9)):
+            async with server.fault_injector.making(Trouble("idle-reset", 2)):
                 await asyncio.sleep(1)
             await asyncio.sleep(8)
             assert status(server).is_activated
@@ -529,20 +532,20 @@ async def test_the_least_patient_of_two_counts() -> None:
 @virtual
 async def test_what_is_over_stays_over() -> None:
     async with simulator() as server:
-        begun = await server.adversary.begin(Trouble("fault", 9))
-        await server.adversary.end(begun)
+        begun = await server.fault_injector.begin(Trouble("fault", 9))
+        await server.fault_injector.end(begun)
         server.gripper.inject_fault(14)
-        await server.adversary.end(begun)
+        await server.fault_injector.end(begun)
         assert status(server).fault is Fault.SCISSOR_BLOCKED
 
 
 @virtual
 async def test_only_the_one_that_is_ended_ends() -> None:
     async with simulator() as server, raw_client(server) as client:
-        one, other = [await server.adversary.begin(Trouble("drop", lasts=60)) for _ in range(2)]
-        assert server.adversary.ongoing == (one, other)
-        await server.adversary.end(one)
-        assert server.adversary.ongoing == (other,)
+        one, other = [await server.fault_injector.begin(Trouble("drop", lasts=60)) for _ in range(2)]
+        assert server.fault_injector.ongoing == (one, other)
+        await server.fault_injector.end(one)
+        assert server.fault_injector.ongoing == (other,)
         assert not await is_answered(client)
 
 
@@ -550,9 +553,9 @@ async def test_only_the_one_that_is_ended_ends() -> None:
 async def test_a_block_that_fails_ends_its_trouble() -> None:
     async with simulator() as server:
         with pytest.raises(ZeroDivisionError):
-            async with server.adversary.making(Trouble("refuse")):
+            async with server.fault_injector.making(Trouble("refuse")):
                 raise ZeroDivisionError
-        assert server.adversary.ongoing == ()
+        assert server.fault_injector.ongoing == ()
         assert await is_let_in(server)
 
 
@@ -560,8 +563,8 @@ async def test_a_block_that_fails_ends_its_trouble() -> None:
 async def test_without_connections_there_is_nothing_to_cut(kind: str) -> None:
     server = SimulatorServer()
     with pytest.raises(RuntimeError, match="not running"):
-        await server.adversary.begin(Trouble(kind))
-    assert server.adversary.ongoing == ()
+        await server.fault_injector.begin(Trouble(kind))
+    assert server.fault_injector.ongoing == ()
     assert server.gripper.is_powered
 
 
@@ -570,26 +573,26 @@ def test_what_fits_which_link(kind: str) -> None:
     fits = ONLY_ON.get(kind)
     for server in (SimulatorServer(), SerialSimulatorServer("/dev/ttyFAR")):
         if fits in (None, server.link):
-            server.adversary.check([Trouble(kind)])
+            server.fault_injector.check([Trouble(kind)])
         else:
             with pytest.raises(ValueError, match=f"^{kind} does not fit a simulator on {server.link}$"):
-                server.adversary.check([Trouble("silence"), Trouble(kind)])
+                server.fault_injector.check([Trouble("silence"), Trouble(kind)])
 
 
 async def test_what_does_not_fit_the_link_does_not_begin() -> None:
     server = SimulatorServer()
     with pytest.raises(ValueError, match="wrong-checksum does not fit a simulator on tcp"):
-        await server.adversary.begin(Trouble("wrong-checksum"))
-    assert server.adversary.ongoing == ()
+        await server.fault_injector.begin(Trouble("wrong-checksum"))
+    assert server.fault_injector.ongoing == ()
 
 
 async def test_of_a_plan_that_does_not_fit_nothing_begins() -> None:
     server = SerialSimulatorServer("/dev/ttyFAR")
     told: list[Trouble] = []
     with pytest.raises(ValueError, match="refuse does not fit a simulator on rtu"):
-        await server.adversary.run(plan_of("fault 9; refuse at 10"), told.append)
+        await server.fault_injector.run(plan_of("fault 9; refuse at 10"), told.append)
     assert told == []
-    assert server.adversary.ongoing == ()
+    assert server.fault_injector.ongoing == ()
     assert status(server).fault is Fault.NONE
 
 
@@ -604,7 +607,7 @@ async def test_each_at_its_time_and_for_as_long_as_it_says() -> None:
         told: list[tuple[float, Trouble]] = []
         plan = plan_of("silence at 5 for 2; fault at 6 for 9; drop for 1")
         carrying_out = asyncio.create_task(
-            server.adversary.run(plan, lambda trouble: told.append((loop.time() - began, trouble)))
+            server.fault_injector.run(plan, lambda trouble: told.append((loop.time() - began, trouble)))
         )
         seen = []
         for _ in range(17):
@@ -615,7 +618,7 @@ async def test_each_at_its_time_and_for_as_long_as_it_says() -> None:
         expected = [(False, none)] + [(True, none)] * 4 + [(False, none), (False, fault)]
         assert seen == expected + [(True, fault)] * 8 + [(True, none)] * 2
         assert told == [(0, plan[2]), (5, plan[0]), (6, plan[1])]
-        assert server.adversary.ongoing == ()
+        assert server.fault_injector.ongoing == ()
         await carrying_out
 
 
@@ -624,15 +627,15 @@ async def test_a_plan_is_over_when_its_last_trouble_is() -> None:
     async with simulator() as server:
         loop = asyncio.get_running_loop()
         began = loop.time()
-        await server.adversary.run(plan_of("fault at 1 for 6; close at 4"))
+        await server.fault_injector.run(plan_of("fault at 1 for 6; close at 4"))
         assert loop.time() - began == pytest.approx(7)
-        assert server.adversary.ongoing == ()
+        assert server.fault_injector.ongoing == ()
 
 
 @virtual
 async def test_an_empty_plan_is_over_at_once() -> None:
     async with simulator() as server:
-        await server.adversary.run([])
+        await server.fault_injector.run([])
 
 
 @virtual
@@ -652,7 +655,7 @@ async def test_again_and_again() -> None:
         began = loop.time()
         told: list[float] = []
         carrying_out = asyncio.create_task(
-            server.adversary.run(
+            server.fault_injector.run(
                 plan_of("power-cut at 1 for 2 every 10"), lambda _: told.append(loop.time() - began)
             )
         )
@@ -691,7 +694,7 @@ async def test_what_has_met_nothing_does_not_pile_up() -> None:
 async def test_it_is_told_before_it_begins() -> None:
     async with simulator() as server:
         seen = []
-        await server.adversary.run(plan_of("fault 9 for 1"), lambda _: seen.append(status(server).fault))
+        await server.fault_injector.run(plan_of("fault 9 for 1"), lambda _: seen.append(status(server).fault))
         assert seen == [Fault.NONE]
 
 
@@ -708,9 +711,9 @@ async def test_a_plan_that_is_cancelled_ends_its_troubles(words: str) -> None:
     async with simulator(device_cycle=0.02) as server:
         async with carried_out(server, words, []) as plan:
             await asyncio.sleep(30)
-            assert len(server.adversary.ongoing) == len(words.split(";"))
+            assert len(server.fault_injector.ongoing) == len(words.split(";"))
         assert plan.cancelled()
-        assert server.adversary.ongoing == ()
+        assert server.fault_injector.ongoing == ()
         assert server.gripper.is_powered
         assert server.gripper.device_cycle == 0.02
         assert status(server).fault is Fault.NONE
@@ -733,13 +736,15 @@ async def test_what_has_not_begun_when_the_plan_is_cancelled_never_begins(words:
 @virtual
 async def test_a_port_that_somebody_took_meanwhile() -> None:
     async with simulator() as server:
-        plan = asyncio.create_task(server.adversary.run(plan_of("refuse for 10; fault 9; slow-device 3")))
+        plan = asyncio.create_task(
+            server.fault_injector.run(plan_of("refuse for 10; fault 9; slow-device 3"))
+        )
         await asyncio.sleep(5)
         other = await asyncio.get_running_loop().create_server(asyncio.Protocol, "127.0.0.1", server.port)
         with pytest.raises(OSError, match="address in use"):
             await plan
         other.close()
-        assert server.adversary.ongoing == ()
+        assert server.fault_injector.ongoing == ()
         assert status(server).fault is Fault.NONE
         assert server.gripper.device_cycle == 0.005
 
@@ -785,7 +790,7 @@ RESET_READING = bytes.fromhex("09 04 02 0000 58f1")
 async def test_no_answer_on_a_serial_line(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     async with serial_simulator(monkeypatch) as (server, client):
         assert await client.ask() == RESET_READING
-        async with server.adversary.making(Trouble(kind, lasts=60)):
+        async with server.fault_injector.making(Trouble(kind, lasts=60)):
             assert [await client.ask() for _ in range(2)] == [b"", b""]
         assert await client.ask() == RESET_READING
 
@@ -793,6 +798,6 @@ async def test_no_answer_on_a_serial_line(kind: str, monkeypatch: pytest.MonkeyP
 @virtual
 async def test_a_wrong_checksum_on_a_serial_line(monkeypatch: pytest.MonkeyPatch) -> None:
     async with serial_simulator(monkeypatch) as (server, client):
-        await server.adversary.begin(Trouble("wrong-checksum"))
+        await server.fault_injector.begin(Trouble("wrong-checksum"))
         assert await client.ask() == bytes.fromhex("09 04 02 0000 58f0")
         assert await client.ask() == RESET_READING
