@@ -12,7 +12,7 @@ from typing import Annotated, Final
 from cyclopts import Parameter, Token
 
 from ..enums import Finger
-from ..fleet.remote_address import is_remote, parse_remote_address
+from ..fleet.network.route import is_remote, parse_remote_address
 from ..link.address import parse_address
 from ..wire.checks import parse_fingers
 from .failures import CommandError, UsageError, usage

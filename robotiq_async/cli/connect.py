@@ -7,8 +7,8 @@ from contextlib import asynccontextmanager
 
 from ..actions import Operator
 from ..enums import DEFAULT_FORCE, DEFAULT_SPEED
-from ..fleet.remote_address import is_remote
-from ..fleet.remote_hand import RemoteHand
+from ..fleet.network.route import is_remote
+from ..fleet.remote.remote_hand import RemoteHand
 from ..hand import RobotiqHand
 from ..protocol import Hand
 from ..session.options import POLL_INTERVAL_S

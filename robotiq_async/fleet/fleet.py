@@ -16,12 +16,12 @@ from ..log import log
 from ..session.clock import now
 from ..session.event_loop import running_loop
 from ..session.streams import Channel, Stream
-from .bus import Bus, Undo, Urgency
-from .envelope import Call, unpack_answer
-from .names import ROOT, GripperName, check_name
-from .remote_address import Route, default_route
-from .remote_hand import RemoteHand
-from .remote_session import label
+from .network.bus import Bus, Undo, Urgency
+from .network.route import Route, default_route
+from .remote.remote_hand import RemoteHand
+from .remote.requests import label
+from .wire.envelope import Call, unpack_answer
+from .wire.names import ROOT, GripperName, check_name
 
 HALT_S: Final = 2.0
 ATTEMPT_S: Final = 0.3
@@ -177,7 +177,7 @@ class Fleet:
     # -- inside ----------------------------------------------------------------------------------------
 
     async def _open(self) -> Bus:
-        from .zenoh_bus import open_bus  # noqa: PLC0415  # needs the extra
+        from .network.zenoh_bus import open_bus  # noqa: PLC0415  # needs the extra
 
         return await open_bus((self._route or default_route()).configuration(), f"the fleet {self._site}")
 

@@ -1,5 +1,6 @@
 import asyncio
-from robotiq_async import RobotiqHand, Finger
+
+from robotiq_async import Finger, RobotiqHand
 
 if not hasattr(RobotiqHand, "hold"):
 

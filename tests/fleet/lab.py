@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from robotiq_async import RobotiqHand
-from robotiq_async.fleet.agent import Agent
-from robotiq_async.fleet.remote_hand import RemoteHand
+from robotiq_async.fleet.agent.agent import Agent
+from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.wire.request import AxisRequest, Request
 from tests.fleet.network import MemoryBus, Network

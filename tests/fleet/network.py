@@ -13,7 +13,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from robotiq_async.fleet.bus import Question, Reply, Undo, Urgency
+from robotiq_async.fleet.network.bus import Question, Reply, Undo, Urgency
 
 LATENCY_S = 0.0002
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from robotiq_async.fleet.agent_file import AgentFileError, AgentSettings, machine_name, read_agent_file
-from robotiq_async.fleet.configuration import LOOPBACK, LOOPBACK_TLS
-from robotiq_async.fleet.names import check_name
+from robotiq_async.fleet.agent.agent_file import AgentFileError, AgentSettings, machine_name, read_agent_file
+from robotiq_async.fleet.network.configuration import LOOPBACK, LOOPBACK_TLS
+from robotiq_async.fleet.wire.names import check_name
 
 LEFT = '[grippers.left]\naddress = "tcp://192.168.1.11"\n'
 GOOD = f'site = "lab"\nhost = "cell-1"\n{LEFT}'

@@ -16,7 +16,7 @@ from ..failures import UsageError
 from ..log_capture import forwarded_warnings
 
 if TYPE_CHECKING:
-    from ...fleet.agent_file import AgentSettings
+    from ...fleet.agent.agent_file import AgentSettings
 
 
 async def agent(
@@ -61,7 +61,7 @@ async def agent(
 
 
 def _settings(file: Path) -> AgentSettings:
-    from ...fleet.agent_file import AgentFileError, read_agent_file
+    from ...fleet.agent.agent_file import AgentFileError, read_agent_file
 
     try:
         return read_agent_file(file)
@@ -70,9 +70,9 @@ def _settings(file: Path) -> AgentSettings:
 
 
 async def _serve(settings: AgentSettings) -> None:
-    from ...fleet.agent import Agent
-    from ...fleet.configuration import agent_configuration
-    from ...fleet.zenoh_bus import open_bus
+    from ...fleet.agent.agent import Agent
+    from ...fleet.network.configuration import agent_configuration
+    from ...fleet.network.zenoh_bus import open_bus
 
     configuration = agent_configuration(
         settings.site,

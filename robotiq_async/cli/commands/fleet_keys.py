@@ -12,7 +12,7 @@ from ..arguments import need
 from ..failures import CommandError, UsageError, usage
 
 if TYPE_CHECKING:
-    from ...fleet.access_list import Role
+    from ...fleet.keys.access_list import Role
 
 DAYS: Final = 825
 _MAY: Final = {"read": "watch", "halt": "watch and halt", "operate": "watch, halt and command"}
@@ -52,7 +52,7 @@ def keys(
         days: How long the certificates are valid (default: 825; the authority: ten years).
     """
     need("cryptography", "fleet")
-    from ...fleet.access_list import Role
+    from ...fleet.keys.access_list import Role
 
     clients = {Role.READ: read, Role.HALT: halt, Role.OPERATE: operate}
     subjects = [_agent(text) for text in dict.fromkeys(agent)]
@@ -75,7 +75,7 @@ class Subject:
 
 def _agent(text: str) -> Subject:
     """An agent in an argument: NAME, or NAME=HOST,HOST."""
-    from ...fleet.access_list import Role
+    from ...fleet.keys.access_list import Role
 
     name, equals, hosts = text.partition("=")
     return Subject(Role.AGENT, name, tuple(hosts.split(",")) if equals else (name,))
@@ -88,9 +88,9 @@ def _check(folder: Path, subjects: list[Subject], days: int) -> None:
         UsageError: a name, a host or the days cannot be.
         CommandError: something would be overwritten.
     """
-    from ...fleet.access_list import check_subject
-    from ...fleet.authority import DAYS_MAX, check_host
-    from ...fleet.certificates import subject_folder
+    from ...fleet.keys.access_list import check_subject
+    from ...fleet.keys.authority import DAYS_MAX, check_host
+    from ...fleet.keys.certificates import subject_folder
 
     if not 1 <= days <= DAYS_MAX:
         raise UsageError(f"--days must be an integer in 1..{DAYS_MAX}, got {days}")
@@ -112,8 +112,8 @@ def _make(folder: Path, subjects: list[Subject], days: int) -> None:
     Raises:
         OSError, ValueError: the folder cannot be written, or is not an authority's.
     """
-    from ...fleet.access_list import Role
-    from ...fleet.certificates import AUTHORITY_KEY, access_lists, has_authority, issue, make_authority
+    from ...fleet.keys.access_list import Role
+    from ...fleet.keys.certificates import AUTHORITY_KEY, access_lists, has_authority, issue, make_authority
 
     if not has_authority(folder):
         print(f"{make_authority(folder)}: the authority. {AUTHORITY_KEY} beside it never leaves this folder.")
@@ -125,7 +125,7 @@ def _make(folder: Path, subjects: list[Subject], days: int) -> None:
 
 
 def _destination(subject: Subject) -> str:
-    from ...fleet.access_list import Role
+    from ...fleet.keys.access_list import Role
 
     if subject.role is Role.AGENT:
         return f"for the agent on {subject.name}; clients connect to it by {', '.join(subject.hosts)}"

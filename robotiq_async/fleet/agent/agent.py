@@ -8,16 +8,16 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from ..errors import AgentError
-from ..hand import RobotiqHand
-from ..log import log
-from ..session.clock import now
-from .bus import Bus, Question, Undo
-from .envelope import Answer
-from .lease import WINDOW_S
-from .names import ROOT, GripperName
+from ...errors import AgentError
+from ...hand import RobotiqHand
+from ...log import log
+from ...session.clock import now
+from ..control.lease import WINDOW_S
+from ..network.bus import Bus, Question, Undo
+from ..wire.envelope import Answer
+from ..wire.names import ROOT, GripperName
+from ..wire.values import error_fields
 from .served_hand import ServedHand
-from .values import error_fields
 
 SUMMARY_S: Final = 1.0
 BEATS: Final = 5
@@ -46,7 +46,7 @@ class Agent:
             host: this host's name.
             hands: by the names of their grippers.
             bus: is left open.
-            window: of the leases, in seconds; see :class:`~robotiq_async.fleet.lease.Lease`.
+            window: of the leases, in seconds; see :class:`~robotiq_async.fleet.control.lease.Lease`.
         """
         self.epoch = secrets.randbits(EPOCH_BITS)
         self._bus = bus

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-import getpass
 import json
-import os
-import secrets
-import socket
 from collections.abc import Coroutine, Mapping
 from contextlib import suppress
 from typing import Any, Final
 
-from ..concurrency import wait_shielded
-from ..enums import State
-from ..errors import (
-    AgentError,
+from ...concurrency import wait_shielded
+from ...enums import State
+from ...errors import (
     ConnectFailedError,
     ConnectionLostError,
     ControlLostError,
@@ -24,19 +19,20 @@ from ..errors import (
     ProtocolError,
     RobotiqError,
 )
-from ..log import log
-from ..session.clock import now
-from ..session.event_loop import check_loop
-from ..session.state_waiters import StateWaiters
-from ..session.statistics import Counters, Statistics
-from ..session.streams import Channels
-from .bus import Bus, Reply, Undo, Urgency
-from .envelope import Call, unpack_answer
-from .lease import WINDOW_S
+from ...log import log
+from ...session.clock import now
+from ...session.event_loop import check_loop
+from ...session.state_waiters import StateWaiters
+from ...session.statistics import Counters, Statistics
+from ...session.streams import Channels
+from ..control.lease import WINDOW_S
+from ..network.bus import Bus, Undo
+from ..wire.envelope import Call
+from ..wire.names import GripperName
+from ..wire.status_message import unpack
+from ..wire.values import Fields, read_statistics
 from .mirror import Mirror
-from .names import GripperName
-from .status_message import unpack
-from .values import Fields, read_statistics
+from .requests import NoAnswerError, Requests, label
 
 RENEWALS: Final = 5
 """So often in a window the lease is renewed, and silence looked for."""
@@ -45,10 +41,6 @@ ANSWER_S: Final = 0.5
 CONNECT_S: Final = 5.0
 HALT_S: Final = 2.0
 RELEASE_S: Final = 1.5
-
-
-class NoAnswerError(ConnectionLostError):
-    """No answer came; whether it was carried out is not known."""
 
 
 class RemoteSession:
@@ -75,13 +67,10 @@ class RemoteSession:
         self._bus = bus
         self._channels = channels
         self._wants_control = wants_control
-        self._client = secrets.token_hex(8)
         self._lease = 0
         self._window = WINDOW_S
-        self._number = 0
         self._heard_at = 0.0
-        self._silence: asyncio.Future[None] = self.loop.create_future()
-        """Done when the agent falls silent; another one when it is heard again."""
+        self._requests = Requests(name, bus)
         self._tasks: set[asyncio.Task[Any]] = set()
         self._is_catching_up = False
         self._renewing: asyncio.Task[Any] | None = None
@@ -169,8 +158,7 @@ class RemoteSession:
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
-        if not self._silence.done():
-            self._silence.cancel()
+        self._requests.fall_silent()
         self.waiters.fail(lambda: failure)
         self._channels.end()
 
@@ -210,8 +198,7 @@ class RemoteSession:
             self._lose_control("closed", "the agent was started anew")
         self._heard_at = now()
         self.mirror.hear(message, self._heard_at, in_turn=in_turn)
-        if self._silence.done() and not self._silence.cancelled():
-            self._silence = self.loop.create_future()
+        self._requests.hear()
         if self.is_in_control and message.lease > self._lease and in_turn:
             self.spawn(self._renew())  # it says why
         if message.events > self.mirror.events and in_turn:
@@ -257,8 +244,15 @@ class RemoteSession:
             if self.is_in_control and (self._renewing is None or self._renewing.done()):
                 self._renewing = self.spawn(self._renew())
             elif self._wants_control and not self.is_in_control and not self.mirror.is_silent:
-                with suppress(RobotiqError):
-                    await self.acquire()
+                await self._acquire_again()
+
+    async def _acquire_again(self) -> None:
+        try:
+            await self.acquire()
+        except ControlLostError:
+            self._wants_control = False  # somebody else was first; whose turn it is then people decide
+        except RobotiqError:
+            pass  # again in a moment
 
     def _fall_silent(self, at: float) -> None:
         if self.mirror.is_silent:
@@ -266,7 +260,7 @@ class RemoteSession:
         log.warning("%s: the agent is silent", self.name)
         self.mirror.fall_silent(at)
         self._lose_control("expired", "the agent is silent")
-        self._silence.set_result(None)
+        self._requests.fall_silent()
 
     # -- control ---------------------------------------------------------------------------------------
 
@@ -324,73 +318,27 @@ class RemoteSession:
 
     # -- asking ----------------------------------------------------------------------------------------
 
-    async def ask(
-        self,
-        verb: str,
-        arguments: Fields | None = None,
-        *,
-        timeout: float,
-        urgency: Urgency = Urgency.COMMAND,
-    ) -> Any:  # noqa: ANN401  # what each request returns
-        """Ask the agent, once.
-
-        Raises:
-            NoAnswerError: no answer; it may have been carried out.
-            NotAllowedError: nobody answers to that, and the agent is there.
-            RobotiqError, TypeError, ValueError: what the agent answered.
-        """
-        return await self.send(self.call(arguments), verb, timeout=timeout, urgency=urgency)
+    async def ask(self, verb: str, arguments: Fields | None = None, **how: Any) -> Any:  # noqa: ANN401
+        """Ask the agent, once; see :meth:`Requests.send` for what else it takes and raises."""
+        return await self.send(self.call(arguments), verb, **how)
 
     def call(self, arguments: Fields | None = None) -> Call:
-        """The next request."""
-        self._number += 1
-        mirror = self.mirror
-        return Call(
-            self.name.base,
-            self._client,
-            mirror.epoch,
-            self._lease,
-            self._number,
-            mirror.stamp,
-            arguments or {},
-        )
+        """The next request, under the present lease."""
+        return self._requests.make(self.mirror, self._lease, arguments or {})
 
-    async def send(self, call: Call, verb: str, *, timeout: float, urgency: Urgency) -> Any:  # noqa: ANN401
-        """Send a request and wait for its answer. Raises what :meth:`ask` does."""
-        asked_at = now()
-        asking = asyncio.ensure_future(
-            self._bus.ask(self.name.key(verb), call.pack(), timeout=timeout, urgency=urgency)
-        )
+    async def send(self, call: Call, verb: str, **how: Any) -> Any:  # noqa: ANN401
+        """Send a request and wait for its answer; see :meth:`Requests.send`.
+
+        Raises:
+            NotStartedError: the run has ended meanwhile.
+        """
         try:
-            # A halt is asked for also when nothing has been heard for a while.
-            awaited: set[asyncio.Future[Any]] = {asking}
-            if urgency is not Urgency.STOP:
-                awaited.add(self._silence)
-            await asyncio.wait(awaited, return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            asking.cancel()
-        if not asking.done() or asking.cancelled():
+            answer, news = await self._requests.send(call, verb, **how)
+        except NoAnswerError:
             self.check_running()
-            raise NoAnswerError(f"{self.name}: the agent fell silent; {verb} may have been carried out")
-        reply = asking.result()
-        if reply is None:
-            self._refuse_silence(verb, at_once=now() - asked_at < timeout / 2)
-        return self._read(reply, call, verb)
-
-    def _refuse_silence(self, verb: str, *, at_once: bool) -> None:
-        self.check_running()
-        if at_once and not self.mirror.is_silent:
-            raise NotAllowedError(f"{self.name}: nobody there answers to {verb}: access denied")
-        raise NoAnswerError(f"{self.name}: no answer in time; {verb} may have been carried out")
-
-    def _read(self, reply: Reply | None, call: Call, verb: str) -> Any:  # noqa: ANN401
-        assert reply is not None
-        answer = unpack_answer(reply.payload)
-        if answer.to != self.name.base or answer.number not in (0, call.number):
-            self.mirror.misrouted += 1
-            raise AgentError(f"{self.name}: the answer to {verb} was another's; it may have been carried out")
-        if reply.attachment:
-            self._hear_status(reply.attachment, in_turn=False)
+            raise
+        if news:
+            self._hear_status(news, in_turn=False)
         try:
             return answer.outcome(self.mirror.clock)
         except ControlLostError as error:
@@ -419,12 +367,3 @@ class RemoteSession:
     def current_state(self) -> State:
         """Where the hand is."""
         return State.SHUTDOWN if self.is_over else self.mirror.state
-
-
-def label() -> str:
-    """What this client is called by people."""
-    try:
-        user = getpass.getuser()
-    except (OSError, KeyError):
-        user = "somebody"
-    return f"{user}@{socket.gethostname()}:{os.getpid()}"

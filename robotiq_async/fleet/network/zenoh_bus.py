@@ -16,8 +16,8 @@ from typing import Any, Final
 import zenoh
 from zenoh.handlers import Callback
 
-from ..errors import ConnectFailedError
-from ..log import log
+from ...errors import ConnectFailedError
+from ...log import log
 from .bus import Question, Reply, Undo, Urgency
 
 CLOSE_S: Final = 1.0
@@ -119,7 +119,7 @@ class ZenohBus:
         self._closing: asyncio.Future[None] | None = None
 
     def publisher(self, key: str, urgency: Urgency) -> Callable[[bytes], None]:
-        """See :class:`~robotiq_async.fleet.bus.Bus`."""
+        """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
         publisher = self._session.declare_publisher(
             key,
             priority=_PRIORITY[urgency],
@@ -135,7 +135,7 @@ class ZenohBus:
         return publish
 
     def subscribe(self, expression: str, listener: Callable[[str, bytes], None]) -> Undo:
-        """See :class:`~robotiq_async.fleet.bus.Bus`."""
+        """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
 
         def deliver(sample: zenoh.Sample) -> None:
             self._mailbox.put(lambda: listener(str(sample.key_expr), sample.payload.to_bytes()))
@@ -143,7 +143,7 @@ class ZenohBus:
         return self._undo(self._session.declare_subscriber(expression, _direct(deliver)))
 
     def serve(self, expression: str, handler: Callable[[Question], None]) -> Undo:
-        """See :class:`~robotiq_async.fleet.bus.Bus`."""
+        """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
 
         def deliver(query: zenoh.Query) -> None:
             self._mailbox.put(lambda: handler(_Question(query)))
@@ -151,7 +151,7 @@ class ZenohBus:
         return self._undo(self._session.declare_queryable(expression, _direct(deliver)))
 
     async def ask(self, key: str, payload: bytes, *, timeout: float, urgency: Urgency) -> Reply | None:
-        """See :class:`~robotiq_async.fleet.bus.Bus`."""
+        """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
         answered: asyncio.Future[Reply | None] = asyncio.get_running_loop().create_future()
 
         def take(reply: Reply | None) -> None:
@@ -183,11 +183,11 @@ class ZenohBus:
         return await answered
 
     def announce(self, key: str) -> Undo:
-        """See :class:`~robotiq_async.fleet.bus.Bus`."""
+        """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
         return self._undo(self._session.liveliness().declare_token(key))
 
     async def announced(self, expression: str, *, timeout: float) -> list[str]:
-        """See :class:`~robotiq_async.fleet.bus.Bus`."""
+        """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
 
         def find() -> list[str]:
             replies = self._session.liveliness().get(expression, timeout=timeout)
@@ -199,7 +199,7 @@ class ZenohBus:
             return []
 
     def watch(self, expression: str, listener: Callable[[str, bool], None]) -> Undo:
-        """See :class:`~robotiq_async.fleet.bus.Bus`."""
+        """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
 
         def deliver(sample: zenoh.Sample) -> None:
             key, is_there = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
@@ -209,7 +209,7 @@ class ZenohBus:
         return self._undo(liveliness.declare_subscriber(expression, _direct(deliver), history=True))
 
     async def close(self) -> None:
-        """See :class:`~robotiq_async.fleet.bus.Bus`."""
+        """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
         if self._closing is None:
             self._closing = asyncio.ensure_future(asyncio.to_thread(self._session.close))
         with contextlib.suppress(TimeoutError, zenoh.ZError):

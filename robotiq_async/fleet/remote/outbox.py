@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Final
 
-from ..enums import AXES, Finger
-from ..errors import ControlLostError, RobotiqError
-from ..log import log
-from .bus import Urgency
-from .remote_session import RemoteSession
+from ...enums import AXES, Finger
+from ...errors import ControlLostError, RobotiqError
+from ...log import log
+from ..network.bus import Urgency
+from .session import RemoteSession
 
 UNDER_WAY: Final = 4
 """Requests that may be unanswered at a time; 200 a second need no more up to 20 ms of round trip."""

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from ..errors import AgentError, ProtocolError
+from ...errors import AgentError, ProtocolError
 from .values import Clock, Fields, error_fields, read_error
 
 VERSION: Final = 1
@@ -21,7 +21,7 @@ class Call:
 
     Attributes:
         to: base key of the gripper it is meant for; it is compared, for a key may be wrong.
-        client: who asks; see :class:`~robotiq_async.fleet.lease.Holder`.
+        client: who asks; see :class:`~robotiq_async.fleet.control.lease.Holder`.
         epoch: the run of the agent it is meant for; 0 for whichever there is.
         lease: number of the lease it is made under.
         number: rises with each request of a client; tells a repetition, and what was overtaken.

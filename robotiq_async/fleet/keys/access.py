@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+from ..wire.names import ROOT, check_name
 from .access_list import CLIENTS, AccessList, Role
-from .names import ROOT, check_name
 
 _IN: Final = ("ingress",)
 """From the client to the agent."""

@@ -8,21 +8,21 @@ from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from typing import Any, Final, TypeVar
 
-from ..control.motion import MoveResult
-from ..control.state_machine import RUNNING
-from ..enums import Finger
-from ..errors import AgentError, ControlLostError, RobotiqConnectionError, RobotiqError
-from ..hand import RobotiqHand
-from ..log import log
-from ..session.clock import now
-from ..version import __version__
-from .admission import Admission
-from .bus import Bus, Question
-from .envelope import Answer, Call, failure, unpack_call
-from .lease import Lease
-from .names import GripperName
+from ...control.motion import MoveResult
+from ...control.state_machine import RUNNING
+from ...enums import Finger
+from ...errors import AgentError, ControlLostError, RobotiqConnectionError, RobotiqError
+from ...hand import RobotiqHand
+from ...log import log
+from ...session.clock import now
+from ...version import __version__
+from ..control.admission import Admission
+from ..control.lease import Lease
+from ..network.bus import Bus, Question
+from ..wire.envelope import Answer, Call, failure, unpack_call
+from ..wire.names import GripperName
+from ..wire.values import Fields, result_fields
 from .news import News
-from .values import Fields, result_fields
 
 RETRY_S: Final = 1.0
 """From one attempt to reach a gripper that is not there to the next."""

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from ..wire.checks import check_int
+from ...wire.checks import check_int
 from .access_list import AccessList, Role, check_subject
 from .authority import DAYS_MAX, Authority, Pair
 from .key_folder import ACCESS, AUTHORITY, CERTIFICATE, KEY

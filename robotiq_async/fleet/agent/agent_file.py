@@ -13,9 +13,9 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any, Final
 
-from ..enums import DEFAULT_FORCE, DEFAULT_SPEED
-from ..hand.robotiq_hand import RobotiqHand
-from ..session.options import (
+from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ...hand.robotiq_hand import RobotiqHand
+from ...session.options import (
     ACTIVATION_TIMEOUT_S,
     CONNECT_TIMEOUT_S,
     POLL_INTERVAL_S,
@@ -23,13 +23,13 @@ from ..session.options import (
     Options,
     check_options,
 )
-from ..wire.checks import check_seconds
-from .access_list import AccessList
-from .configuration import LOOPBACK, LOOPBACK_TLS
-from .endpoints import check_connect, check_listen
-from .key_folder import ACCESS, check_key_folder
-from .lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
-from .names import SCHEME, check_name
+from ...wire.checks import check_seconds
+from ..control.lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
+from ..keys.access_list import AccessList
+from ..keys.key_folder import ACCESS, check_key_folder
+from ..network.configuration import LOOPBACK, LOOPBACK_TLS
+from ..network.endpoints import check_connect, check_listen
+from ..wire.names import SCHEME, check_name
 from .toml_lines import Names, line_of
 
 _GRIPPERS: Final = "grippers"

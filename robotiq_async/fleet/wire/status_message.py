@@ -21,9 +21,9 @@ from __future__ import annotations
 import struct
 from typing import Final, NamedTuple
 
-from ..enums import State
-from ..errors import ProtocolError
-from ..wire.registers import Registers
+from ...enums import State
+from ...errors import ProtocolError
+from ...wire.registers import Registers
 
 _LAYOUT: Final = struct.Struct("<BBBxIIIQQdf8H")
 VERSION: Final = 1
@@ -37,7 +37,7 @@ class StatusMessage(NamedTuple):
     """What an agent says about a gripper in one moment.
 
     Attributes:
-        mark: which gripper it is about (see :attr:`~robotiq_async.fleet.names.GripperName.mark`).
+        mark: which gripper it is about (see :attr:`~robotiq_async.fleet.wire.names.GripperName.mark`).
         epoch: random, anew with each start of the agent.
         stamp: the agent's time at which this was sent, in seconds.
         state: of the agent's hand.

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from .access import access_control
-from .access_list import AccessList
+from ..keys.access import access_control
+from ..keys.access_list import AccessList
+from ..keys.key_folder import ACCESS, AUTHORITY, CERTIFICATE, KEY, check_key_folder
 from .endpoints import check_connect, check_listen
-from .key_folder import ACCESS, AUTHORITY, CERTIFICATE, KEY, check_key_folder
 
 PORT: Final = 7447
 LOOPBACK: Final = f"tcp/127.0.0.1:{PORT}"
@@ -35,7 +35,7 @@ def agent_configuration(
         listen: endpoints where clients come in.
         connect: endpoints to connect to.
         keys: the agent's folder of keys; clients may then do what its access list says, and nothing else.
-        insecure: see :func:`~robotiq_async.fleet.endpoints.check_listen`.
+        insecure: see :func:`~robotiq_async.fleet.network.endpoints.check_listen`.
 
     Raises:
         TypeError, ValueError: an endpoint that is malformed or not protected; a folder that lacks a file.
@@ -57,7 +57,7 @@ def client_configuration(
     Args:
         connect: endpoints of agents, or of a router.
         keys: the client's folder of keys.
-        insecure: see :func:`~robotiq_async.fleet.endpoints.check_connect`.
+        insecure: see :func:`~robotiq_async.fleet.network.endpoints.check_connect`.
 
     Raises:
         TypeError, ValueError: as :func:`agent_configuration`.

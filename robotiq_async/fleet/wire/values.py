@@ -6,15 +6,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from typing import Any, Final
 
-from .. import errors
-from ..control.motion import MoveResult
-from ..control.triggers import Trigger
-from ..enums import Fault, Finger, ObjectStatus, State
-from ..errors import AgentError, ProtocolError, RobotiqError
-from ..session.statistics import Statistics
-from ..session.streams import SentRequest, Transition
-from ..wire.request import Request
-from ..wire.status import RobotiqStatus
+from ... import errors
+from ...control.motion import MoveResult
+from ...control.triggers import Trigger
+from ...enums import Fault, Finger, ObjectStatus, State
+from ...errors import AgentError, ProtocolError, RobotiqError
+from ...session.statistics import Statistics
+from ...session.streams import SentRequest, Transition
+from ...wire.request import Request
+from ...wire.status import RobotiqStatus
 
 Fields = dict[str, Any]
 Clock = Callable[[float], float]

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from ..errors import AgentError, ControlLostError
-from .envelope import Call
+from ...errors import AgentError, ControlLostError
+from ..wire.envelope import Call
 from .lease import Holder, Lease
 
 _CLIENTS: Final = 1000

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Final
 from urllib.parse import parse_qsl
 
+from ..wire.names import SCHEME, GripperName
 from .configuration import LOOPBACK, client_configuration
-from .names import SCHEME, GripperName
 
 FORM: Final = "zenoh://SITE/HOST/GRIPPER[?connect=tls/HOST:7447][&keys=FOLDER]"
 CONNECT_VARIABLE: Final = "ROBOTIQ_ASYNC_CONNECT"

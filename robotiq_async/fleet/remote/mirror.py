@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Final
 
-from ..control.triggers import Trigger
-from ..enums import State
-from ..errors import ProtocolError
-from ..log import log
-from ..session.streams import Channels, Transition
-from ..wire.status import RobotiqStatus
-from .status_message import StatusMessage
-from .values import Fields, read_request, read_transition
+from ...control.triggers import Trigger
+from ...enums import State
+from ...errors import ProtocolError
+from ...log import log
+from ...session.streams import Channels, Transition
+from ...wire.status import RobotiqStatus
+from ..wire.status_message import StatusMessage
+from ..wire.values import Fields, read_request, read_transition
 
 DRIFT: Final = 200e-6
 """How far two clocks may part: seconds a second."""

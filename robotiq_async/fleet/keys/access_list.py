@@ -15,7 +15,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Final, Self
 
-from .names import check_name
+from ..wire.names import check_name
 
 NAME_MAX: Final = 56
 """A common name in a certificate has at most 64 characters, and the role stands before it."""

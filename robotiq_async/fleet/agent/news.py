@@ -10,17 +10,17 @@ import json
 from collections import deque
 from typing import Any, Final
 
-from ..enums import State
-from ..errors import RobotiqError
-from ..hand import RobotiqHand
-from ..session.clock import now
-from ..session.streams import SentRequest, Transition
-from ..wire.status import RobotiqStatus
-from .bus import Bus, Urgency
-from .lease import Lease
-from .names import GripperName
-from .status_message import StatusMessage
-from .values import Fields, request_fields, statistics_fields, transition_fields
+from ...enums import State
+from ...errors import RobotiqError
+from ...hand import RobotiqHand
+from ...session.clock import now
+from ...session.streams import SentRequest, Transition
+from ...wire.status import RobotiqStatus
+from ..control.lease import Lease
+from ..network.bus import Bus, Urgency
+from ..wire.names import GripperName
+from ..wire.status_message import StatusMessage
+from ..wire.values import Fields, request_fields, statistics_fields, transition_fields
 
 KEPT: Final = 2000
 """Events that are kept for those who have missed them: 10 s of a loop that commands at 200 Hz."""

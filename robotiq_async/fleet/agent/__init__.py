@@ -1,0 +1,1 @@
+"""Serves the hands of one host."""

@@ -1,0 +1,1 @@
+"""Who commands a gripper, and which requests are let in. Pure."""

@@ -1,0 +1,1 @@
+"""Certificates, roles, and what each of them may do."""

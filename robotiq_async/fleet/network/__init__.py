@@ -1,0 +1,1 @@
+"""How agents and clients reach each other; zenoh stops here."""

@@ -1,0 +1,1 @@
+"""A hand that an agent on another host serves."""

@@ -1,0 +1,250 @@
+"""What a hand on another host is told: motions, the halt, activation, and the way out of a fault."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Final
+
+from ...control.motion import MoveResult
+from ...control.state_machine import RUNNING
+from ...enums import CLOSED, OPEN, Finger
+from ...errors import InvalidStateError
+from ...session.clock import now
+from ...wire.checks import check_byte, check_mask, check_optional_byte, check_timeout
+from ..network.bus import Urgency
+from ..wire.values import Fields, read_result
+from .observation import RemoteObservation
+from .requests import NoAnswerError, label
+from .session import HALT_S
+
+ATTEMPT_S: Final = 0.3
+"""From one attempt to halt to the next."""
+COMMAND_S: Final = 5.0
+"""For what ends when the gripper acknowledges it."""
+SEQUENCE_S: Final = 130.0
+"""For an activation, a reset or a release; the agent has limits of its own, and they are shorter."""
+MOVE_S: Final = 100.0
+SLACK_S: Final = 5.0
+"""Added to a timeout that the agent watches over."""
+
+
+class RemoteCommands(RemoteObservation):
+    """A hand on another host that is told to move."""
+
+    _control: bool | None
+
+    async def set_position(self, value: int, fingers: Finger | int = Finger.ABC) -> None:
+        """Ask axes to go somewhere; returns when the gripper has acknowledged it, not when they are there.
+
+        Raises:
+            TypeError: value or mask of the wrong type; nothing is sent.
+            ValueError: value or mask outside their range; nothing is sent.
+            ControlLostError: this hand does not hold the lease.
+            RobotiqError: the hand takes no commands now, or the agent fell silent before its answer (the
+                request is not sent again, and may have been carried out).
+        """
+        await self._set("set_position", value, fingers)
+
+    async def set_speed(self, value: int, fingers: Finger | int = Finger.ALL) -> None:
+        """Set the speed of axes, also of a motion under way; never starts one.
+
+        Raises:
+            TypeError, ValueError, RobotiqError: as :meth:`set_position`.
+        """
+        await self._set("set_speed", value, fingers)
+
+    async def set_force(self, value: int, fingers: Finger | int = Finger.ALL) -> None:
+        """Set the force of axes; never starts a motion. More force tightens a grip.
+
+        Raises:
+            TypeError, ValueError, RobotiqError: as :meth:`set_position`.
+        """
+        await self._set("set_force", value, fingers)
+
+    async def _set(self, name: str, value: int, fingers: Finger | int) -> None:
+        mask = check_mask(fingers)
+        arguments = {"value": check_byte("value", value), "fingers": int(mask)}
+        await self._ask(name, arguments, COMMAND_S)
+
+    def command(
+        self,
+        fingers: Finger | int = Finger.ABC,
+        *,
+        position: int | None = None,
+        speed: int | None = None,
+        force: int | None = None,
+    ) -> None:
+        """Ask axes for something, for control loops: never blocks, and the last value wins.
+
+        Some requests are under way at a time; what is asked meanwhile is merged and goes out with the next.
+        A refusal that comes back is logged; the loss of the lease is raised by the next call.
+
+        Raises:
+            ValueError: none of position, speed and force; or a value outside its range.
+            TypeError: a value of the wrong type.
+            RobotiqError: not started, the agent is silent, this hand does not hold the lease, or the hand
+                takes no commands now.
+        """
+        mask = check_mask(fingers)
+        changes = {
+            name: check_optional_byte(name, value)
+            for name, value in (("position", position), ("speed", speed), ("force", force))
+        }
+        if all(value is None for value in changes.values()):
+            raise ValueError("command() needs at least one of position, speed and force")
+        session = self._asked()
+        session.check_control()
+        self._refuse_unless_running()
+        assert self._outbox is not None
+        self._outbox.put(mask, {name: value for name, value in changes.items() if value is not None})
+
+    async def move(
+        self,
+        position: int,
+        fingers: Finger | int = Finger.ABC,
+        *,
+        speed: int | None = None,
+        force: int | None = None,
+        timeout: float | None = None,
+    ) -> MoveResult:
+        """Move axes and return when every one of them has stopped: there, or against something.
+
+        When cancelled, the axes that still move are held; when the agent falls silent, it holds them itself
+        within its window.
+
+        Args:
+            position: target in counts, 0 (open) .. 255 (closed).
+            fingers: mask of the axes.
+            speed: new speed of these axes; None leaves it.
+            force: new force of these axes; None leaves it.
+            timeout: seconds; None for twice the expected time plus 2 s.
+
+        Raises:
+            TypeError, ValueError: an argument of the wrong type or outside its range; nothing is sent.
+            ControlLostError: this hand does not hold the lease, or lost it on the way.
+            RobotiqError: as for a hand of this process, or the agent fell silent.
+        """
+        arguments: Fields = {
+            "position": check_byte("position", position),
+            "fingers": int(check_mask(fingers)),
+            "speed": check_optional_byte("speed", speed),
+            "force": check_optional_byte("force", force),
+            "timeout": check_timeout("timeout", timeout),
+        }
+        limit = MOVE_S if timeout is None else timeout + SLACK_S
+        value = await self._ask("move", arguments, limit)
+        session = self._session
+        assert session is not None
+        return read_result(value, session.mirror.clock)
+
+    async def open(
+        self,
+        fingers: Finger | int = Finger.ABC,
+        *,
+        speed: int | None = None,
+        force: int | None = None,
+        timeout: float | None = None,
+    ) -> MoveResult:
+        """Open fingers: :meth:`move` to 0."""
+        return await self.move(OPEN, fingers, speed=speed, force=force, timeout=timeout)
+
+    async def close(
+        self,
+        fingers: Finger | int = Finger.ABC,
+        *,
+        speed: int | None = None,
+        force: int | None = None,
+        timeout: float | None = None,
+    ) -> MoveResult:
+        """Close the fingers, not the connection: :meth:`move` to 255."""
+        return await self.move(CLOSED, fingers, speed=speed, force=force, timeout=timeout)
+
+    async def hold(self, fingers: Finger | int = Finger.ALL) -> None:
+        """Have axes that move stay where they are; grips stay. Returns when it is acknowledged.
+
+        Raises:
+            RobotiqError: as :meth:`set_position`.
+        """
+        await self._ask("hold", {"fingers": int(check_mask(fingers))}, COMMAND_S)
+
+    async def halt(self) -> None:
+        """Stop every axis now; returns when the gripper shows it. Takes no lease; asked until answered.
+
+        If somebody else commands the gripper, that one loses the lease.
+
+        Raises:
+            NotStartedError: not started.
+            ConnectionLostError: no answer within 2 s: the fingers MAY STILL MOVE. Or the gripper is not
+                connected to its agent.
+            RobotiqError: the agent could not stop them.
+        """
+        session, deadline = self._asked(), now() + HALT_S
+        while True:
+            left = deadline - now()
+            try:
+                await session.ask(
+                    "halt", {"label": label()}, timeout=min(ATTEMPT_S, left), urgency=Urgency.STOP
+                )
+            except NoAnswerError:
+                if deadline - now() < ATTEMPT_S / 2:
+                    raise
+            else:
+                return
+
+    # -- activation, faults ----------------------------------------------------------------------------
+
+    async def activate(self) -> None:
+        """Activate the gripper, if it is not active yet: its fingers MOVE. When cancelled, it goes on.
+
+        Raises:
+            RobotiqError: as for a hand of this process, or the lease or the agent was lost.
+        """
+        await self._ask("activate", {}, SEQUENCE_S)
+
+    async def reset(self) -> None:
+        """Reset the gripper, which lets go of what it holds; returns in RESET. When cancelled, it goes on.
+
+        Raises:
+            RobotiqError: as :meth:`activate`.
+        """
+        await self._ask("reset", {}, SEQUENCE_S)
+
+    async def atr(self) -> None:
+        """Release automatically: all axes open slowly. Only in FAULT; returns in ATR_DONE.
+
+        Raises:
+            RobotiqError: as :meth:`activate`.
+        """
+        await self._ask("atr", {}, SEQUENCE_S)
+
+    async def recover(self, timeout: float | None = None) -> None:
+        """Do whatever the present fault needs: after a major one the part DROPS and the fingers MOVE.
+
+        Args:
+            timeout: seconds for all of it; None for 90 s.
+
+        Raises:
+            RobotiqError: as :meth:`activate`.
+        """
+        limit = check_timeout("timeout", timeout)
+        await self._ask("recover", {"timeout": limit}, SEQUENCE_S if limit is None else limit + SLACK_S)
+
+    # -- inside ----------------------------------------------------------------------------------------
+
+    def _refuse_unless_running(self) -> None:
+        if self.state not in RUNNING:
+            raise InvalidStateError(f"the hand takes no commands in {self.state.name}", self.state, RUNNING)
+
+    async def _ask(self, name: str, arguments: Fields, timeout: float) -> Fields:
+        """Have the agent's hand do something; when cancelled, the agent calls it off."""
+        session = self._asked()
+        if self._control is None and not session.is_in_control and session.lost is None:
+            await session.acquire()
+        session.check_control()
+        call = session.call(arguments)
+        try:
+            value: Fields = await session.send(call, f"cmd/{name}", timeout=timeout, urgency=Urgency.COMMAND)
+        except asyncio.CancelledError:
+            session.call_off(call)
+            raise
+        return value

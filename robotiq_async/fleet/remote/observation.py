@@ -1,0 +1,147 @@
+"""What a hand on another host shows: its state, its statuses, its statistics, and streams of all of it."""
+
+from __future__ import annotations
+
+import asyncio
+
+from ...enums import State
+from ...errors import ConnectionLostError, NotStartedError, StateTimeoutError
+from ...session.statistics import Counters, Statistics
+from ...session.streams import Channels, SentRequest, Stream, Transition
+from ...wire.checks import check_int, check_timeout
+from ...wire.status import RobotiqStatus
+from ..wire.names import GripperName
+from .outbox import Outbox
+from .session import RemoteSession
+
+
+class RemoteObservation:
+    """A hand on another host that is looked at."""
+
+    _name: GripperName
+    _channels: Channels
+    _session: RemoteSession | None
+    """The run under way, or the last one."""
+    _outbox: Outbox | None
+
+    @property
+    def address(self) -> str:
+        """The gripper's address, without how to get there."""
+        return str(self._name)
+
+    @property
+    def state(self) -> State:
+        """Where the hand is, as far as it is known: DISCONNECTED also while the agent is silent."""
+        return State.DISCONNECTED if self._session is None else self._session.current_state()
+
+    @property
+    def status(self) -> RobotiqStatus:
+        """The newest status that was heard; its timestamp tells how old it is.
+
+        Raises:
+            NotStartedError: there is none yet.
+        """
+        status = None if self._session is None else self._session.mirror.status
+        if status is None:
+            raise NotStartedError("no status has been heard yet: start the hand first")
+        return status
+
+    @property
+    def is_activated(self) -> bool:
+        """Whether the gripper is active.
+
+        Raises:
+            RobotiqError: not known: not started, or nothing is heard.
+        """
+        return self._current_status().is_activated
+
+    @property
+    def is_reset(self) -> bool:
+        """Whether the gripper is reset.
+
+        Raises:
+            RobotiqError: not known: not started, or nothing is heard.
+        """
+        status = self._current_status()
+        return status.is_reset and not status.activation_echo
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether an axis moves, or will because of a command that does not act yet.
+
+        Raises:
+            RobotiqError: not known: not started, or nothing is heard.
+        """
+        self._current_status()
+        assert self._session is not None
+        assert self._outbox is not None
+        newest = self._session.mirror.newest
+        return self._outbox.is_moving or (newest is not None and newest.is_moving)
+
+    @property
+    def statistics(self) -> Statistics:
+        """How the agent's polling goes, as of its last summary: at most a second old."""
+        return Counters().snapshot(0) if self._session is None else self._session.statistics
+
+    def statuses(self, buffer: int = 1) -> Stream[RobotiqStatus]:
+        """Every status that is heard from now on, for one reader; see :meth:`RobotiqHand.statuses`."""
+        return self._channels.statuses.open(check_int("buffer", buffer, 1, 1_000_000))
+
+    def transitions(self) -> Stream[Transition]:
+        """Every change of state from now on, none lost that the agent still knows of.
+
+        Losing the agent, and hearing it again, are changes too.
+        """
+        return self._channels.transitions.open(None)
+
+    def requests(self, buffer: int | None = None) -> Stream[SentRequest]:
+        """Every request the agent's hand writes from now on, by whomever it was asked for."""
+        kept = None if buffer is None else check_int("buffer", buffer, 1, 1_000_000)
+        return self._channels.requests.open(kept)
+
+    async def wait_for_state(self, *states: State, timeout: float | None = None) -> State:
+        """Wait until the hand is, if only for a moment, in one of these states, and return it.
+
+        Raises:
+            TypeError: not a State.
+            ValueError: no state, or a malformed timeout.
+            StateTimeoutError: not reached in time.
+            NotStartedError: the hand is not started, or was stopped meanwhile.
+        """
+        if not states:
+            raise ValueError("states must name at least one State, got none")
+        for state in states:
+            if not isinstance(state, State):
+                raise TypeError(f"states must be State members, got {state!r}")
+        limit = check_timeout("timeout", timeout)
+        if self.state in states:
+            return self.state
+        with self._asked().waiters.watching(set(states), {}) as reached:
+            try:
+                async with asyncio.timeout(limit):
+                    return await reached
+            except TimeoutError:
+                names = " or ".join(state.name for state in states)
+                raise StateTimeoutError(f"{names} was not reached within {limit:g} s") from None
+
+    # -- inside ----------------------------------------------------------------------------------------
+
+    def _started(self) -> RemoteSession:
+        if self._session is None:
+            raise NotStartedError("the hand is not started: use 'async with' or start()")
+        self._session.check_running()
+        return self._session
+
+    def _asked(self) -> RemoteSession:
+        session = self._started()
+        session.check_loop()
+        return session
+
+    def _current_status(self) -> RobotiqStatus:
+        self._started()
+        status = self.status
+        if self.state is State.DISCONNECTED:
+            raise ConnectionLostError(
+                "the agent or its gripper is not heard: what the gripper does is not known"
+            )
+        return status

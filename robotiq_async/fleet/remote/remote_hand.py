@@ -1,0 +1,187 @@
+"""RemoteHand: a hand that an agent on another host serves. Its options, its start, its end and its lease."""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import Self
+
+from ...enums import State
+from ...errors import InvalidStateError, NotStartedError
+from ...session.event_loop import running_loop
+from ...session.streams import Channels
+from ...wire.checks import check_seconds
+from ..network.bus import Bus
+from ..network.route import parse_remote_address
+from .commands import RemoteCommands
+from .outbox import Outbox
+from .session import CONNECT_S, RemoteSession
+
+
+class RemoteHand(RemoteCommands):
+    """A Robotiq 3-Finger gripper on another host, served by ``robotiq-async agent`` there.
+
+    A :class:`~robotiq_async.protocol.Hand`: the names, errors and promises are those of
+    :class:`~robotiq_async.RobotiqHand`, and docs/reference/fleet-protocol.md lists what differs. Commanding
+    takes a lease, which this hand acquires when it starts and renews from its own event loop; a program that
+    hangs loses it, and what it had set going is then held. Reading is free, and so is :meth:`halt`.
+
+    The safety of people is none of its business: a network can be cut at any moment. Nothing of this has run
+    on real hardware yet.
+    """
+
+    def __init__(
+        self,
+        address: str,
+        *,
+        control: bool | None = True,
+        connect_timeout: float = CONNECT_S,
+        bus: Bus | None = None,
+    ) -> None:
+        """Check every option. Opens nothing and needs no running loop.
+
+        Args:
+            address: ``zenoh://SITE/HOST/GRIPPER``; ``?connect=tls/HOST:7447&keys=FOLDER`` says how to get
+                there. What the address does not say the environment does (``ROBOTIQ_ASYNC_CONNECT``,
+                ``ROBOTIQ_ASYNC_KEYS``), and without that it is an agent on this machine.
+            control: True acquires the lease when the hand starts, None with the first command that is
+                awaited, False not at all: it only reads (and halts) unless :meth:`acquire` is called.
+            connect_timeout: seconds for finding the agent, 0.1..60.
+            bus: an open session to share; it stays open. None opens one.
+
+        Raises:
+            TypeError: an option of the wrong type.
+            ValueError: an option outside its range, or a malformed address.
+        """
+        if control is not None and not isinstance(control, bool):
+            raise TypeError(f"control must be True, False or None, got {control!r}")
+        self._name, self._route = parse_remote_address(address)
+        self._connect_timeout = check_seconds("connect_timeout", connect_timeout, 0.1, 60.0)
+        self._control = control
+        self._shared = bus
+        self._own: Bus | None = None
+        self._channels = Channels()
+        self._session: RemoteSession | None = None
+        self._outbox: Outbox | None = None
+
+    # -- lifetime --------------------------------------------------------------------------------------
+
+    async def __aenter__(self) -> Self:
+        """Start, with activation. See :meth:`start` for what it raises."""
+        await self.start()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop, also when the block failed or was cancelled."""
+        await self.stop()
+
+    async def start(self, activate: bool = True) -> None:
+        """Find the agent, acquire the lease, and activate a gripper that is reset: its fingers MOVE then.
+
+        A hand that only reads activates nothing. A failed or cancelled start leaves nothing running.
+
+        Args:
+            activate: False writes nothing to the gripper.
+
+        Raises:
+            RuntimeError: not in a running asyncio event loop.
+            InvalidStateError: this hand is started already.
+            ConnectFailedError: no agent that serves this gripper.
+            NotAllowedError: the agent's access rules say no.
+            ControlLostError: another client commands the gripper.
+            RobotiqError: as for a hand of this process, where the gripper is.
+        """
+        if not isinstance(activate, bool):
+            raise TypeError(f"activate must be True or False, got {activate!r}")
+        loop = running_loop()
+        if self._session is not None and not self._session.is_over and self._session.loop is loop:
+            raise InvalidStateError("this hand is started already", self.state, {State.SHUTDOWN})
+        bus = await self._open()
+        self._session = session = RemoteSession(
+            self._name, bus, self._channels, wants_control=self._control is True
+        )
+        self._outbox = Outbox(session)
+        try:
+            await session.connect(self._connect_timeout)
+            if activate and self._control:
+                await self._activate_if_reset()
+        except BaseException:
+            await self.stop()
+            raise
+
+    async def stop(self, *, halt: bool = True) -> None:
+        """Stop the fingers, give the lease back, and disconnect; the agent's hand goes on.
+
+        Ends within 2 s also when the agent is silent, or when cancelled meanwhile. A hand that does not hold
+        the lease stops no fingers. Idempotent.
+
+        Args:
+            halt: False leaves the fingers to what they do.
+
+        Raises:
+            RuntimeError: called in another event loop than the hand runs in.
+        """
+        if not isinstance(halt, bool):
+            raise TypeError(f"halt must be True or False, got {halt!r}")
+        session = self._session
+        if session is None or session.is_over:
+            return
+        session.check_loop()
+        try:
+            await session.close(NotStartedError("the hand was stopped"), halt=halt)
+        finally:
+            if self._own is not None:
+                bus, self._own = self._own, None
+                await bus.close()
+
+    async def _open(self) -> Bus:
+        if self._shared is not None:
+            return self._shared
+        from ..network.zenoh_bus import open_bus  # noqa: PLC0415  # needs the extra
+
+        self._own = await open_bus(self._route.configuration(), str(self._name))
+        return self._own
+
+    async def _activate_if_reset(self) -> None:
+        if self.state is State.RESET:
+            await self.activate()
+
+    # -- the lease -------------------------------------------------------------------------------------
+
+    @property
+    def is_in_control(self) -> bool:
+        """Whether this hand holds the lease, as far as it knows."""
+        return self._session is not None and not self._session.is_over and self._session.is_in_control
+
+    async def acquire(self) -> None:
+        """Get the lease, if nobody else has it.
+
+        Raises:
+            ControlLostError: another client commands the gripper.
+            RobotiqError: not started, or the agent does not answer.
+        """
+        await self._asked().acquire()
+
+    async def take(self) -> None:
+        """Get the lease, whoever has it: what that one commanded and still moves is held.
+
+        Raises:
+            RobotiqError: not started, or the agent does not answer.
+        """
+        await self._asked().acquire(take=True)
+
+    async def release(self, *, halt: bool = True) -> None:
+        """Give the lease back, and read on.
+
+        Args:
+            halt: False leaves the fingers to what they do.
+
+        Raises:
+            RobotiqError: not started, the agent does not answer, or the fingers were not seen to stop.
+        """
+        await self._asked().release(halt=halt)
+
+    def __repr__(self) -> str:
+        """Address and state."""
+        return f"<RemoteHand {self.address} {self.state.name}>"
