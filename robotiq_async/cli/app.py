@@ -20,8 +20,12 @@ from .commands.record import plot, record, recover, replay
 from .commands.simulate import simulate
 from .commands.status import status
 from .commands.view import view
+from .commands.web import web
 
-COMMANDS: Final = (demo, simulate, status, move, monitor, view, doctor, record, replay, recover, plot, agent)
+COMMANDS: Final = (
+    *(demo, simulate, status, move, monitor, web, view, doctor),
+    *(record, replay, recover, plot, agent),
+)
 """A new sub-command is a module with a function of its name, and an entry here."""
 
 _HELP = """Control a Robotiq 3-Finger gripper, or a simulated one.

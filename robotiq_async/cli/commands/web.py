@@ -1,0 +1,190 @@
+"""``robotiq-async web``."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+import webbrowser
+from collections.abc import Sequence
+from contextlib import AsyncExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+from cyclopts import Parameter
+
+from ...actions import Operator
+from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ...errors import RobotiqError
+from ...telemetry.payloads import printable
+from ..arguments import USUAL, Address, Byte, Link, Port, full_address, is_loopback, need
+from ..failures import CommandError, UsageError, usage
+
+if TYPE_CHECKING:
+    from ...web.server import PageServer
+    from ...web.settings import PageSettings
+
+AGAIN_S: Final = 3.0
+"""Between two attempts to reach a gripper of several."""
+
+
+async def web(
+    *addresses: Address,
+    control: Annotated[bool, Parameter(negative=())] = False,
+    open_browser: Annotated[bool, Parameter(name="--open", negative=())] = False,
+    port: Port = 8766,
+    host: str = "127.0.0.1",
+    password_file: Annotated[Path | None, Parameter(metavar="FILE")] = None,
+    certificate: Annotated[Path | None, Parameter(metavar="FILE")] = None,
+    key: Annotated[Path | None, Parameter(metavar="FILE")] = None,
+    speed: Byte = DEFAULT_SPEED,
+    force: Byte = DEFAULT_FORCE,
+    link: Link = USUAL,
+) -> None:
+    """Show grippers on a page in the browser, the hand in three dimensions, until Ctrl-C.
+
+    What is printed is the address to open; the token in it lets in whoever has it. The
+    page only looks, unless --control is given: then it has buttons, and a halt that is
+    also on the space bar. Nothing moves until one is pressed. With several addresses
+    there is a tile for each.
+
+    Closing the browser, or losing its connection, holds the axes that it has set in
+    motion. Ending this command stops the fingers only if they were moved from here.
+
+    For example:
+
+        robotiq-async web --open
+        robotiq-async web --control tcp://192.168.1.11
+        robotiq-async web 192.168.1.11 192.168.1.12
+
+    Args:
+        control: Let the page command the grippers.
+        open_browser: Open the page in a browser.
+        port: TCP port; 0 takes a free one.
+        host: Interface to listen on. Another one than 127.0.0.1 lets others in: only with a
+            password or a certificate.
+        password_file: File whose first line is asked of everybody, in place of the token.
+        certificate: Certificate of your own in PEM, for https.
+        key: Its private key in PEM.
+        speed: Speed of all axes from the first command on; the present one cannot be read.
+        force: Force of all axes from the first command on. A grip made with more loosens.
+    """
+    need("nicegui", "web")
+    from ...web.server import PageServer
+    from ...web.settings import PageSettings
+    from ..connect import make_operator
+    from ..log_capture import forwarded_warnings
+
+    operators = [make_operator(each, link, speed=speed, force=force) for each in addresses or ("sim://",)]
+    with usage():
+        settings = PageSettings(
+            host=host,
+            port=port,
+            control=control,
+            loopback=is_loopback(host),
+            addresses=tuple(operator.hand.address for operator in operators),
+            speed=speed,
+            force=force,
+            password=_password(password_file),
+            certificate=_readable(certificate),
+            key=_readable(key),
+        )
+    _refuse_doubles(settings.addresses)
+    page = PageServer(
+        [operator.hand for operator in operators], settings, operators=operators if control else ()
+    )
+    try:
+        with forwarded_warnings(_tell):
+            await _show(page, operators, settings, open_browser=open_browser)
+    except asyncio.CancelledError:
+        pass  # Being told to stop is how this command ends well.
+
+
+async def _show(
+    page: PageServer, operators: Sequence[Operator], settings: PageSettings, *, open_browser: bool
+) -> None:
+    # In this order nothing that concerns the page delays the stop of the fingers.
+    async with page, AsyncExitStack() as stack:
+        for index, operator in enumerate(operators):
+            stack.push_async_callback(_leave, operator)
+            await _start(page, index, operator, alone=len(operators) == 1, stack=stack)
+        if all(news.problem for news in page.news):
+            raise CommandError("; ".join(news.problem for news in page.news))
+        if not settings.loopback and not settings.certificate:
+            _tell("without a certificate the password goes through the network for everybody to read")
+        print(page.url, flush=True)
+        if open_browser:
+            webbrowser.open(page.url)
+        await page.ended()
+        raise CommandError("the process of the page has ended; what it says is above")
+
+
+async def _start(
+    page: PageServer, index: int, operator: Operator, *, alone: bool, stack: AsyncExitStack
+) -> None:
+    """Start a hand; one of several that cannot be reached is tried again and again, and shows as such."""
+    news = page.news[index]
+    try:
+        await operator.hand.start(activate=False)
+    except RobotiqError as error:
+        if alone:
+            raise
+        news.problem = str(error)
+        trying = asyncio.get_running_loop().create_task(_try_again(page, index, operator))
+        stack.push_async_callback(_cancelled, trying)
+    news.open()
+
+
+async def _try_again(page: PageServer, index: int, operator: Operator) -> None:
+    news = page.news[index]
+    while news.problem:
+        await asyncio.sleep(AGAIN_S)
+        try:
+            await operator.hand.start(activate=False)
+        except RobotiqError as error:
+            news.problem = str(error)
+        else:
+            news.problem = ""
+            news.open()
+
+
+async def _cancelled(task: asyncio.Task[None]) -> None:
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+
+
+async def _leave(operator: Operator) -> None:
+    _tell(f"{operator.hand.address}: {await operator.leave()}")
+
+
+def _password(file: Path | None) -> str:
+    if file is None:
+        return ""
+    password = _text(file).partition("\n")[0].strip()
+    if len(password) < 8:
+        raise UsageError(f"{file}: the first line must be a password of 8 characters or more")
+    return password
+
+
+def _readable(file: Path | None) -> str:
+    if file is not None:
+        _text(file)
+    return "" if file is None else str(file)
+
+
+def _text(file: Path) -> str:
+    try:
+        return file.read_text(encoding="utf-8")
+    except OSError as error:
+        raise CommandError(f"{file}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{file} is no text") from error
+
+
+def _refuse_doubles(addresses: Sequence[str]) -> None:
+    for address in addresses:
+        if addresses.count(address) > 1 and not full_address(address).startswith("sim:"):
+            raise UsageError(f"{address} is there twice")
+
+
+def _tell(words: str) -> None:
+    print("robotiq-async:", printable(words), file=sys.stderr, flush=True)

@@ -1,0 +1,94 @@
+"""Carries out what the pages ask for, and holds the axes when a page is gone."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from ..actions import Operator
+from ..errors import RobotiqError
+from ..telemetry.payloads import Fields
+from ..telemetry.services import SERVICES
+
+MAX_COMMANDS: Final = 16
+"""Of one page at a time; a halt is never refused."""
+HALT: Final = "halt"
+
+
+class PageCommands:
+    """The commands under way, by page.
+
+    A page that is gone has its commands cancelled, and that holds the axes that still move; what cannot be
+    held half-way (an activation, a release, a reset) goes on, as it does whenever it is cancelled.
+    """
+
+    def __init__(self, operators: Sequence[Operator], answer: Callable[[Fields], None]) -> None:
+        """Prepare.
+
+        Args:
+            operators: one for each hand; none at all refuses every command.
+            answer: is called with how a command ended.
+        """
+        self._operators = operators
+        self._answer = answer
+        self._tasks: dict[str, set[asyncio.Task[None]]] = {}
+        self._halts: set[asyncio.Task[None]] = set()
+
+    @property
+    def under_way(self) -> bool:
+        """Whether a page waits for a motion."""
+        return any(not task.done() for tasks in self._tasks.values() for task in tasks)
+
+    def do(self, request: Fields) -> None:
+        """Begin to carry out a request; its answer comes later.
+
+        Args:
+            request: ``page``, ``number``, ``hand``, ``name`` and ``arguments`` of a service.
+        """
+        page, name = str(request["page"]), str(request["name"])
+        task = asyncio.get_running_loop().create_task(self._carry_out(request, page, name))
+        tasks = self._halts if name == HALT else self._tasks.setdefault(page, set())
+        tasks.add(task)
+        task.add_done_callback(tasks.discard)
+
+    def gone(self, page: str) -> None:
+        """The page has ended or cannot be heard: its motions are held. A halt of it is completed."""
+        for task in self._tasks.pop(page, ()):
+            task.cancel()
+
+    def all_gone(self) -> None:
+        """No page can be heard."""
+        for page in list(self._tasks):
+            self.gone(page)
+
+    async def close(self) -> None:
+        """Hold whatever is under way; no more commands may come. Waits until they have ended."""
+        tasks = [task for tasks in self._tasks.values() for task in tasks]
+        self.all_gone()
+        await asyncio.gather(*tasks, *self._halts, return_exceptions=True)
+
+    async def _carry_out(self, request: Fields, page: str, name: str) -> None:
+        answer: Fields = {"page": page, "number": request["number"], "name": name, "ok": False}
+        try:
+            answer["words"] = await self._call(request, page, name)
+            answer["ok"] = True
+        except (RobotiqError, ValueError, TypeError) as error:
+            answer["words"] = str(error)
+        except asyncio.CancelledError:
+            answer["words"] = "the page was gone: the axes are held"
+            raise
+        finally:
+            self._answer(answer)
+
+    async def _call(self, request: Fields, page: str, name: str) -> str:
+        if not self._operators:
+            raise ValueError("this page only looks: start it with --control")
+        if name != HALT and len(self._tasks.get(page, ())) > MAX_COMMANDS:
+            raise ValueError(f"{MAX_COMMANDS} commands of this page are under way already")
+        service = SERVICES.get(f"/gripper/{name}")
+        if service is None or not 0 <= request["hand"] < len(self._operators):
+            raise ValueError(f"there is no {name} of hand {request['hand']}")
+        operator = self._operators[request["hand"]]
+        return await service.call(operator, json.dumps(request["arguments"]).encode())

@@ -1,0 +1,128 @@
+"""Who gets in: decides on a request from its head. Pure.
+
+Three checks, on every request and every websocket:
+
+- Host must be a name of this server: a name of another site that resolves to this machine (DNS rebinding)
+  is refused.
+- Origin, if there is one, must be this server itself; what changes something or stays open has one. A page
+  of another site can make a browser send requests, but not lie about where they come from.
+- The cookie must be there. It is given to whoever has the token of the printed address, or the password.
+"""
+
+from __future__ import annotations
+
+import hmac
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from http.cookies import CookieError, SimpleCookie
+from typing import Final
+from urllib.parse import parse_qs
+
+from ..settings import PageSettings
+
+COOKIE: Final = "robotiq_async"
+_LOCAL: Final = ("127.0.0.1", "localhost", "[::1]")
+
+
+class Verdict(Enum):
+    """What becomes of a request."""
+
+    SERVE = "it is served"
+    LET_IN = "it gets the cookie, and is sent on"
+    ASK = "it is asked for the password"
+    WRONG_HOST = "this is not the address that robotiq-async printed"
+    WRONG_ORIGIN = "a page of another site has no business here"
+    NO_TOKEN = "open the address that robotiq-async printed: it holds the token"
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """What of a request decides.
+
+    Attributes:
+        method: of HTTP; empty for a websocket.
+        path: without the query.
+        query: as it was sent.
+        headers: with lower-case names.
+    """
+
+    method: str
+    path: str
+    query: str = ""
+    headers: Mapping[str, str] = field(default_factory=dict)
+
+
+class Access:
+    """The rules of one server.
+
+    Attributes:
+        settings: how the page is served.
+    """
+
+    def __init__(self, settings: PageSettings, port: int) -> None:
+        """Make a cookie that nobody else has.
+
+        Args:
+            settings: how the page is served.
+            port: where it is.
+        """
+        self.settings = settings
+        self._session = secrets.token_urlsafe(24)
+        named = f"[{settings.host}]" if ":" in settings.host else settings.host
+        names = (named, *_LOCAL) if settings.loopback else (named,)
+        self._hosts = {f"{name.lower()}:{port}" for name in names}
+        # Browsers leave out the port that is usual.
+        if port == (443 if settings.certificate else 80):
+            self._hosts |= {name.lower() for name in names}
+
+    def judge(self, head: Head) -> Verdict:
+        """What becomes of a request."""
+        host = head.headers.get("host", "").lower()
+        # Behind another interface the server does not know its names; the cookie is bound to the right one.
+        if not host or (self.settings.loopback and host not in self._hosts):
+            return Verdict.WRONG_HOST
+        origin = head.headers.get("origin")
+        needs_origin = head.method not in ("GET", "HEAD")
+        if (origin is None and needs_origin) or not self._is_ours(origin, host):
+            return Verdict.WRONG_ORIGIN
+        if head.path.startswith(f"{self.settings.folder}/") and self._has_cookie(head):
+            return Verdict.SERVE
+        if head.path == "/" and head.method in ("GET", "POST"):
+            return self._at_the_door(head)
+        return Verdict.NO_TOKEN
+
+    def knows(self, password: str) -> bool:
+        """Whether this is the password."""
+        return bool(self.settings.password) and _same(password, self.settings.password)
+
+    @property
+    def cookie(self) -> str:
+        """The header that lets a browser in: no script reads it, no other site sends it."""
+        secure = "; Secure" if self.settings.certificate else ""
+        path = self.settings.folder
+        return f"{COOKIE}={self._session}; Path={path}; HttpOnly; SameSite=Strict{secure}"
+
+    def _at_the_door(self, head: Head) -> Verdict:
+        if self.settings.password:
+            return Verdict.ASK
+        token = parse_qs(head.query).get("token", [""])[0]
+        return (
+            Verdict.LET_IN if head.method == "GET" and _same(token, self.settings.token) else Verdict.NO_TOKEN
+        )
+
+    def _is_ours(self, origin: str | None, host: str) -> bool:
+        return origin is None or origin.lower() == f"{self.settings.scheme}://{host}"
+
+    def _has_cookie(self, head: Head) -> bool:
+        try:
+            morsel = SimpleCookie(head.headers.get("cookie", "")).get(COOKIE)
+        except CookieError:
+            return False
+        return morsel is not None and _same(morsel.value, self._session)
+
+
+def _same(one: str, other: str) -> bool:
+    """Compare without telling by the time how much of it is right."""
+    return hmac.compare_digest(one.encode("utf-8", "replace"), other.encode())

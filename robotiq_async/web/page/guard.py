@@ -1,0 +1,128 @@
+"""Stands before the page: every request and every websocket passes here, or does not."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, MutableMapping
+from html import escape
+from typing import Any, Final
+from urllib.parse import parse_qs
+
+from .access import Access, Head, Verdict
+
+Message = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[Message]]
+Send = Callable[[Message], Awaitable[None]]
+App = Callable[[Message, Receive, Send], Awaitable[None]]
+
+TRY_S: Final = 1.0
+"""A wrong password takes this long, and the next one waits for it."""
+MAX_FORM: Final = 4096
+
+HEADERS: Final = {
+    # Nothing is fetched from elsewhere, whatever a library has in mind.
+    "content-security-policy": "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:;"
+    " frame-ancestors 'none'; base-uri 'none'; form-action 'self'",
+    "cross-origin-resource-policy": "same-origin",
+    "referrer-policy": "no-referrer",
+    "x-content-type-options": "nosniff",
+    "x-frame-options": "DENY",
+}
+_PAGE: Final = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Robotiq 3-Finger</title>
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<style>body{font:1.1em sans-serif;max-width:30em;margin:15vh auto;padding:0 1em}
+input,button{font:inherit;padding:.4em}
+</style><h1>Robotiq 3-Finger</h1>"""
+_FORM: Final = """<form method="post" action="/"><label>Password <input type="password"
+ name="password" autofocus autocomplete="current-password"></label> <button>Enter</button></form>"""
+
+
+class Guard:
+    """An ASGI application that lets in only whom the rules let in."""
+
+    def __init__(self, app: App, access: Access) -> None:
+        """Stand before an application.
+
+        Args:
+            app: gets what may pass.
+            access: the rules.
+        """
+        self.app = app
+        self._access = access
+        self._trying = asyncio.Lock()
+
+    async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
+        """Pass on, or answer."""
+        if scope["type"] == "lifespan":
+            await self.app(scope, receive, send)
+            return
+        verdict = self._access.judge(_head(scope))
+        if verdict is Verdict.SERVE:
+            await self.app(scope, receive, _with_headers(send))
+        elif scope["type"] == "websocket":
+            await receive()
+            await send({"type": "websocket.close", "code": 1008})
+        elif verdict is Verdict.LET_IN:
+            await self._let_in(send)
+        elif verdict is Verdict.ASK:
+            await self._ask(scope["method"], receive, send)
+        else:
+            await _answer(send, 403, f"<p>{escape(verdict.value)}.</p>")
+
+    async def _ask(self, method: str, receive: Receive, send: Send) -> None:
+        if method != "POST":
+            await _answer(send, 200, _FORM)
+            return
+        password = parse_qs((await _body(receive)).decode("utf-8", "replace")).get("password", [""])[0]
+        async with self._trying:
+            right = self._access.knows(password)
+            if not right:
+                await asyncio.sleep(TRY_S)
+        if right:
+            await self._let_in(send)
+        else:
+            await _answer(send, 403, f"<p>That is not the password.</p>{_FORM}")
+
+    async def _let_in(self, send: Send) -> None:
+        location = f"{self._access.settings.folder}/"
+        await _answer(send, 303, "", {"location": location, "set-cookie": self._access.cookie})
+
+
+def _head(scope: Message) -> Head:
+    headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
+    method = scope.get("method", "")
+    return Head(method, scope["path"], scope["query_string"].decode("latin-1"), headers)
+
+
+async def _body(receive: Receive) -> bytes:
+    """A short one; of a long one the beginning."""
+    body, more = b"", True
+    while more and len(body) < MAX_FORM:
+        message = await receive()
+        body += message.get("body", b"")
+        more = message.get("more_body", False)
+    return body[:MAX_FORM]
+
+
+async def _answer(send: Send, status: int, words: str, more: dict[str, str] | None = None) -> None:
+    fields = {
+        "content-type": "text/html; charset=utf-8",
+        "cache-control": "no-store",
+        **HEADERS,
+        **(more or {}),
+    }
+    headers = [(name.encode(), value.encode("latin-1")) for name, value in fields.items()]
+    await send({"type": "http.response.start", "status": status, "headers": headers})
+    await send({"type": "http.response.body", "body": (_PAGE + words).encode()})
+
+
+def _with_headers(send: Send) -> Send:
+    added = [(name.encode(), value.encode()) for name, value in HEADERS.items()]
+
+    async def sent(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            message = {**message, "headers": [*message.get("headers", ()), *added]}
+        await send(message)
+
+    return sent

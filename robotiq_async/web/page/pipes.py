@@ -1,0 +1,33 @@
+"""The two pipes to the process that has the hands: a line of JSON each time."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import Any, BinaryIO
+
+
+class Pipes:
+    """The two pipes to the process that has the hands."""
+
+    def __init__(self) -> None:
+        """Keep standard output to ourselves: whatever a library prints goes to the errors."""
+        self._out: BinaryIO = os.fdopen(os.dup(1), "wb", buffering=0)
+        os.dup2(2, 1)
+        self._in = sys.stdin.buffer
+
+    def say(self, message: dict[str, Any]) -> None:
+        """A line to the other process; nothing if it is gone, for then this one ends as well."""
+        with suppress(OSError):
+            self._out.write(json.dumps(message).encode() + b"\n")
+
+    def first_line(self) -> bytes:
+        """The settings; empty if there are none."""
+        return self._in.readline()
+
+    def lines(self) -> Iterator[bytes]:
+        """Whatever comes after them, to the end. Blocks."""
+        return iter(self._in.readline, b"")

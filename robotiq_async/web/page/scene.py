@@ -1,0 +1,198 @@
+"""The hand in three dimensions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import pi
+from typing import Any, Final
+
+from nicegui import ui
+from nicegui.elements.scene.scene_object3d import Object3D
+
+from ...description import HandModel, Pose, Shape, hand_model
+from ...description.geometry import turned
+from ...enums import AXES, Finger, ObjectStatus
+from ...kinematics import JOINTS, PREFIX, finger_angles, palm_angle
+from ...wire.status import RobotiqStatus
+from .held import held, pads
+from .mirror import HandMirror
+from .words import COLORS
+
+SCALE: Final = 10.0
+"""Three.js likes things of a size of one."""
+LIFT: Final = 0.45
+"""The face that is bolted on lies on the ground."""
+GLOW: Final = "#ff5a1f"
+GHOST: Final = "#0ea5e9"
+STAGE: Final = "#b9c3cf"
+"""Behind the hand, which is grey and black; on a light page and on a dark one."""
+STALE: Final = 0.25
+APART: Final = 3
+"""Counts between request and position from which on the request of an axis that is not there yet is drawn."""
+TURNED: Final = 2e-4
+"""Radians below which nobody sees a difference."""
+
+Calls = list[list[Any]]
+
+
+class Figure:
+    """The links of a hand as nested groups, so that turning one joint carries what stands on it."""
+
+    def __init__(self, model: HandModel, *, ghost: bool) -> None:
+        """Build it in the scene that is being filled.
+
+        Args:
+            model: what it looks like.
+            ghost: whether it is drawn as one, and cannot be found by the names of the links.
+        """
+        self._model = model
+        self._ghost = ghost
+        self._angles: dict[str, float] = {}
+        self._shapes: dict[str, list[tuple[Shape, Object3D]]] = {}
+        self._looks: dict[str, tuple[str, float]] = {}
+        self.root = ui.scene.group().move(0, 0, LIFT).scale(SCALE)
+        self.root.rotate(pi / 2, 0, 0)  # out of the palm is up
+        self._groups: dict[str, Object3D] = {model.root: self.root}
+        if not ghost:
+            self.root.with_name(model.root)
+        self._fill(model.root)
+        for joint in model.joints:
+            with self._groups[joint.parent]:
+                group = _placed(ui.scene.group(), joint.pose())
+            if not ghost:
+                group.with_name(joint.child)
+            self._groups[joint.child] = group
+            self._fill(joint.child)
+
+    def turn(self, angles: Mapping[str, float]) -> Calls:
+        """What has to be done so that the joints are at these angles."""
+        calls: Calls = []
+        for joint in self._model.moving:
+            angle = angles[joint.name]
+            if abs(angle - self._angles.get(joint.name, 0.0)) < TURNED:
+                continue
+            self._angles[joint.name] = angle
+            group = self._groups[joint.child]
+            # Kept as well as sent, all joints in one message: a browser that comes back is told all of it.
+            group.R = [list(row) for row in joint.pose(angle).rotation]
+            calls.append(["rotate", group.id, group.R])
+        return calls
+
+    def look(self, link: str, color: str | None, opacity: float) -> None:
+        """Colour a link; None for its own colours."""
+        if self._looks.get(link) == (color or "", opacity):
+            return
+        self._looks[link] = (color or "", opacity)
+        for shape, drawn in self._shapes[link]:
+            drawn.material(color or _hex(shape), opacity)
+
+    def look_all(self, color: str | None, opacity: float) -> None:
+        """Colour every link."""
+        for link in self._shapes:
+            self.look(link, color, opacity)
+
+    def _fill(self, link: str) -> None:
+        with self._groups[link]:
+            shapes = [(shape, _drawn(shape)) for shape in self._model.links[link].shapes]
+        self._shapes[link] = shapes
+        self.look(link, GHOST if self._ghost else None, STALE if self._ghost else 1.0)
+
+
+class HandScene:
+    """A scene with one hand, what it is asked for, and what it holds."""
+
+    def __init__(self, *, compact: bool = False) -> None:
+        """Build it where the page is being built.
+
+        Args:
+            compact: for a tile: without the request.
+        """
+        model = hand_model()
+        with ui.scene(grid=(4, 16), background_color=STAGE, fps=30).classes("w-full h-full") as scene:
+            self.scene = scene
+            self._ghost = None if compact else Figure(model, ghost=True)
+            self._figure = Figure(model, ghost=False)
+            self._object = ui.scene.sphere(1.0).material("#f2c230", 0.85).with_name("object").visible(False)
+            if not compact:
+                self._letters()
+        self._model = model
+        scene.move_camera(1.5, -2.1, 1.95, 0, 0, 0.85, duration=0)
+
+    def show(self, hand: HandMirror) -> None:
+        """Draw what is newest; costs nothing where nothing has changed."""
+        if hand.status is None:
+            self._figure.look_all(None, STALE)
+            return
+        angles = _angles(hand.status, requested=False)
+        calls = self._figure.turn(angles)
+        if self._ghost is not None:
+            wanted = self._show_ghost(self._ghost, hand, hand.status)
+            calls += wanted
+        if calls:
+            self.scene.run_method("run_methods", calls)
+        self._show_contacts(hand, hand.status)
+        self._show_object(hand, hand.status, angles)
+
+    def _show_ghost(self, ghost: Figure, hand: HandMirror, status: RobotiqStatus) -> Calls:
+        # Open is 6 or 7 where 0 was asked for: what an axis itself calls reached is not drawn.
+        away = any(
+            abs(status.requested_position(axis) - status.position(axis)) > APART
+            for axis in AXES
+            if status.finger_status(axis) is not ObjectStatus.AT_POSITION
+        )
+        is_wanted = away and status.go_echo and status.is_activated and not hand.is_lost
+        ghost.root.visible(is_wanted)
+        return ghost.turn(_angles(status, requested=True)) if is_wanted else []
+
+    def _show_contacts(self, hand: HandMirror, status: RobotiqStatus) -> None:
+        opacity = STALE if hand.is_lost else 1.0
+        glowing = Finger(0) if hand.is_lost else status.contacts
+        if glowing & Finger.SCISSOR:
+            glowing |= Finger.B | Finger.C
+        fingers = {f"{prefix}_link_{n}": finger for finger, prefix in PREFIX.items() for n in (2, 3)}
+        for link in self._model.links:
+            is_hot = bool(fingers.get(link, Finger(0)) & glowing)
+            self._figure.look(link, GLOW if is_hot else None, opacity)
+
+    def _show_object(self, hand: HandMirror, status: RobotiqStatus, angles: Mapping[str, float]) -> None:
+        closing = Finger(0)
+        for axis in AXES:
+            if status.finger_status(axis) is ObjectStatus.CONTACT_CLOSING:
+                closing |= axis & status.contacts
+        ball = None if hand.is_lost else held(pads(self._model, self._model.link_poses(angles)), closing)
+        self._object.visible(ball is not None)
+        if ball is not None:
+            (x, y, z), radius = ball
+            self._object.move(x * SCALE, -z * SCALE, y * SCALE + LIFT).scale(radius * SCALE)
+
+    def _letters(self) -> None:
+        for axis, color in zip(AXES, COLORS, strict=True):
+            if axis in PREFIX:
+                with self._figure._groups[f"{PREFIX[axis]}_link_0"]:  # noqa: SLF001
+                    style = f"color:{color};font:bold 15px sans-serif;text-shadow:0 0 3px #0008"
+                    ui.scene.text(str(axis.name), style).move(0.0, -0.035, 0.0)
+
+
+def _angles(status: RobotiqStatus, *, requested: bool) -> dict[str, float]:
+    where = status.requested_position if requested else status.position
+    palm = palm_angle(where(Finger.SCISSOR))
+    one, two, middle = (finger_angles(where(finger)) for finger in PREFIX)
+    return dict(zip(JOINTS, (palm, *one, -palm, *two, *middle), strict=True))
+
+
+def _drawn(shape: Shape) -> Object3D:
+    if shape.kind == "box":
+        return _placed(ui.scene.box(shape.size[0], shape.size[1], shape.size[2]), shape.origin)
+    if shape.kind == "sphere":
+        return _placed(ui.scene.sphere(shape.size[0]), shape.origin)
+    radius, length = shape.size
+    upright = shape.origin @ turned((1, 0, 0), pi / 2)  # those of three.js lie along y
+    return _placed(ui.scene.cylinder(radius, radius, length, 24), upright)
+
+
+def _placed(drawn: Object3D, pose: Pose) -> Object3D:
+    return drawn.move(*pose.position).rotate_R([list(row) for row in pose.rotation])
+
+
+def _hex(shape: Shape) -> str:
+    return "#" + "".join(f"{round(255 * each):02x}" for each in shape.color[:3])

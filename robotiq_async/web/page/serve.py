@@ -1,0 +1,116 @@
+"""Serves the page with NiceGUI and uvicorn, until the other process closes the pipe."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Final
+
+import uvicorn
+from fastapi import FastAPI
+from nicegui import ui
+
+from ..settings import PageSettings
+from .access import Access
+from .guard import Guard
+from .mirror import Mirror
+from .pages import register
+from .pipes import Pipes
+
+BEAT_S: Final = 0.25
+MESSAGE_MAX: Final = 65_536
+"""Bytes of what a browser says at a time."""
+
+
+class _Server(uvicorn.Server):
+    """One that leaves signals alone, and says when it serves."""
+
+    def __init__(self, config: uvicorn.Config) -> None:
+        super().__init__(config)
+        self.serving = asyncio.Event()
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        yield
+
+    def end(self) -> None:
+        """Now, and not when every browser has closed its page."""
+        self.should_exit = self.force_exit = True
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        self.serving.set()
+
+
+def run(settings: PageSettings, listening: socket.socket, pipes: Pipes) -> None:
+    """Serve until the end of the pipe.
+
+    Args:
+        settings: how.
+        listening: where.
+        pipes: to the process that has the hands.
+
+    Raises:
+        OSError: a certificate that cannot be used.
+    """
+    mirror = Mirror(
+        settings.addresses,
+        control=settings.control,
+        say=pipes.say,
+        speed=settings.speed,
+        force=settings.force,
+    )
+    port = listening.getsockname()[1]
+    config = uvicorn.Config(
+        Guard(_application(settings, mirror), Access(settings, port)),
+        log_level="critical",
+        access_log=False,
+        server_header=False,
+        timeout_graceful_shutdown=1,
+        ws_max_size=MESSAGE_MAX,
+        ssl_certfile=settings.certificate or None,
+        ssl_keyfile=settings.key or None,
+    )
+    config.load()
+    asyncio.run(_serve(config, listening, mirror, pipes))
+
+
+def _application(settings: PageSettings, mirror: Mirror) -> FastAPI:
+    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+    register(mirror)
+    ui.run_with(
+        app,
+        mount_path=settings.folder,
+        title="Robotiq 3-Finger",
+        dark=None,
+        show_welcome_message=False,
+        binding_refresh_interval=None,
+    )
+    return app
+
+
+async def _serve(config: uvicorn.Config, listening: socket.socket, mirror: Mirror, pipes: Pipes) -> None:
+    server, loop = _Server(config), asyncio.get_running_loop()
+    threading.Thread(target=_hear, args=(pipes, mirror, loop, server), daemon=True).start()
+    beating = loop.create_task(_beat(mirror, server, pipes, listening.getsockname()[1]))
+    await server.serve(sockets=[listening])
+    beating.cancel()
+
+
+async def _beat(mirror: Mirror, server: _Server, pipes: Pipes, port: int) -> None:
+    await server.serving.wait()
+    pipes.say({"serving": port})
+    while True:
+        await asyncio.sleep(BEAT_S)
+        mirror.beat()
+
+
+def _hear(pipes: Pipes, mirror: Mirror, loop: asyncio.AbstractEventLoop, server: _Server) -> None:
+    """In a thread of its own: not every system can wait for a pipe in an event loop."""
+    with suppress(RuntimeError):  # the loop has been closed meanwhile
+        for line in pipes.lines():
+            loop.call_soon_threadsafe(mirror.hear, line)
+        loop.call_soon_threadsafe(server.end)

@@ -1,0 +1,79 @@
+"""Whether a page and its browser are in touch, in both directions.
+
+The server sends the time by its own clock four times a second, and the browser sends back what it got last:
+with its heartbeat, and with every press of a button. So a press that was held up on its way, or made on a
+page that shows what was long ago, is told apart from a fresh one, although the two clocks know nothing of
+each other.
+"""
+
+from __future__ import annotations
+
+from time import monotonic
+from typing import Final
+
+BEAT_MS: Final = 250
+LOST_S: Final = 2.0
+"""After this a page cannot be heard. A browser wakes up a tab in the background once a second."""
+FRESH_S: Final = 1.5
+"""A press that is older than this moves nothing."""
+
+SCRIPT: Final = f"""
+<script>
+window.robotiqTime = 0;
+setInterval(() => {{
+  if (window.socket && window.socket.connected) emitEvent('beat', window.robotiqTime);
+}}, {BEAT_MS});
+for (const kind of ['keydown', 'keyup']) {{
+  // Before any button that has the focus: the space bar halts, and does nothing else.
+  document.addEventListener(kind, (event) => {{
+    if (event.code !== 'Space') return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    if (kind === 'keydown' && !event.repeat) emitEvent('space');
+  }}, true);
+}}
+</script>
+"""
+PRESS: Final = "() => emit(window.robotiqTime)"
+"""What a button sends."""
+
+
+class Touch:
+    """The time that one browser has sent back.
+
+    Attributes:
+        is_lost: whether it counts as out of touch.
+    """
+
+    def __init__(self) -> None:
+        """In touch, for now: it has just asked for the page."""
+        self.is_lost = False
+        self._newest = monotonic()
+
+    @staticmethod
+    def now() -> str:
+        """The script that tells the browser the time."""
+        return f"window.robotiqTime = {monotonic():.3f}"
+
+    def heard(self, sent_back: object) -> None:
+        """A heartbeat."""
+        self._newest = max(self._newest, _time(sent_back))
+        if self.is_lost and monotonic() - self._newest < LOST_S:
+            self.is_lost = False
+
+    def check(self) -> bool:
+        """Whether the browser has just been lost."""
+        was_lost, self.is_lost = self.is_lost, self.is_lost or monotonic() - self._newest > LOST_S
+        return self.is_lost and not was_lost
+
+    @staticmethod
+    def is_fresh(sent_back: object) -> bool:
+        """Whether a press is."""
+        return 0 <= monotonic() - _time(sent_back) <= FRESH_S
+
+
+def _time(sent_back: object) -> float:
+    """What a browser may have sent is anything."""
+    if isinstance(sent_back, bool) or not isinstance(sent_back, int | float) or sent_back > monotonic():
+        return 0.0
+    return float(sent_back)

@@ -1,0 +1,86 @@
+"""The state of a hand in words and colours."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any, Final
+
+from ...enums import AXES, Fault, Finger, ObjectStatus, Severity, State
+from .mirror import HandMirror
+
+NAMES: Final = tuple("scissor" if axis is Finger.SCISSOR else str(axis.name) for axis in AXES)
+COLORS: Final = ("#3b82f6", "#22a35a", "#e8890c", "#a855f7")
+"""Of A, B, C and the scissor, wherever they are drawn: to be told apart on light and on dark."""
+
+_STATES: Final = {
+    State.DISCONNECTED: "lost",
+    State.DO_ACTIVATION: "activating: the fingers move",
+    State.WF_ACTIVATION: "activating: the fingers move",
+    State.RUNNING_IDLE: "ready",
+    State.RUNNING_CC: "ready",
+    State.FAULT: "fault",
+    State.DO_ATR: "releasing: the fingers open",
+    State.WF_ATR: "releasing: the fingers open",
+    State.ATR_DONE: "released: reset it",
+    State.DO_RESET: "resetting",
+    State.WF_RESET: "resetting",
+    State.RESET: "reset: not active",
+    State.DO_SHUTDOWN: "stopping",
+    State.SHUTDOWN: "stopped",
+}
+
+
+def state_words(hand: HandMirror, *, is_quiet: bool) -> tuple[str, str]:
+    """The state in words, and a colour of Quasar for it."""
+    if is_quiet:
+        return "the program that watches the gripper is silent", "negative"
+    if hand.problem:
+        return "not reached", "negative"
+    words = _STATES[hand.state]
+    if hand.state in (State.DISCONNECTED, State.FAULT):
+        return words, "negative"
+    if hand.state in (State.RUNNING_IDLE, State.RUNNING_CC):
+        moving = hand.status is not None and hand.status.is_moving
+        return ("moving", "primary") if moving else (words, "positive")
+    return words, "warning"
+
+
+def fault_words(hand: HandMirror) -> tuple[str, bool]:
+    """The fault in words, and whether it is a serious one."""
+    if hand.problem:
+        return hand.problem, True
+    if hand.is_lost:
+        seconds = f", last heard {hand.age:.1f} s ago" if hand.status is not None else ""
+        return f"no connection to the gripper{seconds}: what is shown is old", True
+    assert hand.status is not None
+    fault = hand.status.fault
+    if fault is Fault.NONE:
+        return "no fault", False
+    return (
+        f"0x{int(fault):02X} {fault.severity.value}: {fault.description}",
+        fault.severity is not Severity.PRIORITY,
+    )
+
+
+def axis_words(hand: HandMirror, axis: Finger) -> str:
+    """What an axis does."""
+    status = hand.status
+    if hand.is_lost or status is None or hand.state is State.RESET:
+        return "-"
+    reported = status.finger_status(axis)
+    if reported is ObjectStatus.IN_MOTION:
+        return "moving" if status.is_moving else "-"
+    return {
+        ObjectStatus.CONTACT_OPENING: "contact while opening",
+        ObjectStatus.CONTACT_CLOSING: "contact while closing",
+        ObjectStatus.AT_POSITION: "there",
+    }[reported]
+
+
+def event_words(event: dict[str, Any]) -> str:
+    """An event as a line."""
+    clock = f"{datetime.fromtimestamp(event['time']).astimezone():%H:%M:%S.%f}"[:-4]
+    if event["kind"] == "fault":
+        return f"{clock}  fault 0x{event['code']:02X}: {event['description']}"
+    words = _STATES[State[event["target"]]]
+    return f"{clock}  {words}  ({event['source']} to {event['target']})"

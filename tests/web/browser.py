@@ -1,0 +1,130 @@
+"""A real browser, driven from threads so that the loop of the test stays free; Debian's chromium does."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Callable
+from typing import Any, Final, Literal, TypeVar
+
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.by import By
+from selenium.webdriver.remote.webelement import WebElement
+from selenium.webdriver.support.wait import WebDriverWait
+
+T = TypeVar("T")
+
+BROWSER: Final = shutil.which("chromium") or shutil.which("google-chrome")
+DRIVER: Final = shutil.which("chromedriver")
+MISSING: Final = "needs a browser and its driver: apt-get install chromium chromium-driver"
+PATIENCE: Final = 20
+FLAGS: Final = (
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+LINK: Final = """
+const scene = window[Object.keys(window).find((key) => key.startsWith('scene_'))];
+const [palm, link] = ['palm', arguments[0]].map((name) => scene.getObjectByName(name));
+if (!palm || !link) return null;
+scene.updateMatrixWorld(true);
+return palm.worldToLocal(link.getWorldPosition(palm.position.clone())).toArray();
+"""
+"""Where the browser draws a link, in the frame of the palm."""
+MIDDLE: Final = "arguments[0].scrollIntoView({block: 'center'})"
+VISIBLE: Final = """
+const scene = window[Object.keys(window).find((key) => key.startsWith('scene_'))];
+return scene.getObjectByName(arguments[0]).visible;
+"""
+COLOR: Final = """
+const scene = window[Object.keys(window).find((key) => key.startsWith('scene_'))];
+return scene.getObjectByName(arguments[0]).children[0].material.color.getHexString();
+"""
+
+
+class Browser:
+    """One browser with its own profile; a window at a time is driven."""
+
+    def __init__(self, *, nice: int = 5) -> None:
+        assert BROWSER is not None
+        assert DRIVER is not None
+        self._profile = tempfile.mkdtemp(prefix="robotiq_async-")
+        options = webdriver.ChromeOptions()
+        options.binary_location = BROWSER
+        for flag in (*FLAGS, "--window-size=1280,900", f"--user-data-dir={self._profile}"):
+            options.add_argument(flag)
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+        # On other machines the page is drawn by another computer: here the drawing must not starve the hand.
+        service = Service(DRIVER, popen_kw={"preexec_fn": lambda: os.nice(nice)})
+        self.driver = webdriver.Chrome(options=options, service=service)
+
+    def quit(self) -> None:
+        self.driver.quit()
+        shutil.rmtree(self._profile, ignore_errors=True)
+
+    async def do(self, work: Callable[[], T]) -> T:
+        """Drive it, in a thread."""
+        return await asyncio.to_thread(work)
+
+    async def open(self, url: str) -> None:
+        await self.do(lambda: self.driver.get(url))
+
+    async def until(self, condition: Callable[[], T | Literal[False]]) -> T:
+        """Look again and again until it is so; returns what was looked for."""
+        waiting = WebDriverWait(self.driver, PATIENCE, 0.05, ignored_exceptions=(Exception,))
+        found: T = await self.do(lambda: waiting.until(lambda _: condition()))
+        return found
+
+    def find(self, name: str) -> WebElement:
+        return self.driver.find_element(By.CSS_SELECTOR, f"[data-testid={name}]")
+
+    def has(self, name: str) -> bool:
+        return bool(self.driver.find_elements(By.CSS_SELECTOR, f"[data-testid={name}]"))
+
+    async def says(self, name: str, words: str) -> str:
+        """Wait until a part of the page has these words; returns all of them."""
+        return await self.until(lambda: words in self.find(name).text and self.find(name).text)
+
+    async def click(self, name: str) -> None:
+        await self.until(lambda: self.find(name).is_enabled())
+        # In the middle of the window: at its foot the halt would be hit.
+        await self.do(lambda: self.driver.execute_script(MIDDLE, self.find(name)))
+        await self.do(lambda: self.find(name).click())
+
+    async def run(self, script: str, *arguments: object) -> Any:
+        return await self.do(lambda: self.driver.execute_script(script, *arguments))
+
+    def link(self, name: str) -> Any:
+        """Where it draws a link, in the frame of the palm; None before it does."""
+        return self.driver.execute_script(LINK, name)
+
+    async def in_touch(self) -> None:
+        """Wait until the page knows the time of the server, and may press buttons."""
+        await self.until(lambda: self.driver.execute_script("return window.robotiqTime > 0"))
+
+    def _log(self, kind: str) -> list[dict[str, Any]]:
+        return list(self.driver.get_log(kind))  # type: ignore[no-untyped-call]
+
+    def requested(self) -> set[str]:
+        """Every address that was asked for since the last time."""
+        messages = [json.loads(each["message"])["message"] for each in self._log("performance")]
+        return {
+            each["params"].get("request", each["params"]).get("url", "")
+            for each in messages
+            if each["method"] in ("Network.requestWillBeSent", "Network.webSocketCreated")
+        }
+
+    def complaints(self) -> list[str]:
+        """What the page has complained about since the last time."""
+        return [each["message"] for each in self._log("browser") if each["level"] == "SEVERE"]

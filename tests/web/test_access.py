@@ -1,0 +1,124 @@
+"""Who gets in, and who does not."""
+
+from __future__ import annotations
+
+import pytest
+
+from robotiq_async.web.page.access import Access, Head, Verdict
+from robotiq_async.web.settings import PageSettings
+
+PORT = 8766
+HERE = f"127.0.0.1:{PORT}"
+
+
+def access(**options: object) -> Access:
+    return Access(PageSettings(**options), PORT)  # type: ignore[arg-type]
+
+
+def cookie(rules: Access) -> str:
+    return rules.cookie.partition(";")[0]
+
+
+def head(rules: Access, path: str = "/", method: str = "GET", **headers: str) -> Head:
+    return Head(method, path, headers.pop("query", ""), {"host": HERE, **headers})
+
+
+def test_the_token_lets_in_and_nothing_else_does() -> None:
+    rules = access()
+    token = rules.settings.token
+    assert rules.judge(head(rules, query=f"token={token}")) is Verdict.LET_IN
+    for query in ("", "token=", f"token={token[:-1]}", f"token=x{token}", f"other={token}", "token=%FF"):
+        assert rules.judge(head(rules, query=query)) is Verdict.NO_TOKEN
+    assert len(token) >= 24
+    assert access().settings.token != token
+
+
+def test_the_cookie_serves_what_lies_in_the_folder() -> None:
+    rules = access()
+    inside = f"{rules.settings.folder}/anything"
+    assert rules.judge(head(rules, inside, cookie=cookie(rules))) is Verdict.SERVE
+    for wrong in ("", "robotiq_async=", "robotiq_async=x", cookie(access()), "a=b; robotiq_async", "\x00"):
+        assert rules.judge(head(rules, inside, cookie=wrong)) is Verdict.NO_TOKEN
+    assert rules.judge(head(rules, "/elsewhere", cookie=cookie(rules))) is Verdict.NO_TOKEN
+    assert rules.judge(head(rules, inside)) is Verdict.NO_TOKEN
+
+
+def test_the_cookie_is_for_browsers_only_and_for_this_server_only() -> None:
+    """Cookies do not know ports: the folder keeps this one from other servers of the machine."""
+    rules = access()
+    assert f"Path={rules.settings.folder};" in rules.cookie
+    assert "HttpOnly" in rules.cookie
+    assert "SameSite=Strict" in rules.cookie
+    assert "Secure" not in rules.cookie
+    assert "Secure" in access(certificate="cert.pem", key="key.pem").cookie
+
+
+@pytest.mark.parametrize(
+    ("host", "fine"),
+    [
+        (HERE, True),
+        (f"localhost:{PORT}", True),
+        (f"LOCALHOST:{PORT}", True),
+        (f"[::1]:{PORT}", True),
+        ("127.0.0.1", False),
+        ("127.0.0.1:80", False),
+        (f"evil.example:{PORT}", False),
+        (f"127.0.0.1.evil.example:{PORT}", False),
+        ("", False),
+    ],
+)
+def test_the_host_must_be_ours(host: str, fine: bool) -> None:
+    """A name of another site may resolve to this machine: its pages would be of the same origin."""
+    rules = access()
+    verdict = rules.judge(head(rules, query=f"token={rules.settings.token}", host=host))
+    assert verdict is (Verdict.LET_IN if fine else Verdict.WRONG_HOST)
+
+
+@pytest.mark.parametrize("method", ["GET", "POST", ""])
+@pytest.mark.parametrize(
+    "origin",
+    ["http://evil.example", "http://127.0.0.1:80", "http://127.0.0.1", "null", "", f"https://{HERE}"],
+)
+def test_a_foreign_origin_is_refused_whatever_it_has(method: str, origin: str) -> None:
+    rules = access()
+    asked = head(rules, f"{rules.settings.folder}/x", method, cookie=cookie(rules), origin=origin)
+    assert rules.judge(asked) is Verdict.WRONG_ORIGIN
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "OPTIONS", ""])
+def test_what_changes_something_or_stays_open_has_an_origin(method: str) -> None:
+    rules = access()
+    inside = f"{rules.settings.folder}/x"
+    assert rules.judge(head(rules, inside, method, cookie=cookie(rules))) is Verdict.WRONG_ORIGIN
+    ours = head(rules, inside, method, cookie=cookie(rules), origin=f"http://{HERE}")
+    assert rules.judge(ours) is Verdict.SERVE
+
+
+def test_a_password_takes_the_place_of_the_token() -> None:
+    rules = access(host="192.0.2.1", loopback=False, password="correct horse")
+    here = "gripper.lab:8766"
+    assert rules.judge(head(rules, host=here)) is Verdict.ASK
+    assert rules.judge(head(rules, host=here, query=f"token={rules.settings.token}")) is Verdict.ASK
+    assert rules.judge(head(rules, "/", "POST", host=here)) is Verdict.WRONG_ORIGIN
+    assert rules.judge(head(rules, "/", "POST", host=here, origin=f"http://{here}")) is Verdict.ASK
+    assert rules.knows("correct horse")
+    for wrong in ("", "correct", "correct horse ", "\udcff"):
+        assert not rules.knows(wrong)
+    assert not access().knows(""), "no password is not the empty one"
+
+
+def test_another_interface_needs_a_password_or_a_certificate() -> None:
+    with pytest.raises(ValueError, match=r"192\.0\.2\.1 lets others in"):
+        access(host="192.0.2.1", loopback=False)
+    access(host="192.0.2.1", loopback=False, certificate="cert.pem", key="key.pem")
+    with pytest.raises(ValueError, match="needs its key"):
+        access(certificate="cert.pem")
+
+
+def test_settings_travel_as_a_line_and_show_no_secret() -> None:
+    settings = PageSettings(addresses=("sim://", "tcp://192.0.2.7:502"), password="correct horse")
+    assert PageSettings.read(settings.line()) == settings
+    assert settings.token not in repr(settings)
+    assert "horse" not in repr(settings)
+    assert settings.url(80) == "http://127.0.0.1:80/"
+    assert PageSettings(host="::1").url(80).startswith("http://[::1]:80/?token=")

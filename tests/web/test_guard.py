@@ -1,0 +1,124 @@
+"""The server from outside: by plain clients, which may lie."""
+
+from __future__ import annotations
+
+import asyncio
+import http.client
+from collections.abc import AsyncIterator
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+from websockets.asyncio.client import connect
+from websockets.exceptions import InvalidStatus
+
+from robotiq_async.errors import ViewerError
+from robotiq_async.web.server import PageServer
+from robotiq_async.web.settings import PageSettings
+from tests.fake_hand import FakeHand
+
+WORD = "correct horse"
+
+
+def settings(**options: object) -> PageSettings:
+    return PageSettings(port=0, addresses=("fake://hand",), **options)  # type: ignore[arg-type]
+
+
+@pytest.fixture
+async def page() -> AsyncIterator[PageServer]:
+    async with PageServer([FakeHand()], settings()) as page:
+        yield page
+
+
+class Answer:
+    def __init__(self, url: str, path: str, method: str, body: str, headers: dict[str, str]) -> None:
+        parts = urlsplit(url)
+        connection = http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=20)
+        try:
+            connection.request(method, path, body, headers)
+            response = connection.getresponse()
+            self.status, self.headers = response.status, response.headers
+            self.text = response.read().decode("utf-8", "replace")
+        finally:
+            connection.close()
+
+
+async def ask(url: str, path: str, method: str = "GET", body: str = "", **headers: str) -> Answer:
+    return await asyncio.to_thread(Answer, url, path, method, body, headers)
+
+
+def inside(url: str) -> str:
+    parts = urlsplit(url)
+    return f"{parts.path}?{parts.query}"
+
+
+async def let_in(page: PageServer) -> tuple[str, str]:
+    """The folder, and the cookie."""
+    answer = await ask(page.url, inside(page.url))
+    assert answer.status == 303
+    return answer.headers["location"], answer.headers["set-cookie"].partition(";")[0]
+
+
+async def test_no_token_no_page(page: PageServer) -> None:
+    folder, cookie = await let_in(page)
+    for path in ("/", "/?token=wrong", folder, f"{folder}hand/0", "/favicon.ico", "/_nicegui/static/x.js"):
+        answer = await ask(page.url, path)
+        assert answer.status == 403
+        assert "holds the token" in answer.text
+        assert "nicegui" not in answer.text
+    answer = await ask(page.url, folder, Cookie=cookie)
+    assert answer.status == 200
+    assert answer.headers["x-frame-options"] == "DENY"
+    assert "default-src 'self'" in answer.headers["content-security-policy"]
+
+
+async def test_a_name_of_another_site_and_a_page_of_another_site_are_refused(page: PageServer) -> None:
+    folder, cookie = await let_in(page)
+    for headers in ({"Host": "evil.example"}, {"Origin": "http://evil.example"}, {"Origin": "null"}):
+        answer = await ask(page.url, folder, Cookie=cookie, **headers)
+        assert answer.status == 403
+        assert "set-cookie" not in answer.headers
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "http://127.0.0.1:1", "null", None])
+async def test_a_websocket_of_another_site_is_refused(page: PageServer, origin: str | None) -> None:
+    folder, cookie = await let_in(page)
+    socket = f"{folder}_nicegui_ws/socket.io/?EIO=4&transport=websocket"
+    ours = page.url.partition("/?")[0]
+    base, headers = ours.replace("http", "ws"), {"Cookie": cookie}
+    async with connect(base + socket, origin=ours, additional_headers=headers) as connection:  # type: ignore[arg-type]
+        assert str(await connection.recv()).startswith("0{")
+    with pytest.raises(InvalidStatus, match="403"):
+        await connect(base + socket, origin=origin, additional_headers=headers)  # type: ignore[arg-type]
+    with pytest.raises(InvalidStatus, match="403"):
+        await connect(base + socket, origin=ours)  # type: ignore[arg-type]
+
+
+async def test_a_password_is_asked_for_and_a_wrong_one_takes_its_time() -> None:
+    async with PageServer([FakeHand()], settings(password=WORD)) as page:
+        assert "token" not in page.url
+        here = page.url.removesuffix("/")
+        assert "Password" in (await ask(page.url, "/")).text
+        began = asyncio.get_running_loop().time()
+        wrong = await ask(page.url, "/", "POST", "password=guess", Origin=here)
+        assert (wrong.status, "set-cookie" in wrong.headers) == (403, False)
+        assert asyncio.get_running_loop().time() - began >= 1
+        assert (await ask(page.url, "/", "POST", f"password={WORD}")).status == 403, "a form of another site"
+        right = await ask(page.url, "/", "POST", f"password={WORD.replace(' ', '+')}", Origin=here)
+        assert right.status == 303
+        assert right.headers["set-cookie"].startswith("robotiq_async=")
+
+
+async def test_a_port_that_is_taken(page: PageServer) -> None:
+    taken = PageSettings(port=urlsplit(page.url).port or 0, addresses=("fake://hand",))
+    with pytest.raises(ViewerError, match="in use"):
+        async with PageServer([FakeHand()], taken):
+            pass
+
+
+async def test_a_certificate_that_is_none(tmp_path: Path) -> None:
+    file = tmp_path / "cert.pem"
+    file.write_text("no certificate")
+    with pytest.raises(ViewerError, match=r"cert\.pem"):
+        async with PageServer([FakeHand()], settings(certificate=str(file), key=str(file))):
+            pass

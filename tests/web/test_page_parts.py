@@ -1,0 +1,246 @@
+"""What the page is made of, without a browser: commands, news, the mirror, being in touch, what is held."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from math import dist
+from time import monotonic
+from typing import Any
+
+import pytest
+
+from robotiq_async import CLOSED, Fault, Finger, RobotiqHand, State
+from robotiq_async.actions import Operator
+from robotiq_async.description import hand_model
+from robotiq_async.kinematics import JOINTS, joint_angles
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.web.commands import MAX_COMMANDS, PageCommands
+from robotiq_async.web.news import HandNews
+from robotiq_async.web.page.held import held, pads
+from robotiq_async.web.page.mirror import HISTORY_S, Mirror
+from robotiq_async.web.page.touch import FRESH_S, LOST_S, Touch
+from robotiq_async.web.page.words import event_words, fault_words, state_words
+from robotiq_async.web.server import PageServer
+from robotiq_async.web.settings import PageSettings
+from tests.fake_hand import FakeHand
+
+# -- commands ----------------------------------------------------------------------------------------------
+
+
+class Desk:
+    """Commands, and their answers."""
+
+    def __init__(self, *hands: Any) -> None:
+        self.answers: list[dict[str, Any]] = []
+        self.commands = PageCommands([Operator(hand) for hand in hands], self.answers.append)
+
+    def do(self, name: str, page: str = "one", hand: int = 0, **arguments: object) -> None:
+        self.commands.do({"page": page, "number": 1, "hand": hand, "name": name, "arguments": arguments})
+
+    async def answer(self) -> dict[str, Any]:
+        async with asyncio.timeout(20):
+            while not self.answers:  # noqa: ASYNC110
+                await asyncio.sleep(0)
+        return self.answers.pop(0)
+
+
+async def test_a_command_is_carried_out_and_answered(hand: RobotiqHand) -> None:
+    desk = Desk(hand)
+    desk.do("close")
+    answer = await desk.answer()
+    assert answer["ok"]
+    assert answer["words"].startswith("A at 24")
+    desk.do("reset")
+    assert "needs the argument 'confirm'" in (await desk.answer())["words"]
+    desk.do("reset", confirm=True)
+    assert (await desk.answer())["words"] == "the gripper is reset"
+
+
+@pytest.mark.parametrize(("name", "hand"), [("explode", 0), ("close", 1), ("close", -1)])
+async def test_what_there_is_not_is_refused(name: str, hand: int) -> None:
+    desk = Desk(FakeHand())
+    desk.do(name, hand=hand)
+    answer = await desk.answer()
+    assert (answer["ok"], answer["words"]) == (False, f"there is no {name} of hand {hand}")
+
+
+async def test_without_operators_nothing_is_carried_out() -> None:
+    """Whatever the process of the page says: looking only is decided where the hand is."""
+    desk = Desk()
+    for name in ("close", "halt"):
+        desk.do(name)
+        assert "only looks" in (await desk.answer())["words"]
+
+
+async def test_a_page_that_is_gone_has_its_motion_held_and_no_other() -> None:
+    gripper = SimulatedGripper(speedup=4, spread=False)
+    async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
+        desk = Desk(hand)
+        desk.do("move", page="one", position=CLOSED, fingers="A")
+        desk.do("move", page="two", position=100, fingers="B")
+        async for status in hand.statuses():
+            if status.moving & Finger.A and status.moving & Finger.B:
+                break
+        desk.commands.gone("one")
+        answers = [await desk.answer(), await desk.answer()]
+        assert [each["page"] for each in answers] == ["one", "two"]
+        assert (answers[0]["ok"], answers[1]["words"].partition(";")[0]) == (False, "B at 100")
+        assert hand.status.position(Finger.A) < 200
+        assert not desk.commands.under_way
+
+
+async def test_a_halt_of_a_page_that_is_gone_is_completed(hand: RobotiqHand) -> None:
+    desk = Desk(hand)
+    desk.do("halt")
+    desk.commands.gone("one")
+    assert (await desk.answer())["words"] == "every axis stands still"
+
+
+async def test_a_halt_finds_its_way_through_a_crowd() -> None:
+    async with SimulatorServer(SimulatedGripper(speedup=4)) as server, RobotiqHand(server.address) as hand:
+        server.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
+        await hand.wait_for_state(State.FAULT)
+        desk = Desk(hand)
+        for _ in range(MAX_COMMANDS + 1):
+            desk.do("recover", confirm=True)
+        assert "under way already" in (await desk.answer())["words"]
+        desk.do("halt")
+        words = [(await desk.answer())["words"] for _ in range(MAX_COMMANDS + 1)]
+        assert "every axis stands still" in words
+        await desk.commands.close()
+
+
+# -- news and mirror ---------------------------------------------------------------------------------------
+
+
+def mirrored(news: HandNews, mirror: Mirror) -> None:
+    news.gather()
+    mirror.hear(json.dumps({"hands": [news.take(0)], "answers": []}).encode())
+
+
+async def test_the_mirror_shows_what_the_hand_is(hand: RobotiqHand, gripper: SimulatedGripper) -> None:
+    news, mirror = HandNews(hand), Mirror(("here",), control=False, say=lambda _: None)
+    shown = mirror.hands[0]
+    assert state_words(shown, is_quiet=False)[0] == "lost"
+    await hand.move(90)
+    gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    await hand.wait_for_state(State.FAULT)
+    mirrored(news, mirror)
+    assert shown.status == hand.status
+    assert (state_words(shown, is_quiet=False), fault_words(shown)[1]) == (("fault", "negative"), True)
+    assert Fault.SCISSOR_BLOCKED.description in fault_words(shown)[0]
+    lines = [event_words(event) for _, event in shown.events]
+    assert any("fault 0x0E" in line for line in lines)
+    assert not any("RUNNING_CC" in line for line in lines), "every command would be two of them"
+    assert shown.statistics["polls"] == pytest.approx(hand.statistics.polls, abs=20)
+    assert state_words(shown, is_quiet=True)[0].endswith("silent")
+    mirrored(news, mirror)
+    assert len(shown.events) == len(lines), "events are told once"
+
+
+async def test_a_peak_of_the_current_is_not_lost_between_two_looks(hand: RobotiqHand) -> None:
+    news = HandNews(hand)
+    peak = 0
+    moving = asyncio.create_task(hand.close())
+    async for status in hand.statuses():
+        news.gather()
+        peak = max(peak, status.current_ma(Finger.A))
+        if moving.done():
+            break
+    assert news.take(0)["peaks"][0] >= peak > 0
+    assert news.take(0)["peaks"] == [0, 0, 0, 0]
+
+
+def test_the_curves_are_of_the_last_half_minute() -> None:
+    mirror = Mirror(("here",), control=False, say=lambda _: None)
+    shown = mirror.hands[0]
+    for tick in range(1000):
+        shown._sample(tick * 0.1)
+    assert shown.samples[-1].at - shown.samples[0].at <= HISTORY_S
+    assert 140 <= len(shown.samples) <= 152
+    assert shown.samples[-1].positions is None, "nothing is known: a gap in the curve"
+
+
+def test_an_answer_goes_to_whoever_asked() -> None:
+    said: list[dict[str, Any]] = []
+    told: list[tuple[bool, str]] = []
+    mirror = Mirror(("here",), control=True, say=said.append)
+    mirror.ask("page", 0, "close", {}, lambda ok, words: told.append((ok, words)))
+    number = said[0]["do"]["number"]
+    answer = {"number": number, "ok": True, "words": "A"}
+    for _ in range(2):
+        mirror.hear(json.dumps({"hands": [], "answers": [answer]}).encode())
+    assert told == [(True, "A")]
+
+
+# -- the process -------------------------------------------------------------------------------------------
+
+
+async def test_operators_are_those_of_the_hands() -> None:
+    one, other = FakeHand(), FakeHand()
+    with pytest.raises(ValueError, match="operators must be those of the hands"):
+        PageServer([one], PageSettings(control=True), operators=[Operator(other)])
+    with pytest.raises(ValueError, match="control needs operators"):
+        PageServer([one], PageSettings(control=True))
+    with pytest.raises(ValueError, match="control needs operators"):
+        PageServer([one], PageSettings(), operators=[Operator(one)])
+
+
+async def test_a_process_that_dies_is_noticed_and_its_motions_are_held() -> None:
+    gripper = SimulatedGripper(speedup=4, spread=False)
+    async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
+        settings = PageSettings(port=0, control=True, addresses=(hand.address,))
+        async with PageServer([hand], settings, operators=[Operator(hand)]) as page:
+            page._hear({"do": {"page": "p", "number": 1, "hand": 0, "name": "close", "arguments": {}}})
+            async for status in hand.statuses():
+                if status.is_moving:
+                    break
+            page._process.kill()
+            async with asyncio.timeout(20):
+                await page.ended()
+            async for status in hand.statuses():
+                if not status.is_moving:
+                    break
+            assert hand.status.position(Finger.A) < 200
+
+
+# -- in touch ----------------------------------------------------------------------------------------------
+
+
+def test_a_press_is_fresh_for_a_moment() -> None:
+    now = monotonic()
+    assert Touch.is_fresh(now)
+    assert not Touch.is_fresh(now - FRESH_S - 0.1)
+    nothing: tuple[object, ...] = (None, "now", [now], True, {}, now + 60, float("nan"))
+    assert not any(Touch.is_fresh(each) for each in nothing)
+
+
+def test_a_browser_is_lost_once_and_found_again() -> None:
+    touch = Touch()
+    assert not touch.check()
+    touch._newest -= LOST_S + 1
+    assert touch.check()
+    assert not touch.check(), "told once"
+    touch.heard(monotonic() - LOST_S - 1)
+    assert touch.is_lost, "what it sent was long under way"
+    touch.heard(monotonic())
+    assert not touch.is_lost
+
+
+# -- what is held ------------------------------------------------------------------------------------------
+
+
+async def test_what_is_held_lies_between_the_fingers(hand: RobotiqHand, gripper: SimulatedGripper) -> None:
+    gripper.place_object(Finger.ABC, position=70)
+    await hand.close()
+    model = hand_model()
+    faces = pads(model, model.link_poses(dict(zip(JOINTS, joint_angles(hand.status), strict=True))))
+    assert held(faces, Finger(0)) is None
+    ball = held(faces, hand.status.contacts)
+    assert ball is not None
+    middle, radius = ball
+    assert abs(middle[2]) < 1e-6, "B and C are level, so it lies in the plane of A"
+    assert dist(middle, faces[Finger.A].position) == pytest.approx(radius)
+    for axes in (Finger.A, Finger.B | Finger.C, Finger.SCISSOR):
+        assert held(faces, axes) is not None
