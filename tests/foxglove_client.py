@@ -48,14 +48,14 @@ class Client:
             number, nanoseconds = struct.unpack_from("<IQ", frame, 1)
             topic = self._topics[number]
             self.received.append((topic, nanoseconds, frame[13:]))
-            if topic != "/joint_states":
+            if topic not in ("/joint_states", "/robot_description"):
                 self._objects.setdefault(topic, []).append(json.loads(frame[13:]))
         elif frame[0] == ANSWER:
             _, call, length = struct.unpack_from("<III", frame, 1)
             self.answers[call] = json.loads(frame[13 + length :])["outcome"]
 
     async def meet(self, *, services: bool) -> None:
-        while len(self.channels) < 5 or (services and not self.services):
+        while len(self.channels) < 7 or (services and not self.services):
             await self.read()
 
     async def subscribe(self, *topics: str) -> None:

@@ -6,10 +6,10 @@
 
 In this order nothing that concerns viewers delays the stop of the hand.
 
-The topics are those of a recording (:mod:`.feed`) and ``/gripper/state``: state, fault and statistics, once
-a second and at every event. There is no password, and the server does not check the origin of a request:
-whoever reaches the port sees the hand and, with an operator, commands it. A web page that is open on the same
-machine reaches it too.
+The topics are those of a recording (:mod:`.feed`); ``/gripper/state``: state, fault and statistics, once a
+second and at every event; ``/robot_description`` and ``/tf`` for 3-D panels. There is no password: whichever
+program reaches the port sees the hand and, with an operator, commands it. Pages of other sites do not: the
+origin of every connection is looked at (:mod:`.gate`).
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ import asyncio
 import concurrent.futures
 import json
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from types import TracebackType
 from typing import Any, Final, Self
 
 try:
     import foxglove
     from foxglove import Channel, Context, MessageSchema, Schema, ServiceRequest, ServiceSchema
-    from foxglove.websocket import Capability, WebSocketServer
+    from foxglove.websocket import Capability, ChannelView, Client, ServerListener, WebSocketServer
 except ModuleNotFoundError as error:
     raise ImportError("viewers need foxglove-sdk: pip install 'robotiq-async[view]'") from error
 
@@ -33,17 +33,34 @@ from ..actions import Operator
 from ..concurrency import in_a_thread, wait_shielded
 from ..enums import State
 from ..errors import ViewerError
+from ..log import log
 from ..protocol import Hand
 from ..session.clock import now
 from ..wire.checks import check_int
-from .feed import EVENT, TOPICS, Feed, Message, Topic, compact, json_topic
+from .feed import EVENT, JOINTS, TOPICS, Feed, Message, Topic, compact, json_topic
+from .gate import Gate, hidden_address
 from .payloads import SCHEMAS, state_fields
+from .robot_description import (
+    SCHEMA,
+    SCHEMA_NAME,
+    TRANSFORMS_NAME,
+    TRANSFORMS_SCHEMA,
+    description_message,
+    transforms,
+)
 from .services import RESPONSE, SERVICES, Service
 
 LOOPBACK: Final = "127.0.0.1"
 PORT: Final = 8765
 """The default of Foxglove's own dialog."""
 STATE: Final = json_topic("state", SCHEMAS["state"])
+DESCRIPTION: Final = Topic("/robot_description", "cdr", SCHEMA_NAME, "ros2msg", SCHEMA.encode())
+_TRANSFORMS_SCHEMA: Final = json.dumps(TRANSFORMS_SCHEMA).encode()
+TRANSFORMS: Final = Topic("/tf", "json", TRANSFORMS_NAME, "jsonschema", _TRANSFORMS_SCHEMA)
+SHOWN: Final = (*TOPICS, STATE, DESCRIPTION, TRANSFORMS)
+ORIGINS: Final = ("https://app.foxglove.dev",)
+"""Where viewers are served from that run in a browser; programs have no origin."""
+TRANSFORMS_S: Final = 0.05
 STATE_S: Final = 1.0
 """Between two messages on ``/gripper/state`` when nothing happens."""
 STOP_S: Final = 1.0
@@ -73,6 +90,7 @@ class Viewer:
         host: str = LOOPBACK,
         port: int = PORT,
         operator: Operator | None = None,
+        origins: Collection[str] = ORIGINS,
     ) -> None:
         """Prepare; opens nothing.
 
@@ -81,6 +99,7 @@ class Viewer:
             host: the interface to listen on.
             port: 0 takes a free one.
             operator: carries out what a viewer calls; None offers no services.
+            origins: pages of these sites may connect, and no others.
 
         Raises:
             TypeError: port is not an int.
@@ -93,13 +112,16 @@ class Viewer:
         self._hand = hand
         self._operator = operator
         self._feed = Feed(hand, self._publish)
+        self._origins = origins
         self._server: WebSocketServer
+        self._gate: Gate
         self._context: Context
         """Its channels close when the last reference to it is gone."""
         self._channels: dict[Topic, Channel] = {}
         self._loop: asyncio.AbstractEventLoop
         self._publisher: asyncio.Task[None]
-        self._calls: set[asyncio.Task[Any]] = set()
+        self._calls: dict[asyncio.Task[Any], Service] = {}
+        self._transformed_at = 0
         self._slots = threading.BoundedSemaphore(MAX_CALLS)
         self._closing = False
         self._published_state: State | None = None
@@ -119,7 +141,7 @@ class Viewer:
         self._loop = asyncio.get_running_loop()
         self._closing = False
         self._context = Context()
-        self._channels = {topic: _channel(topic, self._context) for topic in (*TOPICS, STATE)}
+        self._channels = {topic: _channel(topic, self._context) for topic in SHOWN}
         listening = in_a_thread(self._start_server)
         try:
             await wait_shielded(listening)
@@ -132,7 +154,7 @@ class Viewer:
             self._server = listening.result()
         except (RuntimeError, OSError, ValueError) as error:
             raise ViewerError(f"{self.url}: {error}") from error
-        self.port = self._server.port
+        self.port = self._gate.port
         self._feed.start()
         self._publisher = self._loop.create_task(self._publish_periodically(), name="robotiq_async viewer")
         return self
@@ -164,19 +186,35 @@ class Viewer:
 
     async def _stop_server(self) -> None:
         """The port is closed at once; a client that does not read could delay the rest for ever."""
+        self._gate.stop()
         await asyncio.wait({in_a_thread(self._server.stop)}, timeout=STOP_S)
 
     def _start_server(self) -> WebSocketServer:
         services = [] if self._operator is None else list(SERVICES.values())
-        return foxglove.start_server(
+        host = hidden_address()
+        server = foxglove.start_server(
             name="robotiq_async",
-            host=self.host,
-            port=self.port,
+            host=host,
+            port=0,
             capabilities=[Capability.Services] if services else [],
             supported_encodings=["json"] if services else None,
             services=[self._service(service) for service in services],
+            server_listener=_Listener(self._describe),
             context=self._context,
         )
+        try:
+            self._gate = Gate(
+                self.host,
+                self.port,
+                (host, server.port),
+                origins=self._origins,
+                refused=_report,
+                left=lambda: self._loop.call_soon_threadsafe(self._hold_calls),
+            )
+        except OSError as error:
+            server.stop()
+            raise ViewerError(f"{self.url}: {error.strerror or error}") from error
+        return server
 
     # -- publishing ------------------------------------------------------------------------------------
 
@@ -185,6 +223,15 @@ class Viewer:
         # With every command the state goes to RUNNING_CC and back: publishing that would double the work.
         if message.topic is EVENT and self._hand.state not in (self._published_state, State.RUNNING_CC):
             self._publish_state()
+
+        if message.topic is JOINTS and message.nanoseconds - self._transformed_at >= TRANSFORMS_S * 1e9:
+            self._transformed_at = message.nanoseconds
+            data = compact(transforms(self._hand.status, message.nanoseconds))
+            self._channels[TRANSFORMS].log(data, log_time=message.nanoseconds)
+
+    def _describe(self) -> None:
+        """Somebody has just begun to listen to the description: it never changes, so it is told then."""
+        self._channels[DESCRIPTION].log(description_message())
 
     def _publish_state(self) -> None:
         self._published_state = self._hand.state
@@ -237,11 +284,34 @@ class Viewer:
             raise ViewerError("no more calls are accepted")
         task = asyncio.current_task()
         assert task is not None
-        self._calls.add(task)
+        self._calls[task] = service
         try:
             return compact({"outcome": await service.call(self._operator, payload)})
         finally:
-            self._calls.discard(task)
+            del self._calls[task]
+
+    def _hold_calls(self) -> None:
+        """A viewer has left, and the server does not tell whose call is whose: what moves is held."""
+        for call, service in self._calls.items():
+            if service.name != HALT:
+                call.cancel()
+
+
+class _Listener(ServerListener):
+    """Hears who subscribes to the description, in a thread of the server."""
+
+    def __init__(self, describe: Callable[[], None]) -> None:
+        self._describe = describe
+
+    def on_subscribe(self, client: Client, channel: ChannelView) -> None:  # noqa: ARG002
+        if channel.topic == DESCRIPTION.name:
+            self._describe()
+
+
+def _report(origin: str) -> None:
+    log.warning(
+        "a page of %s was refused; if it is your viewer, name it: origins, or --origin %s", origin, origin
+    )
 
 
 def _channel(topic: Topic, context: Context) -> Channel:

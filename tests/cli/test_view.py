@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 from websockets.asyncio.client import connect
-from websockets.typing import Subprotocol
+from websockets.exceptions import InvalidStatus
+from websockets.typing import Origin, Subprotocol
 
 from docs import make_layout
 from robotiq_async import RobotiqHand
@@ -40,7 +41,7 @@ async def test_it_prints_where_to_look_and_leaves_the_fingers_alone(
     async with RobotiqHand(server.address) as hand:
         await hand.move(50)
         before = gripper.request_registers
-        process = await shell.start("view", "--port", "0", server.address)
+        process = await shell.start("view", "--control", "--port", "0", server.address)
         url = await shell.read_line(process)
         assert url.startswith("ws://127.0.0.1:")
         async with met(url, services=True) as client:
@@ -57,7 +58,7 @@ async def test_what_a_viewer_moved_is_stopped_although_another_says_nothing(shel
     async with SimulatorServer(gripper) as server:
         async with RobotiqHand(server.address):
             pass
-        process = await shell.start("view", "--port", "0", server.address)
+        process = await shell.start("view", "--control", "--port", "0", server.address)
         url = await shell.read_line(process)
         _, silent = await asyncio.open_connection("127.0.0.1", int(url.rpartition(":")[2]))
         async with met(url, services=True) as client:
@@ -73,8 +74,8 @@ async def test_what_a_viewer_moved_is_stopped_although_another_says_nothing(shel
         assert not gripper.request_registers[0] & 0x0800
 
 
-async def test_read_only_offers_no_commands(shell: Shell, server: SimulatorServer) -> None:
-    process = await shell.start("view", "--read-only", "--port", "0", server.address)
+async def test_without_control_there_are_no_commands(shell: Shell, server: SimulatorServer) -> None:
+    process = await shell.start("view", "--port", "0", server.address)
     url = await shell.read_line(process)
     async with met(url, services=False) as client:
         await client.subscribe("/gripper/status")
@@ -116,9 +117,30 @@ async def test_another_interface_is_warned_about(shell: Shell) -> None:
     # An address for documentation (RFC 5737): no machine has it, so nothing is opened to a network.
     outcome = await shell.run("view", "--host", "192.0.2.1", "--port", "0")
     assert outcome.code == 1
-    assert "anyone who reaches 192.0.2.1 can see this gripper and COMMAND it" in outcome.err
-    outcome = await shell.run("view", "--host", "192.0.2.1", "--port", "0", "--read-only")
     assert "anyone who reaches 192.0.2.1 can see this gripper: there is no password" in outcome.err
+
+
+async def test_commands_come_from_this_machine_only(shell: Shell) -> None:
+    outcome = await shell.run("view", "--host", "192.0.2.1", "--port", "0", "--control")
+    outcome.assert_failed(2, "--control needs 127.0.0.1", "ssh -L")
+
+
+async def test_a_page_of_another_site_is_refused_and_named(shell: Shell, server: SimulatorServer) -> None:
+    process = await shell.start("view", "--port", "0", "--origin", "http://lab.example", server.address)
+    url = await shell.read_line(process)
+    with pytest.raises(InvalidStatus, match="403"):
+        await connect(
+            url, subprotocols=[Subprotocol("foxglove.sdk.v1")], origin=Origin("http://evil.example")
+        )
+    assert process.stderr is not None
+    async with asyncio.timeout(20):
+        while b"--origin http://evil.example" not in (line := await process.stderr.readline()):
+            assert line
+    ours = Origin("http://lab.example")
+    async with connect(
+        url, subprotocols=[Subprotocol("foxglove.sdk.v1")], origin=ours, max_queue=None
+    ) as socket:
+        await Client(socket).meet(services=False)
 
 
 async def test_the_layout_is_handed_out(shell: Shell, tmp_path: Path) -> None:

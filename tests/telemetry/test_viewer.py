@@ -13,11 +13,12 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
-from websockets.typing import Subprotocol
+from websockets.typing import Origin, Subprotocol
 
 from docs import make_layout
 from robotiq_async import Fault, Finger, RobotiqHand, RobotiqStatus, State
 from robotiq_async.actions import Operator
+from robotiq_async.description import HandModel
 from robotiq_async.errors import ViewerError
 from robotiq_async.kinematics import JOINTS, joint_angles
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
@@ -26,6 +27,7 @@ from robotiq_async.telemetry.services import SERVICES
 from robotiq_async.telemetry.viewer import Viewer
 from tests.foxglove_client import Client, client
 
+PROTOCOLS = [Subprotocol("foxglove.sdk.v1")]
 SOCKETS = Path("/proc/net/tcp")
 LINUX = SOCKETS.exists()
 
@@ -163,6 +165,76 @@ async def test_an_older_client_is_refused(operator: Operator) -> None:
     async with Viewer(operator.hand, port=0) as viewer:
         with pytest.raises(InvalidStatus, match="400"):
             await connect(viewer.url, subprotocols=[Subprotocol("foxglove.websocket.v1")])
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://localhost:1", "file://"])
+async def test_a_page_of_another_site_is_refused(operator: Operator, origin: str) -> None:
+    async with Viewer(operator.hand, port=0, operator=operator) as viewer:
+        with pytest.raises(InvalidStatus, match="403"):
+            await connect(viewer.url, subprotocols=PROTOCOLS, origin=Origin(origin))
+        both = [("Origin", "https://app.foxglove.dev"), ("Origin", origin)]
+        with pytest.raises(InvalidStatus, match="403"):  # one for each who looks
+            await connect(viewer.url, subprotocols=PROTOCOLS, additional_headers=both)
+
+
+async def test_the_viewers_own_site_is_let_in_and_programs_are(operator: Operator) -> None:
+    async with Viewer(operator.hand, port=0) as viewer:
+        for origin in (None, Origin("https://app.foxglove.dev")):
+            async with connect(viewer.url, subprotocols=PROTOCOLS, origin=origin, max_queue=None) as socket:
+                await Client(socket).meet(services=False)
+
+
+@pytest.mark.skipif(not LINUX, reason="asks Linux who listens where")
+async def test_the_server_behind_is_not_where_pages_look(operator: Operator) -> None:
+    before = listening()
+    async with Viewer(operator.hand, port=0) as viewer:
+        others = {interface for interface, port in listening() - before if port != viewer.port}
+    assert len(others) == 1
+    assert not others & {"0100007F", "00000000"}
+    assert all(interface.endswith("7F") for interface in others)
+
+
+async def test_who_says_no_end_of_things_is_sent_away(operator: Operator) -> None:
+    async with Viewer(operator.hand, port=0) as viewer:
+        reader, writer = await asyncio.open_connection("127.0.0.1", viewer.port)
+        writer.write(b"GET / HTTP/1.1\r\n" + b"X: " + b"y" * 30_000)
+        async with asyncio.timeout(5):
+            with contextlib.suppress(ConnectionError):
+                assert await reader.read() == b""
+        writer.close()
+        with contextlib.suppress(ConnectionError):
+            await writer.wait_closed()
+
+
+async def test_a_viewer_that_leaves_holds_what_moves() -> None:
+    async with SimulatorServer(SimulatedGripper(speedup=4)) as slow, RobotiqHand(slow.address) as hand:
+        viewer = Viewer(hand, port=0, operator=Operator(hand))
+        async with viewer:
+            async with client(viewer) as one:
+                await one.ask(1, "close", {})
+                await seen(hand, moving=True)
+            status = await seen(hand, moving=False)
+            assert status.position(Finger.A) < 200
+
+
+async def test_the_hand_can_be_drawn(operator: Operator) -> None:
+    """The description when somebody begins to listen, and a transform for every joint of it."""
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    async with viewed(operator) as one:
+        await one.subscribe("/robot_description", "/tf")
+        while not one.objects("/tf") or not any(
+            topic == "/robot_description" for topic, _, _ in one.received
+        ):
+            await one.read()
+    data = next(data for topic, _, data in one.received if topic == "/robot_description")
+    message: Any = store.deserialize_cdr(data, "std_msgs/msg/String")
+    model = HandModel.parse(message.data)
+    placed = {model.root: (0.0, 0.0, 0.0)}
+    told = {each["child_frame_id"]: each for each in one.objects("/tf")[-1]["transforms"]}
+    assert {(each["parent_frame_id"], child) for child, each in told.items()} == {
+        (joint.parent, joint.child) for joint in model.joints
+    }
+    assert len(placed | told) == len(model.links)
 
 
 # -- what is asked -----------------------------------------------------------------------------------------

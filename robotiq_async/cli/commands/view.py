@@ -13,7 +13,7 @@ from cyclopts import Parameter
 from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...telemetry.payloads import printable
 from ..arguments import USUAL, Address, Byte, Link, Port, is_loopback, need
-from ..failures import CommandError
+from ..failures import CommandError, UsageError
 
 
 async def view(
@@ -22,33 +22,37 @@ async def view(
     *,
     port: Port = 8765,
     host: str = "127.0.0.1",
-    read_only: Annotated[bool, Parameter(negative=())] = False,
+    control: Annotated[bool, Parameter(negative=())] = False,
+    origin: Annotated[tuple[str, ...], Parameter(metavar="URL", negative=())] = (),
     layout: Annotated[Path | None, Parameter(metavar="FILE")] = None,
     speed: Byte = DEFAULT_SPEED,
     force: Byte = DEFAULT_FORCE,
     link: Link = USUAL,
 ) -> None:
-    """Show a gripper in Foxglove or Lichtblick, and let buttons there move it, until Ctrl-C.
+    """Show a gripper in Foxglove or Lichtblick until Ctrl-C; --control lets buttons there move it.
 
-    Nothing moves until a service is called. What is printed is the address to open there
-    (Open connection, Foxglove WebSocket). Status, commands, events and joint states are
-    the topics of a recording; /gripper/state has state, fault and statistics.
+    What is printed is the address to open there (Open connection, Foxglove WebSocket).
+    Status, commands, events and joint states are the topics of a recording;
+    /gripper/state has state, fault and statistics, /robot_description and /tf the hand
+    in three dimensions.
 
-    There is no password. Whoever reaches the port may call a service, and so may a web
-    page that is open in a browser on the same machine: --read-only has no services.
+    Nothing moves until a service is called, and there are none without --control.
+    There is no password: with it, every program of this machine may call them. Pages of
+    other sites are refused, but for https://app.foxglove.dev and those named by --origin.
 
     Ending it stops the fingers only if they were moved from here.
 
     For example:
 
         robotiq-async view tcp://192.168.1.11
-        robotiq-async view --read-only --port 8766 192.168.1.11
+        robotiq-async view --control --origin http://localhost:8080 192.168.1.11
         robotiq-async view --layout gripper.json
 
     Args:
         port: TCP port; 0 takes a free one.
-        host: Interface to listen on. Another one than 127.0.0.1 lets others in.
-        read_only: Take no commands.
+        host: Interface to listen on. Another one than 127.0.0.1 lets others look.
+        control: Let viewers command the gripper. On 127.0.0.1 only: from elsewhere through ssh -L.
+        origin: A site whose pages may connect too: where a viewer of your own is served. May be given again.
         speed: Speed of all axes from the first command on; the present one cannot be read.
         force: Force of all axes from the first command on. A grip made with more loosens.
         layout: Write the matching layout to a file, for Foxglove to import, and exit.
@@ -57,16 +61,23 @@ async def view(
         _write(layout)
         return
     need("foxglove", "view")
-    from ...telemetry.viewer import Viewer
+    from ...telemetry.viewer import ORIGINS, Viewer
     from ..connect import make_operator, operated
     from ..log_capture import forwarded_warnings
 
     if not is_loopback(host):
-        what = "see this gripper" if read_only else "see this gripper and COMMAND it"
-        _tell(f"anyone who reaches {host} can {what}: there is no password")
+        if control:
+            raise UsageError("--control needs 127.0.0.1, as viewers know no password: use ssh -L")
+        _tell(f"anyone who reaches {host} can see this gripper: there is no password")
     try:
         operator = make_operator(address, link, speed=speed, force=force)
-        viewer = Viewer(operator.hand, host=host, port=port, operator=None if read_only else operator)
+        viewer = Viewer(
+            operator.hand,
+            host=host,
+            port=port,
+            operator=operator if control else None,
+            origins=(*ORIGINS, *origin),
+        )
         # In this order no viewer delays the stop of the fingers.
         with forwarded_warnings(_tell):
             async with viewer, operated(operator, _tell):
