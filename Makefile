@@ -16,13 +16,17 @@ STAMP := $(VENV)/.complete
 unexport VIRTUAL_ENV CONDA_PREFIX PYTHONHOME PYTHONPATH PYTHONSTARTUP PIP_USER PIP_TARGET PIP_PREFIX UV_PYTHON
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test pages soak fuzz explore bench lint check format constraints clean
+.PHONY: help demo show test pages soak fuzz explore bench lint check format constraints clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: $(STAMP)  ## Run the demo on a simulated gripper (ADDRESS=... for a real one: it asks, and moves)
 	@$(BIN)/python -m robotiq_async demo $(ADDRESS)
+	@echo; echo "To see the hand itself, moving in your browser: make show"
+
+show: $(STAMP)  ## Run the demo with the hand in three dimensions on a page in your browser
+	@$(BIN)/python -m robotiq_async demo --show $(ADDRESS)
 
 test: $(STAMP)  ## Run all tests
 	@$(BIN)/python -m pytest --numprocesses auto --dist worksteal

@@ -15,7 +15,7 @@ import asyncio
 import signal
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
-from contextlib import aclosing, asynccontextmanager, suppress
+from contextlib import AbstractAsyncContextManager, aclosing, asynccontextmanager, nullcontext, suppress
 from functools import partial
 from typing import Any, TypeVar
 
@@ -47,8 +47,14 @@ COLUMN = 54
 T = TypeVar("T")
 
 
-async def run(address: str) -> None:
+async def run(
+    address: str, shown: Callable[[RobotiqHand], AbstractAsyncContextManager[object]] = nullcontext
+) -> None:
     """The whole demo.
+
+    Args:
+        address: of the gripper.
+        shown: shows the hand while it moves, ``robotiq-async demo --show``.
 
     Raises:
         RobotiqError: the gripper or the link failed.
@@ -57,7 +63,7 @@ async def run(address: str) -> None:
         hand = RobotiqHand(where)
         transitions = hand.transitions()  # Opened before start(), it misses nothing.
         print(f"async with RobotiqHand({where!r}) as hand:  # connects and activates", flush=True)
-        async with hand:
+        async with shown(hand), hand:
             await movements(hand)
             await speeds(hand)
             await forces(hand, simulated)

@@ -162,6 +162,14 @@ def test_the_curves_are_of_the_last_half_minute() -> None:
     assert shown.samples[-1].positions is None, "nothing is known: a gap in the curve"
 
 
+async def test_a_silence_is_a_gap_in_the_curves_and_no_line(hand: RobotiqHand) -> None:
+    news, mirror = HandNews(hand), Mirror(("here",), control=False, say=lambda _: None)
+    mirrored(news, mirror)
+    shown = mirror.hands[0]
+    shown._sample(shown.samples[-1].at + 10)
+    assert [sample.positions is None for sample in shown.samples] == [False, True, False]
+
+
 def test_an_answer_goes_to_whoever_asked() -> None:
     said: list[dict[str, Any]] = []
     told: list[tuple[bool, str]] = []

@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Coroutine
+import asyncio
+from collections.abc import AsyncIterator, Coroutine
+from contextlib import asynccontextmanager, nullcontext
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
+from typing import Annotated, Final
 
-from ..arguments import Address, Yes
+from cyclopts import Parameter
+
+from ...protocol import Hand
+from ..arguments import Address, Yes, need
+from ..browser import open_page
 from ..consent import consent
 
+PATIENCE_S: Final = 60.0
+"""How long the demo waits for somebody to look."""
+LOOK_S: Final = 2.0
+"""For the page to be drawn, and found among the windows."""
 
-def demo(address: Address = "sim://", /, *, yes: Yes = False) -> Coroutine[None, None, None]:
+
+def demo(
+    address: Address = "sim://", /, *, yes: Yes = False, show: Annotated[bool, Parameter(negative=())] = False
+) -> Coroutine[None, None, None]:
     """Show what the library does, call by call. THE FINGERS MOVE.
 
     Four parts: movements, speeds, forces, status and faults. Unless the gripper is
@@ -20,16 +34,39 @@ def demo(address: Address = "sim://", /, *, yes: Yes = False) -> Coroutine[None,
     For example:
 
         robotiq-async demo
+        robotiq-async demo --show
         robotiq-async demo tcp://192.168.1.11
 
     Args:
         yes: Do not ask.
+        show: Show the hand on a page in the browser while it moves; it only looks.
     """
     program = _program()
+    if show:
+        need("nicegui", "web")
     # Asked here and not in the coroutine: a question would block the event loop.
     consent(address, program.WARNING, yes=yes)
-    run: Coroutine[None, None, None] = program.run(address)
+    run: Coroutine[None, None, None] = program.run(address, _shown if show else nullcontext)
     return run
+
+
+@asynccontextmanager
+async def _shown(hand: Hand) -> AsyncIterator[None]:
+    """Show a hand on a page, and begin when somebody looks."""
+    from ...web.server import PageServer
+    from ...web.settings import PageSettings
+
+    async with PageServer([hand], PageSettings(port=0, addresses=(hand.address,))) as page:
+        print(f"Watch it move: {page.url}", flush=True)
+        if not await open_page(page.url):
+            print(f"No screen here: open it yourself. It begins then, or in {PATIENCE_S:g} s.", flush=True)
+        try:
+            async with asyncio.timeout(PATIENCE_S):
+                await page.seen()
+            await asyncio.sleep(LOOK_S)
+        except TimeoutError:
+            print("Nobody looks; it begins.", flush=True)
+        yield
 
 
 def _program() -> ModuleType:

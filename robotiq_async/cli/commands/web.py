@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import sys
-import webbrowser
 from collections.abc import Sequence
 from contextlib import AsyncExitStack
 from pathlib import Path
@@ -17,6 +16,7 @@ from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...errors import RobotiqError
 from ...telemetry.payloads import printable
 from ..arguments import USUAL, Address, Byte, Link, Port, full_address, is_loopback, need
+from ..browser import open_page
 from ..failures import CommandError, UsageError, usage
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ async def _show(
             _tell("without a certificate the password goes through the network for everybody to read")
         print(page.url, flush=True)
         if open_browser:
-            webbrowser.open(page.url)
+            await open_page(page.url)
         await page.ended()
         raise CommandError("the process of the page has ended; what it says is above")
 

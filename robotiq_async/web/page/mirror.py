@@ -92,6 +92,8 @@ class HandMirror:
         # Half a millisecond of grace: ticks of a float do not add up.
         if self.samples and now - self.samples[-1].at < SAMPLE_S - 0.0005:
             return
+        if self.samples and now - self.samples[-1].at > QUIET_S:
+            self.samples.append(Sample(now - SAMPLE_S, None, tuple(self.peaks)))  # a gap, and not a line
         status = None if self.is_lost else self.status
         positions = None if status is None else tuple(status.position(axis) for axis in AXES)
         self.samples.append(Sample(now, positions, tuple(self.peaks)))

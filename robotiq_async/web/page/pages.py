@@ -95,13 +95,13 @@ def _frame(title: str, *, home: bool) -> None:
     ui.add_head_html(STYLE)
     ui.add_body_html(SCRIPT)
     dark = ui.dark_mode(None)
-    with ui.header().classes("items-center gap-3 py-2 px-4 bg-slate-800"):
+    with ui.header().classes("items-center no-wrap gap-3 py-2 px-4 bg-slate-800"):
         if home:
             ui.button(icon="arrow_back", on_click=lambda: ui.navigate.to("/")).props(
                 "flat round dense color=white"
             )
-        ui.label("Robotiq 3-Finger").classes("text-base font-bold")
-        ui.label(title).classes("text-sm opacity-80").props("data-testid=address")
+        ui.label("Robotiq 3-Finger").classes("text-base font-bold whitespace-nowrap")
+        ui.label(title).classes("text-sm opacity-80 truncate").props("data-testid=address")
         ui.space()
         with ui.button_group().props("flat"):
             for icon, value in (("light_mode", False), ("brightness_auto", None), ("dark_mode", True)):

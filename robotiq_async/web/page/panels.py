@@ -65,7 +65,7 @@ def _axis_row(hand: HandMirror, index: int) -> str:
         f'<div class="rq-axis{contact}{stale}" data-axis="{NAMES[index]}" data-position="{position}">'
         f'<b style="color:{color}">{NAMES[index]}</b>'
         f'<span class="rq-bar"><i style="width:{position / 2.55:.1f}%;background:{color}"></i>'
-        f'<u style="left:{wanted / 2.55:.1f}%"></u></span>'
+        f'<u style="left:{wanted / 2.57:.1f}%"></u></span>'
         f'<span class="rq-number">{position}</span><span class="rq-wanted">&rarr; {wanted}</span>'
         f'<span class="rq-number">{status.current_ma(axis)} mA</span>'
         f'<span class="rq-does">{escape(axis_words(hand, axis))}</span></div>'

@@ -78,6 +78,14 @@ class Figure:
             calls.append(["rotate", group.id, group.R])
         return calls
 
+    def group(self, link: str) -> Object3D:
+        """What moves with a link."""
+        return self._groups[link]
+
+    def show(self, link: str, *, is_shown: bool) -> None:
+        """Show or hide a link, and whatever stands on it."""
+        self._groups[link].visible(is_shown)
+
     def look(self, link: str, color: str | None, opacity: float) -> None:
         """Colour a link; None for its own colours."""
         if self._looks.get(link) == (color or "", opacity):
@@ -92,8 +100,10 @@ class Figure:
             self.look(link, color, opacity)
 
     def _fill(self, link: str) -> None:
+        # The request says nothing about the palm: drawn twice in one place, it would flicker.
+        wanted = () if self._ghost and link == self._model.root else self._model.links[link].shapes
         with self._groups[link]:
-            shapes = [(shape, _drawn(shape)) for shape in self._model.links[link].shapes]
+            shapes = [(shape, _drawn(shape)) for shape in wanted]
         self._shapes[link] = shapes
         self.look(link, GHOST if self._ghost else None, STALE if self._ghost else 1.0)
 
@@ -116,7 +126,7 @@ class HandScene:
             if not compact:
                 self._letters()
         self._model = model
-        scene.move_camera(1.5, -2.1, 1.95, 0, 0, 0.85, duration=0)
+        scene.move_camera(0.75, -2.5, 1.9, 0, 0, 0.8, duration=0)
 
     def show(self, hand: HandMirror) -> None:
         """Draw what is newest; costs nothing where nothing has changed."""
@@ -126,23 +136,17 @@ class HandScene:
         angles = _angles(hand.status, requested=False)
         calls = self._figure.turn(angles)
         if self._ghost is not None:
-            wanted = self._show_ghost(self._ghost, hand, hand.status)
-            calls += wanted
+            calls += self._show_ghost(self._ghost, hand, hand.status)
         if calls:
             self.scene.run_method("run_methods", calls)
         self._show_contacts(hand, hand.status)
         self._show_object(hand, hand.status, angles)
 
     def _show_ghost(self, ghost: Figure, hand: HandMirror, status: RobotiqStatus) -> Calls:
-        # Open is 6 or 7 where 0 was asked for: what an axis itself calls reached is not drawn.
-        away = any(
-            abs(status.requested_position(axis) - status.position(axis)) > APART
-            for axis in AXES
-            if status.finger_status(axis) is not ObjectStatus.AT_POSITION
-        )
-        is_wanted = away and status.go_echo and status.is_activated and not hand.is_lost
-        ghost.root.visible(is_wanted)
-        return ghost.turn(_angles(status, requested=True)) if is_wanted else []
+        away = _away(status) if status.go_echo and status.is_activated and not hand.is_lost else Finger(0)
+        for finger, prefix in PREFIX.items():
+            ghost.show(f"{prefix}_link_0", is_shown=bool(finger & away))
+        return ghost.turn(_angles(status, requested=True)) if away else []
 
     def _show_contacts(self, hand: HandMirror, status: RobotiqStatus) -> None:
         opacity = STALE if hand.is_lost else 1.0
@@ -168,9 +172,20 @@ class HandScene:
     def _letters(self) -> None:
         for axis, color in zip(AXES, COLORS, strict=True):
             if axis in PREFIX:
-                with self._figure._groups[f"{PREFIX[axis]}_link_0"]:  # noqa: SLF001
+                with self._figure.group(f"{PREFIX[axis]}_link_0"):
                     style = f"color:{color};font:bold 15px sans-serif;text-shadow:0 0 3px #0008"
                     ui.scene.text(str(axis.name), style).move(0.0, -0.035, 0.0)
+
+
+def _away(status: RobotiqStatus) -> Finger:
+    """The fingers that are not where they are asked to be; the scissor stands for B and C."""
+    away = Finger(0)
+    for axis in AXES:
+        # Open is 6 or 7 where 0 was asked for: what an axis itself calls reached is no difference.
+        if status.finger_status(axis) is not ObjectStatus.AT_POSITION:
+            apart = abs(status.requested_position(axis) - status.position(axis)) > APART
+            away |= (Finger.B | Finger.C if axis is Finger.SCISSOR else axis) if apart else Finger(0)
+    return away
 
 
 def _angles(status: RobotiqStatus, *, requested: bool) -> dict[str, float]:

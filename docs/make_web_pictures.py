@@ -1,0 +1,151 @@
+"""Takes the pictures of the page in the browser, and a short animation, from a simulated gripper. A minute.
+
+    python docs/make_web_pictures.py
+
+Needs Debian's chromium and chromium-driver, selenium and Pillow. They are taken by hand when what they show
+has changed, and looked at.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import sys
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Final
+
+from PIL import Image
+
+ROOT: Final = Path(__file__).parents[1]
+if __name__ == "__main__":
+    sys.path.insert(0, str(ROOT))
+
+from robotiq_async import WIDTH_NORMAL, WIDTH_WIDE, Finger, RobotiqHand  # noqa: E402
+from robotiq_async.actions import Operator  # noqa: E402
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer  # noqa: E402
+from robotiq_async.web.server import PageServer  # noqa: E402
+from robotiq_async.web.settings import PageSettings  # noqa: E402
+from tests.web.browser import Browser  # noqa: E402
+
+FOLDER: Final = ROOT / "docs" / "measured"
+FRAME_S: Final = 0.15
+WIDTH: Final = 760
+"""Of the animation, in pixels."""
+
+
+async def main() -> None:
+    """All of them."""
+    gripper, browser = SimulatedGripper(), Browser()
+    try:
+        async with SimulatorServer(gripper, port=5020) as server, RobotiqHand(server.address) as hand:
+            settings = PageSettings(port=0, control=True, addresses=(hand.address,), speed=128, force=64)
+            async with PageServer([hand], settings, operators=[Operator(hand)]) as page:
+                await resize(browser, 1200, 760)
+                await browser.open(page.url)
+                await browser.says("statistics", "polls")
+                await animation(browser, hand, gripper)
+                await stills(browser, hand, gripper, server)
+    finally:
+        browser.quit()
+
+
+async def animation(browser: Browser, hand: RobotiqHand, gripper: SimulatedGripper) -> None:
+    """Wide, normal, a grasp, and open again."""
+
+    async def play() -> None:
+        await hand.move(WIDTH_WIDE, Finger.SCISSOR, speed=255)
+        await hand.move(WIDTH_NORMAL, Finger.SCISSOR, speed=255)
+        gripper.place_object(Finger.ABC, position=85)
+        await hand.close(speed=60)
+        await asyncio.sleep(1)
+        await hand.open(speed=60)
+        gripper.remove_object()
+
+    await light(browser, dark=False)
+    frames, durations = await film(browser, play)
+    await asyncio.to_thread(save, frames, durations)  # the hand is polled meanwhile
+
+
+def save(frames: list[Image.Image], durations: list[int]) -> None:
+    """The animation."""
+    size = (WIDTH, frames[0].height * WIDTH // frames[0].width)
+    first, *others = [frame.resize(size, Image.Resampling.LANCZOS) for frame in frames]
+    first.save(
+        FOLDER / "web.webp",
+        save_all=True,
+        append_images=others,
+        duration=durations,
+        loop=0,
+        quality=60,
+        method=6,
+    )
+
+
+async def stills(
+    browser: Browser, hand: RobotiqHand, gripper: SimulatedGripper, server: SimulatorServer
+) -> None:
+    """Closing, holding something in the dark, on a phone, and lost."""
+    await resize(browser, 1200, 1040)
+    closing = asyncio.create_task(hand.close(speed=100))
+    await asyncio.sleep(1.2)
+    await keep(browser, "web_closing")
+    await closing
+    await hand.open(speed=255)
+    gripper.place_object(Finger.ABC, position=85)
+    await hand.close(speed=255)
+    await light(browser, dark=True)
+    await asyncio.sleep(1.5)
+    await keep(browser, "web_holding")
+    await light(browser, dark=False)
+    await resize(browser, 400, 820)
+    await asyncio.sleep(1.5)
+    await keep(browser, "web_phone")
+    await resize(browser, 1200, 760)
+    server.refuse()
+    server.cut()
+    await browser.says("state", "lost")
+    await asyncio.sleep(1.5)
+    await keep(browser, "web_lost")
+    await server.accept()
+    await browser.says("state", "ready")
+
+
+async def film(browser: Browser, play: Callable[[], Awaitable[None]]) -> tuple[list[Image.Image], list[int]]:
+    """What is to be seen while something happens, and for how many milliseconds each."""
+    frames, durations = [], []
+    playing, loop = asyncio.ensure_future(play()), asyncio.get_running_loop()
+    while not playing.done():
+        began = loop.time()
+        frames.append(await shot(browser))
+        await asyncio.sleep(max(FRAME_S - (loop.time() - began), 0))
+        durations.append(round(1000 * (loop.time() - began)))
+    await playing
+    return frames, durations
+
+
+async def shot(browser: Browser) -> Image.Image:
+    """What the window shows."""
+    data = await browser.do(browser.driver.get_screenshot_as_png)
+    return Image.open(io.BytesIO(data)).convert("RGB")
+
+
+async def keep(browser: Browser, name: str) -> None:
+    """A picture in the folder."""
+    (await shot(browser)).save(FOLDER / f"{name}.webp", quality=80, method=6)
+
+
+async def light(browser: Browser, *, dark: bool) -> None:
+    """Light or dark."""
+    await browser.click("dark_mode" if dark else "light_mode")
+
+
+async def resize(browser: Browser, width: int, height: int) -> None:
+    """Another window, or a phone."""
+    metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}
+    await browser.do(lambda: browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics))
+    await browser.run("window.dispatchEvent(new Event('resize'))")
+
+
+if __name__ == "__main__":
+    asyncio.run(main())

@@ -1,0 +1,106 @@
+"""``robotiq-async web``, and the demo that shows itself."""
+
+from __future__ import annotations
+
+import asyncio
+import http.client
+import signal
+from pathlib import Path
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+
+import pytest
+
+from robotiq_async import RobotiqHand
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from tests.cli.conftest import WITHOUT
+
+pytest.importorskip("nicegui", reason="the page needs the extra web")
+
+if TYPE_CHECKING:
+    from tests.cli.conftest import Shell
+
+
+def status(url: str) -> int:
+    """What the page answers to whoever has this address."""
+    parts = urlsplit(url)
+    connection = http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=20)
+    try:
+        connection.request("GET", f"{parts.path}?{parts.query}")
+        return connection.getresponse().status
+    finally:
+        connection.close()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+async def test_it_prints_where_to_look_and_leaves_the_fingers_alone(
+    shell: Shell, server: SimulatorServer, gripper: SimulatedGripper, number: signal.Signals
+) -> None:
+    async with RobotiqHand(server.address) as hand:
+        await hand.move(50)
+        before = gripper.request_registers
+        process = await shell.start("web", "--port", "0", "--control", server.address)
+        url = await shell.read_line(process)
+        assert url.startswith("http://127.0.0.1:")
+        assert await asyncio.to_thread(status, url) == 303
+        assert await asyncio.to_thread(status, url[:-1]) == 403
+        process.send_signal(number)
+        outcome = await shell.finish(process)
+        assert (outcome.code, outcome.out) == (0, "")
+        assert "The fingers were left as they are: nothing here has moved them." in outcome.err
+        assert gripper.request_registers == before
+
+
+async def test_of_several_grippers_one_may_be_missing(shell: Shell, server: SimulatorServer) -> None:
+    process = await shell.start("web", "--port", "0", server.address, "tcp://127.0.0.1:1")
+    assert await asyncio.to_thread(status, await shell.read_line(process)) == 303
+    process.send_signal(signal.SIGTERM)
+    assert (await shell.finish(process)).code == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["tcp://127.0.0.1:1"], 1, "cannot connect to tcp://127.0.0.1:1"),
+        (["tcp://127.0.0.1:1", "tcp://127.0.0.1:2"], 1, "127.0.0.1:2"),
+        (["tcp://127.0.0.1:1", "127.0.0.1:1"], 2, "is there twice"),
+        (["gripper:x"], 2, "gripper:x"),
+        (["--port", "70000"], 2, "0..65535"),
+        (["--host", "192.0.2.1"], 2, "lets others in: that needs a password or a certificate"),
+        (["--password-file", "/nowhere/file"], 1, "/nowhere/file: No such file"),
+        (["--certificate", "/nowhere/file"], 1, "/nowhere/file: No such file"),
+        (["--certificate", __file__], 2, "needs its key"),
+        (["--certificate", __file__, "--key", __file__], 1, "test_web.py"),
+        (["--host", "192.0.2.1", "--password-file", "PASSWORD"], 1, "192.0.2.1:8766"),
+        (["--password-file", "SHORT"], 2, "8 characters or more"),
+    ],
+)
+async def test_bad_input_is_one_clear_line(
+    shell: Shell, tmp_path: Path, arguments: list[str], code: int, words: str
+) -> None:
+    (tmp_path / "PASSWORD").write_text("correct horse\n")
+    (tmp_path / "SHORT").write_text("horse\n")
+    named = [str(tmp_path / each) if each.isupper() else each for each in arguments]
+    outcome = await shell.run("web", *named)
+    assert outcome.code == code
+    assert words in outcome.err
+    assert "Traceback" not in outcome.err
+    # What became of the fingers of a hand that was started may be said as well.
+    assert len([line for line in outcome.err.splitlines() if "left as they are" not in line]) == 1
+
+
+async def test_without_nicegui_one_line_names_the_extra(shell: Shell) -> None:
+    for command in (["web"], ["demo", "--show"]):
+        outcome = await shell.finish(await shell.python("-c", WITHOUT.format("nicegui", command)))
+        outcome.assert_failed(1, "pip install 'robotiq-async[web]'")
+
+
+async def test_the_demo_waits_until_somebody_looks(shell: Shell) -> None:
+    process = await shell.start("demo", "--show")
+    lines = [await shell.read_line(process) for _ in range(2)]
+    url = next(line.partition(": ")[2] for line in lines if line.startswith("Watch it move: "))
+    assert await asyncio.to_thread(status, url) == 303
+    process.send_signal(signal.SIGINT)
+    outcome = await shell.finish(process)
+    assert outcome.code == 130
+    assert "Traceback" not in outcome.err
