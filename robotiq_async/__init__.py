@@ -8,7 +8,9 @@ What a program needs is imported from here. Where it comes from, and what stands
     link                     addresses, transports, Modbus: the bytes
     wire                     status and request, decoded and encoded
     calibration, kinematics  what the values mean: mm/s, N, joint angles
+    description              the hand in three dimensions: its URDF, the poses of its links
     actions, telemetry       operating a hand; recordings, viewers and metrics of one
+    web                      a page in the browser
     measure, doctor          measurements of a gripper; what is wrong with a connection
     simulator, cli           a simulated gripper with its servers; the command line
 
