@@ -151,7 +151,12 @@ class MemoryBus:
         self.queryables.append(entry)
         return lambda: self.queryables.remove(entry) if entry in self.queryables else None
 
-    async def ask(self, key: str, payload: bytes, *, timeout: float, urgency: Urgency) -> Reply | None:
+    def ask(
+        self, key: str, payload: bytes, *, timeout: float, urgency: Urgency
+    ) -> asyncio.Future[Reply | None]:
+        return asyncio.ensure_future(self._ask(key, payload, timeout=timeout, urgency=urgency))
+
+    async def _ask(self, key: str, payload: bytes, *, timeout: float, urgency: Urgency) -> Reply | None:
         answered: asyncio.Future[Reply | None] = asyncio.get_running_loop().create_future()
         for other in self._others():
             for expression, handler in other.queryables:

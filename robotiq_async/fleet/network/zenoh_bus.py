@@ -150,7 +150,9 @@ class ZenohBus:
 
         return self._undo(self._session.declare_queryable(expression, _direct(deliver)))
 
-    async def ask(self, key: str, payload: bytes, *, timeout: float, urgency: Urgency) -> Reply | None:
+    def ask(
+        self, key: str, payload: bytes, *, timeout: float, urgency: Urgency
+    ) -> asyncio.Future[Reply | None]:
         """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
         answered: asyncio.Future[Reply | None] = asyncio.get_running_loop().create_future()
 
@@ -179,8 +181,8 @@ class ZenohBus:
                 congestion_control=zenoh.CongestionControl.DROP,
             )
         except zenoh.ZError:
-            return None  # closed
-        return await answered
+            answered.set_result(None)  # closed
+        return answered
 
     def announce(self, key: str) -> Undo:
         """See :class:`~robotiq_async.fleet.network.bus.Bus`."""

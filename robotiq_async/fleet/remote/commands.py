@@ -241,6 +241,8 @@ class RemoteCommands(RemoteObservation):
         if self._control is None and not session.is_in_control and session.lost is None:
             await session.acquire()
         session.check_control()
+        assert self._outbox is not None
+        self._outbox.flush()
         call = session.call(arguments)
         try:
             value: Fields = await session.send(call, f"cmd/{name}", timeout=timeout, urgency=Urgency.COMMAND)

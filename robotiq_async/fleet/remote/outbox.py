@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Coroutine
+from typing import Any, Final
 
 from ...enums import AXES, Finger
 from ...errors import ControlLostError, RobotiqError
 from ...log import log
-from ..network.bus import Urgency
 from .session import RemoteSession
 
 UNDER_WAY: Final = 4
@@ -37,19 +37,24 @@ class Outbox:
                 self._waiting.setdefault(axis, {}).update(changes)
         self._send_next()
 
-    def _send_next(self) -> None:
-        if self._waiting and self._under_way < UNDER_WAY and not self._session.is_over:
+    def flush(self) -> None:
+        """Send what waits now: what is asked for after it is to come after it."""
+        if self._waiting and not self._session.is_over:
+            waiting, self._waiting = self._waiting, {}
+            arguments = {"axes": {str(int(axis)): changes for axis, changes in waiting.items()}}
+            sent = self._session.send(self._session.call(arguments), "cmd/command", timeout=ANSWER_S)
+            is_motion = any("position" in changes for changes in waiting.values())
             self._under_way += 1
-            self._session.spawn(self._send())
+            self._motions += is_motion
+            self._session.spawn(self._wait(sent, is_motion=is_motion))
 
-    async def _send(self) -> None:
-        waiting, self._waiting = self._waiting, {}
-        is_motion = any("position" in changes for changes in waiting.values())
-        self._motions += is_motion
-        arguments = {"axes": {str(int(axis)): changes for axis, changes in waiting.items()}}
+    def _send_next(self) -> None:
+        if self._under_way < UNDER_WAY:
+            self.flush()
+
+    async def _wait(self, sent: Coroutine[Any, Any, Any], *, is_motion: bool) -> None:
         try:
-            if waiting:
-                await self._session.ask("cmd/command", arguments, timeout=ANSWER_S, urgency=Urgency.COMMAND)
+            await sent
         except ControlLostError:
             pass  # the next command() raises it
         except (RobotiqError, TypeError, ValueError) as error:

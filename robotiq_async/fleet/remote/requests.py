@@ -7,11 +7,12 @@ import getpass
 import os
 import secrets
 import socket
+from collections.abc import Coroutine
 from typing import Any, Final
 
 from ...errors import AgentError, ConnectionLostError, NotAllowedError
 from ...session.clock import now
-from ..network.bus import Bus, Urgency
+from ..network.bus import Bus, Reply, Urgency
 from ..wire.envelope import Answer, Call, unpack_answer
 from ..wire.names import GripperName
 from ..wire.values import Fields
@@ -53,10 +54,10 @@ class Requests:
         self._number += 1
         return Call(self._name.base, self._client, mirror.epoch, lease, self._number, mirror.stamp, arguments)
 
-    async def send(
+    def send(
         self, call: Call, verb: str, *, timeout: float, urgency: Urgency = Urgency.COMMAND
-    ) -> tuple[Answer, bytes]:
-        """Send a request and wait for its answer; returns it, and the status that came with it.
+    ) -> Coroutine[Any, Any, tuple[Answer, bytes]]:
+        """Send a request now; what is returned waits for the answer, and for the status that comes with it.
 
         Args:
             call: the request.
@@ -70,10 +71,13 @@ class Requests:
             AgentError: the answer was another's, or of another version.
             ProtocolError: it is none.
         """
+        asking = self._bus.ask(self._name.key(verb), call.pack(), timeout=timeout, urgency=urgency)
+        return self._answer(asking, call, verb, timeout, urgency)
+
+    async def _answer(
+        self, asking: asyncio.Future[Reply | None], call: Call, verb: str, timeout: float, urgency: Urgency
+    ) -> tuple[Answer, bytes]:
         asked_at = now()
-        asking = asyncio.ensure_future(
-            self._bus.ask(self._name.key(verb), call.pack(), timeout=timeout, urgency=urgency)
-        )
         awaited: set[asyncio.Future[Any]] = {asking}
         if urgency is not Urgency.STOP:
             awaited.add(self._silence)

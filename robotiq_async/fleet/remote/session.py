@@ -27,7 +27,7 @@ from ...session.statistics import Counters, Statistics
 from ...session.streams import Channels
 from ..control.lease import WINDOW_S
 from ..network.bus import Bus, Undo
-from ..wire.envelope import Call
+from ..wire.envelope import Answer, Call
 from ..wire.names import GripperName
 from ..wire.status_message import unpack
 from ..wire.values import Fields, read_statistics
@@ -140,7 +140,7 @@ class RemoteSession:
 
     async def close(self, failure: NotStartedError, *, halt: bool) -> None:
         """End the run; within two seconds, also when cancelled meanwhile."""
-        self.is_over = True
+        self.is_over, self._wants_control = True, False
         work = asyncio.ensure_future(self._close(failure, halt=halt))
         await wait_shielded(work)
         work.result()
@@ -326,14 +326,19 @@ class RemoteSession:
         """The next request, under the present lease."""
         return self._requests.make(self.mirror, self._lease, arguments or {})
 
-    async def send(self, call: Call, verb: str, **how: Any) -> Any:  # noqa: ANN401
-        """Send a request and wait for its answer; see :meth:`Requests.send`.
+    def send(self, call: Call, verb: str, **how: Any) -> Coroutine[Any, Any, Any]:  # noqa: ANN401
+        """Send a request now; what is returned waits for its outcome. See :meth:`Requests.send`.
 
         Raises:
             NotStartedError: the run has ended meanwhile.
         """
+        return self._outcome(self._requests.send(call, verb, **how), call, verb)
+
+    async def _outcome(
+        self, answering: Coroutine[Any, Any, tuple[Answer, bytes]], call: Call, verb: str
+    ) -> Any:  # noqa: ANN401  # what each request returns
         try:
-            answer, news = await self._requests.send(call, verb, **how)
+            answer, news = await answering
         except NoAnswerError:
             self.check_running()
             raise
