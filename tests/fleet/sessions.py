@@ -91,7 +91,7 @@ class Line:
             question.reply(b"!")
 
         for verb in ("info", "lease", "halt", "cmd/*"):
-            self.stack.callback(bus.serve(LEFT.key(verb), answer))
+            self.stack.callback(bus.serve(f"robotiq/v1/lab/cell-1/*/{verb}", answer))
         self.stack.callback(bus.announce(LEFT.key("alive", "77")))
         publish = {name: bus.publisher(LEFT.key(name), Urgency.NEWS) for name in ("feed", "summary", "other")}
         agent = Agent(bus, lambda name: publish[name](NEWS))
