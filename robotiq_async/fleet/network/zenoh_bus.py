@@ -40,8 +40,10 @@ async def open_bus(configuration: Mapping[str, object], what: str) -> ZenohBus:
     Raises:
         ConnectFailedError: it cannot be opened: an address in use, a malformed certificate.
     """
-    config = zenoh.Config.from_json5(json.dumps(configuration))
-    opening = asyncio.ensure_future(asyncio.to_thread(zenoh.open, config))
+    def open_session() -> zenoh.Session:
+        return zenoh.open(zenoh.Config.from_json5(json.dumps(configuration)))
+
+    opening = asyncio.ensure_future(asyncio.to_thread(open_session))
     try:
         session = await asyncio.shield(opening)
     except zenoh.ZError as error:

@@ -112,6 +112,8 @@ class RemoteSession:
             try:
                 async with asyncio.timeout(max(ANSWER_S, deadline - now())):
                     await reached
+                # A change of state is heard before the status that shows it; an answer carries both.
+                await self.ask("info", timeout=ANSWER_S)
             except TimeoutError:
                 problem = (await self.ask("info", timeout=ANSWER_S))["problem"]
                 raise ConnectFailedError(
