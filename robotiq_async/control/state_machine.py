@@ -124,9 +124,7 @@ TABLE: Final[dict[State, Row]] = {
         }
     ),
     State.DO_ATR: _connected(_EMERGENCY | {Trigger.DELIVERED: State.WF_ATR}),
-    State.WF_ATR: _connected(
-        _EMERGENCY | {Trigger.SEEN_RELEASED: State.ATR_DONE, Trigger.SEEN_RESET: State.RESET}
-    ),
+    State.WF_ATR: _connected(_EMERGENCY | _SEEN),
     State.ATR_DONE: _connected(
         _SEEN
         | {
