@@ -65,9 +65,9 @@ class RequestShadow:
         return replace(self.base, go=False).with_positions({axis: status.position(axis) for axis in AXES})
 
     @property
-    def settings(self) -> tuple[AxisRequest, ...]:
-        """Speed and force of each axis, as last written."""
-        return self._image.axes
+    def speeds(self) -> dict[Finger, int]:
+        """The speed of each axis, as last written."""
+        return {axis: request.speed for axis, request in zip(AXES, self._image.axes, strict=True)}
 
     @property
     def is_certain(self) -> bool:
