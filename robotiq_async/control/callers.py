@@ -7,7 +7,7 @@ from collections.abc import Callable
 from ..enums import Finger
 from ..errors import MoveSupersededError, RobotiqError
 from ..wire.status import RobotiqStatus
-from .motion import LiveMoves, Move
+from .motion import LiveMoves
 from .pending import PendingCommand
 from .waiters import Waiter, fail, resolve
 
@@ -39,25 +39,25 @@ class Callers:
         waiter: Waiter[None] | None = None,
     ) -> None:
         """Ask axes for something; moves of axes that get a position are superseded."""
-        if position is not None and self.moves:
-            error = MoveSupersededError(f"another command moves {axes}")
-            self.moves.fail(error, lambda move: bool(move.axes & axes))
+        if position is not None:
+            self._supersede(axes, MoveSupersededError(f"another command moves {axes}"))
         self.pending.merge(axes, position, speed, force, waiter)
 
-    def move(self, move: Move, speed: int | None, force: int | None) -> None:
-        """Ask for a move."""
-        self.command(move.axes, move.position, speed, force)
-        self.moves.add(move)
-
-    def hold(self, axes: Finger, why: str) -> None:
-        """Hold axes where they are, if they move."""
-        self.pending.merge_hold(axes, MoveSupersededError(why))
+    def hold(self, axes: Finger, why: str, waiter: Waiter[None] | None = None) -> None:
+        """Hold axes where they are, if they move; moves of them are superseded."""
+        superseded = MoveSupersededError(why)
+        self._supersede(axes, superseded)
+        self.pending.merge_hold(axes, superseded, waiter)
 
     def halt(self, waiter: Waiter[None]) -> None:
         """Stop everything."""
         superseded = MoveSupersededError("halt() stopped the fingers")
         self.moves.fail(superseded)
         self.pending.merge_halt(waiter, superseded)
+
+    def _supersede(self, axes: Finger, error: MoveSupersededError) -> None:
+        if self.moves:
+            self.moves.fail(error, lambda move: bool(move.axes & axes))
 
     # -- what becomes of it ----------------------------------------------------------------------------
 
@@ -70,6 +70,11 @@ class Callers:
             self.pending = PendingCommand()
         self._sent = sent
         return sent
+
+    def nothing_to_send(self) -> None:
+        """What is pending holds already."""
+        resolve(self.pending.waiters)
+        self.pending = PendingCommand()
 
     def acknowledged(self, number: int) -> None:
         """What is on the line was acknowledged under this number."""
@@ -100,12 +105,14 @@ class Callers:
         fail((waiter for _, waiter in halting), error)
         self.moves.fail(error)
 
-    def fail_but_halts(self, error: RobotiqError) -> None:
-        """Nothing will move that was asked to; a halt is good all the same."""
-        halt, self.pending.halting = self.pending.halting, None
+    def fail_but_stops(self, error: RobotiqError) -> None:
+        """Nothing will move that was asked to; a halt and a hold are good all the same."""
+        pending = self.pending
+        kept = PendingCommand(hold=pending.asked_to_hold, holding=pending.holding, halting=pending.halting)
+        pending.holding, pending.halting = [], None
         halting, self._halting = self._halting, []
         self.fail(error)
-        self.pending.halting, self._halting = halt, halting
+        self.pending, self._halting = kept, halting
 
     def lost(self, error: RobotiqError) -> Finger:
         """The link is down: tell everybody, and return the axes whose hold was not acknowledged.

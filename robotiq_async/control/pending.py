@@ -25,6 +25,7 @@ class PendingCommand:
         halting: callers of halt(); None when nobody asked to halt.
         going: callers that wait for a position to be acknowledged, with their axes.
         setting: callers that wait for nothing but a speed or a force.
+        holding: callers of hold(), with their axes.
     """
 
     positions: dict[Finger, int] = field(default_factory=dict)
@@ -35,6 +36,7 @@ class PendingCommand:
     halting: list[Waiter[None]] | None = None
     going: list[tuple[Finger, Waiter[None]]] = field(default_factory=list)
     setting: list[Waiter[None]] = field(default_factory=list)
+    holding: list[tuple[Finger, Waiter[None]]] = field(default_factory=list)
 
     @property
     def is_empty(self) -> bool:
@@ -57,7 +59,15 @@ class PendingCommand:
     @property
     def waiters(self) -> list[Waiter[None]]:
         """Callers that wait for nothing but the acknowledgement."""
-        return [*(waiter for _, waiter in self.going), *self.setting]
+        return [*(waiter for _, waiter in (*self.going, *self.holding)), *self.setting]
+
+    @property
+    def asked_to_hold(self) -> Finger:
+        """The axes that callers of hold() have named: to be held whoever moves them."""
+        mask = NO_AXES
+        for axes, _ in self.holding:
+            mask |= axes
+        return mask
 
     def merge(
         self,
@@ -79,7 +89,7 @@ class PendingCommand:
         elif waiter is not None:
             self.going.append((axes, waiter))
 
-    def merge_hold(self, axes: Finger, superseded: RobotiqError) -> None:
+    def merge_hold(self, axes: Finger, superseded: RobotiqError, waiter: Waiter[None] | None = None) -> None:
         """Hold axes; a position that was not sent yet is dropped, and who waits for it is told."""
         for axis in AXES:
             if axis in axes:
@@ -87,6 +97,8 @@ class PendingCommand:
         fail([waiter for mask, waiter in self.going if mask & axes], superseded)
         self.going = [(mask, waiter) for mask, waiter in self.going if not mask & axes]
         self.hold |= axes
+        if waiter is not None:
+            self.holding.append((axes, waiter))
 
     def merge_halt(self, waiter: Waiter[None], superseded: RobotiqError) -> None:
         """Stop everything; a position that was asked before and not sent yet is dropped."""
@@ -95,7 +107,9 @@ class PendingCommand:
         self.going.clear()
         self.replaced |= self.hold
         self.hold = NO_AXES
-        self.halting = [*(self.halting or ()), waiter]
+        # What was to be held is stopped by this.
+        self.halting = [*(self.halting or ()), *(holder for _, holder in self.holding), waiter]
+        self.holding.clear()
 
     def fail(self, error: RobotiqError) -> None:
         """Tell everybody who waits that it will not happen."""

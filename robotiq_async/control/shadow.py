@@ -65,9 +65,9 @@ class RequestShadow:
         return replace(self.base, go=False).with_positions({axis: status.position(axis) for axis in AXES})
 
     @property
-    def settings(self) -> tuple[AxisRequest, ...]:
-        """Speed and force of each axis, as last written."""
-        return self._image.axes
+    def speeds(self) -> dict[Finger, int]:
+        """The speed of each axis, as last written."""
+        return {axis: request.speed for axis, request in zip(AXES, self._image.axes, strict=True)}
 
     @property
     def is_certain(self) -> bool:
@@ -200,10 +200,11 @@ class RequestShadow:
         """A sequence is over: what it wrote last is what the gripper has, and nothing else is on its way.
 
         Returns:
-            Whether the status shows that. If not, another client has written meanwhile.
+            Whether the status shows that. If not, another client has written meanwhile. rATR has no echo; a
+            gripper that follows requests does not follow that one.
         """
         self._writes.restart(self._image, status.echo, self._asked)
-        return status.echo == self._image.echo
+        return status.echo == self._image.echo and not self._image.release
 
     def see_arrivals(self, status: RobotiqStatus) -> None:
         """Remember which axes have come to rest, from a status of a gripper that has no fault.

@@ -54,6 +54,7 @@ Row = dict[Trigger, State | Verdict]
 _USER: Final = (
     Trigger.ASK_ACTIVATE,
     Trigger.ASK_COMMAND,
+    Trigger.ASK_HOLD,
     Trigger.ASK_HALT,
     Trigger.ASK_RELEASE,
     Trigger.ASK_RESET,
@@ -70,7 +71,9 @@ _SEEN: Final[Row] = {
 def _connected(entries: Row) -> Row:
     """A row of a hand that has its link: it can always be stopped, and always lose its link."""
     usual: Row = {trigger: _IGNORED if trigger.is_seen else Verdict.NOT_NOW for trigger in Trigger}
-    return usual | {Trigger.ASK_STOP: State.DO_SHUTDOWN, Trigger.LINK_LOST: State.DISCONNECTED} | entries
+    usual |= {Trigger.ASK_STOP: State.DO_SHUTDOWN, Trigger.LINK_LOST: State.DISCONNECTED}
+    # Where no motion of ours is under way there is nothing to hold.
+    return usual | {Trigger.ASK_HOLD: _IGNORED} | entries
 
 
 def _all(triggers: tuple[Trigger, ...], verdict: State | Verdict) -> Row:
@@ -98,6 +101,7 @@ TABLE: Final[dict[State, Row]] = {
         | {
             Trigger.ASK_ACTIVATE: _IGNORED,
             Trigger.ASK_COMMAND: State.RUNNING_CC,
+            Trigger.ASK_HOLD: State.RUNNING_CC,
             Trigger.ASK_HALT: State.RUNNING_CC,
             Trigger.ASK_RESET: State.DO_RESET,
         }
@@ -108,6 +112,7 @@ TABLE: Final[dict[State, Row]] = {
             Trigger.SEEN_READY: State.RUNNING_CC,
             Trigger.ASK_ACTIVATE: _IGNORED,
             Trigger.ASK_COMMAND: State.RUNNING_CC,
+            Trigger.ASK_HOLD: State.RUNNING_CC,
             Trigger.ASK_HALT: State.RUNNING_CC,
             Trigger.ASK_RESET: State.DO_RESET,
             Trigger.DELIVERED: State.RUNNING_IDLE,
@@ -118,15 +123,14 @@ TABLE: Final[dict[State, Row]] = {
         | {
             Trigger.ASK_ACTIVATE: _IN_FAULT,
             Trigger.ASK_COMMAND: _IN_FAULT,
+            Trigger.ASK_HOLD: State.FAULT,
             Trigger.ASK_HALT: State.FAULT,
             Trigger.ASK_RELEASE: State.DO_ATR,
             Trigger.ASK_RESET: State.DO_RESET,
         }
     ),
     State.DO_ATR: _connected(_EMERGENCY | {Trigger.DELIVERED: State.WF_ATR}),
-    State.WF_ATR: _connected(
-        _EMERGENCY | {Trigger.SEEN_RELEASED: State.ATR_DONE, Trigger.SEEN_RESET: State.RESET}
-    ),
+    State.WF_ATR: _connected(_EMERGENCY | _SEEN),
     State.ATR_DONE: _connected(
         _SEEN
         | {

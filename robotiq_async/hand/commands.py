@@ -133,11 +133,10 @@ class Commands(Recovery):
         limit = check_timeout("timeout", timeout)
         session = self._asked()
         controller = session.controller
-        if limit is None:
-            limit = controller.move_timeout(target, axes, speed)
         ended: asyncio.Future[MoveResult] = session.waiter()
         move = Move(target, axes, now(), ended)
-        controller.move(move, speed, force)
+        usual = controller.move(move, speed, force)
+        limit = usual if limit is None else limit
         with session.counters.move() as note:
             try:
                 with anyio.move_on_after(limit):
@@ -176,6 +175,30 @@ class Commands(Recovery):
     ) -> MoveResult:
         """Close the fingers, not the connection (that is :meth:`stop`): :meth:`move` to 255."""
         return await self.move(CLOSED, fingers, speed=speed, force=force, timeout=timeout)
+
+    async def hold(self, fingers: Finger | int = Finger.ALL) -> None:
+        """Ask axes that move to stay where they are, whoever moves them; returns when it is acknowledged.
+
+        An axis in contact keeps its request and its grip, and one at rest is left alone: what a cancelled
+        move does to its axes. Awaited moves and pending requests of these axes end with MoveSupersededError,
+        and their other axes go on. When cancelled, the hold is sent all the same; one that a lost link keeps
+        from being acknowledged is made good when the link is back, unless another client moves the axes then.
+
+        In RESET and ATR_DONE, and during an activation, a release or a reset, no motion of a command is under
+        way: it returns, and nothing is sent. :meth:`halt` ends those.
+
+        Args:
+            fingers: mask of the axes.
+
+        Raises:
+            TypeError: a mask of the wrong type; nothing is sent.
+            ValueError: a mask outside its range; nothing is sent.
+            MoveSupersededError: reset() took over before it was sent.
+            NotActivatedError: the gripper lost its activation before it was sent.
+            RobotiqError: not connected, or the link went down before the acknowledgement.
+        """
+        axes, session = check_mask(fingers), self._asked()
+        await session.answered(lambda waiter: session.controller.hold(axes, waiter))
 
     async def halt(self) -> None:
         """Stop every axis now (rGTO = 0); the next command goes again, and moves only what it addresses.

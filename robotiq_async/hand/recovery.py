@@ -80,13 +80,15 @@ class Recovery(Observation):
             RobotiqError: the link went down.
         """
         session = self._asked()
+        # Nothing but a reset ends a release; what is found then may have been activated by another client.
+        ended = (State.RESET, State.WF_ACTIVATION, State.RUNNING_IDLE, State.FAULT)
         await session.reach(
             {State.ATR_DONE},
             RELEASE_TIMEOUT_S,
             ask=session.controller.release,
             failing={
+                **dict.fromkeys(ended, lambda: NotActivatedError("the gripper was reset during the release")),
                 State.DISCONNECTED: session.link_lost,
-                State.RESET: lambda: NotActivatedError("the gripper was reset during the automatic release"),
                 State.DO_RESET: lambda: InvalidStateError("reset() or halt() took over", State.DO_RESET),
             },
             what="the automatic release was not finished",

@@ -100,6 +100,7 @@ WALKS = {
     "move": Walk(lambda world: world.hand.move(TARGET, A, speed=0), active),
     "open": Walk(lambda world: world.hand.open(A), moving),
     "close": Walk(lambda world: world.hand.close(A), active),
+    "hold": Walk(lambda world: world.hand.hold(), moving),
     "halt": Walk(lambda world: world.hand.halt(), moving),
     "activate": Walk(lambda world: world.hand.activate(), reset, RESTS, FAST),
     "reset": Walk(lambda world: world.hand.reset(), active, RESTS),

@@ -18,6 +18,8 @@ from robotiq_async.calibration import (
 )
 from robotiq_async.calibration.closing_time import closing_time
 from robotiq_async.calibration.csv_tables import FORCE, SPEED, TableError, thesis_table, write_table
+from robotiq_async.control.motion import Move
+from tests.control.outcome import Outcome
 
 # -- positions ---------------------------------------------------------------------------------------------
 
@@ -130,7 +132,7 @@ async def test_the_default_time_out_of_a_move_comes_from_the_calibration(tmp_pat
         async with RobotiqHand(calibration=calibration) as hand:
             session = hand._session
             assert session is not None
-            timeout = session.controller.move_timeout(255, Finger.A, 255)
+            timeout = session.controller.move(Move(255, Finger.A, 0.0, Outcome()), 255, None)
             way = 255 - hand.status.position(Finger.A)
         assert timeout == pytest.approx(2 * way / 235 * seconds + 2, rel=0.005)
 

@@ -115,6 +115,11 @@ class Scan:
         self.controller.command(axes, position, speed, force, outcome)
         return outcome
 
+    def hold(self, axes: Finger = Finger.ALL) -> Outcome:
+        outcome = Outcome()
+        self.controller.hold(axes, outcome)
+        return outcome
+
     def halt(self) -> Outcome:
         outcome = Outcome()
         self.controller.halt(outcome)

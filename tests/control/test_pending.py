@@ -215,6 +215,22 @@ def test_who_waits_for_a_speed_goes_on_waiting_though_a_halt_drops_the_position_
     assert not for_speed.told
 
 
+def test_who_waits_for_a_hold_waits_for_the_halt_that_stops_its_axes() -> None:
+    """The hold is dropped: nothing would be left to write, and nobody would be told."""
+    pending, holder, halter = PendingCommand(), Outcome(), Outcome()
+    pending.merge_hold(A, SUPERSEDED, holder)
+    pending.merge_halt(halter, SUPERSEDED)
+    assert (pending.halting, pending.holding) == ([holder, halter], [])
+
+
+def test_who_waits_for_a_hold_goes_on_waiting_when_a_position_replaces_it() -> None:
+    pending, holder = PendingCommand(), Outcome()
+    pending.merge_hold(A, SUPERSEDED, holder)
+    pending.merge(A, 100, None, None)
+    assert pending.waiters == [holder]
+    assert not holder.is_told
+
+
 def test_every_caller_of_halt_is_kept() -> None:
     pending, one, other = PendingCommand(), Outcome(), Outcome()
     pending.merge_halt(one, SUPERSEDED)

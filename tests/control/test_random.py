@@ -56,6 +56,11 @@ class RandomUse(RuleBasedStateMachine):
         self.scan.controller.abandon(move)
         self.told = [each for each in self.told if each[0] is not move]
 
+    @rule(axes=masks)
+    @precondition(lambda self: self.running)
+    def hold(self, axes: Finger) -> None:
+        self.told.append((None, self.scan.hold(axes)))
+
     @rule()
     @precondition(lambda self: self.running)
     def halt(self) -> None:

@@ -50,6 +50,7 @@ async def test_masks(hand: RobotiqHand, server: SimulatorServer, mask: Any) -> N
     await refused(server, mask, lambda: hand.set_position(3, mask), "fingers")
     await refused(server, mask, lambda: hand.move(3, mask), "fingers")
     await refused(server, mask, lambda: hand.command(mask, position=3), "fingers")
+    await refused(server, mask, lambda: hand.hold(mask), "fingers")
 
 
 @pytest.mark.parametrize("timeout", [0, -1, "1", True, float("inf"), float("nan")], ids=repr)

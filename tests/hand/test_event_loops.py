@@ -42,6 +42,7 @@ CALLS: dict[str, Callable[[RobotiqHand], Coroutine[Any, Any, object]]] = {
     "set_force": lambda hand: hand.set_force(3),
     "move": lambda hand: hand.move(200),
     "close": lambda hand: hand.close(),
+    "hold": lambda hand: hand.hold(),
     "halt": lambda hand: hand.halt(),
     "reset": lambda hand: hand.reset(),
     "activate": lambda hand: hand.activate(),
