@@ -15,6 +15,7 @@ from ..errors import NotAllStoppedError, RobotiqError
 from ..log import log
 from ..session.clock import now
 from ..session.event_loop import running_loop
+from ..session.listeners import Listeners
 from ..session.streams import Channel, Stream
 from .network.bus import Bus, Undo, Urgency
 from .network.route import Route, default_route
@@ -84,7 +85,7 @@ class Fleet:
         self._undo: list[Undo] = []
         self._members: dict[GripperName, Member] = {}
         self._tokens: dict[GripperName, set[str]] = {}
-        self._changes: Channel[Member] = Channel()
+        self._changes: Channel[Member] = Channel(Listeners())
 
     async def __aenter__(self) -> Self:
         """Begin to listen, and find who is there already.

@@ -23,7 +23,7 @@ async def test_a_move() -> None:
 async def test_a_cancelled_move_is_held() -> None:
     async with lab() as here, here.client() as hand:
         moving = asyncio.create_task(hand.move(200, Finger.A, speed=0))
-        while not here.gripper.is_moving:
+        while not here.gripper.is_moving:  # noqa: ASYNC110  # what is waited for tells nobody
             await asyncio.sleep(0.001)
         moving.cancel()
         await asyncio.gather(moving, return_exceptions=True)

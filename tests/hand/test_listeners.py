@@ -119,7 +119,7 @@ async def coroutine(item: object) -> None:
     raise AssertionError("nobody would await it")
 
 
-@pytest.mark.parametrize("callback", [None, 3, coroutine], ids=repr)
+@pytest.mark.parametrize("callback", [None, 3, coroutine], ids=["None", "3", "coroutine"])
 def test_what_is_no_plain_function_is_refused(callback: Any) -> None:
     with pytest.raises(TypeError, match="callback must be a plain function"):
         RobotiqHand().add_listener(callback)

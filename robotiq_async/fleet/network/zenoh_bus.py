@@ -40,6 +40,7 @@ async def open_bus(configuration: Mapping[str, object], what: str) -> ZenohBus:
     Raises:
         ConnectFailedError: it cannot be opened: an address in use, a malformed certificate.
     """
+
     def open_session() -> zenoh.Session:
         return zenoh.open(zenoh.Config.from_json5(json.dumps(configuration)))
 
