@@ -6,7 +6,7 @@ import asyncio
 import inspect
 import logging
 import os
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 
 import pytest
 import pytest_asyncio
@@ -14,6 +14,7 @@ from hypothesis import settings
 
 from robotiq_async import RobotiqHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from tests.virtual import VirtualLoop
 
 # The suite tries the same examples every time; HYPOTHESIS_PROFILE=explore tries new ones, and more.
 settings.register_profile("suite", derandomize=True, deadline=None)
@@ -28,6 +29,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.fixturenames.insert(0, "nothing_left_running")
 
 
+def pytest_asyncio_loop_factories(item: pytest.Item) -> dict[str, Callable[[], asyncio.AbstractEventLoop]]:
+    """Let what is marked so run in virtual time, fixtures and all."""
+    if item.get_closest_marker("virtual_time"):
+        return {"virtual": VirtualLoop}
+    return {"real": asyncio.new_event_loop}
+
+
 @pytest_asyncio.fixture
 async def nothing_left_running(caplog: pytest.LogCaptureFixture) -> AsyncIterator[None]:
     """Fail a test that leaves a task behind or that the event loop had to complain about."""
@@ -39,13 +47,16 @@ async def nothing_left_running(caplog: pytest.LogCaptureFixture) -> AsyncIterato
         task.cancel()
     assert not left, f"tasks left running: {left}"
     complaints = [record.getMessage() for record in caplog.get_records("call") if record.name == "asyncio"]
+    loop = asyncio.get_running_loop()
+    if isinstance(loop, VirtualLoop):
+        complaints += loop.complaints
     assert not complaints, f"the event loop complained: {complaints}"
 
 
 @pytest.fixture
 async def gripper() -> SimulatedGripper:
     """A fast one that stops where it is told to."""
-    return SimulatedGripper(speedup=20, spread=False)
+    return SimulatedGripper(asyncio.get_running_loop().time, speedup=20, spread=False)
 
 
 @pytest.fixture

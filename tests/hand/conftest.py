@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from collections.abc import AsyncIterator
 
 import pytest_asyncio
@@ -19,7 +18,7 @@ class Clock:
         self.ahead = 0.0
 
     def __call__(self) -> float:
-        return time.monotonic() + self.ahead
+        return asyncio.get_running_loop().time() + self.ahead
 
 
 @pytest_asyncio.fixture
