@@ -12,7 +12,7 @@ import pytest
 import pytest_asyncio
 from hypothesis import settings
 
-from robotiq_async import RobotiqHand
+from robotiq_async import RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.virtual import VirtualLoop
 
@@ -53,10 +53,37 @@ async def nothing_left_running(caplog: pytest.LogCaptureFixture) -> AsyncIterato
     assert not complaints, f"the event loop complained: {complaints}"
 
 
+class Clock:
+    """The time of the loop, that can be moved ahead."""
+
+    def __init__(self) -> None:
+        self.ahead = 0.0
+        self._loop = asyncio.get_running_loop()
+
+    def __call__(self) -> float:
+        return self._loop.time() + self.ahead
+
+
+async def started(hand: RobotiqHand, clock: Clock) -> None:
+    """Start a hand; the seconds in which it activates its gripper are skipped."""
+    transitions = hand.transitions()
+    starting = asyncio.create_task(hand.start())
+    while (await anext(transitions)).target is not State.WF_ACTIVATION:
+        pass
+    clock.ahead += 10
+    await starting
+
+
 @pytest.fixture
-async def gripper() -> SimulatedGripper:
+async def clock() -> Clock:
+    """The gripper's."""
+    return Clock()
+
+
+@pytest.fixture
+async def gripper(clock: Clock) -> SimulatedGripper:
     """A fast one that stops where it is told to."""
-    return SimulatedGripper(asyncio.get_running_loop().time, speedup=20, spread=False)
+    return SimulatedGripper(clock, speedup=20, spread=False)
 
 
 @pytest.fixture
@@ -67,7 +94,9 @@ async def server(gripper: SimulatedGripper) -> AsyncIterator[SimulatorServer]:
 
 
 @pytest.fixture
-async def hand(server: SimulatorServer) -> AsyncIterator[RobotiqHand]:
+async def hand(server: SimulatorServer, clock: Clock) -> AsyncIterator[RobotiqHand]:
     """A hand at it, active."""
-    async with RobotiqHand(server.address) as hand:
-        yield hand
+    hand = RobotiqHand(server.address)
+    await started(hand, clock)
+    yield hand
+    await hand.stop()

@@ -25,11 +25,6 @@ from tests.virtual import VirtualLoop
 pytestmark = pytest.mark.virtual_time
 
 
-@pytest.fixture
-def gripper(server: SimulatorServer) -> SimulatedGripper:
-    return server.gripper
-
-
 async def reach(hand: RobotiqHand, state: State) -> asyncio.Task[None]:
     """Begin what leads to a state, and return the task that does it once the hand is there."""
     gripper = {State.DO_ACTIVATION: hand.activate, State.WF_ACTIVATION: hand.activate}
