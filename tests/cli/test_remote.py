@@ -16,7 +16,7 @@ import pytest
 from robotiq_async import Finger
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.conftest import Shell
-from tests.hand.conftest import Clock
+from tests.conftest import Clock
 
 pytest.importorskip("zenoh")
 

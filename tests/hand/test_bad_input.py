@@ -10,6 +10,8 @@ import pytest
 from robotiq_async import RobotiqHand, State
 from robotiq_async.simulator import SimulatorServer
 
+pytestmark = pytest.mark.virtual_time
+
 BAD_BYTES = [256, -1, 1.0, True, "7", None, 1e300, float("nan")]
 BAD_MASKS = [0, 16, -1, True, 1.5, "A", None]
 

@@ -31,6 +31,8 @@ from robotiq_async import (
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.wire.request import Request
 
+pytestmark = pytest.mark.virtual_time
+
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from collections.abc import Sequence
 
 import pytest
@@ -21,12 +20,10 @@ from robotiq_async.control.state_machine import SEQUENCES
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.wire.registers import Registers
 from robotiq_async.wire.request import Request
-from tests.hand.conftest import Clock
+from tests.conftest import Clock
+from tests.virtual import VirtualLoop
 
-
-@pytest.fixture
-def gripper(server: SimulatorServer) -> SimulatedGripper:
-    return server.gripper
+pytestmark = pytest.mark.virtual_time
 
 
 async def reach(hand: RobotiqHand, state: State) -> asyncio.Task[None]:
@@ -189,7 +186,8 @@ class Wire:
     """A gripper without a network, that notes what it is asked."""
 
     def __init__(self) -> None:
-        self.gripper = SimulatedGripper(speedup=20)
+        self.loop = asyncio.get_running_loop()
+        self.gripper = SimulatedGripper(self.loop.time, speedup=20)
         self.is_open = False
         self.asked: list[str] = []
         self.holds_up = 0.0
@@ -203,7 +201,8 @@ class Wire:
 
     async def read(self) -> Registers:
         self.asked.append("read")
-        time.sleep(self.holds_up)  # noqa: ASYNC251
+        assert isinstance(self.loop, VirtualLoop)
+        self.loop.hold_up(self.holds_up)
         self.holds_up = 0.0
         return self.gripper.status_registers()
 

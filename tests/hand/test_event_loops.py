@@ -17,11 +17,6 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 ADVICE = "call_soon_threadsafe|run_coroutine_threadsafe"
 
 
-@pytest.fixture
-def gripper(server: SimulatorServer) -> SimulatedGripper:
-    return server.gripper
-
-
 async def in_a_thread(work: Callable[[], object]) -> BaseException | None:
     """What a call from another thread raises, or None."""
 

@@ -96,6 +96,19 @@ async def test_nobody_waits_for_what_was_refused() -> None:
         assert not session._waiters._waiters
 
 
+@virtual
+async def test_nobody_is_left_who_waits_after_a_cancellation() -> None:
+    async with running() as (_, session):
+        reaching = asyncio.create_task(session.reach({State.ATR_DONE}, 9.0, what=""))
+        activating = asyncio.create_task(session.activated(session.controller.activate))
+        await asyncio.sleep(0.1)
+        assert session._waiters._waiters
+        for task in (reaching, activating):
+            task.cancel()
+        await asyncio.gather(reaching, activating, return_exceptions=True)
+        assert not session._waiters._waiters
+
+
 def refuse() -> None:
     raise NotActivatedError("no")
 
