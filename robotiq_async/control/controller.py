@@ -169,7 +169,6 @@ class Controller:
         """The hand is being stopped: nothing more is taken, and whoever waits is told."""
         self.machine.fire(Trigger.ASK_STOP)
         self._callers.fail(NotStartedError("the hand was stopped"))
-        self._callers.drop_sent()
         self.machine.drop_sequence()
 
     def stopped(self) -> None:
@@ -222,8 +221,7 @@ class Controller:
         # What nobody waits for is not worked out: this runs at every poll.
         if self._activating:
             self._see_activation(status)
-        if self._callers.wait_for_halt:
-            self._callers.see_halt(status, self._shadow.acts)
+        self._callers.see_halt(status, self._shadow.acts)
         if after in RUNNING:
             self._shadow.see_contacts(status)
             self._shadow.see_arrivals(status)

@@ -101,13 +101,6 @@ def test_holding_an_axis_drops_its_unsent_position_and_no_other() -> None:
     assert pending.hold == A | B
 
 
-def test_a_new_position_lifts_the_hold_of_its_axes_and_no_other() -> None:
-    pending = PendingCommand()
-    pending.merge_hold(ALL, SUPERSEDED)
-    pending.merge(A, 100, None, None)
-    assert pending.hold == B | C | S
-
-
 def test_a_new_speed_does_not_lift_a_hold() -> None:
     pending = PendingCommand()
     pending.merge_hold(A, SUPERSEDED)
@@ -122,14 +115,14 @@ def test_holds_add_up() -> None:
     assert pending.hold == A | B
 
 
-def test_a_hold_that_a_position_replaced_is_remembered() -> None:
-    """If the position is lost with the link, the hold is not: it was a stop."""
+def test_a_hold_that_a_position_or_a_halt_goes_before_is_remembered() -> None:
+    """If that is lost with the link, the hold is not: it was a stop."""
     pending = PendingCommand()
     pending.merge_hold(A | B, SUPERSEDED)
     pending.merge(A, 100, None, None)
-    assert pending.replaced == A
+    assert (pending.hold, pending.positions) == (A | B, {A: 100})
     pending.merge_halt(Outcome(), SUPERSEDED)
-    assert pending.replaced == A | B
+    assert pending.hold == A | B
 
 
 def test_who_waits_for_an_axis_that_is_held_is_told_and_nobody_else() -> None:
@@ -175,13 +168,11 @@ def test_a_pending_command_knows_whether_there_is_something_to_write(
 # -- halting -----------------------------------------------------------------------------------------------
 
 
-def test_a_halt_drops_unsent_positions_and_holds_and_keeps_speeds_and_forces() -> None:
+def test_a_halt_drops_unsent_positions_and_keeps_speeds_and_forces() -> None:
     pending, halter = PendingCommand(), Outcome()
     pending.merge(ABC, 100, 50, 60)
-    pending.merge_hold(S, SUPERSEDED)
     pending.merge_halt(halter, SUPERSEDED)
     assert not pending.positions
-    assert pending.hold == Finger(0)
     assert pending.speeds == {A: 50, B: 50, C: 50}
     assert pending.forces == {A: 60, B: 60, C: 60}
     assert pending.halting == [halter]
@@ -193,7 +184,7 @@ def test_who_waits_for_a_position_is_told_that_a_halt_took_over() -> None:
     pending.merge(A, 100, None, None, caller)
     pending.merge_halt(Outcome(), SUPERSEDED)
     assert isinstance(caller.told[0], MoveSupersededError)
-    assert not pending.going
+    assert not pending.asking
 
 
 def test_who_waits_for_a_speed_goes_on_waiting_through_a_halt() -> None:
@@ -201,7 +192,7 @@ def test_who_waits_for_a_speed_goes_on_waiting_through_a_halt() -> None:
     pending.merge(A, None, 50, None, caller)
     pending.merge_halt(Outcome(), SUPERSEDED)
     assert not caller.told
-    assert pending.setting == [caller]
+    assert pending.waiters == [caller]
 
 
 def test_who_waits_for_a_speed_goes_on_waiting_though_a_halt_drops_the_position_of_another() -> None:
@@ -213,14 +204,6 @@ def test_who_waits_for_a_speed_goes_on_waiting_though_a_halt_drops_the_position_
     assert pending.speeds == {A: 50}
     assert isinstance(for_position.told[0], MoveSupersededError)
     assert not for_speed.told
-
-
-def test_who_waits_for_a_hold_waits_for_the_halt_that_stops_its_axes() -> None:
-    """The hold is dropped: nothing would be left to write, and nobody would be told."""
-    pending, holder, halter = PendingCommand(), Outcome(), Outcome()
-    pending.merge_hold(A, SUPERSEDED, holder)
-    pending.merge_halt(halter, SUPERSEDED)
-    assert (pending.halting, pending.holding) == ([holder, halter], [])
 
 
 def test_who_waits_for_a_hold_goes_on_waiting_when_a_position_replaces_it() -> None:
@@ -279,4 +262,4 @@ def test_commands_share_nothing() -> None:
     one.merge(ALL, None, 2, 3, Outcome())
     one.halting = [Outcome()]
     assert other.is_empty
-    assert other.going == other.setting == []
+    assert other.asking == []
