@@ -9,7 +9,7 @@ from ..enums import NO_AXES, Finger
 from ..errors import MoveSupersededError, RobotiqError
 from ..wire.status import RobotiqStatus
 from .motion import LiveMoves
-from .pending import PendingCommand
+from .pending import Command, PendingCommand
 from .waiters import Waiter, resolve
 
 
@@ -32,18 +32,11 @@ class Callers:
 
     # -- what they ask ---------------------------------------------------------------------------------
 
-    def command(
-        self,
-        axes: Finger,
-        position: int | None,
-        speed: int | None,
-        force: int | None,
-        waiter: Waiter[None] | None = None,
-    ) -> None:
+    def command(self, command: Command, waiter: Waiter[None] | None = None) -> None:
         """Ask axes for something; moves of axes that get a position are superseded."""
-        if position is not None:
-            self._supersede(axes, MoveSupersededError(f"another command moves {axes}"))
-        self.pending.merge(axes, position, speed, force, waiter)
+        if command.position is not None:
+            self._supersede(command.axes, MoveSupersededError(f"another command moves {command.axes}"))
+        self.pending.merge(command, waiter)
 
     def hold(self, axes: Finger, why: str, waiter: Waiter[None] | None = None) -> None:
         """Hold axes where they are, if they move; moves of them are superseded."""

@@ -14,6 +14,16 @@ from ..errors import RobotiqError
 from .waiters import Waiter, fail
 
 
+@dataclass(frozen=True, slots=True)
+class Command:
+    """What is asked of some axes: a position, a speed, a force; None leaves what there is."""
+
+    axes: Finger
+    position: int | None = None
+    speed: int | None = None
+    force: int | None = None
+
+
 @dataclass(slots=True)
 class PendingCommand:
     """Changes that wait for the next write, and who waits for that.
@@ -62,20 +72,14 @@ class PendingCommand:
         """Callers that wait for nothing but the acknowledgement."""
         return [waiter for _, waiter in (*self.asking, *self.holding)]
 
-    def merge(
-        self,
-        axes: Finger,
-        position: int | None,
-        speed: int | None,
-        force: int | None,
-        waiter: Waiter[None] | None = None,
-    ) -> None:
+    def merge(self, new: Command, waiter: Waiter[None] | None = None) -> None:
         """Merge a command; the last value wins."""
-        for changes, value in ((self.positions, position), (self.speeds, speed), (self.forces, force)):
+        values = (new.position, new.speed, new.force)
+        for changes, value in zip((self.positions, self.speeds, self.forces), values, strict=True):
             if value is not None:
-                changes.update(dict.fromkeys((axis for axis in AXES if axis in axes), value))
+                changes.update(dict.fromkeys((axis for axis in AXES if axis in new.axes), value))
         if waiter is not None:
-            self.asking.append((NO_AXES if position is None else axes, waiter))
+            self.asking.append((NO_AXES if new.position is None else new.axes, waiter))
 
     def merge_hold(self, axes: Finger, superseded: RobotiqError, waiter: Waiter[None] | None = None) -> None:
         """Hold axes; a position that was not sent yet is dropped, and who waits for it is told."""

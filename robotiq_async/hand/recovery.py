@@ -9,11 +9,7 @@ import anyio
 from ..control.state_machine import RUNNING
 from ..control.triggers import Trigger
 from ..enums import Severity, State
-from ..errors import (
-    InvalidStateError,
-    NotActivatedError,
-    StateTimeoutError,
-)
+from ..errors import InvalidStateError, NotActivatedError, StateTimeoutError
 from ..wire.checks import check_timeout
 from .observation import Observation
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from robotiq_async.control.callers import Callers
+from robotiq_async.control.pending import Command
 from robotiq_async.enums import AXES, Fault, Finger
 from robotiq_async.errors import ConnectionLostError, GripperFaultError
 from tests.control.outcome import Outcome
@@ -13,9 +14,9 @@ NONE = Finger(0)
 
 def test_a_halt_goes_before_what_was_asked_with_it() -> None:
     callers, halter, setter = Callers(), Outcome(), Outcome()
-    callers.command(A, None, 50, None, setter)
+    callers.command(Command(A, None, 50), setter)
     callers.halt(halter)
-    callers.command(B, 100, None, None)
+    callers.command(Command(B, 100))
     sent = callers.take()
     assert (sent.halting, sent.speeds, sent.positions) == ([halter], {}, {})
     assert (callers.pending.speeds, callers.pending.positions) == ({A: 50}, {B: 100})
@@ -43,7 +44,7 @@ def test_what_was_to_be_held_when_the_link_was_lost_is_given_back() -> None:
     callers.halt(Outcome())
     callers.take()
     callers.hold(B, "")
-    callers.command(B, 100, None, None)
+    callers.command(Command(B, 100))
     assert callers.lost(ConnectionLostError("gone")) == A | B
     assert isinstance(holder.error, ConnectionLostError)
     assert callers.lost(ConnectionLostError("gone")) == NONE
@@ -51,7 +52,7 @@ def test_what_was_to_be_held_when_the_link_was_lost_is_given_back() -> None:
 
 def test_what_fails_on_the_line_is_not_told_again_when_it_is_acknowledged() -> None:
     callers, asking = Callers(), Outcome()
-    callers.command(A, 100, None, None, asking)
+    callers.command(Command(A, 100), asking)
     callers.take()
     callers.fail(ConnectionLostError("gone"))
     callers.acknowledged(1)
@@ -60,11 +61,11 @@ def test_what_fails_on_the_line_is_not_told_again_when_it_is_acknowledged() -> N
 
 def test_a_fault_ends_what_moves_and_not_what_stops() -> None:
     callers, asking, holder, halter = Callers(), Outcome(), Outcome(), Outcome()
-    callers.command(A, 100, None, None, asking)
+    callers.command(Command(A, 100), asking)
     callers.hold(B, "", holder)
     callers.halt(halter)
     callers.hold(C, "of a move that was given up")
-    callers.command(S, None, 50, None)
+    callers.command(Command(S, None, 50))
     callers.fail_but_stops(GripperFaultError(Fault.COMMUNICATION_NOT_READY))
     assert not halter.is_told
     assert not holder.is_told
