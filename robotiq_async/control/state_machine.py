@@ -130,7 +130,6 @@ SEQUENCES: Final = frozenset(
     {State.DO_ACTIVATION, State.WF_ACTIVATION, State.DO_ATR, State.WF_ATR, State.DO_RESET, State.WF_RESET}
 )
 """Activation, release and reset: they lead somewhere by themselves, and clearing rGTO ends none of them."""
-_ABOUT_TO_SEND: Final = frozenset({State.DO_ACTIVATION, State.DO_ATR, State.DO_RESET, State.RUNNING_CC})
 
 
 def states_allowing(trigger: Trigger) -> frozenset[State]:
@@ -187,7 +186,7 @@ class StateMachine:
 
     def delivered(self) -> None:
         """What was about to be sent has been acknowledged, or is not sent after all."""
-        if self._state in _ABOUT_TO_SEND:
+        if isinstance(TABLE[self._state][Trigger.DELIVERED], State):
             self.fire(Trigger.DELIVERED)
 
     # -- the sequence under way ------------------------------------------------------------------------

@@ -59,7 +59,7 @@ class Recovery(Observation):
             {State.RESET},
             RESET_TIMEOUT_S,
             ask=lambda: session.controller.reset(trigger),
-            failing={State.DISCONNECTED: session.link_lost},
+            failing={},
             what="the gripper did not report the reset",
         )
 
@@ -84,7 +84,6 @@ class Recovery(Observation):
             ask=session.controller.release,
             failing={
                 **dict.fromkeys(ended, lambda: NotActivatedError("the gripper was reset during the release")),
-                State.DISCONNECTED: session.link_lost,
                 State.DO_RESET: lambda: InvalidStateError("reset() or halt() took over", State.DO_RESET),
             },
             what="the automatic release was not finished",

@@ -216,13 +216,14 @@ class Session:
             timeout: seconds; None for as long as it takes.
             what: the sentence for a timeout.
             ask: asks for it.
-            failing: states that mean it will not come.
+            failing: states that mean it will not come, as a lost link does then; None waits that out.
 
         Raises:
             StateTimeoutError: not in time.
             RobotiqError: refused, or it will not come.
         """
-        with self._waiters.watching(states, failing or {}) as reached:
+        ends = {} if failing is None else {State.DISCONNECTED: self.link_lost, **failing}
+        with self._waiters.watching(states, ends) as reached:
             if ask is not None:
                 ask()
             with anyio.move_on_after(timeout):
@@ -241,7 +242,6 @@ class Session:
         failing: Failing = {
             State.FAULT: self._fault,
             State.ATR_DONE: self._fault,
-            State.DISCONNECTED: self.link_lost,
             State.RESET: lambda: NotActivatedError("the gripper was reset during the activation"),
             State.DO_RESET: lambda: NotActivatedError("reset() or halt() took over"),
         }
