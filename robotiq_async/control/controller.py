@@ -28,6 +28,7 @@ from ..wire.status import RobotiqStatus
 from .callers import Callers
 from .merging import merged
 from .motion import Move, default_timeout
+from .pending import Command
 from .sequences import Sequence, activation, automatic_release, reset, shutdown
 from .shadow import NEVER, RequestShadow
 from .state_machine import RUNNING, StateMachine
@@ -73,21 +74,14 @@ class Controller:
 
     # -- what is asked ---------------------------------------------------------------------------------
 
-    def command(
-        self,
-        axes: Finger,
-        position: int | None,
-        speed: int | None,
-        force: int | None,
-        waiter: Waiter[None] | None = None,
-    ) -> None:
-        """Ask axes for a position, a speed, a force; goes out with the next write.
+    def command(self, command: Command, waiter: Waiter[None] | None = None) -> None:
+        """Ask axes for something; it goes out with the next write.
 
         Raises:
             RobotiqError: the hand takes no command now.
         """
         self.machine.fire(Trigger.ASK_COMMAND, self.status)
-        self._callers.command(axes, position, speed, force, waiter)
+        self._callers.command(command, waiter)
 
     def move(self, move: Move, speed: int | None, force: int | None) -> float:
         """Ask for a move; its end is told to its waiter.
@@ -97,7 +91,7 @@ class Controller:
         Raises:
             RobotiqError: the hand takes no command now.
         """
-        self.command(move.axes, move.position, speed, force)
+        self.command(Command(move.axes, move.position, speed, force))
         self._callers.moves.add(move)
         assert self.status is not None, "the hand takes commands, so a status has been read"
         speeds = self._shadow.speeds | self._callers.pending.speeds
@@ -169,7 +163,6 @@ class Controller:
         """The hand is being stopped: nothing more is taken, and whoever waits is told."""
         self.machine.fire(Trigger.ASK_STOP)
         self._callers.fail(NotStartedError("the hand was stopped"))
-        self._callers.drop_sent()
         self.machine.drop_sequence()
 
     def stopped(self) -> None:
@@ -222,8 +215,7 @@ class Controller:
         # What nobody waits for is not worked out: this runs at every poll.
         if self._activating:
             self._see_activation(status)
-        if self._callers.wait_for_halt:
-            self._callers.see_halt(status, self._shadow.acts)
+        self._callers.see_halt(status, self._shadow.acts)
         if after in RUNNING:
             self._shadow.see_contacts(status)
             self._shadow.see_arrivals(status)

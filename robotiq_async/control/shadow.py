@@ -8,6 +8,8 @@ written, and an adopted gripper's requests are only known from its status. No I/
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import reduce
+from operator import or_
 from typing import Final
 
 from ..enums import AXES, NO_AXES, Finger, ObjectStatus
@@ -43,8 +45,9 @@ class RequestShadow:
         """Axes that we have given a position since the gripper was found."""
         self._contacts: dict[Finger, tuple[ObjectStatus, int]] = {}
         """The contacts, and where, when the go bit was last seen set: gDT is not worth reading without it."""
-        self._arrived = Finger.ALL
-        """Axes that have been seen at rest under the position that they were asked last."""
+        self.arrived = Finger.ALL
+        """Axes that have been seen at rest under the position that they were asked last; the others move, or
+        are about to."""
         self._asked = 0.0
         """When the newest status was asked for. What it shows may be as old as that, however late its reply
         was looked at; so this is the time that the age of a write is measured by."""
@@ -110,16 +113,9 @@ class RequestShadow:
         """The axes that may move because we said so: all, unless somebody else's requests were adopted."""
         if self._adoption is None:
             return Finger.ALL
-        mask = NO_AXES
-        for axis in AXES:
-            if axis in self._moved and self._adopted.position(axis) == self._image.position(axis):
-                mask |= axis
-        return mask
-
-    @property
-    def arrived(self) -> Finger:
-        """The axes that have come to rest under their requests; the others move, or are about to."""
-        return self._arrived
+        adopted, image = self._adopted, self._image
+        unchanged = (axis for axis in AXES if adopted.position(axis) == image.position(axis))
+        return self._moved & reduce(or_, unchanged, NO_AXES)
 
     def acts(self, number: int) -> bool:
         """Whether the image of this number acts."""
@@ -133,10 +129,8 @@ class RequestShadow:
         self._adoption = None
         self._unsure_until = NEVER
         self._moved |= moved
-        self._arrived &= ~moved
-        for axis in AXES:
-            if axis in moved:
-                self._contacts.pop(axis, None)
+        self.arrived &= ~moved
+        self._contacts = {axis: at for axis, at in self._contacts.items() if axis not in moved}
         return self._writes.writing(image, now)
 
     def acknowledged(self, now: float) -> int:
@@ -211,11 +205,8 @@ class RequestShadow:
 
         In a fault an axis that has not begun yet is at rest, too.
         """
-        if self._arrived is Finger.ALL or not (status.go_echo and self.is_settled):
-            return
-        for axis in AXES:
-            if status.finger_status(axis) is not ObjectStatus.IN_MOTION:
-                self._arrived |= axis
+        if self.arrived is not Finger.ALL and status.go_echo and self.is_settled:
+            self.arrived |= Finger.ALL & ~status.moving
 
     # -- grips -----------------------------------------------------------------------------------------
 
@@ -229,12 +220,14 @@ class RequestShadow:
 
     def gripping(self, status: RobotiqStatus) -> Finger:
         """The axes that gripped when rGTO was last set, are there still, and by the request they have."""
-        mask, base = NO_AXES, self.base
-        for axis, (what, at) in self._contacts.items():
-            is_there = abs(status.position(axis) - at) <= TOLERANCE
-            if is_there and agrees(base.position(axis), what, at, direction=0):
-                mask |= axis
-        return mask
+        base = self.base
+        gripping = (
+            axis
+            for axis, (what, at) in self._contacts.items()
+            if abs(status.position(axis) - at) <= TOLERANCE
+            and agrees(base.position(axis), what, at, direction=0)
+        )
+        return reduce(or_, gripping, NO_AXES)
 
     def forget_contacts(self) -> None:
         """A sequence begins: it lets go."""

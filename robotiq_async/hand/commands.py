@@ -7,12 +7,11 @@ import asyncio
 import anyio
 
 from ..control.motion import Move, MoveResult
+from ..control.pending import Command
 from ..control.state_machine import SEQUENCES
 from ..control.triggers import Trigger
 from ..enums import CLOSED, OPEN, Finger
-from ..errors import (
-    MoveTimeoutError,
-)
+from ..errors import MoveTimeoutError
 from ..session.clock import now
 from ..wire.checks import check_byte, check_mask, check_optional_byte, check_timeout
 from .recovery import Recovery
@@ -36,7 +35,7 @@ class Commands(Recovery):
             RobotiqError: the hand takes no commands now, or the link went down before the
                 acknowledgement (the request is not sent again).
         """
-        await self._deliver(check_mask(fingers), position=check_byte("value", value))
+        await self._deliver(Command(check_mask(fingers), position=check_byte("value", value)))
 
     async def set_speed(self, value: int, fingers: Finger | int = Finger.ALL) -> None:
         """Set the speed of axes, also of a motion under way; never starts one.
@@ -48,7 +47,7 @@ class Commands(Recovery):
         Raises:
             TypeError, ValueError, RobotiqError: as :meth:`set_position`.
         """
-        await self._deliver(check_mask(fingers), speed=check_byte("value", value))
+        await self._deliver(Command(check_mask(fingers), speed=check_byte("value", value)))
 
     async def set_force(self, value: int, fingers: Finger | int = Finger.ALL) -> None:
         """Set the force of axes; never starts a motion. More force tightens a grip.
@@ -60,7 +59,7 @@ class Commands(Recovery):
         Raises:
             TypeError, ValueError, RobotiqError: as :meth:`set_position`.
         """
-        await self._deliver(check_mask(fingers), force=check_byte("value", value))
+        await self._deliver(Command(check_mask(fingers), force=check_byte("value", value)))
 
     def command(
         self,
@@ -91,7 +90,7 @@ class Commands(Recovery):
             raise ValueError("command() needs at least one of position, speed and force in 0..255, got none")
         position = check_optional_byte("position", position)
         speed, force = check_optional_byte("speed", speed), check_optional_byte("force", force)
-        self._asked().controller.command(axes, position, speed, force)
+        self._asked().controller.command(Command(axes, position, speed, force))
 
     async def move(
         self,
@@ -221,10 +220,6 @@ class Commands(Recovery):
         else:
             await session.answered(session.controller.halt)
 
-    async def _deliver(
-        self, axes: Finger, *, position: int | None = None, speed: int | None = None, force: int | None = None
-    ) -> None:
+    async def _deliver(self, command: Command) -> None:
         session = self._asked()
-        await session.answered(
-            lambda waiter: session.controller.command(axes, position, speed, force, waiter)
-        )
+        await session.answered(lambda waiter: session.controller.command(command, waiter))

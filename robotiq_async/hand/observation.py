@@ -8,13 +8,8 @@ from typing import TypeVar
 
 from ..control.state_machine import StateMachine
 from ..enums import State
-from ..errors import (
-    ConnectionLostError,
-    NotStartedError,
-)
-from ..session.options import (
-    Options,
-)
+from ..errors import ConnectionLostError, NotStartedError
+from ..session.options import Options
 from ..session.session import Session
 from ..session.statistics import Counters, Statistics
 from ..session.streams import Channel, Channels, SentRequest, Stream, Transition

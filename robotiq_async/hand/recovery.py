@@ -9,11 +9,7 @@ import anyio
 from ..control.state_machine import RUNNING
 from ..control.triggers import Trigger
 from ..enums import Severity, State
-from ..errors import (
-    InvalidStateError,
-    NotActivatedError,
-    StateTimeoutError,
-)
+from ..errors import InvalidStateError, NotActivatedError, StateTimeoutError
 from ..wire.checks import check_timeout
 from .observation import Observation
 
@@ -63,7 +59,7 @@ class Recovery(Observation):
             {State.RESET},
             RESET_TIMEOUT_S,
             ask=lambda: session.controller.reset(trigger),
-            failing={State.DISCONNECTED: session.link_lost},
+            failing={},
             what="the gripper did not report the reset",
         )
 
@@ -88,7 +84,6 @@ class Recovery(Observation):
             ask=session.controller.release,
             failing={
                 **dict.fromkeys(ended, lambda: NotActivatedError("the gripper was reset during the release")),
-                State.DISCONNECTED: session.link_lost,
                 State.DO_RESET: lambda: InvalidStateError("reset() or halt() took over", State.DO_RESET),
             },
             what="the automatic release was not finished",

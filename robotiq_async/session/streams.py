@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 import weakref
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -231,10 +232,15 @@ class Channel(Generic[T]):
 
 
 class Channels:
-    """Everything that a hand tells: its statuses, its changes of state, what is written."""
+    """Everything that a hand tells: its statuses, its changes of state, what is written.
+
+    Attributes:
+        numbers: of the statuses, from the first start on.
+    """
 
     def __init__(self) -> None:
         """Begin without readers."""
+        self.numbers = itertools.count()
         self.listeners = Listeners()
         self.statuses: Channel[RobotiqStatus] = Channel(self.listeners)
         self.transitions: Channel[Transition] = Channel(self.listeners)

@@ -6,6 +6,7 @@ import pytest
 
 from robotiq_async import ConnectionLostError, Finger, NotActivatedError
 from robotiq_async.control.motion import Move
+from robotiq_async.control.pending import Command
 from tests.control.other_client import going_to
 from tests.control.outcome import Outcome
 from tests.control.scan import Scan
@@ -73,7 +74,7 @@ def test_a_command_does_not_activate_a_gripper_that_was_reset_since_the_last_pol
 
 def test_the_default_timeout_goes_by_the_speed_an_axis_has_or_is_about_to_get(scan: Scan) -> None:
     usual = default_timeout(scan, 241, A)
-    scan.controller.command(A, None, 0, None)
+    scan.controller.command(Command(A, None, 0))
     slow = default_timeout(scan, 241, A)
     assert slow > usual
     scan.hold()

@@ -195,6 +195,9 @@ async def test_hold(hand: RobotiqHand, server: SimulatorServer) -> None:
     with pytest.raises(MoveSupersededError):
         await moves[2]
     assert last_write(server).position(B) == 255
+    async for _ in hand.statuses():
+        if not hand.is_moving:
+            break
     writes = len(server.gripper.writes)
     await hand.hold()
     assert len(server.gripper.writes) == writes, "nothing moves"
