@@ -10,6 +10,7 @@ What a program needs is imported from here. Where it comes from, and what stands
     calibration, kinematics  what the values mean: mm/s, N, joint angles
     actions, telemetry       operating a hand; recordings, viewers and metrics of one
     measure, doctor          measurements of a gripper; what is wrong with a connection
+    fleet                    hands on other hosts: agents that serve them, remote hands
     simulator, cli           a simulated gripper with its servers; the command line
 
 Nothing of this has run on real hardware yet.

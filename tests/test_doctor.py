@@ -13,7 +13,8 @@ from typing import Any
 import pytest
 
 from robotiq_async import RobotiqHand
-from robotiq_async.doctor import Finding, Level, _advice_for_opening, examine
+from robotiq_async.doctor import Finding, Level, examine
+from robotiq_async.doctor.gripper import _advice_for_opening
 from robotiq_async.link.address import parse_address
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.wire.request import AxisRequest, Request

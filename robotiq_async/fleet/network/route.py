@@ -31,14 +31,18 @@ class Route:
     keys: Path | None = None
     insecure: bool = False
 
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """Where it leads: to an agent on this machine, if nothing else was said."""
+        return self.connect or (LOOPBACK if self.keys is None else LOOPBACK_TLS,)
+
     def configuration(self) -> dict[str, object]:
         """The configuration of a session that takes this route.
 
         Raises:
             TypeError, ValueError: a malformed or unprotected endpoint, or a folder that lacks a file.
         """
-        connect = self.connect or (LOOPBACK if self.keys is None else LOOPBACK_TLS,)
-        return client_configuration(connect, keys=self.keys, insecure=self.insecure)
+        return client_configuration(self.endpoints, keys=self.keys, insecure=self.insecure)
 
 
 def default_route() -> Route:
