@@ -7,7 +7,7 @@ import getpass
 import os
 import secrets
 import socket
-from collections.abc import Coroutine
+from dataclasses import dataclass
 from typing import Any, Final
 
 from ...errors import AgentError, ConnectionLostError, NotAllowedError
@@ -26,6 +26,27 @@ class NoAnswerError(ConnectionLostError):
     """No answer came; whether it was carried out is not known."""
 
 
+@dataclass(frozen=True, slots=True)
+class Posted:
+    """A request on its way.
+
+    Attributes:
+        call: the request.
+        verb: the last part of the key it went to.
+        timeout: seconds for its answer.
+        urgency: of both.
+        asked_at: when it was sent.
+        asking: waits for the reply.
+    """
+
+    call: Call
+    verb: str
+    timeout: float
+    urgency: Urgency
+    asked_at: float
+    asking: asyncio.Task[Reply | None]
+
+
 class Requests:
     """Numbers requests, sends each once, and ends the wait when the agent falls silent."""
 
@@ -36,34 +57,58 @@ class Requests:
         self._client = secrets.token_hex(8)
         self._number = 0
         self._heard_at = now()
-        self._silence: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._loop = asyncio.get_running_loop()
+        self._silence: asyncio.Future[None] = self._loop.create_future()
+        self._closed: asyncio.Future[None] = self._loop.create_future()
+        self._asking: set[asyncio.Task[Reply | None]] = set()
 
     def hear(self) -> None:
         """The agent is heard."""
         self._heard_at = now()
         if self._silence.done():
-            self._silence = asyncio.get_running_loop().create_future()
+            self._silence = self._loop.create_future()
 
     def fall_silent(self) -> None:
         """The agent is not heard any more: nobody waits for its answers."""
         if not self._silence.done():
             self._silence.set_result(None)
 
+    async def close(self) -> None:
+        """Nobody waits for any answer any more."""
+        if not self._closed.done():
+            self._closed.set_result(None)
+        for asking in self._asking:
+            asking.cancel()
+        await asyncio.gather(*self._asking, return_exceptions=True)
+
     def make(self, mirror: Mirror, lease: int, arguments: Fields) -> Call:
         """The next request."""
         self._number += 1
         return Call(self._name.base, self._client, mirror.epoch, lease, self._number, mirror.stamp, arguments)
 
-    def send(
-        self, call: Call, verb: str, *, timeout: float, urgency: Urgency = Urgency.COMMAND
-    ) -> Coroutine[Any, Any, tuple[Answer, bytes]]:
-        """Send a request now; what is returned waits for the answer, and for the status that comes with it.
+    def post(self, call: Call, verb: str, *, timeout: float, urgency: Urgency = Urgency.COMMAND) -> Posted:
+        """Send a request: before whatever is posted after it.
 
         Args:
             call: the request.
             verb: the last part of the key it goes to.
-            timeout: seconds.
+            timeout: seconds for its answer.
             urgency: a halt is asked for also when the agent has been silent for a while.
+
+        Raises:
+            NoAnswerError: the agent is silent: nothing was asked.
+        """
+        if self._silence.done() and urgency is not Urgency.STOP:
+            raise NoAnswerError(f"{self._name}: the agent is silent; {verb} was not asked")
+        asking = self._loop.create_task(
+            self._bus.ask(self._name.key(verb), call.pack(), timeout=timeout, urgency=urgency)
+        )
+        self._asking.add(asking)
+        asking.add_done_callback(self._asking.discard)
+        return Posted(call, verb, timeout, urgency, now(), asking)
+
+    async def answer(self, posted: Posted) -> tuple[Answer, bytes]:
+        """Wait for the answer to a request; returns it, and the status that came with it.
 
         Raises:
             NoAnswerError: no answer; it may have been carried out.
@@ -71,27 +116,21 @@ class Requests:
             AgentError: the answer was another's, or of another version.
             ProtocolError: it is none.
         """
-        asking = self._bus.ask(self._name.key(verb), call.pack(), timeout=timeout, urgency=urgency)
-        return self._answer(asking, call, verb, timeout, urgency)
-
-    async def _answer(
-        self, asking: asyncio.Future[Reply | None], call: Call, verb: str, timeout: float, urgency: Urgency
-    ) -> tuple[Answer, bytes]:
-        asked_at = now()
-        awaited: set[asyncio.Future[Any]] = {asking}
-        if urgency is not Urgency.STOP:
+        asking, verb = posted.asking, posted.verb
+        awaited: set[asyncio.Future[Any]] = {asking, self._closed}
+        if posted.urgency is not Urgency.STOP:
             awaited.add(self._silence)
         try:
             await asyncio.wait(awaited, return_when=asyncio.FIRST_COMPLETED)
         finally:
             asking.cancel()
-        if not asking.done():
+        if not asking.done() or asking.cancelled():
             raise NoAnswerError(f"{self._name}: the agent fell silent; {verb} may have been carried out")
         reply = asking.result()
         if reply is None:
-            raise self._silent(verb, at_once=now() - asked_at < timeout / 2)
+            raise self._silent(verb, at_once=now() - posted.asked_at < posted.timeout / 2)
         answer = unpack_answer(reply.payload)
-        if answer.to != self._name.base or answer.number not in (0, call.number):
+        if answer.to != self._name.base or answer.number not in (0, posted.call.number):
             raise AgentError(f"{self._name}: another answer came to {verb}; it may have been carried out")
         return answer, reply.attachment
 

@@ -9,14 +9,15 @@ from contextlib import suppress
 from typing import Any, Final
 
 from ...concurrency import wait_shielded
+from ...control.triggers import Trigger
 from ...enums import State
 from ...errors import (
     ConnectFailedError,
     ConnectionLostError,
     ControlLostError,
+    MoveTimeoutError,
     NotAllowedError,
     NotStartedError,
-    ProtocolError,
     RobotiqError,
 )
 from ...log import log
@@ -30,9 +31,9 @@ from ..network.bus import Bus, Undo
 from ..wire.envelope import Answer, Call
 from ..wire.names import GripperName
 from ..wire.status_message import unpack
-from ..wire.values import Fields, read_statistics
+from ..wire.values import Fields, read_statistics, reading
 from .mirror import Mirror
-from .requests import NoAnswerError, Requests, label
+from .requests import NoAnswerError, Posted, Requests, label
 
 RENEWALS: Final = 5
 """So often in a window the lease is renewed, and silence looked for."""
@@ -40,7 +41,8 @@ ANSWER_S: Final = 0.5
 """For an answer that the agent gives at once; asked again within the time that there is."""
 CONNECT_S: Final = 5.0
 HALT_S: Final = 2.0
-RELEASE_S: Final = 1.5
+RELEASE_S: Final = 0.9
+"""With the second that closing a session of zenoh may take, within the two of a stop."""
 
 
 class RemoteSession:
@@ -50,24 +52,48 @@ class RemoteSession:
         mirror: what has been heard.
         waiters: who waits for a state.
         is_in_control: whether this hand holds the lease, as far as it knows.
-        is_over: whether the run has ended.
+        is_over: whether the run has ended, or is about to.
+        has_ended: whether nothing of it is left.
+        lease: number of the lease it holds, or held last.
         lost: why control was lost; None while it is held, or was never asked for.
     """
 
-    def __init__(self, name: GripperName, bus: Bus, channels: Channels, *, wants_control: bool) -> None:
-        """Begin to listen."""
+    def __init__(
+        self,
+        name: GripperName,
+        bus: Bus,
+        channels: Channels,
+        *,
+        wants_control: bool,
+        owns_bus: bool = False,
+        before: Mirror | None = None,
+    ) -> None:
+        """Begin to listen.
+
+        Args:
+            name: the gripper's.
+            bus: an open session.
+            channels: of the hand: they were opened before, perhaps, and are read afterwards.
+            wants_control: whether the lease is acquired, and again when the agent was lost.
+            owns_bus: whether the bus is closed at the end.
+            before: what the run before this one has heard.
+        """
         self.name = name
         self.loop = asyncio.get_running_loop()
         self.waiters = StateWaiters()
-        self.mirror = Mirror(name.mark, channels, self.waiters.reached)
+        self.mirror = Mirror(name.mark, channels, self.waiters.reached, before)
         self.is_over = False
+        self.has_ended = False
         self.is_in_control = False
         self.lost: ControlLostError | None = None
         self.statistics: Statistics = Counters().snapshot(0)
         self._bus = bus
         self._channels = channels
         self._wants_control = wants_control
-        self._lease = 0
+        self.lease = 0
+        self._owns_bus = owns_bus
+        self._closing: asyncio.Task[None] | None = None
+        self._acquiring = asyncio.Lock()
         self._window = WINDOW_S
         self._heard_at = 0.0
         self._requests = Requests(name, bus)
@@ -75,6 +101,7 @@ class RemoteSession:
         self._is_catching_up = False
         self._renewing: asyncio.Task[Any] | None = None
         channels.reopen(self.loop)
+        self.mirror.begin(now())
         # One wildcard, and every payload says what it is about: samples may come under the wrong key.
         self._undo: Undo = bus.subscribe(name.key("*"), self._hear)
 
@@ -126,8 +153,9 @@ class RemoteSession:
             info = await self.ask("info", timeout=min(ANSWER_S, max(0.05, deadline - now())))
         except (NoAnswerError, NotAllowedError):
             return False
-        self._window = float(info["window"])
-        self.statistics = read_statistics(info["statistics"])
+        with reading("its figures"):
+            self._window = float(info["window"])
+            self.statistics = read_statistics(info["statistics"])
         return True
 
     async def _give_up(self) -> None:
@@ -140,29 +168,51 @@ class RemoteSession:
             "no agent of it is heard: none runs, or the network or a certificate is in the way",
         )
 
-    async def close(self, failure: NotStartedError, *, halt: bool) -> None:
-        """End the run; within two seconds, also when cancelled meanwhile."""
-        self.is_over, self._wants_control = True, False
-        work = asyncio.ensure_future(self._close(failure, halt=halt))
-        await wait_shielded(work)
-        work.result()
+    async def close(self, *, halt: bool) -> None:
+        """End the run; within two seconds, also when cancelled meanwhile, and whoever asks waits for it."""
+        if self._closing is None:
+            self.is_over = True
+            self.mirror.shut_down(State.DO_SHUTDOWN, Trigger.ASK_STOP, now())
+            self._closing = self.loop.create_task(self._close(halt=halt))
+        await wait_shielded(self._closing)
+        self._closing.result()
 
-    async def _close(self, failure: NotStartedError, *, halt: bool) -> None:
-        if self.is_in_control:
-            self.is_in_control = False
-            try:
+    async def _close(self, *, halt: bool) -> None:
+        try:
+            if self.is_in_control:
+                self.is_in_control = False
                 await self.ask("lease", {"what": "release", "halt": halt}, timeout=RELEASE_S)
-            except RobotiqError as error:
-                log.warning(
-                    "%s: the agent did not acknowledge the end (%s): it holds what moves", self.name, error
-                )
-        self._undo()
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-        self._requests.fall_silent()
-        self.waiters.fail(lambda: failure)
+        except RobotiqError as error:
+            log.warning(
+                "%s: the agent did not acknowledge the end (%s): it holds what moves", self.name, error
+            )
+        finally:
+            self._undo()
+            for task in self._tasks:
+                task.cancel()
+            await self._requests.close()
+            await asyncio.gather(*self._tasks, return_exceptions=True)
+            if self._owns_bus:
+                await self._bus.close()
+            self._end()
+
+    def _end(self) -> None:
+        self.is_over = self.has_ended = True
+        self.mirror.shut_down(State.SHUTDOWN, Trigger.STOPPED, now())
+        self.waiters.fail(lambda: NotStartedError("the hand was stopped"))
         self._channels.end()
+
+    @property
+    def lost_its_loop(self) -> bool:
+        """Whether the loop was closed under it: its tasks can never end then."""
+        return not self.has_ended and self.loop.is_closed()
+
+    def abandon(self) -> None:
+        """Count as over when the loop was closed under it; the agent holds what moves by itself."""
+        log.warning("%s: the event loop was closed before stop()", self.name)
+        self.is_in_control = False
+        self.waiters = StateWaiters()
+        self._end()
 
     def check_running(self) -> None:
         """Refuse what only a hand that runs can do.
@@ -171,7 +221,9 @@ class RemoteSession:
             NotStartedError: it does not.
         """
         if self.is_over:
-            raise NotStartedError("the hand was stopped")
+            raise NotStartedError("the hand is not started: use 'async with' or start()")
+        if self.loop.is_closed():
+            raise NotStartedError("the event loop that the hand ran in was closed: start() it again")
 
     def check_loop(self) -> None:
         """Refuse a call from another thread or event loop.
@@ -185,12 +237,15 @@ class RemoteSession:
 
     def _hear(self, _key: str, payload: bytes) -> None:
         try:
-            if payload[:1] == b"{":
-                self._hear_fields(json.loads(payload))
-            else:
-                self._hear_status(payload, in_turn=True)
-        except (ProtocolError, ValueError, KeyError, TypeError) as error:
+            with reading("news"):
+                if payload[:1] == b"{":
+                    self._hear_fields(json.loads(payload))
+                else:
+                    self._hear_status(payload, in_turn=True)
+        except RobotiqError as error:
             log.warning("%s: %s", self.name, error)
+        if self.mirror.has_missed():
+            self._catch_up()  # an event was dropped on the way
 
     def _hear_status(self, payload: bytes, *, in_turn: bool) -> None:
         message = unpack(payload)
@@ -198,21 +253,21 @@ class RemoteSession:
             return
         if self.mirror.epoch not in (0, message.epoch):
             self._lose_control("closed", "the agent was started anew")
+            self._requests.fall_silent()  # what the former one was asked it does not answer
         self._heard_at = now()
         self.mirror.hear(message, self._heard_at, in_turn=in_turn)
         self._requests.hear()
-        if self.is_in_control and message.lease > self._lease and in_turn:
+        if self.is_in_control and message.lease > self.lease and in_turn:
             self.spawn(self._renew())  # it says why
-        if message.events > self.mirror.events and in_turn:
-            self._catch_up()  # an event was dropped on the way
 
     def _hear_fields(self, fields: Mapping[str, Any]) -> None:
         if self.mirror.is_about_another(fields["mark"]):
             return
         if "statistics" in fields:
             self.statistics = read_statistics(fields["statistics"])
-        elif fields["epoch"] == self.mirror.epoch and self.mirror.hear_events(fields["events"]):
-            self._catch_up()
+            return
+        self._hear_status(bytes.fromhex(fields["status"]), in_turn=True)
+        self.mirror.hear_events(fields["events"])
 
     def _catch_up(self) -> None:
         if not self._is_catching_up and not self.is_over:
@@ -222,14 +277,15 @@ class RemoteSession:
     async def _fetch_events(self) -> None:
         """Ask for the events that were missed."""
         try:
-            while self.mirror.newest is not None and self.mirror.newest.events > self.mirror.events:
+            while self.mirror.has_missed():
                 info = await self.ask("info", {"since": self.mirror.events}, timeout=ANSWER_S)
-                events = info["events"]
-                if info["epoch"] == self.mirror.epoch and events:
-                    self.mirror.skip_events(events[0]["index"] - 1)
-                    self.mirror.hear_events(events)
+                with reading("events"):
+                    events = info["events"]
+                    if info["epoch"] == self.mirror.epoch and events:
+                        self.mirror.skip_events(events[0]["index"] - 1)
+                        self.mirror.hear_events(events)
                 await asyncio.sleep(0.02)
-        except (RobotiqError, KeyError, TypeError) as error:
+        except RobotiqError as error:
             log.info("%s: missed events could not be fetched: %s", self.name, error)
         finally:
             self._is_catching_up = False
@@ -273,10 +329,16 @@ class RemoteSession:
             ControlLostError: another client holds it, and it is not to be taken away.
             RobotiqError: the agent did not answer.
         """
-        what = {"what": "take" if take else "acquire", "label": label()}
-        value = await self.ask("lease", what, timeout=ANSWER_S)
-        self._lease = value["lease"]
-        self.is_in_control, self._wants_control, self.lost = True, True, None
+        async with self._acquiring:
+            if self.is_in_control:
+                await self._renew()  # it may have been lost without a word
+            if self.is_in_control:
+                return  # asked for again, the agent would take what is under way for forgotten
+            what = {"what": "take" if take else "acquire", "label": label()}
+            value = await self.ask("lease", what, timeout=ANSWER_S)
+            with reading("a lease"):
+                self.lease = int(value["lease"])
+            self.is_in_control, self._wants_control, self.lost = True, True, None
 
     async def release(self, *, halt: bool) -> None:
         """Give the lease back.
@@ -326,10 +388,18 @@ class RemoteSession:
 
     def call(self, arguments: Fields | None = None) -> Call:
         """The next request, under the present lease."""
-        return self._requests.make(self.mirror, self._lease, arguments or {})
+        return self._requests.make(self.mirror, self.lease, arguments or {})
 
-    def send(self, call: Call, verb: str, **how: Any) -> Coroutine[Any, Any, Any]:  # noqa: ANN401
-        """Send a request now; what is returned waits for its outcome. See :meth:`Requests.send`.
+    def post(self, call: Call, verb: str, **how: Any) -> Posted:  # noqa: ANN401
+        """Send a request; see :meth:`Requests.post`."""
+        return self._requests.post(call, verb, **how)
+
+    async def send(self, call: Call, verb: str, **how: Any) -> Any:  # noqa: ANN401
+        """Send a request and wait for its answer; see :meth:`answer`."""
+        return await self.answer(self.post(call, verb, **how))
+
+    async def answer(self, posted: Posted) -> Any:  # noqa: ANN401
+        """Wait for the answer to a request; see :meth:`Requests.answer`.
 
         Raises:
             NotStartedError: the run has ended meanwhile.
@@ -340,7 +410,7 @@ class RemoteSession:
         self, answering: Coroutine[Any, Any, tuple[Answer, bytes]], call: Call, verb: str
     ) -> Any:  # noqa: ANN401  # what each request returns
         try:
-            answer, news = await answering
+            answer, news = await self._requests.answer(posted)
         except NoAnswerError:
             self.check_running()
             raise
@@ -348,21 +418,26 @@ class RemoteSession:
             self._hear_status(news, in_turn=False)
         try:
             return answer.outcome(self.mirror.clock)
+        except MoveTimeoutError as error:
+            error.status = self.mirror.renumbered(error.status)
+            raise
         except ControlLostError as error:
-            if verb != "halt" and error.reason != "late" and call.lease == self._lease:
+            if posted.verb != "lease":
+                self.check_running()  # the lease was given back at the end of the run
+            if posted.verb != "halt" and error.reason != "late" and posted.call.lease == self.lease:
                 self._lose_control(error.reason, str(error))
             raise
 
-    def call_off(self, call: Call) -> None:
+    def call_off(self, call: Call) -> asyncio.Task[Any] | None:
         """Nobody waits for a request any more: what it set going is to be held."""
-        if self.is_in_control and not self.is_over:
-            cancel = self.ask("cmd/cancel", {"number": call.number}, timeout=self._window)
+        if not self.is_in_control or self.is_over:
+            return None
 
-            async def ask() -> None:
-                with suppress(RobotiqError):  # then the lease ends, and the agent holds by itself
-                    await cancel
+        async def ask() -> None:
+            with suppress(RobotiqError):  # then the lease ends, and the agent holds by itself
+                await self.ask("cmd/cancel", {"number": call.number}, timeout=self._window)
 
-            self.spawn(ask())
+        return self.spawn(ask())
 
     def spawn(self, work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
         """Do something beside; it ends with the run."""
@@ -373,4 +448,4 @@ class RemoteSession:
 
     def current_state(self) -> State:
         """Where the hand is."""
-        return State.SHUTDOWN if self.is_over else self.mirror.state
+        return self.mirror.state
