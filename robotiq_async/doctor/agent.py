@@ -77,12 +77,12 @@ class Asker:
 
         Raises:
             RobotiqError, TypeError, ValueError: what the agent raised, or why no answer came; see
-                :meth:`~robotiq_async.fleet.remote.requests.Requests.send`.
+                :meth:`~robotiq_async.fleet.remote.requests.Requests.answer`.
         """
         self._number += 1
         self._requests.hear()  # its token was seen a moment ago
         call = Call(self._name.base, self._client, epoch, 0, self._number, seen, arguments or {})
-        answer, _ = await self._requests.send(call, verb, timeout=ANSWER_S)
+        answer, _ = await self._requests.answer(self._requests.post(call, verb, timeout=ANSWER_S))
         return answer.outcome(lambda stamp: stamp)
 
 

@@ -44,7 +44,7 @@ class Posted:
     timeout: float
     urgency: Urgency
     asked_at: float
-    asking: asyncio.Task[Reply | None]
+    asking: asyncio.Future[Reply | None]
 
 
 class Requests:
@@ -60,7 +60,7 @@ class Requests:
         self._loop = asyncio.get_running_loop()
         self._silence: asyncio.Future[None] = self._loop.create_future()
         self._closed: asyncio.Future[None] = self._loop.create_future()
-        self._asking: set[asyncio.Task[Reply | None]] = set()
+        self._asking: set[asyncio.Future[Reply | None]] = set()
 
     def hear(self) -> None:
         """The agent is heard."""
@@ -100,9 +100,7 @@ class Requests:
         """
         if self._silence.done() and urgency is not Urgency.STOP:
             raise NoAnswerError(f"{self._name}: the agent is silent; {verb} was not asked")
-        asking = self._loop.create_task(
-            self._bus.ask(self._name.key(verb), call.pack(), timeout=timeout, urgency=urgency)
-        )
+        asking = self._bus.ask(self._name.key(verb), call.pack(), timeout=timeout, urgency=urgency)
         self._asking.add(asking)
         asking.add_done_callback(self._asking.discard)
         return Posted(call, verb, timeout, urgency, now(), asking)

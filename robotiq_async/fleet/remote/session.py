@@ -28,7 +28,7 @@ from ...session.statistics import Counters, Statistics
 from ...session.streams import Channels
 from ..control.lease import WINDOW_S
 from ..network.bus import Bus, Undo
-from ..wire.envelope import Answer, Call
+from ..wire.envelope import Call
 from ..wire.names import GripperName
 from ..wire.status_message import unpack
 from ..wire.values import Fields, read_statistics, reading
@@ -171,7 +171,7 @@ class RemoteSession:
     async def close(self, *, halt: bool) -> None:
         """End the run; within two seconds, also when cancelled meanwhile, and whoever asks waits for it."""
         if self._closing is None:
-            self.is_over = True
+            self.is_over, self._wants_control = True, False
             self.mirror.shut_down(State.DO_SHUTDOWN, Trigger.ASK_STOP, now())
             self._closing = self.loop.create_task(self._close(halt=halt))
         await wait_shielded(self._closing)
@@ -404,11 +404,6 @@ class RemoteSession:
         Raises:
             NotStartedError: the run has ended meanwhile.
         """
-        return self._outcome(self._requests.send(call, verb, **how), call, verb)
-
-    async def _outcome(
-        self, answering: Coroutine[Any, Any, tuple[Answer, bytes]], call: Call, verb: str
-    ) -> Any:  # noqa: ANN401  # what each request returns
         try:
             answer, news = await self._requests.answer(posted)
         except NoAnswerError:
