@@ -215,7 +215,8 @@ class Controller:
         # What nobody waits for is not worked out: this runs at every poll.
         if self._activating:
             self._see_activation(status)
-        self._callers.see_halt(status, self._shadow.acts)
+        if self._callers.halting:
+            self._callers.see_halt(status, self._shadow.acts)
         if after in RUNNING:
             self._shadow.see_contacts(status)
             self._shadow.see_arrivals(status)
