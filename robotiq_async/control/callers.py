@@ -19,6 +19,7 @@ class Callers:
     Attributes:
         pending: what the gripper has not been told yet.
         moves: the moves that somebody waits for.
+        halting: callers of halt() whose write was acknowledged, with its number.
     """
 
     def __init__(self) -> None:
@@ -27,8 +28,7 @@ class Callers:
         self.moves = LiveMoves()
         self._sent = PendingCommand()
         """What is on the line."""
-        self._halting: list[tuple[int, Waiter[None]]] = []
-        """Callers of halt() whose write was acknowledged, with its number."""
+        self.halting: list[tuple[int, Waiter[None]]] = []
 
     # -- what they ask ---------------------------------------------------------------------------------
 
@@ -75,29 +75,29 @@ class Callers:
         """What is on the line was acknowledged under this number."""
         sent, self._sent = self._sent, PendingCommand()
         resolve(sent.waiters)
-        self._halting += [(number, waiter) for waiter in sent.halting or ()]
+        self.halting += [(number, waiter) for waiter in sent.halting or ()]
 
     def see_halt(self, status: RobotiqStatus, acts: Callable[[int], bool]) -> None:
         """Tell those whose halt a status shows, or whose write acts by now."""
-        for number, waiter in self._halting[:]:
+        for number, waiter in self.halting[:]:
             if not status.go_echo or acts(number):
-                self._halting.remove((number, waiter))
+                self.halting.remove((number, waiter))
                 resolve([waiter])
 
     def fail(self, error: RobotiqError) -> None:
         """Nothing asked so far will happen: tell everybody. The write may be on the line all the same."""
-        told = (self.pending, self._sent, PendingCommand(halting=[waiter for _, waiter in self._halting]))
-        self.pending, self._sent, self._halting = PendingCommand(), PendingCommand(), []
+        told = (self.pending, self._sent, PendingCommand(halting=[waiter for _, waiter in self.halting]))
+        self.pending, self._sent, self.halting = PendingCommand(), PendingCommand(), []
         for command in told:
             command.fail(error)
         self.moves.fail(error)
 
     def fail_but_stops(self, error: RobotiqError) -> None:
         """Nothing will move that was asked to; a halt and a hold are good all the same."""
-        asked, halting, self._halting = self.pending, self._halting, []
+        asked, halting, self.halting = self.pending, self.halting, []
         self.pending = replace(asked, holding=[], halting=None)
         self.fail(error)
-        self._halting = halting
+        self.halting = halting
         self.pending = PendingCommand(hold=asked.asked_to_hold, holding=asked.holding, halting=asked.halting)
 
     def lost(self, error: RobotiqError) -> Finger:

@@ -10,7 +10,6 @@ No I/O, no clock and no event loop. Whoever owns the link calls, once per cycle 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Final
 
 from ..enums import NO_AXES, Finger, Severity, State
@@ -27,7 +26,7 @@ from ..wire.request import Request
 from ..wire.status import RobotiqStatus
 from .callers import Callers
 from .merging import merged
-from .motion import Move, default_timeout
+from .motion import Move
 from .pending import Command
 from .sequences import Sequence, activation, automatic_release, reset, shutdown
 from .shadow import NEVER, RequestShadow
@@ -95,7 +94,7 @@ class Controller:
         self._callers.moves.add(move)
         assert self.status is not None, "the hand takes commands, so a status has been read"
         speeds = self._shadow.speeds | self._callers.pending.speeds
-        return default_timeout(move.position, move.axes, self.status, speeds, self._closing_time)
+        return move.default_timeout(self.status, speeds, self._closing_time)
 
     def abandon(self, move: Move, *, unseen: bool = False) -> None:
         """Nobody waits for this move any more: hold those of its axes that still move.
@@ -178,7 +177,7 @@ class Controller:
         if self._activating:
             self._begin(reset(self._shadow.at_rest))
         elif self.status is not None:
-            self._begin(shutdown(self._last_image))
+            self._begin(shutdown(self._shadow.last_image))
 
     # -- what is known ---------------------------------------------------------------------------------
 
@@ -215,7 +214,8 @@ class Controller:
         # What nobody waits for is not worked out: this runs at every poll.
         if self._activating:
             self._see_activation(status)
-        self._callers.see_halt(status, self._shadow.acts)
+        if self._callers.halting:
+            self._callers.see_halt(status, self._shadow.acts)
         if after in RUNNING:
             self._shadow.see_contacts(status)
             self._shadow.see_arrivals(status)
@@ -232,7 +232,7 @@ class Controller:
         """Whether a stop is to be written. It does not wait for a status that may never come."""
         if not self.machine.is_busy or self.status is None:
             return self._callers.pending.halting is not None
-        state, may_move = self.machine.state, self._activating or self._may_move(self.status)
+        state, may_move = self.machine.state, self._activating or self._shadow.may_go(self.status)
         stops = state is State.DO_RESET or (state is State.DO_SHUTDOWN and may_move)
         return stops and not self._step
 
@@ -311,22 +311,6 @@ class Controller:
             self._take_over(status)
         if self._activating:
             self._see_activation(status)
-
-    def _last_image(self, status: RobotiqStatus) -> Request | None:
-        """The image to leave the gripper with; None when there is nothing to stop."""
-        shadow = self._shadow
-        if classify(status) is Trigger.SEEN_READY and not shadow.is_ours(status):
-            shadow.adopt(status)
-        if not self._may_move(status):
-            return None
-        # A gripper that lost its activation unnoticed must not be activated by our shutdown, nor one
-        # that a reset of ours is just about to reach; and one that others have activated not be reset.
-        base = shadow.base
-        active = status.activation_echo and (base.activate or shadow.is_settled)
-        return replace(base, activate=active, go=False)
-
-    def _may_move(self, status: RobotiqStatus) -> bool:
-        return status.go_echo or not self._shadow.is_settled
 
     def _see_activation(self, status: RobotiqStatus) -> None:
         """See whether an activation of ours has come to its end."""

@@ -50,7 +50,8 @@ class PendingCommand:
     @property
     def is_empty(self) -> bool:
         """Whether there is nothing to write."""
-        return self.holds_at_most and not self.hold
+        # In full, and not by the next one: this runs at every poll.
+        return not (self.positions or self.speeds or self.forces or self.hold or self.halting is not None)
 
     @property
     def holds_at_most(self) -> bool:

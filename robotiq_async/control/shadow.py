@@ -17,6 +17,7 @@ from ..wire.request import AxisRequest, Request
 from ..wire.status import RobotiqStatus
 from .adoption import Adoption
 from .contact import TOLERANCE, agrees
+from .triggers import Trigger, classify
 from .writes import SILENT_S, WINDOW_S, WriteHistory
 
 NEVER: Final = float("-inf")
@@ -66,6 +67,21 @@ class RequestShadow:
     def at_rest(self, status: RobotiqStatus) -> Request:
         """The base with rGTO clear and every axis asked to be where it is: nothing to wake."""
         return replace(self.base, go=False).with_positions({axis: status.position(axis) for axis in AXES})
+
+    def may_go(self, status: RobotiqStatus) -> bool:
+        """Whether rGTO is set, or an image that does not act yet may set it."""
+        return status.go_echo or not self.is_settled
+
+    def last_image(self, status: RobotiqStatus) -> Request | None:
+        """The image to leave the gripper with; None when there is nothing to stop."""
+        if classify(status) is Trigger.SEEN_READY and not self.is_ours(status):
+            self.adopt(status)
+        if not self.may_go(status):
+            return None
+        # A gripper that lost its activation unnoticed must not be activated by our shutdown, nor one
+        # that a reset of ours is just about to reach; and one that others have activated not be reset.
+        active = status.activation_echo and (self.base.activate or self.is_settled)
+        return replace(self.base, activate=active, go=False)
 
     @property
     def speeds(self) -> dict[Finger, int]:

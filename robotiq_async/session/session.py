@@ -280,6 +280,7 @@ class Session:
         return GripperFaultError(self.controller.status.fault)
 
     def _on_transition(self, source: State, target: State, trigger: Trigger) -> None:
-        self._channels.transitions.push(Transition(source, target, trigger, now()))
         self.counters.faults += target is State.FAULT
         self._waiters.reached(target)
+        # Last, for a listener may bring about the next one.
+        self._channels.transitions.push(Transition(source, target, trigger, now()))
