@@ -11,13 +11,13 @@ from ...control.motion import MoveResult
 from ...control.state_machine import RUNNING, refusal
 from ...control.triggers import Trigger
 from ...enums import CLOSED, OPEN, Finger
-from ...errors import NotAllowedError, NotStartedError
+from ...errors import ConnectionLostError, NotAllowedError, NotStartedError
 from ...session.clock import now
 from ...wire.checks import check_byte, check_mask, check_optional_byte, check_timeout
 from ..network.bus import Urgency
 from ..wire.values import Fields, read_result, reading
 from .observation import RemoteObservation
-from .requests import NoAnswerError, label
+from .requests import NoAnswerError, label, plainly
 from .session import HALT_S, RemoteSession
 
 ATTEMPT_S: Final = 0.3
@@ -190,7 +190,8 @@ class RemoteCommands(RemoteObservation):
         self._outbox.clear()
         halting = session.spawn(self._halt(session))
         try:
-            await asyncio.shield(halting)
+            with plainly():
+                await asyncio.shield(halting)
         except asyncio.CancelledError:
             if not halting.cancelled():
                 # Nobody looks at what becomes of it any more; it goes on all the same.
@@ -265,16 +266,17 @@ class RemoteCommands(RemoteObservation):
         session, outbox = self._asked(), self._outbox
         assert outbox is not None
         if self._control is None and not session.is_in_control and session.lost is None:
-            await session.acquire()
+            with plainly():
+                await session.acquire()
         session.check_control()
         outbox.flush()
         call = session.call(arguments)
         try:
-            with outbox.motion() if name in ("move", "set_position") else nullcontext():
+            with plainly(), outbox.motion() if name in ("move", "set_position") else nullcontext():
                 value: Fields = await session.send(
                     call, f"cmd/{name}", timeout=timeout, urgency=Urgency.COMMAND
                 )
-        except (asyncio.CancelledError, NoAnswerError):
+        except (asyncio.CancelledError, ConnectionLostError):
             cancelling = session.call_off(call)
             if cancelling is not None and name in ("move", "set_position"):
                 outbox.count_motion(cancelling)

@@ -14,6 +14,7 @@ from ..network.bus import Bus
 from ..network.route import parse_remote_address
 from .commands import RemoteCommands
 from .outbox import Outbox
+from .requests import plainly
 from .session import CONNECT_S, RemoteSession
 
 
@@ -115,7 +116,8 @@ class RemoteHand(RemoteCommands):
         )
         self._outbox = Outbox(session)
         try:
-            await session.connect(self._connect_timeout)
+            with plainly():
+                await session.connect(self._connect_timeout)
             if activate and self._control:
                 await self._activate_if_reset()
         except BaseException:
@@ -188,7 +190,8 @@ class RemoteHand(RemoteCommands):
             ControlLostError: another client commands the gripper.
             RobotiqError: not started, or the agent does not answer.
         """
-        await self._asked().acquire()
+        with plainly():
+            await self._asked().acquire()
 
     async def take(self) -> None:
         """Get the lease, whoever has it: what that one commanded and still moves is held.
@@ -196,7 +199,8 @@ class RemoteHand(RemoteCommands):
         Raises:
             RobotiqError: not started, or the agent does not answer.
         """
-        await self._asked().acquire(take=True)
+        with plainly():
+            await self._asked().acquire(take=True)
 
     async def release(self, *, halt: bool = True) -> None:
         """Give the lease back, and read on.
@@ -207,7 +211,8 @@ class RemoteHand(RemoteCommands):
         Raises:
             RobotiqError: not started, the agent does not answer, or the fingers were not seen to stop.
         """
-        await self._asked().release(halt=halt)
+        with plainly():
+            await self._asked().release(halt=halt)
 
     def __repr__(self) -> str:
         """Address and state."""

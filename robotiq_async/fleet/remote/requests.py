@@ -7,6 +7,8 @@ import getpass
 import os
 import secrets
 import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -24,6 +26,19 @@ RECENT_S: Final = 0.5
 
 class NoAnswerError(ConnectionLostError):
     """No answer came; whether it was carried out is not known."""
+
+
+@contextmanager
+def plainly() -> Iterator[None]:
+    """Around what users call: that no answer came is a lost connection to them.
+
+    Raises:
+        ConnectionLostError: no answer came.
+    """
+    try:
+        yield
+    except NoAnswerError as error:
+        raise ConnectionLostError(str(error)) from error
 
 
 @dataclass(frozen=True, slots=True)
