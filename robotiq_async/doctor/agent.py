@@ -8,9 +8,9 @@ import secrets
 from typing import Any, Final
 
 from ..errors import AgentError, NotAllowedError, ProtocolError, RobotiqError
-from ..fleet.network.bus import Bus
-from ..fleet.remote.requests import NoAnswerError, Requests
-from ..fleet.wire.envelope import Call
+from ..fleet.network.bus import Bus, Urgency
+from ..fleet.remote.requests import NoAnswerError
+from ..fleet.wire.envelope import Call, unpack_answer
 from ..fleet.wire.names import GripperName
 from ..fleet.wire.status_message import StatusMessage, unpack
 from ..fleet.wire.values import Fields
@@ -66,23 +66,32 @@ class Asker:
     def __init__(self, name: GripperName, bus: Bus) -> None:
         """Ask about a gripper."""
         self._name = name
-        self._requests = Requests(name, bus)
+        self._bus = bus
         self._client = secrets.token_hex(8)
         self._number = 0
 
     async def ask(
         self, verb: str, *, epoch: int = 0, seen: float = 0.0, arguments: Fields | None = None
-    ) -> Any:  # noqa: ANN401
+    ) -> Any:  # noqa: ANN401  # what each request returns
         """What the agent answers.
 
         Raises:
-            RobotiqError, TypeError, ValueError: what the agent raised, or why no answer came; see
-                :meth:`~robotiq_async.fleet.remote.requests.Requests.answer`.
+            NotAllowedError: nobody answers, and that was plain at once.
+            NoAnswerError: no answer in time.
+            AgentError: another answer came.
+            RobotiqError, TypeError, ValueError: what the agent raised.
         """
         self._number += 1
-        self._requests.hear()  # its token was seen a moment ago
         call = Call(self._name.base, self._client, epoch, 0, self._number, seen, arguments or {})
-        answer, _ = await self._requests.answer(self._requests.post(call, verb, timeout=ANSWER_S))
+        asked, key = now(), self._name.key(verb)
+        reply = await self._bus.ask(key, call.pack(), timeout=ANSWER_S, urgency=Urgency.COMMAND)
+        if reply is None and now() - asked < ANSWER_S / 2:
+            raise NotAllowedError(f"the agent is there, and does not answer to {verb}: access denied")
+        if reply is None:
+            raise NoAnswerError(f"no answer to {verb} within {ANSWER_S:g} s")
+        answer = unpack_answer(reply.payload)
+        if answer.to != self._name.base or answer.number not in (0, call.number):
+            raise AgentError(f"another answer came to {verb}")
         return answer.outcome(lambda stamp: stamp)
 
 

@@ -11,7 +11,6 @@ from collections import deque
 from itertools import islice
 from typing import Any, Final
 
-from ...enums import State
 from ...errors import RobotiqError
 from ...hand import RobotiqHand
 from ...session.clock import now
@@ -40,6 +39,7 @@ class News:
         """Tell of this hand; nothing is sent yet."""
         self.problem = ""
         self._name = name
+        self._mark = name.mark
         self._hand = hand
         self._epoch = epoch
         self._lease = lease
@@ -86,7 +86,7 @@ class News:
         """Where the hand is."""
         stamp, status = now(), self._status()
         return StatusMessage(
-            mark=self._name.mark,
+            mark=self._mark,
             epoch=self._epoch,
             stamp=stamp,
             state=self._hand.state,
@@ -120,7 +120,7 @@ class News:
         }
 
     def _head(self) -> dict[str, Any]:
-        return {"mark": self._name.mark, "epoch": self._epoch}
+        return {"mark": self._mark, "epoch": self._epoch}
 
     def _status(self) -> RobotiqStatus | None:
         try:
@@ -129,9 +129,7 @@ class News:
             return None
 
     def _is_moving(self) -> bool:
-        if self._hand.state in (State.DISCONNECTED, State.SHUTDOWN):
-            return False
         try:
             return self._hand.is_moving
-        except RobotiqError:
+        except RobotiqError:  # not connected: nobody knows
             return False

@@ -131,9 +131,13 @@ class ZenohBus:
             express=urgency in _EXPRESS,
         )
 
+        put = publisher.put
+
         def publish(payload: bytes) -> None:
-            with contextlib.suppress(zenoh.ZError):  # closed meanwhile
-                publisher.put(payload)
+            try:  # noqa: SIM105  # runs most often of all, and suppress() takes 0.3 us
+                put(payload)
+            except zenoh.ZError:
+                pass  # closed meanwhile
 
         return publish
 
