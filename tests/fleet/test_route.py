@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from robotiq_async.fleet.network.configuration import LOOPBACK
 from robotiq_async.fleet.network.route import (
     CONNECT_VARIABLE,
     KEYS_VARIABLE,
@@ -28,7 +27,7 @@ def empty_environment(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_without_options_it_is_an_agent_on_this_machine() -> None:
-    assert parse_remote_address(PLAIN) == (NAME, Route((LOOPBACK,), None, False))
+    assert parse_remote_address(PLAIN) == (NAME, Route((), None, False))
 
 
 def test_options() -> None:
