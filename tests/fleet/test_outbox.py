@@ -210,3 +210,20 @@ async def test_a_halt_goes_on_after_an_empty_answer_and_in_a_silence() -> None:
         await hand.halt()
         assert 0.4 < loop.time() - began < 0.7
         assert not here.gripper.is_moving
+
+
+@virtual
+async def test_a_move_that_is_cancelled_on_its_way_moves_until_the_agent_has_called_it_off() -> None:
+    async with slow_network(0.1) as (here, _, hand):
+        moving = asyncio.create_task(hand.move(255, speed=0))
+        await asyncio.sleep(0.01)
+        moving.cancel()
+        await asyncio.wait({moving})
+        assert hand.is_moving, "it is about to"
+        async for _status in hand.statuses():
+            if not hand.is_moving:
+                break
+        await asyncio.sleep(0.05)
+        travel = here.gripper.travel(A)
+        await asyncio.sleep(0.5)
+        assert here.gripper.travel(A) == travel
