@@ -16,6 +16,8 @@ from dataclasses import dataclass, field
 from robotiq_async.fleet.network.bus import Question, Reply, Undo, Urgency
 
 LATENCY_S = 0.0002
+IN_ORDER_S = 1e-8
+"""From one message to the next: timers of the same instant come in any order."""
 
 
 def matches(expression: str, key: str) -> bool:
@@ -86,7 +88,7 @@ class Network:
         while self.random.random() < stream.loss:
             again = 2 * again or 0.2
         begins = max(loop.time(), stream.free_at - stream.delay) + again + size / stream.rate
-        stream.free_at = begins + stream.delay
+        stream.free_at = begins + stream.delay + IN_ORDER_S
         for copy in range(stream.copies):
             loop.call_at(stream.free_at + LATENCY_S + copy * stream.lateness, deliver)
 

@@ -133,7 +133,7 @@ class ServedHand:
             self._admission.check_meant(call)
             self._expire()
             value = self._answer(verb, call, question)
-        except (RobotiqError, TypeError, ValueError) as error:
+        except (RobotiqError, TypeError, ValueError, OverflowError) as error:  # JSON may hold infinity
             log.info("%s: %s refused: %s", self.name, verb, error)
             self._reply(question, failure(call, self._epoch, error))
         else:
