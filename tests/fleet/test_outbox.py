@@ -35,16 +35,19 @@ class CountingBus:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._bus, name)
 
-    async def ask(self, key: str, payload: bytes, *, timeout: float, urgency: Urgency) -> Reply | None:
-        if not key.endswith("cmd/command"):
-            return await self._bus.ask(key, payload, timeout=timeout, urgency=urgency)
-        self.commands.append(unpack_call(payload))
-        self.under_way += 1
-        self.most = max(self.most, self.under_way)
-        try:
-            return await self._bus.ask(key, payload, timeout=timeout, urgency=urgency)
-        finally:
-            self.under_way -= 1
+    def ask(
+        self, key: str, payload: bytes, *, timeout: float, urgency: Urgency
+    ) -> asyncio.Future[Reply | None]:
+        asking = self._bus.ask(key, payload, timeout=timeout, urgency=urgency)
+        if key.endswith("cmd/command"):
+            self.commands.append(unpack_call(payload))
+            self.under_way += 1
+            self.most = max(self.most, self.under_way)
+            asking.add_done_callback(self._answered)
+        return asking
+
+    def _answered(self, _: object) -> None:
+        self.under_way -= 1
 
 
 @asynccontextmanager
