@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import re
 import struct
@@ -15,7 +16,7 @@ from robotiq_async import Finger, MoveResult, ObjectStatus, RobotiqHand, State, 
 from robotiq_async.errors import ControlLostError
 from robotiq_async.fleet import GripperName
 from robotiq_async.fleet.agent.agent_file import AgentSettings, GripperSettings, read_agent_file
-from robotiq_async.fleet.agent.news import KEPT, News
+from robotiq_async.fleet.agent.news import AT_ONCE, KEPT, News
 from robotiq_async.fleet.agent.served_hand import COMMANDS, ServedHand
 from robotiq_async.fleet.control.lease import Lease
 from robotiq_async.fleet.wire import status_message
@@ -66,14 +67,17 @@ def call(number: int, lease: int = 3, **arguments: Any) -> Call:
 
 
 def event(index: int, what: dict[str, Any]) -> dict[str, Any]:
-    return {"mark": NAME.mark, "epoch": EPOCH, "events": [{"index": index, **what}]}
+    return {"index": index, **what}
 
 
+def told(what: dict[str, Any]) -> dict[str, Any]:
+    return {"mark": NAME.mark, "epoch": EPOCH, "events": [what], "status": MESSAGE.pack().hex()}
+
+
+BEGUN: Final = Transition(State.RUNNING_IDLE, State.RUNNING_CC, Trigger.ASK_COMMAND, 811.5)
 MOVE: Final = call(7, position=100, fingers=1, speed=None, force=None, timeout=None)
 EXAMPLES: Final = [
-    event(
-        38, transition_fields(Transition(State.RUNNING_IDLE, State.RUNNING_CC, Trigger.ASK_COMMAND, 811.5))
-    ),
+    told(event(38, transition_fields(BEGUN))),
     event(39, request_fields(SentRequest(IMAGE, 811.53125, acknowledged=True))),
     event(40, {"kind": "lease", "number": 3, "holder": LABEL, "reason": "granted"}),
     event(41, {"kind": "conflict", "key": NAME.key("alive", "77")}),
@@ -120,6 +124,22 @@ def test_every_state_has_its_number() -> None:
     assert [(int(number), name) for number, name in numbers] == [
         (number, state.name) for number, state in enumerate(State)
     ]
+
+
+async def test_an_event_is_told_as_the_page_has_it() -> None:
+    network = Network()
+    heard: list[bytes] = []
+    network.bus("client").subscribe(NAME.key("*"), lambda _, payload: heard.append(payload))
+    news = News(NAME, RobotiqHand("sim://"), network.bus("agent"), EPOCH, Lease())
+    news.add({"kind": "conflict", "key": NAME.key("alive", "77")})
+    while not heard:  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
+    (first,) = [json.loads(each) for each in heard]
+    example = json.loads(shown("json", PROTOCOL)[0])
+    assert first.keys() == example.keys()
+    assert (first["mark"], first["epoch"]) == (example["mark"], example["epoch"])
+    assert len(bytes.fromhex(first["status"])) == status_message.SIZE
+    assert f"at most {AT_ONCE}" in PROTOCOL
 
 
 async def test_a_summary_and_an_info() -> None:
