@@ -14,6 +14,7 @@ import logging
 import random
 import sys
 import time
+from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any
 
@@ -101,18 +102,27 @@ async def active(hands: dict[str, RobotiqHand]) -> None:
 
 
 async def measured_polls(hands: dict[str, RobotiqHand]) -> None:
-    """How many polls came in time, and how evenly."""
+    """How many polls came in time, and how evenly; of the last ten seconds at most."""
     meter, before = Meter(), [0]
     async for order in orders():
         polls = [each.statistics.polls for each in hands.values()]
         if order == "begin":
             meter, before = Meter(), polls
+            for each in hands.values():
+                periods_of(each).clear()
             continue
         figures = meter.figures()
         kept = [(now - then) * INTERVAL_S / figures["took"] for now, then in zip(polls, before, strict=True)]
-        periods = sorted(1000 * each.statistics.period_p99 for each in hands.values())
-        middle = periods[len(periods) // 2]
-        tell({**figures, "kept": sum(kept) / len(kept), "period_p99": middle, "worst_p99": periods[-1]})
+        p99 = sorted(1000 * percentile(sorted(periods_of(each)), 0.99) for each in hands.values())
+        middle = p99[len(p99) // 2]
+        tell({**figures, "kept": sum(kept) / len(kept), "period_p99": middle, "worst_p99": p99[-1]})
+
+
+def periods_of(hand: RobotiqHand) -> deque[float]:
+    """Every single one: the public figures are of the last few seconds, the start included."""
+    session = hand._session
+    assert session is not None
+    return session.counters.periods
 
 
 # -- clients -----------------------------------------------------------------------------------------------
