@@ -9,16 +9,14 @@ from ...control.motion import MoveResult
 from ...control.state_machine import RUNNING
 from ...enums import CLOSED, OPEN, Finger
 from ...errors import InvalidStateError
-from ...session.clock import now
 from ...wire.checks import check_byte, check_mask, check_optional_byte, check_timeout
 from ..network.bus import Urgency
 from ..wire.values import Fields, read_result
 from .observation import RemoteObservation
+from .persistence import until_answered
 from .requests import NoAnswerError, label
 from .session import HALT_S
 
-ATTEMPT_S: Final = 0.3
-"""From one attempt to halt to the next."""
 COMMAND_S: Final = 5.0
 """For what ends when the gripper acknowledges it."""
 SEQUENCE_S: Final = 130.0
@@ -178,18 +176,12 @@ class RemoteCommands(RemoteObservation):
                 connected to its agent.
             RobotiqError: the agent could not stop them.
         """
-        session, deadline = self._asked(), now() + HALT_S
-        while True:
-            left = deadline - now()
-            try:
-                await session.ask(
-                    "halt", {"label": label()}, timeout=min(ATTEMPT_S, left), urgency=Urgency.STOP
-                )
-            except NoAnswerError:
-                if deadline - now() < ATTEMPT_S / 2:
-                    raise
-            else:
-                return
+        session = self._asked()
+        assert self._outbox is not None
+        self._outbox.clear()  # it was asked before, and would go out after
+        await until_answered(
+            lambda left: session.ask("halt", {"label": label()}, timeout=left, urgency=Urgency.STOP), HALT_S
+        )
 
     # -- activation, faults ----------------------------------------------------------------------------
 
@@ -244,7 +236,8 @@ class RemoteCommands(RemoteObservation):
         call = session.call(arguments)
         try:
             value: Fields = await session.send(call, f"cmd/{name}", timeout=timeout, urgency=Urgency.COMMAND)
-        except asyncio.CancelledError:
+        except (asyncio.CancelledError, NoAnswerError):
+            # A request that nobody waits for any more does not end by itself what it set going.
             session.call_off(call)
             raise
         return value

@@ -11,14 +11,16 @@ from typing import Any, Final
 
 from ...errors import AgentError, ConnectionLostError, NotAllowedError
 from ...session.clock import now
-from ..network.bus import Bus, Urgency
+from ..network.bus import Bus, Reply, Urgency
 from ..wire.envelope import Answer, Call, unpack_answer
 from ..wire.names import GripperName
 from ..wire.values import Fields
 from .mirror import Mirror
 
 RECENT_S: Final = 0.5
-"""So recently the agent must have been heard for an empty answer to mean that the request is not allowed."""
+"""So soon the agent must be heard after an empty answer for that to mean that the request is not allowed."""
+AT_ONCE_S: Final = 0.25
+"""Sooner than any time is over: nobody was there for the request."""
 
 
 class NoAnswerError(ConnectionLostError):
@@ -29,24 +31,24 @@ class Requests:
     """Numbers requests, sends each once, and ends the wait when the agent falls silent."""
 
     def __init__(self, name: GripperName, bus: Bus) -> None:
-        """Ask the agent that serves a gripper; it counts as heard."""
+        """Ask the agent that serves a gripper."""
         self._name = name
         self._bus = bus
         self._client = secrets.token_hex(8)
         self._number = 0
-        self._heard_at = now()
         self._silence: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._sign: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        """Done as soon as the agent is heard."""
 
     def hear(self) -> None:
         """The agent is heard."""
-        self._heard_at = now()
-        if self._silence.done():
-            self._silence = asyncio.get_running_loop().create_future()
+        if not self._sign.done():
+            self._sign.set_result(None)
 
     def fall_silent(self) -> None:
-        """The agent is not heard any more: nobody waits for its answers."""
-        if not self._silence.done():
-            self._silence.set_result(None)
+        """The agent is not heard any more: nobody waits for the answers to what was asked until now."""
+        silence, self._silence = self._silence, asyncio.get_running_loop().create_future()
+        silence.set_result(None)
 
     def make(self, mirror: Mirror, lease: int, arguments: Fields) -> Call:
         """The next request."""
@@ -70,6 +72,28 @@ class Requests:
             AgentError: the answer was another's, or of another version.
             ProtocolError: it is none.
         """
+        reply, at_once = await self._ask(call, verb, timeout, urgency)
+        if reply is None and at_once and await self._hears_on():
+            # Just after a link has come up nobody seems to be there. Nothing is done twice: the number is the
+            # same, and so is what had been heard when it was asked.
+            reply, at_once = await self._ask(call, verb, timeout, urgency)
+            if reply is None and at_once and await self._hears_on():
+                raise NotAllowedError(f"{self._name}: nobody there answers to {verb}: access denied")
+        if reply is None:
+            raise NoAnswerError(f"{self._name}: no answer in time; {verb} may have been carried out")
+        answer = unpack_answer(reply.payload)
+        if answer.to != self._name.base or answer.number not in (0, call.number):
+            raise AgentError(f"{self._name}: another answer came to {verb}; it may have been carried out")
+        return answer, reply.attachment
+
+    async def _ask(
+        self, call: Call, verb: str, timeout: float, urgency: Urgency
+    ) -> tuple[Reply | None, bool]:
+        """Send it once; returns the answer, and whether it came at once: as where access rules say no.
+
+        Raises:
+            NoAnswerError: the agent fell silent.
+        """
         asked_at = now()
         asking = asyncio.ensure_future(
             self._bus.ask(self._name.key(verb), call.pack(), timeout=timeout, urgency=urgency)
@@ -83,19 +107,13 @@ class Requests:
             asking.cancel()
         if not asking.done():
             raise NoAnswerError(f"{self._name}: the agent fell silent; {verb} may have been carried out")
-        reply = asking.result()
-        if reply is None:
-            raise self._silent(verb, at_once=now() - asked_at < timeout / 2)
-        answer = unpack_answer(reply.payload)
-        if answer.to != self._name.base or answer.number not in (0, call.number):
-            raise AgentError(f"{self._name}: another answer came to {verb}; it may have been carried out")
-        return answer, reply.attachment
+        return asking.result(), now() - asked_at < min(AT_ONCE_S, timeout / 2)
 
-    def _silent(self, verb: str, *, at_once: bool) -> NotAllowedError | NoAnswerError:
-        """What it means that nobody answered: access rules answer nothing, and at once."""
-        if at_once and now() - self._heard_at < RECENT_S:
-            return NotAllowedError(f"{self._name}: nobody there answers to {verb}: access denied")
-        return NoAnswerError(f"{self._name}: no answer in time; {verb} may have been carried out")
+    async def _hears_on(self) -> bool:
+        """Whether the agent is heard from now on; a link that is down may have been up a moment ago."""
+        self._sign = sign = self._sign if not self._sign.done() else self._sign.get_loop().create_future()
+        await asyncio.wait({sign}, timeout=RECENT_S)
+        return sign.done()
 
 
 def label() -> str:

@@ -40,6 +40,8 @@ ANSWER_S: Final = 0.5
 """For an answer that the agent gives at once; asked again within the time that there is."""
 CONNECT_S: Final = 5.0
 HALT_S: Final = 2.0
+BY_OTHERS: Final = ("taken", "halted", "held")
+"""Reasons for which nobody comes back without having been asked to."""
 RELEASE_S: Final = 1.5
 
 
@@ -68,12 +70,19 @@ class RemoteSession:
         self._channels = channels
         self._wants_control = wants_control
         self._lease = 0
+        self._lease_run = 0
+        """The run of the agent that the number of the lease is of."""
         self._window = WINDOW_S
         self._heard_at = 0.0
+        """When something current was heard."""
+        self._arrived_at = 0.0
+        """When anything was."""
         self._requests = Requests(name, bus)
         self._tasks: set[asyncio.Task[Any]] = set()
         self._is_catching_up = False
         self._renewing: asyncio.Task[Any] | None = None
+        self._finding_out: asyncio.Task[Any] | None = None
+        self._looking: asyncio.Task[Any] | None = None
         channels.reopen(self.loop)
         # One wildcard, and every payload says what it is about: samples may come under the wrong key.
         self._undo: Undo = bus.subscribe(name.key("*"), self._hear)
@@ -95,9 +104,21 @@ class RemoteSession:
                 await self._give_up()
             await asyncio.sleep(0.05)
         if self._wants_control:
-            await self.acquire()
+            await self._acquire_until(deadline)
         self.spawn(self._keep())
         await self._wait_for_gripper(deadline)
+
+    async def _acquire_until(self, deadline: float) -> None:
+        """Acquire the lease; again when an answer was lost, until it is time to give up."""
+        while True:
+            try:
+                return await self.acquire()
+            except NoAnswerError:
+                if now() >= deadline:
+                    raise
+            except ControlLostError as error:
+                if error.reason != "late" or now() >= deadline:
+                    raise
 
     async def _wait_for_gripper(self, deadline: float) -> None:
         """Wait until the agent has reached the gripper.
@@ -190,17 +211,21 @@ class RemoteSession:
         except (ProtocolError, ValueError, KeyError, TypeError) as error:
             log.warning("%s: %s", self.name, error)
 
-    def _hear_status(self, payload: bytes, *, in_turn: bool) -> None:
-        message = unpack(payload)
+    def _hear_status(self, payload: bytes, *, in_turn: bool, asked: float | None = None) -> None:
+        message, arrival = unpack(payload), now()
         if self.mirror.is_about_another(message.mark):
+            return
+        if self.mirror.is_superseded(message, arrival, self._window):
             return
         if self.mirror.epoch not in (0, message.epoch):
             self._lose_control("closed", "the agent was started anew")
-        self._heard_at = now()
-        self.mirror.hear(message, self._heard_at, in_turn=in_turn)
+        self._arrived_at = arrival
+        if not self.mirror.hear(message, arrival, in_turn=in_turn, window=self._window, asked=asked):
+            return  # it has been on its way for so long that it says nothing about now
+        self._heard_at = arrival
         self._requests.hear()
         if self.is_in_control and message.lease > self._lease and in_turn:
-            self.spawn(self._renew())  # it says why
+            self._find_out_soon()
         if message.events > self.mirror.events and in_turn:
             self._catch_up()  # an event was dropped on the way
 
@@ -241,16 +266,25 @@ class RemoteSession:
             # After a hold-up of this loop, what has arrived meanwhile is heard first.
             if late < interval and woken - self._heard_at > self._window:
                 self._fall_silent(woken)
-            if self.is_in_control and (self._renewing is None or self._renewing.done()):
-                self._renewing = self.spawn(self._renew())
-            elif self._wants_control and not self.is_in_control and not self.mirror.is_silent:
+            if self.mirror.is_silent and woken - self._arrived_at < interval:
+                self._look_again()
+            if self.is_in_control:
+                self._renew_soon()
+            elif self._wants_control and not self.mirror.is_silent:
                 await self._acquire_again()
+
+    def _look_again(self) -> None:
+        """What is heard seems to be old: it is, or the agent's clock stood still. An answer tells."""
+        if self._looking is None or self._looking.done():
+            self._looking = self.spawn(self._ask_quietly("info", {}, ANSWER_S))
 
     async def _acquire_again(self) -> None:
         try:
-            await self.acquire()
-        except ControlLostError:
-            self._wants_control = False  # somebody else was first; whose turn it is then people decide
+            await self._acquire({"what": "acquire", "again": self._lease, "run": self._lease_run})
+        except ControlLostError as error:
+            if error.reason in BY_OTHERS:
+                # Somebody else was first, or has stepped in meanwhile; whose turn it is people decide.
+                self._wants_control, self.lost = False, error
         except RobotiqError:
             pass  # again in a moment
 
@@ -271,9 +305,12 @@ class RemoteSession:
             ControlLostError: another client holds it, and it is not to be taken away.
             RobotiqError: the agent did not answer.
         """
-        what = {"what": "take" if take else "acquire", "label": label()}
-        value = await self.ask("lease", what, timeout=ANSWER_S)
-        self._lease = value["lease"]
+        await self._acquire({"what": "take" if take else "acquire"})
+
+    async def _acquire(self, what: Fields) -> None:
+        call = self.call({**what, "label": label()})
+        value = await self.send(call, "lease", timeout=ANSWER_S)
+        self._lease, self._lease_run = value["lease"], self.mirror.epoch
         self.is_in_control, self._wants_control, self.lost = True, True, None
 
     async def release(self, *, halt: bool) -> None:
@@ -287,16 +324,34 @@ class RemoteSession:
             self._lose_control("released", "it was given back")
             await self.ask("lease", {"what": "release", "halt": halt}, timeout=RELEASE_S)
 
-    async def _renew(self) -> None:
+    def _renew_soon(self) -> None:
+        """Unless an answer is awaited already."""
+        if self._renewing is None or self._renewing.done():
+            self._renewing = self.spawn(self._ask_quietly("lease", {"what": "renew"}, self._window))
+
+    def _find_out_soon(self) -> None:
+        """The agent says that the lease has ended; the answer to a request under it says why."""
+        if self._finding_out is None or self._finding_out.done():
+            self._finding_out = self.spawn(self._find_out())
+
+    async def _find_out(self) -> None:
+        lease, run = self._lease, self._lease_run
+        await self._ask_quietly("lease", {"what": "renew"}, self._window / RENEWALS)
+        if (lease, run) == (self._lease, self.mirror.epoch):
+            # Nobody answers. When the lease is asked for again the agent says whether somebody stepped in.
+            self._lose_control("expired", "its agent says that the lease has ended")
+
+    async def _ask_quietly(self, verb: str, arguments: Fields, timeout: float) -> None:
+        """For what the answer does by itself."""
         with suppress(RobotiqError):
-            await self.ask("lease", {"what": "renew"}, timeout=self._window)
+            await self.ask(verb, arguments, timeout=timeout)
 
     def _lose_control(self, reason: str, why: str) -> None:
         if not self.is_in_control:
             return
         self.is_in_control = False
         # After a halt or a take of somebody else nobody takes it back without having been asked to.
-        self._wants_control = self._wants_control and reason not in ("taken", "halted", "held", "released")
+        self._wants_control = self._wants_control and reason not in (*BY_OTHERS, "released")
         self.lost = ControlLostError(f"{self.name} is not commanded from here any more: {why}", reason)
         if reason != "released":
             log.warning("%s", self.lost)
@@ -332,13 +387,14 @@ class RemoteSession:
         Raises:
             NotStartedError: the run has ended meanwhile.
         """
+        asked = now()
         try:
             answer, news = await self._requests.send(call, verb, **how)
         except NoAnswerError:
             self.check_running()
             raise
         if news:
-            self._hear_status(news, in_turn=False)
+            self._hear_status(news, in_turn=False, asked=asked)
         try:
             return answer.outcome(self.mirror.clock)
         except ControlLostError as error:
@@ -349,13 +405,8 @@ class RemoteSession:
     def call_off(self, call: Call) -> None:
         """Nobody waits for a request any more: what it set going is to be held."""
         if self.is_in_control and not self.is_over:
-            cancel = self.ask("cmd/cancel", {"number": call.number}, timeout=self._window)
-
-            async def ask() -> None:
-                with suppress(RobotiqError):  # then the lease ends, and the agent holds by itself
-                    await cancel
-
-            self.spawn(ask())
+            # If it is not heard the lease ends, and the agent holds by itself.
+            self.spawn(self._ask_quietly("cmd/cancel", {"number": call.number}, self._window))
 
     def spawn(self, work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
         """Do something beside; it ends with the run."""
