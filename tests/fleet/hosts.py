@@ -2,7 +2,7 @@
 
 A host is an event loop of its own that lives inside the virtual one: its callbacks, tasks, timers and
 connections are called through a gate. While the gate is shut nothing of the host runs, and when it opens
-again everything that had become due runs at once, as in a process after SIGCONT or in a loop that was held up.
+again everything that had become due runs at once, as in a process after SIGCONT.
 """
 
 from __future__ import annotations

@@ -32,6 +32,7 @@ from ..wire.names import GripperName
 from ..wire.status_message import unpack
 from ..wire.values import Fields, read_statistics
 from .mirror import Mirror
+from .missed_events import MissedEvents
 from .requests import NoAnswerError, Requests, label
 
 RENEWALS: Final = 5
@@ -73,13 +74,15 @@ class RemoteSession:
         self._lease_run = 0
         """The run of the agent that the number of the lease is of."""
         self._window = WINDOW_S
-        self._heard_at = 0.0
-        """When something current was heard."""
-        self._arrived_at = 0.0
-        """When anything was."""
+        self._heard_at = 0.0  # something current
+        self._arrived_at = 0.0  # anything
         self._requests = Requests(name, bus)
         self._tasks: set[asyncio.Task[Any]] = set()
-        self._is_catching_up = False
+        self._missed = MissedEvents(
+            self.mirror,
+            lambda since: self.ask("info", {"since": since}, timeout=ANSWER_S),
+            self.spawn,
+        )
         self._renewing: asyncio.Task[Any] | None = None
         self._finding_out: asyncio.Task[Any] | None = None
         self._looking: asyncio.Task[Any] | None = None
@@ -113,11 +116,8 @@ class RemoteSession:
         while True:
             try:
                 return await self.acquire()
-            except NoAnswerError:
-                if now() >= deadline:
-                    raise
-            except ControlLostError as error:
-                if error.reason != "late" or now() >= deadline:
+            except (NoAnswerError, ControlLostError) as error:
+                if getattr(error, "reason", "late") != "late" or now() >= deadline:
                     raise
 
     async def _wait_for_gripper(self, deadline: float) -> None:
@@ -227,7 +227,7 @@ class RemoteSession:
         if self.is_in_control and message.lease > self._lease and in_turn:
             self._find_out_soon()
         if message.events > self.mirror.events and in_turn:
-            self._catch_up()  # an event was dropped on the way
+            self._missed.fetch()  # an event was dropped on the way
 
     def _hear_fields(self, fields: Mapping[str, Any]) -> None:
         if self.mirror.is_about_another(fields["mark"]):
@@ -235,27 +235,7 @@ class RemoteSession:
         if "statistics" in fields:
             self.statistics = read_statistics(fields["statistics"])
         elif fields["epoch"] == self.mirror.epoch and self.mirror.hear_events(fields["events"]):
-            self._catch_up()
-
-    def _catch_up(self) -> None:
-        if not self._is_catching_up and not self.is_over:
-            self._is_catching_up = True
-            self.spawn(self._fetch_events())
-
-    async def _fetch_events(self) -> None:
-        """Ask for the events that were missed."""
-        try:
-            while self.mirror.newest is not None and self.mirror.newest.events > self.mirror.events:
-                info = await self.ask("info", {"since": self.mirror.events}, timeout=ANSWER_S)
-                events = info["events"]
-                if info["epoch"] == self.mirror.epoch and events:
-                    self.mirror.skip_events(events[0]["index"] - 1)
-                    self.mirror.hear_events(events)
-                await asyncio.sleep(0.02)
-        except (RobotiqError, KeyError, TypeError) as error:
-            log.info("%s: missed events could not be fetched: %s", self.name, error)
-        finally:
-            self._is_catching_up = False
+            self._missed.fetch()
 
     async def _keep(self) -> None:
         """Look for silence, renew the lease, and acquire it again when that is due."""
