@@ -70,8 +70,8 @@ class World:
             while not condition():  # noqa: ASYNC110  # what is waited for tells nobody
                 await asyncio.sleep(LOOK_S)
 
-    async def start_agent(self, name: str) -> ServingAgent:
-        agent = ServingAgent(self, name)
+    async def start_agent(self, name: str, **options: Any) -> ServingAgent:
+        agent = ServingAgent(self, name, options)
         self.agents.append(agent)
         await agent.start()
         return agent
@@ -130,8 +130,9 @@ class World:
 class ServingAgent:
     """An agent on a host, in its own run."""
 
-    def __init__(self, world: World, name: str) -> None:
+    def __init__(self, world: World, name: str, options: dict[str, Any]) -> None:
         self.world = world
+        self.options = options
         self.host = Host(name)
         self.bus = world.network.bus(name, self.host)
         self.hands: dict[str, RobotiqHand] = {}
@@ -148,7 +149,7 @@ class ServingAgent:
                 name: RobotiqHand(f"tcp://127.0.0.{place}:{server.port}", poll_interval=POLL_S)
                 for name, server in self.world.servers.items()
             }
-            self.agent = Agent("lab", "cell", self.hands, self.bus, window=WINDOW_S)
+            self.agent = Agent("lab", "cell", self.hands, self.bus, window=WINDOW_S, **self.options)
             try:
                 await self.agent.run(lambda: self.world.network.loop.call_soon(ready.set))
             finally:
@@ -242,15 +243,15 @@ async def _all_of(stream: Any) -> list[RobotiqStatus]:
 
 
 @asynccontextmanager
-async def world() -> AsyncIterator[World]:
-    """Everything is up: left is active and open, and the holder commands it."""
+async def world(**options: Any) -> AsyncIterator[World]:
+    """Everything is up: left is active and open, and the holder commands it. Options are the agent's."""
     here = World()
     async with AsyncExitStack() as stack:
         for name, gripper in here.grippers.items():
             here.servers[name] = await stack.enter_async_context(SimulatorServer(gripper))
             await activate_beforehand(gripper)
             await asyncio.sleep(20)
-        await here.start_agent("agent")
+        await here.start_agent("agent", **options)
         await here.holder.start()
         await here.other.start(control=False)
         await here.neighbour.start()

@@ -71,8 +71,7 @@ class RemoteSession:
         self._channels = channels
         self._wants_control = wants_control
         self._lease = 0
-        self._lease_run = 0
-        """The run of the agent that the number of the lease is of."""
+        self._lease_run = 0  # the run of the agent that the number is of
         self._window = WINDOW_S
         self._heard_at = 0.0  # something current
         self._arrived_at = 0.0  # anything
