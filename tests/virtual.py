@@ -153,6 +153,11 @@ class VirtualLoop(asyncio.SelectorEventLoop):
 
     async def create_connection(self, factory: Any, _host: Any = None, port: Any = None, **_: Any) -> Any:  # type: ignore[override]
         await asyncio.sleep(2 * LATENCY_S)
+        transport = self.connect(factory, port)
+        return transport, transport.protocol
+
+    def connect(self, factory: Callable[[], Any], port: int) -> MemoryTransport:
+        """Connect at once."""
         listener = self._listeners.get(port)
         if listener is None:
             raise ConnectionRefusedError(111, "nobody listens")
@@ -160,7 +165,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         here.peer, there.peer = there, here
         there.attach(listener.factory())
         here.attach(factory())
-        return here, here.protocol
+        return here
 
 
 class _Listener:

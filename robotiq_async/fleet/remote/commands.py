@@ -11,19 +11,15 @@ from ...control.motion import MoveResult
 from ...control.state_machine import RUNNING, refusal
 from ...control.triggers import Trigger
 from ...enums import CLOSED, OPEN, Finger
-from ...errors import ConnectionLostError, NotAllowedError, NotStartedError
-from ...session.clock import now
+from ...errors import ConnectionLostError, NotStartedError
 from ...wire.checks import check_byte, check_mask, check_optional_byte, check_timeout
 from ..network.bus import Urgency
 from ..wire.values import Fields, read_result, reading
 from .observation import RemoteObservation
-from .requests import NoAnswerError, label, plainly
+from .persistence import until_answered
+from .requests import label, plainly
 from .session import HALT_S, RemoteSession
 
-ATTEMPT_S: Final = 0.3
-"""For one attempt to halt."""
-PAUSE_S: Final = 0.05
-"""To the next attempt, when the answer was empty."""
 COMMAND_S: Final = 5.0
 """For what ends when the gripper acknowledges it."""
 SEQUENCE_S: Final = 130.0
@@ -201,20 +197,9 @@ class RemoteCommands(RemoteObservation):
             raise
 
     async def _halt(self, session: RemoteSession) -> None:
-        """Ask until answered."""
-        deadline = now() + HALT_S
-        while True:
-            asked_at = now()
-            try:
-                timeout = min(ATTEMPT_S, deadline - asked_at)
-                await session.ask("halt", {"label": label()}, timeout=timeout, urgency=Urgency.STOP)
-            except (NoAnswerError, NotAllowedError):
-                # An empty answer also comes just after a connection was made.
-                if deadline - now() < ATTEMPT_S / 2:
-                    raise
-            else:
-                return
-            await asyncio.sleep(max(0.0, min(PAUSE_S, asked_at + ATTEMPT_S - now())))
+        await until_answered(
+            lambda left: session.ask("halt", {"label": label()}, timeout=left, urgency=Urgency.STOP), HALT_S
+        )
 
     # -- activation, faults ----------------------------------------------------------------------------
 

@@ -11,9 +11,12 @@ from ...enums import State
 from ...log import log
 from ...session.streams import Channels, Transition
 from ...wire.status import RobotiqStatus
+from ..control.lease import WINDOW_S
 from ..wire.status_message import StatusMessage
 from ..wire.values import Fields, read_request, read_transition, reading
 
+_RUNS: Final = 16
+"""So many runs of an agent are told apart."""
 DRIFT: Final = 200e-6
 """How far two clocks may part: seconds a second."""
 _SEEN: Final = {
@@ -35,7 +38,8 @@ class AgentClock:
     """Makes times of this process of times of the agent.
 
     A message takes at least no time. So the smallest difference of arrival and stamp is the best guess of how
-    far the clocks are apart; it may grow slowly, for clocks drift.
+    far the clocks are apart; it may grow slowly, for clocks drift. What an answer says was said after its
+    question: a smaller difference cannot be (the agent's host was suspended, and its clock with it).
     """
 
     def __init__(self) -> None:
@@ -43,13 +47,15 @@ class AgentClock:
         self._offset: float | None = None
         self._at = 0.0
 
-    def hear(self, stamp: float, arrival: float) -> None:
-        """A message with this stamp of the agent has arrived."""
+    def hear(self, stamp: float, arrival: float, asked: float | None = None) -> None:
+        """A message with this stamp of the agent has arrived; it was asked for at ``asked``, if it was."""
         difference = arrival - stamp
         if self._offset is None:
             self._offset = difference
         else:
             self._offset = min(difference, self._offset + DRIFT * (arrival - self._at))
+        if asked is not None and self._offset < asked - stamp:
+            self._offset = difference
         self._at = arrival
 
     def __call__(self, stamp: float) -> float:
@@ -104,6 +110,8 @@ class Mirror:
         """Where the events so far have led; statuses may be ahead of them."""
         self._pushed: RobotiqStatus | None = None
         """The last status that was handed on."""
+        self._clocks: dict[int, AgentClock] = {}
+        """Of each run of the agent that was heard, the present one last."""
         self._first = 0 if before is None else before.next_sequence
         self._base = 0
         """Added to the agent's sequences: they begin anew with each run of the agent, ours do not."""
@@ -131,23 +139,45 @@ class Mirror:
         log.warning("a message about another gripper was dropped (%d so far)", self.misrouted)
         return True
 
-    def hear(self, message: StatusMessage, arrival: float, *, in_turn: bool) -> None:
-        """A message has arrived.
+    def is_superseded(self, message: StatusMessage, arrival: float, window: float = WINDOW_S) -> bool:
+        """Whether a message is of a run of the agent that another one has followed.
+
+        Either it was late; or two agents serve the gripper, and that other one is heard.
+        """
+        clock = self._clocks.get(message.epoch)
+        if message.epoch == self.epoch or clock is None:
+            return False
+        return not self.is_silent or arrival - clock(message.stamp) > window
+
+    def hear(
+        self,
+        message: StatusMessage,
+        arrival: float,
+        *,
+        in_turn: bool,
+        window: float = WINDOW_S,
+        asked: float | None = None,
+    ) -> bool:
+        """A message has arrived. Returns whether it is current: one that was on its way for long is not.
 
         Args:
-            message: about this gripper.
+            message: about this gripper, and not superseded.
             arrival: our time.
             in_turn: whether it came among the news, where every status has its turn. One that came with an
                 answer has overtaken others: readers get theirs first.
+            window: seconds for which it is current.
+            asked: our time at which it was asked for; None if it was not.
         """
         if message.epoch != self.epoch:
             self._begin_anew(message, arrival)
-        self.clock.hear(message.stamp, arrival)
+        self.clock.hear(message.stamp, arrival, asked)
+        is_current = arrival - self.clock(message.stamp) <= window
         status = self._status(message)
         if message.stamp >= self.stamp:
             self.newest = message
             self.status = status or self.status
-            self._enter(as_seen_from_here(message.state), arrival)
+            if is_current:
+                self._enter(as_seen_from_here(message.state), arrival)
         if (
             in_turn
             and status is not None
@@ -155,6 +185,7 @@ class Mirror:
         ):
             self._pushed = status
             self._channels.statuses.push(status)
+        return is_current
 
     def hear_events(self, events: Iterable[Fields]) -> bool:
         """Events have arrived. Returns whether some before them are missing: they wait for those."""
@@ -200,7 +231,11 @@ class Mirror:
     def _begin_anew(self, message: StatusMessage, arrival: float) -> None:
         """Another run of the agent: its clock, its events and its polls are others."""
         self.fall_silent(arrival)
-        self.clock = AgentClock()
+        # What is late from a run that was heard before is told by the clock of that run.
+        self.clock = self._clocks.pop(message.epoch) if message.epoch in self._clocks else AgentClock()
+        self._clocks[message.epoch] = self.clock
+        while len(self._clocks) > _RUNS:
+            del self._clocks[next(iter(self._clocks))]
         self.newest = None
         self.events = message.events
         self._followed = as_seen_from_here(message.state)

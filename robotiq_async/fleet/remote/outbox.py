@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any, Final
 
 from ...enums import AXES, Finger
 from ...errors import ControlLostError, NotStartedError, RobotiqError
 from ...log import log
 from ..network.bus import Urgency
+from ..wire.envelope import Call
 from .requests import Posted
 from .session import RemoteSession
 
@@ -25,8 +27,8 @@ class Outbox:
     def __init__(self, session: RemoteSession) -> None:
         """Send through a session."""
         self._session = session
-        self._lease = 0
-        """What waits was asked for under this lease."""
+        self._asked: Call | None = None
+        """As which the oldest of those that wait would have gone out: its lease, and what was heard then."""
         self._waiting: dict[Finger, dict[str, int]] = {}
         self._under_way = 0
         self._motions = 0
@@ -38,9 +40,9 @@ class Outbox:
 
     def put(self, axes: Finger, changes: dict[str, int]) -> None:
         """Ask axes for something."""
-        if self._lease != self._session.lease:
+        if self._asked is None or not self._is_under_this_lease(self._asked):
             self.clear()
-            self._lease = self._session.lease
+            self._asked = self._session.call()
         for axis in AXES:
             if axis in axes:
                 self._waiting.setdefault(axis, {}).update(changes)
@@ -49,22 +51,27 @@ class Outbox:
     def clear(self) -> None:
         """What waits is not to be sent any more."""
         self._waiting.clear()
+        self._asked = None
 
     def flush(self) -> None:
         """Send what waits now: something is asked for after it."""
-        if self._lease != self._session.lease or not self._session.is_in_control:
-            self.clear()
-        if self._waiting:
-            waiting, self._waiting = self._waiting, {}
+        asked, self._asked = self._asked, None
+        waiting, self._waiting = self._waiting, {}
+        if waiting and asked is not None and self._is_under_this_lease(asked):
             is_motion = any("position" in changes for changes in waiting.values())
             arguments = {"axes": {str(int(axis)): changes for axis, changes in waiting.items()}}
-            call = self._session.call(arguments)
+            # The time it has waited here counts like the time on its way.
+            call = replace(self._session.call(arguments), seen=asked.seen)
             posted = self._session.post(call, "cmd/command", timeout=ANSWER_S, urgency=Urgency.COMMAND)
             self._under_way += 1
             asking = self._session.spawn(self._await(posted))
             asking.add_done_callback(lambda _: self._done())
             if is_motion:
                 self.count_motion(asking)
+
+    def _is_under_this_lease(self, asked: Call) -> bool:
+        now = self._session
+        return now.is_in_control and (asked.epoch, asked.lease) == (now.mirror.epoch, now.lease)
 
     def count_motion(self, asking: asyncio.Task[Any]) -> None:
         """Something is under way that may set axes going."""
@@ -98,7 +105,10 @@ class Outbox:
     async def _await(self, posted: Posted) -> None:
         try:
             await self._session.answer(posted)
-        except (ControlLostError, NotStartedError):
+        except NotStartedError:
             pass  # the next command() raises it
+        except ControlLostError as error:
+            if error.reason == "late":  # any other is raised by the next command()
+                log.warning("%s: a command was not carried out: %s", self._session.name, error)
         except (RobotiqError, TypeError, ValueError) as error:
             log.warning("%s: a command was not carried out: %s", self._session.name, error)

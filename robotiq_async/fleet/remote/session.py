@@ -32,17 +32,13 @@ from ..wire.envelope import Call
 from ..wire.names import GripperName
 from ..wire.status_message import unpack
 from ..wire.values import Fields, read_statistics, reading
+from .lease_keeper import ANSWER_S, RENEWALS, LeaseKeeper
 from .mirror import Mirror
-from .requests import NoAnswerError, Posted, Requests, label
+from .missed_events import MissedEvents
+from .requests import NoAnswerError, Posted, Requests
 
-RENEWALS: Final = 5
-"""So often in a window the lease is renewed, and silence looked for."""
-ANSWER_S: Final = 0.5
-"""For an answer that the agent gives at once; asked again within the time that there is."""
 CONNECT_S: Final = 5.0
 HALT_S: Final = 2.0
-RELEASE_S: Final = 0.9
-"""With the second that closing a session of zenoh may take, within the two of a stop."""
 
 
 class RemoteSession:
@@ -51,11 +47,9 @@ class RemoteSession:
     Attributes:
         mirror: what has been heard.
         waiters: who waits for a state.
-        is_in_control: whether this hand holds the lease, as far as it knows.
         is_over: whether the run has ended, or is about to.
         has_ended: whether nothing of it is left.
-        lease: number of the lease it holds, or held last.
-        lost: why control was lost; None while it is held, or was never asked for.
+        window: of the leases, in seconds.
     """
 
     def __init__(
@@ -84,22 +78,21 @@ class RemoteSession:
         self.mirror = Mirror(name.mark, channels, self.waiters.reached, before)
         self.is_over = False
         self.has_ended = False
-        self.is_in_control = False
-        self.lost: ControlLostError | None = None
         self.statistics: Statistics = Counters().snapshot(0)
         self._bus = bus
         self._channels = channels
-        self._wants_control = wants_control
-        self.lease = 0
         self._owns_bus = owns_bus
         self._closing: asyncio.Task[None] | None = None
-        self._acquiring = asyncio.Lock()
-        self._window = WINDOW_S
-        self._heard_at = 0.0
+        self.window = WINDOW_S
+        self._heard_at = 0.0  # something current
+        self._arrived_at = 0.0  # anything
         self._requests = Requests(name, bus)
         self._tasks: set[asyncio.Task[Any]] = set()
-        self._is_catching_up = False
-        self._renewing: asyncio.Task[Any] | None = None
+        self._missed = MissedEvents(
+            self.mirror, lambda since: self.ask("info", {"since": since}, timeout=ANSWER_S), self.spawn
+        )
+        self._keeper = LeaseKeeper(self, wants_control=wants_control)
+        self._looking: asyncio.Task[Any] | None = None
         channels.reopen(self.loop)
         self.mirror.begin(now())
         # One wildcard, and every payload says what it is about: samples may come under the wrong key.
@@ -121,8 +114,7 @@ class RemoteSession:
             if now() >= deadline:
                 await self._give_up()
             await asyncio.sleep(0.05)
-        if self._wants_control:
-            await self.acquire()
+        await self._keeper.begin(deadline)
         self.spawn(self._keep())
         await self._wait_for_gripper(deadline)
 
@@ -154,7 +146,7 @@ class RemoteSession:
         except (NoAnswerError, NotAllowedError):
             return False
         with reading("its figures"):
-            self._window = float(info["window"])
+            self.window = float(info["window"])
             self.statistics = read_statistics(info["statistics"])
         return True
 
@@ -171,7 +163,7 @@ class RemoteSession:
     async def close(self, *, halt: bool) -> None:
         """End the run; within two seconds, also when cancelled meanwhile, and whoever asks waits for it."""
         if self._closing is None:
-            self.is_over, self._wants_control = True, False
+            self.is_over = True
             self.mirror.shut_down(State.DO_SHUTDOWN, Trigger.ASK_STOP, now())
             self._closing = self.loop.create_task(self._close(halt=halt))
         await wait_shielded(self._closing)
@@ -179,9 +171,7 @@ class RemoteSession:
 
     async def _close(self, *, halt: bool) -> None:
         try:
-            if self.is_in_control:
-                self.is_in_control = False
-                await self.ask("lease", {"what": "release", "halt": halt}, timeout=RELEASE_S)
+            await self._keeper.end(halt=halt)
         except RobotiqError as error:
             log.warning(
                 "%s: the agent did not acknowledge the end (%s): it holds what moves", self.name, error
@@ -210,7 +200,7 @@ class RemoteSession:
     def abandon(self) -> None:
         """Count as over when the loop was closed under it; the agent holds what moves by itself."""
         log.warning("%s: the event loop was closed before stop()", self.name)
-        self.is_in_control = False
+        self._keeper.abandon()
         self.waiters = StateWaiters()
         self._end()
 
@@ -244,21 +234,27 @@ class RemoteSession:
                     self._hear_status(payload, in_turn=True)
         except RobotiqError as error:
             log.warning("%s: %s", self.name, error)
-        if self.mirror.has_missed():
-            self._catch_up()  # an event was dropped on the way
+        if self.mirror.has_missed() and not self.is_over:
+            self._missed.fetch()  # an event was dropped on the way
 
-    def _hear_status(self, payload: bytes, *, in_turn: bool) -> None:
-        message = unpack(payload)
+    def _hear_status(self, payload: bytes, *, in_turn: bool, asked: float | None = None) -> bool:
+        """A status has arrived; returns whether it is about the gripper as it is."""
+        message, arrival = unpack(payload), now()
         if self.mirror.is_about_another(message.mark):
-            return
+            return False
+        if self.mirror.is_superseded(message, arrival, self.window):
+            return False
         if self.mirror.epoch not in (0, message.epoch):
-            self._lose_control("closed", "the agent was started anew")
+            self._keeper.lose("closed", "the agent was started anew")
             self._requests.fall_silent()  # what the former one was asked it does not answer
-        self._heard_at = now()
-        self.mirror.hear(message, self._heard_at, in_turn=in_turn)
+        self._arrived_at = arrival
+        if not self.mirror.hear(message, arrival, in_turn=in_turn, window=self.window, asked=asked):
+            return True  # it has been on its way for so long that it says nothing about now
+        self._heard_at = arrival
         self._requests.hear()
-        if self.is_in_control and message.lease > self.lease and in_turn:
-            self.spawn(self._renew())  # it says why
+        if in_turn:
+            self._keeper.hear(message.lease)
+        return True
 
     def _hear_fields(self, fields: Mapping[str, Any]) -> None:
         if self.mirror.is_about_another(fields["mark"]):
@@ -266,104 +262,59 @@ class RemoteSession:
         if "statistics" in fields:
             self.statistics = read_statistics(fields["statistics"])
             return
-        self._hear_status(bytes.fromhex(fields["status"]), in_turn=True)
-        self.mirror.hear_events(fields["events"])
-
-    def _catch_up(self) -> None:
-        if not self._is_catching_up and not self.is_over:
-            self._is_catching_up = True
-            self.spawn(self._fetch_events())
-
-    async def _fetch_events(self) -> None:
-        """Ask for the events that were missed."""
-        try:
-            while self.mirror.has_missed():
-                info = await self.ask("info", {"since": self.mirror.events}, timeout=ANSWER_S)
-                with reading("events"):
-                    events = info["events"]
-                    if info["epoch"] == self.mirror.epoch and events:
-                        self.mirror.skip_events(events[0]["index"] - 1)
-                        self.mirror.hear_events(events)
-                await asyncio.sleep(0.02)
-        except RobotiqError as error:
-            log.info("%s: missed events could not be fetched: %s", self.name, error)
-        finally:
-            self._is_catching_up = False
+        if self._hear_status(bytes.fromhex(fields["status"]), in_turn=True):
+            self.mirror.hear_events(fields["events"])
 
     async def _keep(self) -> None:
         """Look for silence, renew the lease, and acquire it again when that is due."""
-        interval, woken = self._window / RENEWALS, now()
+        interval, woken = self.window / RENEWALS, now()
         while True:
             await asyncio.sleep(interval)
             late, woken = now() - woken - interval, now()
             # After a hold-up of this loop, what has arrived meanwhile is heard first.
-            if late < interval and woken - self._heard_at > self._window:
+            if late < interval and woken - self._heard_at > self.window:
                 self._fall_silent(woken)
-            if self.is_in_control and (self._renewing is None or self._renewing.done()):
-                self._renewing = self.spawn(self._renew())
-            elif self._wants_control and not self.is_in_control and not self.mirror.is_silent:
-                await self._acquire_again()
+            if self.mirror.is_silent and woken - self._arrived_at < interval:
+                self._look_again()
+            await self._keeper.look()
 
-    async def _acquire_again(self) -> None:
-        try:
-            await self.acquire()
-        except ControlLostError:
-            self._wants_control = False  # somebody else was first; whose turn it is then people decide
-        except RobotiqError:
-            pass  # again in a moment
+    def _look_again(self) -> None:
+        """What is heard seems to be old: it is, or the agent's clock stood still. An answer tells."""
+        if self._looking is None or self._looking.done():
+            self._looking = self.spawn(self.ask_quietly("info", {}, ANSWER_S))
 
     def _fall_silent(self, at: float) -> None:
         if self.mirror.is_silent:
             return
         log.warning("%s: the agent is silent", self.name)
         self.mirror.fall_silent(at)
-        self._lose_control("expired", "the agent is silent")
+        self._keeper.lose("expired", "the agent is silent")
         self._requests.fall_silent()
 
     # -- control ---------------------------------------------------------------------------------------
 
-    async def acquire(self, *, take: bool = False) -> None:
-        """Get the lease.
+    @property
+    def is_in_control(self) -> bool:
+        """Whether this hand holds the lease, as far as it knows."""
+        return self._keeper.is_in_control
 
-        Raises:
-            ControlLostError: another client holds it, and it is not to be taken away.
-            RobotiqError: the agent did not answer.
-        """
-        async with self._acquiring:
-            if self.is_in_control:
-                await self._renew()  # it may have been lost without a word
-            if self.is_in_control:
-                return  # asked for again, the agent would take what is under way for forgotten
-            what = {"what": "take" if take else "acquire", "label": label()}
-            value = await self.ask("lease", what, timeout=ANSWER_S)
-            with reading("a lease"):
-                self.lease = int(value["lease"])
-            self.is_in_control, self._wants_control, self.lost = True, True, None
+    @property
+    def lease(self) -> int:
+        """Number of the lease it holds, or held last."""
+        return self._keeper.lease
+
+    @property
+    def lost(self) -> ControlLostError | None:
+        """Why control was lost; None while it is held, or was never asked for."""
+        return self._keeper.lost
+
+    async def acquire(self, *, take: bool = False) -> None:
+        """Get the lease; see :meth:`LeaseKeeper.acquire`."""
+        await self._keeper.acquire(take=take)
 
     async def release(self, *, halt: bool) -> None:
-        """Give the lease back.
-
-        Raises:
-            RobotiqError: the agent did not answer, or the fingers were not seen to stop.
-        """
-        self._wants_control = False
-        if self.is_in_control:
-            self._lose_control("released", "it was given back")
-            await self.ask("lease", {"what": "release", "halt": halt}, timeout=RELEASE_S)
-
-    async def _renew(self) -> None:
-        with suppress(RobotiqError):
-            await self.ask("lease", {"what": "renew"}, timeout=self._window)
-
-    def _lose_control(self, reason: str, why: str) -> None:
-        if not self.is_in_control:
-            return
-        self.is_in_control = False
-        # After a halt or a take of somebody else nobody takes it back without having been asked to.
-        self._wants_control = self._wants_control and reason not in ("taken", "halted", "held", "released")
-        self.lost = ControlLostError(f"{self.name} is not commanded from here any more: {why}", reason)
-        if reason != "released":
-            log.warning("%s", self.lost)
+        """Give the lease back; see :meth:`LeaseKeeper.release`."""
+        await self._keeper.release(halt=halt)
 
     def check_control(self) -> None:
         """Refuse commands of a hand that only reads, or has lost the lease.
@@ -374,16 +325,12 @@ class RemoteSession:
         """
         if self.mirror.is_silent:
             raise ConnectionLostError(f"{self.name}: the agent is silent: nothing was asked")
-        if not self.is_in_control:
-            lost = self.lost
-            if lost is None:
-                raise ControlLostError("this hand only reads: acquire() the lease first", "released")
-            raise ControlLostError(str(lost), lost.reason)
+        self._keeper.check()
 
     # -- asking ----------------------------------------------------------------------------------------
 
     async def ask(self, verb: str, arguments: Fields | None = None, **how: Any) -> Any:  # noqa: ANN401
-        """Ask the agent, once; see :meth:`Requests.send` for what else it takes and raises."""
+        """Ask the agent, once; see :meth:`Requests.post` for what else it takes and raises."""
         return await self.send(self.call(arguments), verb, **how)
 
     def call(self, arguments: Fields | None = None) -> Call:
@@ -410,7 +357,7 @@ class RemoteSession:
             self.check_running()
             raise
         if news:
-            self._hear_status(news, in_turn=False)
+            self._hear_status(news, in_turn=False, asked=posted.asked_at)
         try:
             return answer.outcome(self.mirror.clock)
         except MoveTimeoutError as error:
@@ -420,19 +367,21 @@ class RemoteSession:
             if posted.verb != "lease":
                 self.check_running()  # the lease was given back at the end of the run
             if posted.verb != "halt" and error.reason != "late" and posted.call.lease == self.lease:
-                self._lose_control(error.reason, str(error))
+                self._keeper.lose(error.reason, str(error))
             raise
+
+    async def ask_quietly(self, verb: str, arguments: Fields, timeout: float) -> None:
+        """Ask for what the answer does by itself."""
+        with suppress(RobotiqError):
+            await self.ask(verb, arguments, timeout=timeout)
 
     def call_off(self, call: Call) -> asyncio.Task[Any] | None:
         """Nobody waits for a request any more: what it set going is to be held."""
         if not self.is_in_control or self.is_over:
             return None
 
-        async def ask() -> None:
-            with suppress(RobotiqError):  # then the lease ends, and the agent holds by itself
-                await self.ask("cmd/cancel", {"number": call.number}, timeout=self._window)
-
-        return self.spawn(ask())
+        # If it is not heard the lease ends, and the agent holds by itself.
+        return self.spawn(self.ask_quietly("cmd/cancel", {"number": call.number}, self.window))
 
     def spawn(self, work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
         """Do something beside; it ends with the run."""
