@@ -35,6 +35,8 @@ from robotiq_async import (
 )
 from robotiq_async.cli.consent import consent
 from robotiq_async.cli.failures import CommandError, UsageError
+from robotiq_async.fleet.remote.remote_hand import RemoteHand
+from robotiq_async.protocol import Hand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
 WARNING = """ALL its fingers MOVE. It is activated (they open and close to their stops), then
@@ -48,7 +50,7 @@ T = TypeVar("T")
 
 
 async def run(
-    address: str, shown: Callable[[RobotiqHand], AbstractAsyncContextManager[object]] = nullcontext
+    address: str, shown: Callable[[Hand], AbstractAsyncContextManager[object]] = nullcontext
 ) -> None:
     """The whole demo.
 
@@ -60,9 +62,10 @@ async def run(
         RobotiqError: the gripper or the link failed.
     """
     async with gripper(address) as (where, simulated):
-        hand = RobotiqHand(where)
+        kind: type[RemoteHand | RobotiqHand] = RemoteHand if where.startswith("zenoh:") else RobotiqHand
+        hand: Hand = kind(where)
         transitions = hand.transitions()  # Opened before start(), it misses nothing.
-        print(f"async with RobotiqHand({where!r}) as hand:  # connects and activates", flush=True)
+        print(f"async with {kind.__name__}({where!r}) as hand:  # connects and activates", flush=True)
         async with shown(hand), hand:
             await movements(hand)
             await speeds(hand)
@@ -84,7 +87,7 @@ async def gripper(address: str) -> AsyncIterator[tuple[str, SimulatedGripper | N
         yield server.address, server.gripper
 
 
-async def movements(hand: RobotiqHand) -> None:
+async def movements(hand: Hand) -> None:
     """Part 1: the fingers, and the scissor that sets the width between B and C."""
     title("1. Basic movements")
     await call(hand.set_speed, 255)
@@ -99,7 +102,7 @@ async def movements(hand: RobotiqHand) -> None:
     await call(hand.move, WIDTH_NORMAL, Finger.SCISSOR)
 
 
-async def speeds(hand: RobotiqHand) -> None:
+async def speeds(hand: Hand) -> None:
     """Part 2: a speed for each finger, then one for the group."""
     title("2. Speeds")
     await call(hand.set_speed, 255, Finger.A)
@@ -111,7 +114,7 @@ async def speeds(hand: RobotiqHand) -> None:
     await call(hand.open)
 
 
-async def forces(hand: RobotiqHand, simulated: SimulatedGripper | None) -> None:
+async def forces(hand: Hand, simulated: SimulatedGripper | None) -> None:
     """Part 3: a force for each finger and for a group; a contact is a result, not an error."""
     title("3. Forces")
     if simulated is not None:
@@ -135,7 +138,7 @@ def grasp(result: MoveResult) -> None:
     read("result.peak_current_ma", peaks)
 
 
-async def status(hand: RobotiqHand) -> None:
+async def status(hand: Hand) -> None:
     """Part 4, first half: what the gripper says, once and as a stream."""
     title("4. Status and faults")
     read("hand.state", hand.state)
@@ -150,7 +153,7 @@ async def status(hand: RobotiqHand) -> None:
     read("hand.statistics.period_p50", f"{hand.statistics.period_p50 * 1000:.2f} ms")
 
 
-async def watch(hand: RobotiqHand) -> None:
+async def watch(hand: Hand) -> None:
     """Print readings while the hand moves."""
     due = 0.0
     async with aclosing(hand.statuses()) as statuses:
@@ -163,7 +166,7 @@ async def watch(hand: RobotiqHand) -> None:
                 break
 
 
-async def faults(hand: RobotiqHand, simulated: SimulatedGripper | None) -> None:
+async def faults(hand: Hand, simulated: SimulatedGripper | None) -> None:
     """Part 4, second half: a call that is refused, and a fault with the way out of it."""
     note("a call that makes no sense now is refused, and nothing is sent")
     with suppress(InvalidStateError):
@@ -255,7 +258,12 @@ def read(expression: str, value: object) -> None:
 def main() -> int:
     """Run from the shell without the extra ``cli``."""
     parser = argparse.ArgumentParser(description="The robotiq_async demo. The fingers move.")
-    parser.add_argument("address", nargs="?", default="sim://", help="tcp://HOST, rtu://DEVICE or sim://")
+    parser.add_argument(
+        "address",
+        nargs="?",
+        default="sim://",
+        help="tcp://HOST, rtu://DEVICE, zenoh://SITE/HOST/NAME or sim://",
+    )
     parser.add_argument("--yes", "-y", action="store_true", help="do not ask before moving")
     options = parser.parse_args()
     # As Ctrl-C does: leaving ``async with`` stops the fingers.

@@ -176,6 +176,16 @@ class Hand(Protocol):
     ) -> MoveResult:
         """Close the fingers, not the connection: :meth:`move` to 255."""
 
+    async def hold(self, fingers: Finger | int = Finger.ALL) -> None:
+        """Ask axes that move to stay where they are; returns when the gripper has acknowledged it.
+
+        An axis in contact keeps its grip, and one at rest is left alone. Moves of these axes end with
+        MoveSupersededError. In an activation, a release or a reset nothing is sent.
+
+        Raises:
+            RobotiqError: not connected, or the acknowledgement did not come.
+        """
+
     async def halt(self) -> None:
         """Stop every axis now; returns when the gripper shows it. The next command goes again.
 

@@ -6,14 +6,15 @@ import asyncio
 import inspect
 import logging
 import os
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 
 import pytest
 import pytest_asyncio
 from hypothesis import settings
 
-from robotiq_async import RobotiqHand
+from robotiq_async import RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from tests.virtual import VirtualLoop
 
 # The suite tries the same examples every time; HYPOTHESIS_PROFILE=explore tries new ones, and more.
 settings.register_profile("suite", derandomize=True, deadline=None)
@@ -28,6 +29,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.fixturenames.insert(0, "nothing_left_running")
 
 
+def pytest_asyncio_loop_factories(item: pytest.Item) -> dict[str, Callable[[], asyncio.AbstractEventLoop]]:
+    """Let what is marked so run in virtual time, fixtures and all."""
+    if item.get_closest_marker("virtual_time"):
+        return {"virtual": VirtualLoop}
+    return {"real": asyncio.new_event_loop}
+
+
 @pytest_asyncio.fixture
 async def nothing_left_running(caplog: pytest.LogCaptureFixture) -> AsyncIterator[None]:
     """Fail a test that leaves a task behind or that the event loop had to complain about."""
@@ -39,13 +47,43 @@ async def nothing_left_running(caplog: pytest.LogCaptureFixture) -> AsyncIterato
         task.cancel()
     assert not left, f"tasks left running: {left}"
     complaints = [record.getMessage() for record in caplog.get_records("call") if record.name == "asyncio"]
+    loop = asyncio.get_running_loop()
+    if isinstance(loop, VirtualLoop):
+        complaints += loop.complaints
     assert not complaints, f"the event loop complained: {complaints}"
 
 
+class Clock:
+    """The time of the loop, that can be moved ahead."""
+
+    def __init__(self) -> None:
+        self.ahead = 0.0
+        self._loop = asyncio.get_running_loop()
+
+    def __call__(self) -> float:
+        return self._loop.time() + self.ahead
+
+
+async def started(hand: RobotiqHand, clock: Clock) -> None:
+    """Start a hand; the seconds in which it activates its gripper are skipped."""
+    transitions = hand.transitions()
+    starting = asyncio.create_task(hand.start())
+    while (await anext(transitions)).target is not State.WF_ACTIVATION:
+        pass
+    clock.ahead += 10
+    await starting
+
+
 @pytest.fixture
-async def gripper() -> SimulatedGripper:
+async def clock() -> Clock:
+    """The gripper's."""
+    return Clock()
+
+
+@pytest.fixture
+async def gripper(clock: Clock) -> SimulatedGripper:
     """A fast one that stops where it is told to."""
-    return SimulatedGripper(speedup=20, spread=False)
+    return SimulatedGripper(clock, speedup=20, spread=False)
 
 
 @pytest.fixture
@@ -56,7 +94,9 @@ async def server(gripper: SimulatedGripper) -> AsyncIterator[SimulatorServer]:
 
 
 @pytest.fixture
-async def hand(server: SimulatorServer) -> AsyncIterator[RobotiqHand]:
+async def hand(server: SimulatorServer, clock: Clock) -> AsyncIterator[RobotiqHand]:
     """A hand at it, active."""
-    async with RobotiqHand(server.address) as hand:
-        yield hand
+    hand = RobotiqHand(server.address)
+    await started(hand, clock)
+    yield hand
+    await hand.stop()

@@ -151,6 +151,10 @@ class FakeHand:
     async def close(self, fingers: Finger | int = Finger.ABC, **options: Any) -> MoveResult:
         return await self.move(CLOSED, fingers, **options)
 
+    async def hold(self, fingers: Finger | int = Finger.ALL) -> None:  # noqa: ARG002
+        if self.state in (State.DISCONNECTED, State.SHUTDOWN):
+            raise NotStartedError("the fake hand does not run")
+
     async def halt(self) -> None:
         self._write(go=False)
 

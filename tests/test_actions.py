@@ -25,6 +25,8 @@ from robotiq_async.actions import ACTIONS, Operator
 from robotiq_async.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
+pytestmark = pytest.mark.virtual_time
+
 
 @pytest.fixture
 async def operator(gripper: SimulatedGripper) -> AsyncIterator[Operator]:
@@ -302,7 +304,7 @@ async def test_a_motion_that_is_on_its_way_counts(new: Someone, gripper: Simulat
     closing = asyncio.create_task(operator.act(ACTIONS["close"]))
     async with asyncio.timeout(20):
         while not gripper.request_registers[0] & 0x0800:  # noqa: ASYNC110
-            await asyncio.sleep(0)
+            await asyncio.sleep(0.0001)
     assert operator.has_moved
     assert STOPPED in await operator.leave()
     assert not gripper.is_moving

@@ -44,6 +44,8 @@ def test_importing_the_library_imports_neither_simulator_nor_extras() -> None:
         "robotiq_async.simulator",
         "robotiq_async.cli",
         "robotiq_async.telemetry",
+        "robotiq_async.fleet",
+        "zenoh",
         "matplotlib",
         "mcap",
     ):

@@ -56,7 +56,8 @@ def members(kind: type) -> dict[str, object]:
 
 
 def test_what_is_public_at_a_hand_is_in_the_protocol() -> None:
-    assert members(RobotiqHand).keys() == members(Hand).keys()
+    """But for what belongs to the process that owns the link."""
+    assert members(RobotiqHand).keys() - {"add_listener"} == members(Hand).keys()
 
 
 @pytest.mark.parametrize("name", sorted(name for name, each in members(Hand).items() if callable(each)))

@@ -12,8 +12,6 @@ from typing import Annotated, Final
 from cyclopts import Parameter, Token
 
 from ..enums import Finger
-from ..fleet.network.route import is_remote, parse_remote_address
-from ..link.address import parse_address
 from ..wire.checks import parse_fingers
 from .failures import CommandError, UsageError, usage
 
@@ -34,21 +32,6 @@ def is_loopback(host: str) -> bool:
         return ip_address(host).is_loopback
     except ValueError:
         return host.lower() == "localhost"
-
-
-def full_address(address: str) -> str:
-    """The full form of a gripper's address, wherever it is.
-
-    Raises:
-        UsageError: malformed.
-    """
-    with usage():
-        return str(parse_remote_address(address)[0] if is_remote(address) else parse_address(address))
-
-
-def is_simulated(address: str) -> bool:
-    """Whether the gripper is a simulated one inside the command."""
-    return full_address(address).startswith("sim:")
 
 
 def _integer(name: str, low: int, high: int) -> Callable[[object, Sequence[Token]], int]:

@@ -10,7 +10,7 @@ import sys
 from contextlib import suppress
 from typing import TextIO
 
-from .arguments import full_address, is_simulated
+from .addresses import full_address, is_simulated
 from .failures import CommandError, UsageError
 
 NOTE = "Nothing here has run on real hardware yet: keep a hand on the emergency stop."

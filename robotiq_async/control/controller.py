@@ -10,10 +10,9 @@ No I/O, no clock and no event loop. Whoever owns the link calls, once per cycle 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Final
 
-from ..enums import AXES, NO_AXES, Finger, Severity, State
+from ..enums import NO_AXES, Finger, Severity, State
 from ..errors import (
     ConnectionLostError,
     GripperFaultError,
@@ -22,21 +21,23 @@ from ..errors import (
     NotStartedError,
     RobotiqError,
 )
+from ..log import log
 from ..wire.request import Request
 from ..wire.status import RobotiqStatus
 from .callers import Callers
-from .foreign_commands import ForeignCommands
 from .merging import merged
-from .motion import Move, default_timeout
-from .pending import PendingCommand
+from .motion import Move
+from .pending import Command
 from .sequences import Sequence, activation, automatic_release, reset, shutdown
-from .shadow import RequestShadow
+from .shadow import NEVER, RequestShadow
 from .state_machine import RUNNING, StateMachine
 from .triggers import Trigger, classify
 from .waiters import Waiter
 
 _COMMANDED: Final = RUNNING | {State.FAULT}
 """The states in which the gripper follows requests, ours or another client's."""
+WARNING_S: Final = 1.0
+"""At most one warning about another client in this time."""
 
 
 class Controller:
@@ -57,16 +58,14 @@ class Controller:
         self.status: RobotiqStatus | None = None
         self.activates = False
         """Whether a gripper that is found reset is activated."""
-        self._foreign = ForeignCommands()
+        self.foreign_commands = 0
+        """How often another client was seen to command the gripper."""
+        self._warned = NEVER
         self._closing_time = closing_time
         self._shadow = RequestShadow(speed, force)
         self._callers = Callers()
-        self._step_is_sent = False
-        """Whether what is on the line is a step of the sequence under way."""
         self._step = 0
         """The write that carried the last step of a sequence: it sees only what came of it."""
-        self._is_stop = False
-        """Whether the sequence under way begins with a stop."""
         self._activating = False
         """Whether an activation of ours may still be under way: to be taken back if the hand is stopped."""
         self._hold_on_return = NO_AXES
@@ -74,30 +73,28 @@ class Controller:
 
     # -- what is asked ---------------------------------------------------------------------------------
 
-    def command(
-        self,
-        axes: Finger,
-        position: int | None,
-        speed: int | None,
-        force: int | None,
-        waiter: Waiter[None] | None = None,
-    ) -> None:
-        """Ask axes for a position, a speed, a force; goes out with the next write.
+    def command(self, command: Command, waiter: Waiter[None] | None = None) -> None:
+        """Ask axes for something; it goes out with the next write.
 
         Raises:
             RobotiqError: the hand takes no command now.
         """
         self.machine.fire(Trigger.ASK_COMMAND, self.status)
-        self._callers.command(axes, position, speed, force, waiter)
+        self._callers.command(command, waiter)
 
-    def move(self, move: Move, speed: int | None, force: int | None) -> None:
+    def move(self, move: Move, speed: int | None, force: int | None) -> float:
         """Ask for a move; its end is told to its waiter.
 
+        Returns its default timeout in seconds, from where its axes are.
+
         Raises:
             RobotiqError: the hand takes no command now.
         """
-        self.machine.fire(Trigger.ASK_COMMAND, self.status)
-        self._callers.move(move, speed, force)
+        self.command(Command(move.axes, move.position, speed, force))
+        self._callers.moves.add(move)
+        assert self.status is not None, "the hand takes commands, so a status has been read"
+        speeds = self._shadow.speeds | self._callers.pending.speeds
+        return move.default_timeout(self.status, speeds, self._closing_time)
 
     def abandon(self, move: Move, *, unseen: bool = False) -> None:
         """Nobody waits for this move any more: hold those of its axes that still move.
@@ -109,6 +106,17 @@ class Controller:
         elif unseen and move.was_lost:
             self._hold_on_return |= move.axes
             self._hold_what_was_lost()
+
+    def hold(self, axes: Finger, waiter: Waiter[None]) -> None:
+        """Hold those of some axes that move, whoever moves them; in a sequence there is nothing to do.
+
+        Raises:
+            RobotiqError: the gripper cannot be reached.
+        """
+        if self.machine.fire(Trigger.ASK_HOLD, self.status):
+            self._callers.hold(axes, "hold() took over", waiter)
+        else:
+            waiter.set_result(None)
 
     def halt(self, waiter: Waiter[None]) -> None:
         """Clear rGTO; where nothing moves, there is nothing to do. A sequence is ended by :meth:`reset`.
@@ -123,8 +131,7 @@ class Controller:
 
     def activate(self) -> None:
         """Begin an activation, unless the gripper is active or activating; raises why it is not possible."""
-        if self.machine.fire(Trigger.ASK_ACTIVATE, self.status):
-            self._begin_activation()
+        self._begin_activation(Trigger.ASK_ACTIVATE)
 
     def reset(self, trigger: Trigger = Trigger.ASK_RESET) -> None:
         """Begin a reset; one that is about to be sent already will do.
@@ -137,7 +144,7 @@ class Controller:
         """
         if self.machine.fire(trigger, self.status):
             self._callers.fail(MoveSupersededError(f"{trigger.value} took over"))
-            self._begin(reset(self._shadow.at_rest), is_stop=True)
+            self._begin(reset(self._shadow.at_rest))
 
     def release(self) -> None:
         """Begin an automatic release.
@@ -155,7 +162,6 @@ class Controller:
         """The hand is being stopped: nothing more is taken, and whoever waits is told."""
         self.machine.fire(Trigger.ASK_STOP)
         self._callers.fail(NotStartedError("the hand was stopped"))
-        self._callers.drop_sent()
         self.machine.drop_sequence()
 
     def stopped(self) -> None:
@@ -169,37 +175,18 @@ class Controller:
         An activation that this hand began is taken back (rACT = 0): clearing rGTO would not stop it.
         """
         if self._activating:
-            self._begin(reset(self._shadow.at_rest), is_stop=True)
+            self._begin(reset(self._shadow.at_rest))
         elif self.status is not None:
-            self._begin(shutdown(self._last_image), is_stop=self._last_image(self.status) is not None)
+            self._begin(shutdown(self._shadow.last_image))
 
     # -- what is known ---------------------------------------------------------------------------------
 
     @property
-    def foreign_commands(self) -> int:
-        """How often another client was seen to command the gripper."""
-        return self._foreign.count
-
-    @property
     def is_moving(self) -> bool:
         """Whether an axis moves, or will because of a command that does not act yet."""
-        status = self.status
-        if status is None or self.machine.state not in RUNNING:
-            return status is not None and status.is_moving
-        return status.is_moving or bool(self._callers.pending.positions) or self._shadow.may_begin_to_move
-
-    def move_timeout(self, position: int, axes: Finger, speed: int | None) -> float:
-        """The default timeout of a move from where the axes are, in seconds.
-
-        Raises:
-            RobotiqError: the hand takes no command now.
-        """
-        if self.status is None or self.machine.state not in RUNNING:
-            self.machine.fire(Trigger.ASK_COMMAND, self.status)
-        assert self.status is not None, "the hand is running, so a status has been read"
-        has = {axis: request.speed for axis, request in zip(AXES, self._shadow.settings, strict=True)}
-        speeds = has | self._callers.pending.speeds if speed is None else dict.fromkeys(AXES, speed)
-        return default_timeout(position, axes, self.status, speeds, self._closing_time)
+        if self.status is None or self.status.is_moving or self.machine.state not in RUNNING:
+            return self.status is not None and self.status.is_moving
+        return bool(self._callers.pending.positions) or self._shadow.may_begin_to_move
 
     # -- the cycle -------------------------------------------------------------------------------------
 
@@ -214,8 +201,7 @@ class Controller:
             return  # the sequence decides what it means
         before, condition = self.machine.state, classify(status)
         if before is State.DISCONNECTED and condition is Trigger.SEEN_RESET and self.activates:
-            self.machine.fire(Trigger.ACTIVATES)
-            self._begin_activation()
+            self._begin_activation(Trigger.ACTIVATES)
             return
         self.machine.fire(condition)
         after = self.machine.state
@@ -228,7 +214,7 @@ class Controller:
         # What nobody waits for is not worked out: this runs at every poll.
         if self._activating:
             self._see_activation(status)
-        if self._callers.wait_for_halt:
+        if self._callers.halting:
             self._callers.see_halt(status, self._shadow.acts)
         if after in RUNNING:
             self._shadow.see_contacts(status)
@@ -244,9 +230,11 @@ class Controller:
     @property
     def is_urgent(self) -> bool:
         """Whether a stop is to be written. It does not wait for a status that may never come."""
-        if self.machine.is_busy:
-            return self._is_stop and not self._step
-        return self._callers.pending.halting is not None
+        if not self.machine.is_busy or self.status is None:
+            return self._callers.pending.halting is not None
+        state, may_move = self.machine.state, self._activating or self._shadow.may_go(self.status)
+        stops = state is State.DO_RESET or (state is State.DO_SHUTDOWN and may_move)
+        return stops and not self._step
 
     def decide(self, now: float) -> Request | None:
         """The image to write now, after the status just seen, or None. It counts as sent from here on."""
@@ -265,7 +253,7 @@ class Controller:
         if pending.holds_at_most and image == shadow.base:
             # Nothing drifts; but what was written before may not act yet, and then something might.
             if shadow.is_settled:
-                self._callers.pending = PendingCommand()
+                self._callers.nothing_to_send()
                 self.machine.delivered()
             return None
         sent = self._callers.take()
@@ -276,9 +264,9 @@ class Controller:
 
     def acknowledged(self, now: float) -> None:
         """The image was acknowledged."""
-        self._callers.acknowledged(self._shadow.acknowledged(now))
-        step, self._step_is_sent = self._step_is_sent, False
-        if step or (not self.machine.is_busy and self._callers.pending.is_empty):
+        number = self._shadow.acknowledged(now)
+        self._callers.acknowledged(number)
+        if number == self._step or (not self.machine.is_busy and self._callers.pending.is_empty):
             self.machine.delivered()
 
     def lost(self, why: RobotiqError | None = None) -> None:
@@ -287,20 +275,19 @@ class Controller:
         error = ConnectionLostError(f"the link went down before this was done: {why}")
         error.__cause__ = why
         self._hold_on_return |= self._callers.lost(error)
-        self._step_is_sent = False
         self.machine.drop_sequence()
         self._shadow.lost()
 
     # -- sequences -------------------------------------------------------------------------------------
 
-    def _begin_activation(self) -> None:
-        self._activating = True
-        self._begin(activation(self._shadow.at_rest))
+    def _begin_activation(self, trigger: Trigger) -> None:
+        if self.machine.fire(trigger, self.status):
+            self._activating = True
+            self._begin(activation(self._shadow.at_rest))
 
-    def _begin(self, sequence: Sequence, *, is_stop: bool = False) -> None:
+    def _begin(self, sequence: Sequence) -> None:
         self.machine.begin(sequence)
-        self._step, self._is_stop = 0, is_stop
-        self._step_is_sent = False  # what is on the line now was a step of another one
+        self._step = 0
         self._hold_on_return = NO_AXES
         self._shadow.forget_contacts()
 
@@ -310,7 +297,6 @@ class Controller:
             return None
         image = self.machine.advance(status)
         if image is not None:
-            self._step_is_sent = True
             self._step = self._shadow.writing(image, NO_AXES, now)
         elif not self.machine.is_busy:
             self._after_sequence(status)
@@ -325,19 +311,6 @@ class Controller:
             self._take_over(status)
         if self._activating:
             self._see_activation(status)
-
-    def _last_image(self, status: RobotiqStatus) -> Request | None:
-        """The image to leave the gripper with; None when there is nothing to stop."""
-        shadow = self._shadow
-        if classify(status) is Trigger.SEEN_READY and not shadow.is_ours(status):
-            shadow.adopt(status)
-        if not status.go_echo and shadow.is_settled:
-            return None
-        # A gripper that lost its activation unnoticed must not be activated by our shutdown, nor one
-        # that a reset of ours is just about to reach; and one that others have activated not be reset.
-        base = shadow.base
-        active = status.activation_echo and (base.activate or shadow.is_settled)
-        return replace(base, activate=active, go=False)
 
     def _see_activation(self, status: RobotiqStatus) -> None:
         """See whether an activation of ours has come to its end."""
@@ -377,9 +350,12 @@ class Controller:
 
     def _take_over(self, status: RobotiqStatus) -> None:
         """Another client commands the gripper: take over its requests, or our next write undoes them."""
-        self._foreign.see(status)
+        self.foreign_commands += 1
+        if status.timestamp - self._warned >= WARNING_S:
+            self._warned = status.timestamp
+            log.warning("another client commands the gripper: %r", status)
         self._shadow.adopt(status)
-        self._callers.pending.hold &= self._shadow.ours
+        self._callers.pending.hold &= self._shadow.ours | self._callers.pending.asked_to_hold
         self._callers.moves.fail(
             MoveSupersededError("another client commands the gripper"),
             lambda move: move.write is not None and not move.is_under(status),
@@ -387,13 +363,13 @@ class Controller:
 
     def _leave(self, after: State, status: RobotiqStatus) -> None:
         """The gripper is not active any more, or reports a fault: nothing asked before may resume."""
-        if after is not State.FAULT:
-            fault = after is State.ATR_DONE
-            lost = NotActivatedError("the gripper lost its activation")
-            self._callers.fail(GripperFaultError(status.fault) if fault else lost)
-            return
-        self._callers.fail_but_halts(GripperFaultError(status.fault))
-        if status.activation_echo:
+        if after not in (State.FAULT, State.ATR_DONE):
+            self._callers.fail(NotActivatedError("the gripper lost its activation"))
+        elif after is State.ATR_DONE:
+            self._callers.fail(GripperFaultError(status.fault))
+        else:
+            self._callers.fail_but_stops(GripperFaultError(status.fault))
+        if after is State.FAULT and status.activation_echo:
             # Which axes drift is decided when the hold is written: a command that was sent just before
             # may not act yet, and its motion would begin when the fault clears.
             self._callers.hold(self._shadow.ours, "the fingers are held")

@@ -77,6 +77,22 @@ class Move:
         self._waiter = waiter
         self._peak = dict.fromkeys((axis for axis in AXES if axis in axes), 0)
 
+    def default_timeout(
+        self, status: RobotiqStatus, speeds: Mapping[Finger, int], closing_time: Callable[[int], float]
+    ) -> float:
+        """Seconds it may take: twice the expected time plus 2 s.
+
+        The expected time is that of the slowest addressed axis. The scissor has no published figure and is
+        taken for a finger.
+
+        Args:
+            status: where the axes are.
+            speeds: of every axis.
+            closing_time: seconds of a full closing at a speed.
+        """
+        ways = {axis: abs(self.position - status.position(axis)) / STROKE_COUNTS for axis in self._peak}
+        return 2 * max(way * closing_time(speeds[axis]) for axis, way in ways.items()) + MARGIN_S
+
     def see(self, status: RobotiqStatus) -> None:
         """Take in the currents of a status read after the command was sent."""
         for axis, peak in self._peak.items():
@@ -157,30 +173,3 @@ class LiveMoves:
         self._moves = [move for move in self._moves if move not in failing]
         for move in failing:
             move.fail(error)
-
-
-def default_timeout(
-    position: int,
-    axes: Finger,
-    status: RobotiqStatus,
-    speeds: Mapping[Finger, int],
-    closing_time: Callable[[int], float],
-) -> float:
-    """Seconds a move may take: twice the expected time plus 2 s.
-
-    The expected time is that of the slowest addressed axis. The scissor has no published figure and is
-    taken for a finger.
-
-    Args:
-        position: target in counts.
-        axes: the addressed axes.
-        status: where they are.
-        speeds: of every axis.
-        closing_time: seconds of a full closing at a speed.
-    """
-    expected = max(
-        abs(position - status.position(axis)) / STROKE_COUNTS * closing_time(speeds[axis])
-        for axis in AXES
-        if axis in axes
-    )
-    return 2 * expected + MARGIN_S

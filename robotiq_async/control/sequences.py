@@ -17,6 +17,7 @@ from ..errors import GripperFaultError, NotActivatedError
 from ..wire.request import Request
 from ..wire.status import RobotiqStatus
 from .triggers import Trigger, classify
+from .writes import WINDOW_S
 
 Sequence = Generator[Request | None, RobotiqStatus, None]
 """Yields what to write now, is sent the next status that counts."""
@@ -64,14 +65,20 @@ def automatic_release(at_rest: Image) -> Sequence:
     Does nothing when the gripper has been reset: the raised rACT would activate it.
 
     Raises:
-        NotActivatedError: the gripper was reset meanwhile.
+        NotActivatedError: the gripper was reset meanwhile; perhaps it was activated again at once.
     """
     status = yield None
     if not status.activation_echo:
         return
+    asked, begun = status.timestamp, False
     status = yield replace(at_rest(status), activate=True, release=True)
     while status.fault is not Fault.AUTOMATIC_RELEASE_DONE:
-        if classify(status) is Trigger.SEEN_RESET:
+        begun = begun or status.fault is Fault.AUTOMATIC_RELEASE
+        # gIMC is 0 during a release. Until it has been seen, a status may be from before the request, and the
+        # fault from before the release.
+        goes_on = status.is_reset or status.fault is Fault.AUTOMATIC_RELEASE
+        is_sure = begun or (status.timestamp - asked > WINDOW_S and not status.fault.is_serious)
+        if classify(status) is Trigger.SEEN_RESET or (is_sure and not goes_on):
             raise NotActivatedError("the gripper was reset during the automatic release")
         status = yield None
 

@@ -8,6 +8,8 @@ written, and an adopted gripper's requests are only known from its status. No I/
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import reduce
+from operator import or_
 from typing import Final
 
 from ..enums import AXES, NO_AXES, Finger, ObjectStatus
@@ -15,6 +17,7 @@ from ..wire.request import AxisRequest, Request
 from ..wire.status import RobotiqStatus
 from .adoption import Adoption
 from .contact import TOLERANCE, agrees
+from .triggers import Trigger, classify
 from .writes import SILENT_S, WINDOW_S, WriteHistory
 
 NEVER: Final = float("-inf")
@@ -43,8 +46,9 @@ class RequestShadow:
         """Axes that we have given a position since the gripper was found."""
         self._contacts: dict[Finger, tuple[ObjectStatus, int]] = {}
         """The contacts, and where, when the go bit was last seen set: gDT is not worth reading without it."""
-        self._arrived = Finger.ALL
-        """Axes that have been seen at rest under the position that they were asked last."""
+        self.arrived = Finger.ALL
+        """Axes that have been seen at rest under the position that they were asked last; the others move, or
+        are about to."""
         self._asked = 0.0
         """When the newest status was asked for. What it shows may be as old as that, however late its reply
         was looked at; so this is the time that the age of a write is measured by."""
@@ -64,10 +68,25 @@ class RequestShadow:
         """The base with rGTO clear and every axis asked to be where it is: nothing to wake."""
         return replace(self.base, go=False).with_positions({axis: status.position(axis) for axis in AXES})
 
+    def may_go(self, status: RobotiqStatus) -> bool:
+        """Whether rGTO is set, or an image that does not act yet may set it."""
+        return status.go_echo or not self.is_settled
+
+    def last_image(self, status: RobotiqStatus) -> Request | None:
+        """The image to leave the gripper with; None when there is nothing to stop."""
+        if classify(status) is Trigger.SEEN_READY and not self.is_ours(status):
+            self.adopt(status)
+        if not self.may_go(status):
+            return None
+        # A gripper that lost its activation unnoticed must not be activated by our shutdown, nor one
+        # that a reset of ours is just about to reach; and one that others have activated not be reset.
+        active = status.activation_echo and (self.base.activate or self.is_settled)
+        return replace(self.base, activate=active, go=False)
+
     @property
-    def settings(self) -> tuple[AxisRequest, ...]:
-        """Speed and force of each axis, as last written."""
-        return self._image.axes
+    def speeds(self) -> dict[Finger, int]:
+        """The speed of each axis, as last written."""
+        return {axis: request.speed for axis, request in zip(AXES, self._image.axes, strict=True)}
 
     @property
     def is_certain(self) -> bool:
@@ -110,16 +129,9 @@ class RequestShadow:
         """The axes that may move because we said so: all, unless somebody else's requests were adopted."""
         if self._adoption is None:
             return Finger.ALL
-        mask = NO_AXES
-        for axis in AXES:
-            if axis in self._moved and self._adopted.position(axis) == self._image.position(axis):
-                mask |= axis
-        return mask
-
-    @property
-    def arrived(self) -> Finger:
-        """The axes that have come to rest under their requests; the others move, or are about to."""
-        return self._arrived
+        adopted, image = self._adopted, self._image
+        unchanged = (axis for axis in AXES if adopted.position(axis) == image.position(axis))
+        return self._moved & reduce(or_, unchanged, NO_AXES)
 
     def acts(self, number: int) -> bool:
         """Whether the image of this number acts."""
@@ -133,10 +145,8 @@ class RequestShadow:
         self._adoption = None
         self._unsure_until = NEVER
         self._moved |= moved
-        self._arrived &= ~moved
-        for axis in AXES:
-            if axis in moved:
-                self._contacts.pop(axis, None)
+        self.arrived &= ~moved
+        self._contacts = {axis: at for axis, at in self._contacts.items() if axis not in moved}
         return self._writes.writing(image, now)
 
     def acknowledged(self, now: float) -> int:
@@ -200,21 +210,19 @@ class RequestShadow:
         """A sequence is over: what it wrote last is what the gripper has, and nothing else is on its way.
 
         Returns:
-            Whether the status shows that. If not, another client has written meanwhile.
+            Whether the status shows that. If not, another client has written meanwhile. rATR has no echo; a
+            gripper that follows requests does not follow that one.
         """
         self._writes.restart(self._image, status.echo, self._asked)
-        return status.echo == self._image.echo
+        return status.echo == self._image.echo and not self._image.release
 
     def see_arrivals(self, status: RobotiqStatus) -> None:
         """Remember which axes have come to rest, from a status of a gripper that has no fault.
 
         In a fault an axis that has not begun yet is at rest, too.
         """
-        if self._arrived is Finger.ALL or not (status.go_echo and self.is_settled):
-            return
-        for axis in AXES:
-            if status.finger_status(axis) is not ObjectStatus.IN_MOTION:
-                self._arrived |= axis
+        if self.arrived is not Finger.ALL and status.go_echo and self.is_settled:
+            self.arrived |= Finger.ALL & ~status.moving
 
     # -- grips -----------------------------------------------------------------------------------------
 
@@ -228,12 +236,14 @@ class RequestShadow:
 
     def gripping(self, status: RobotiqStatus) -> Finger:
         """The axes that gripped when rGTO was last set, are there still, and by the request they have."""
-        mask, base = NO_AXES, self.base
-        for axis, (what, at) in self._contacts.items():
-            is_there = abs(status.position(axis) - at) <= TOLERANCE
-            if is_there and agrees(base.position(axis), what, at, direction=0):
-                mask |= axis
-        return mask
+        base = self.base
+        gripping = (
+            axis
+            for axis, (what, at) in self._contacts.items()
+            if abs(status.position(axis) - at) <= TOLERANCE
+            and agrees(base.position(axis), what, at, direction=0)
+        )
+        return reduce(or_, gripping, NO_AXES)
 
     def forget_contacts(self) -> None:
         """A sequence begins: it lets go."""

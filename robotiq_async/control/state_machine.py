@@ -45,19 +45,17 @@ class Verdict(Enum):
     NOT_NOW = "InvalidStateError"
 
 
-_IGNORED, _LINK_DOWN, _NOT_STARTED = Verdict.IGNORED, Verdict.LINK_DOWN, Verdict.NOT_STARTED
-_NOT_ACTIVATED, _IN_FAULT = Verdict.NOT_ACTIVATED, Verdict.IN_FAULT
-
 Row = dict[Trigger, State | Verdict]
 """The entries of one state."""
 
-_USER: Final = (
-    Trigger.ASK_ACTIVATE,
-    Trigger.ASK_COMMAND,
-    Trigger.ASK_HALT,
-    Trigger.ASK_RELEASE,
-    Trigger.ASK_RESET,
-)
+
+def _all(triggers: tuple[Trigger, ...], entry: State | Verdict) -> Row:
+    return dict.fromkeys(triggers, entry)
+
+
+_STOPS: Final = (Trigger.ASK_HOLD, Trigger.ASK_HALT)
+_MOTIONS: Final = (Trigger.ASK_ACTIVATE, Trigger.ASK_COMMAND)
+_USER: Final = (*_MOTIONS, *_STOPS, Trigger.ASK_RELEASE, Trigger.ASK_RESET)
 _SEEN: Final[Row] = {
     Trigger.SEEN_READY: State.RUNNING_IDLE,
     Trigger.SEEN_BUSY: State.WF_ACTIVATION,
@@ -65,93 +63,64 @@ _SEEN: Final[Row] = {
     Trigger.SEEN_FAULT: State.FAULT,
     Trigger.SEEN_RELEASED: State.ATR_DONE,
 }
+_RUNNING: Final[Row] = _SEEN | {
+    Trigger.ASK_ACTIVATE: Verdict.IGNORED,
+    **_all((Trigger.ASK_COMMAND, *_STOPS), State.RUNNING_CC),
+}
+_FAULTY: Final[Row] = _SEEN | _all(_MOTIONS, Verdict.IN_FAULT)
 
 
-def _connected(entries: Row) -> Row:
-    """A row of a hand that has its link: it can always be stopped, and always lose its link."""
-    usual: Row = {trigger: _IGNORED if trigger.is_seen else Verdict.NOT_NOW for trigger in Trigger}
-    return usual | {Trigger.ASK_STOP: State.DO_SHUTDOWN, Trigger.LINK_LOST: State.DISCONNECTED} | entries
+def _row(entries: Row) -> Row:
+    """What is usual in a sequence, and wherever the hand has its link, with entries of its own."""
+    return {
+        **{trigger: Verdict.IGNORED if trigger.is_seen else Verdict.NOT_NOW for trigger in Trigger},
+        # No motion of a command is under way; and rACT = 0 is the only request that ends a sequence.
+        Trigger.ASK_HOLD: Verdict.IGNORED,
+        Trigger.ASK_HALT: State.DO_RESET,
+        Trigger.ASK_RESET: State.DO_RESET,
+        Trigger.ASK_STOP: State.DO_SHUTDOWN,
+        Trigger.LINK_LOST: State.DISCONNECTED,
+        **entries,
+    }
 
 
-def _all(triggers: tuple[Trigger, ...], verdict: State | Verdict) -> Row:
-    return dict.fromkeys(triggers, verdict)
-
-
-# An emergency is heard in every sequence; rACT = 0 is the only request that ends one.
-_EMERGENCY: Final[Row] = _all((Trigger.ASK_HALT, Trigger.ASK_RESET), State.DO_RESET)
-_OFF: Final[Row] = _connected(
-    _all(_USER, _NOT_STARTED) | {Trigger.ASK_STOP: _IGNORED, Trigger.LINK_LOST: _IGNORED}
+_OFF: Final[Row] = _row(
+    _all(_USER, Verdict.NOT_STARTED) | _all((Trigger.ASK_STOP, Trigger.LINK_LOST), Verdict.IGNORED)
 )
 
 TABLE: Final[dict[State, Row]] = {
-    State.DISCONNECTED: _connected(
+    State.DISCONNECTED: _row(
         _SEEN
-        | _all(_USER, _LINK_DOWN)
+        | _all(_USER, Verdict.LINK_DOWN)
         | {Trigger.ASK_START: State.DISCONNECTED, Trigger.ACTIVATES: State.DO_ACTIVATION}
     ),
-    State.DO_ACTIVATION: _connected(
-        _EMERGENCY | {Trigger.ASK_ACTIVATE: _IGNORED, Trigger.DELIVERED: State.WF_ACTIVATION}
+    State.DO_ACTIVATION: _row(
+        {Trigger.ASK_ACTIVATE: Verdict.IGNORED, Trigger.DELIVERED: State.WF_ACTIVATION}
     ),
-    State.WF_ACTIVATION: _connected(_EMERGENCY | _SEEN | {Trigger.ASK_ACTIVATE: _IGNORED}),
-    State.RUNNING_IDLE: _connected(
-        _SEEN
-        | {
-            Trigger.ASK_ACTIVATE: _IGNORED,
-            Trigger.ASK_COMMAND: State.RUNNING_CC,
-            Trigger.ASK_HALT: State.RUNNING_CC,
-            Trigger.ASK_RESET: State.DO_RESET,
-        }
+    State.WF_ACTIVATION: _row(_SEEN | {Trigger.ASK_ACTIVATE: Verdict.IGNORED}),
+    State.RUNNING_IDLE: _row(_RUNNING),
+    State.RUNNING_CC: _row(
+        _RUNNING | {Trigger.SEEN_READY: State.RUNNING_CC, Trigger.DELIVERED: State.RUNNING_IDLE}
     ),
-    State.RUNNING_CC: _connected(
-        _SEEN
-        | {
-            Trigger.SEEN_READY: State.RUNNING_CC,
-            Trigger.ASK_ACTIVATE: _IGNORED,
-            Trigger.ASK_COMMAND: State.RUNNING_CC,
-            Trigger.ASK_HALT: State.RUNNING_CC,
-            Trigger.ASK_RESET: State.DO_RESET,
-            Trigger.DELIVERED: State.RUNNING_IDLE,
-        }
-    ),
-    State.FAULT: _connected(
-        _SEEN
-        | {
-            Trigger.ASK_ACTIVATE: _IN_FAULT,
-            Trigger.ASK_COMMAND: _IN_FAULT,
-            Trigger.ASK_HALT: State.FAULT,
-            Trigger.ASK_RELEASE: State.DO_ATR,
-            Trigger.ASK_RESET: State.DO_RESET,
-        }
-    ),
-    State.DO_ATR: _connected(_EMERGENCY | {Trigger.DELIVERED: State.WF_ATR}),
-    State.WF_ATR: _connected(
-        _EMERGENCY | {Trigger.SEEN_RELEASED: State.ATR_DONE, Trigger.SEEN_RESET: State.RESET}
-    ),
-    State.ATR_DONE: _connected(
-        _SEEN
-        | {
-            Trigger.ASK_ACTIVATE: _IN_FAULT,
-            Trigger.ASK_COMMAND: _IN_FAULT,
-            Trigger.ASK_HALT: _IGNORED,
-            Trigger.ASK_RESET: State.DO_RESET,
-        }
-    ),
-    State.DO_RESET: _connected(
-        _all((Trigger.ASK_HALT, Trigger.ASK_RESET), _IGNORED) | {Trigger.DELIVERED: State.WF_RESET}
+    State.FAULT: _row(_FAULTY | _all(_STOPS, State.FAULT) | {Trigger.ASK_RELEASE: State.DO_ATR}),
+    State.DO_ATR: _row({Trigger.DELIVERED: State.WF_ATR}),
+    State.WF_ATR: _row(_SEEN),
+    State.ATR_DONE: _row(_FAULTY | {Trigger.ASK_HALT: Verdict.IGNORED}),
+    State.DO_RESET: _row(
+        _all((Trigger.ASK_HALT, Trigger.ASK_RESET), Verdict.IGNORED) | {Trigger.DELIVERED: State.WF_RESET}
     ),
     # A fault may outlast the request that clears it by a device cycle: only the reset itself counts.
-    State.WF_RESET: _connected(_EMERGENCY | {Trigger.SEEN_RESET: State.RESET}),
-    State.RESET: _connected(
+    State.WF_RESET: _row({Trigger.SEEN_RESET: State.RESET}),
+    State.RESET: _row(
         _SEEN
         | {
             Trigger.ASK_ACTIVATE: State.DO_ACTIVATION,
-            Trigger.ASK_COMMAND: _NOT_ACTIVATED,
-            Trigger.ASK_HALT: _IGNORED,
-            Trigger.ASK_RESET: State.DO_RESET,
+            Trigger.ASK_COMMAND: Verdict.NOT_ACTIVATED,
+            Trigger.ASK_HALT: Verdict.IGNORED,
         }
     ),
     State.DO_SHUTDOWN: _OFF | {Trigger.STOPPED: State.SHUTDOWN},
-    State.SHUTDOWN: _OFF | {Trigger.ASK_START: State.DISCONNECTED, Trigger.STOPPED: _IGNORED},
+    State.SHUTDOWN: _OFF | {Trigger.ASK_START: State.DISCONNECTED, Trigger.STOPPED: Verdict.IGNORED},
 }
 """For every state and trigger the state that follows, IGNORED, or the error."""
 
@@ -161,13 +130,14 @@ SEQUENCES: Final = frozenset(
     {State.DO_ACTIVATION, State.WF_ACTIVATION, State.DO_ATR, State.WF_ATR, State.DO_RESET, State.WF_RESET}
 )
 """Activation, release and reset: they lead somewhere by themselves, and clearing rGTO ends none of them."""
-_ABOUT_TO_SEND: Final = frozenset({State.DO_ACTIVATION, State.DO_ATR, State.DO_RESET, State.RUNNING_CC})
 
 
 def states_allowing(trigger: Trigger) -> frozenset[State]:
     """The states in which a trigger is not refused."""
     return frozenset(
-        state for state, row in TABLE.items() if isinstance(row[trigger], State) or row[trigger] is _IGNORED
+        state
+        for state, row in TABLE.items()
+        if isinstance(row[trigger], State) or row[trigger] is Verdict.IGNORED
     )
 
 
@@ -203,7 +173,7 @@ class StateMachine:
         target = TABLE[source][trigger]
         if target is source:
             return True  # quickly: most statuses show nothing new
-        if target is _IGNORED:
+        if target is Verdict.IGNORED:
             return False
         if isinstance(target, Verdict):
             raise refusal(trigger, source, status)
@@ -216,7 +186,7 @@ class StateMachine:
 
     def delivered(self) -> None:
         """What was about to be sent has been acknowledged, or is not sent after all."""
-        if self._state in _ABOUT_TO_SEND:
+        if isinstance(TABLE[self._state][Trigger.DELIVERED], State):
             self.fire(Trigger.DELIVERED)
 
     # -- the sequence under way ------------------------------------------------------------------------

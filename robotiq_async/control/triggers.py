@@ -21,6 +21,7 @@ class Trigger(Enum):
     ASK_START = "start()"
     ASK_ACTIVATE = "activate()"
     ASK_COMMAND = "a command"
+    ASK_HOLD = "hold()"
     ASK_HALT = "halt()"
     ASK_RELEASE = "atr()"
     ASK_RESET = "reset()"

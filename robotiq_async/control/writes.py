@@ -55,7 +55,8 @@ class WriteHistory:
     def __init__(self) -> None:
         """Know nothing yet: :meth:`restart` tells what the gripper shows."""
         self._writes: deque[_Write] = deque()
-        self._number = 0
+        self.last_number = 0
+        """The number of the last image."""
         self._shown: _Write | None = None
 
     @property
@@ -69,15 +70,10 @@ class WriteHistory:
         """Whether what is shown and what waits cannot be told apart by the echo."""
         return len({each.echo for each in self._writes}) <= 1
 
-    @property
-    def last_number(self) -> int:
-        """The number of the last image."""
-        return self._number
-
     def restart(self, image: Request, echo: Echo, now: float) -> None:
         """Take an image for what the gripper has now, and an echo for how it shows; forget the rest."""
-        self._number += 1
-        self._shown = _Write(self._number, image, echo, now, Phase.SHOWN)
+        self.last_number += 1
+        self._shown = _Write(self.last_number, image, echo, now, Phase.SHOWN)
         self._writes = deque([self._shown])
 
     def adopt(self, image: Request, echo: Echo, now: float) -> None:
@@ -86,19 +82,19 @@ class WriteHistory:
         That is a write that was on its way when another client wrote, or one that was not acknowledged
         before the link went down: it may have arrived all the same.
         """
-        shown = self._shown.number if self._shown is not None else self._number
+        shown = self._shown.number if self._shown is not None else self.last_number
         waiting = [each for each in self._writes if each.number > shown]
         self.restart(image, echo, now)
         for each in waiting:
-            self._number += 1
+            self.last_number += 1
             phase = Phase.OVERTAKEN if each.phase in _ARRIVED else Phase.IN_DOUBT
-            self._writes.append(replace(each, number=self._number, time=now, phase=phase))
+            self._writes.append(replace(each, number=self.last_number, time=now, phase=phase))
 
     def writing(self, image: Request, now: float) -> int:
         """An image is about to be sent; returns the number it goes by."""
-        self._number += 1
-        self._writes.append(_Write(self._number, image, image.echo, now))
-        return self._number
+        self.last_number += 1
+        self._writes.append(_Write(self.last_number, image, image.echo, now))
+        return self.last_number
 
     def acknowledged(self, now: float) -> None:
         """The last image was acknowledged."""

@@ -7,24 +7,26 @@ import json
 import secrets
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import count
 from types import TracebackType
 from typing import Any, Final, Self
 
 from ..enums import Fault, State
-from ..errors import NotAllStoppedError, RobotiqError
+from ..errors import AgentError, NotAllStoppedError, RobotiqError
 from ..log import log
 from ..session.clock import now
 from ..session.event_loop import running_loop
+from ..session.listeners import Listeners
 from ..session.streams import Channel, Stream
 from .network.bus import Bus, Undo, Urgency
 from .network.route import Route, default_route
+from .remote.persistence import until_answered
 from .remote.remote_hand import RemoteHand
-from .remote.requests import label
+from .remote.requests import NoAnswerError, label
 from .wire.envelope import Call, unpack_answer
 from .wire.names import ROOT, GripperName, check_name
 
 HALT_S: Final = 2.0
-ATTEMPT_S: Final = 0.3
 LOOK_S: Final = 0.5
 
 
@@ -84,7 +86,7 @@ class Fleet:
         self._undo: list[Undo] = []
         self._members: dict[GripperName, Member] = {}
         self._tokens: dict[GripperName, set[str]] = {}
-        self._changes: Channel[Member] = Channel()
+        self._changes: Channel[Member] = Channel(Listeners())
 
     async def __aenter__(self) -> Self:
         """Begin to listen, and find who is there already.
@@ -154,25 +156,25 @@ class Fleet:
 
     async def _halt(self, name: GripperName) -> str:
         """Ask until answered."""
-        bus, client, deadline = self._entered(), secrets.token_hex(8), now() + HALT_S
-        number = 0
-        while (left := deadline - now()) > 0:
-            number += 1
-            call = Call(name.base, client, number=number, arguments={"label": label()})
-            asked = now()
-            reply = await bus.ask(
-                name.key("halt"), call.pack(), timeout=min(left, ATTEMPT_S), urgency=Urgency.STOP
-            )
-            if reply is not None:
-                try:
-                    answer = unpack_answer(reply.payload)
-                    if answer.to == name.base and answer.number == number:
-                        answer.outcome(lambda stamp: stamp)
-                        return "stopped"
-                except (RobotiqError, TypeError, ValueError) as error:
-                    return f"refused: {error}"
-            await asyncio.sleep(max(0.0, min(0.05, asked + ATTEMPT_S - now())))
-        return "no answer"
+        bus, client, numbers = self._entered(), secrets.token_hex(8), count(1)
+
+        async def attempt(left: float) -> None:
+            call = Call(name.base, client, number=next(numbers), arguments={"label": label()})
+            reply = await bus.ask(name.key("halt"), call.pack(), timeout=left, urgency=Urgency.STOP)
+            if reply is None:
+                raise NoAnswerError("no answer")
+            answer = unpack_answer(reply.payload)
+            if answer.to != name.base or answer.number != call.number:
+                raise AgentError("another answer")
+            answer.outcome(lambda stamp: stamp)
+
+        try:
+            await until_answered(attempt, HALT_S)
+        except NoAnswerError:
+            return "no answer"
+        except (RobotiqError, TypeError, ValueError) as error:
+            return f"refused: {error}"
+        return "stopped"
 
     # -- inside ----------------------------------------------------------------------------------------
 

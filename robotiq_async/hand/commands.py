@@ -7,12 +7,11 @@ import asyncio
 import anyio
 
 from ..control.motion import Move, MoveResult
+from ..control.pending import Command
 from ..control.state_machine import SEQUENCES
 from ..control.triggers import Trigger
 from ..enums import CLOSED, OPEN, Finger
-from ..errors import (
-    MoveTimeoutError,
-)
+from ..errors import MoveTimeoutError
 from ..session.clock import now
 from ..wire.checks import check_byte, check_mask, check_optional_byte, check_timeout
 from .recovery import Recovery
@@ -36,7 +35,7 @@ class Commands(Recovery):
             RobotiqError: the hand takes no commands now, or the link went down before the
                 acknowledgement (the request is not sent again).
         """
-        await self._deliver(check_mask(fingers), position=check_byte("value", value))
+        await self._deliver(Command(check_mask(fingers), position=check_byte("value", value)))
 
     async def set_speed(self, value: int, fingers: Finger | int = Finger.ALL) -> None:
         """Set the speed of axes, also of a motion under way; never starts one.
@@ -48,7 +47,7 @@ class Commands(Recovery):
         Raises:
             TypeError, ValueError, RobotiqError: as :meth:`set_position`.
         """
-        await self._deliver(check_mask(fingers), speed=check_byte("value", value))
+        await self._deliver(Command(check_mask(fingers), speed=check_byte("value", value)))
 
     async def set_force(self, value: int, fingers: Finger | int = Finger.ALL) -> None:
         """Set the force of axes; never starts a motion. More force tightens a grip.
@@ -60,7 +59,7 @@ class Commands(Recovery):
         Raises:
             TypeError, ValueError, RobotiqError: as :meth:`set_position`.
         """
-        await self._deliver(check_mask(fingers), force=check_byte("value", value))
+        await self._deliver(Command(check_mask(fingers), force=check_byte("value", value)))
 
     def command(
         self,
@@ -91,7 +90,7 @@ class Commands(Recovery):
             raise ValueError("command() needs at least one of position, speed and force in 0..255, got none")
         position = check_optional_byte("position", position)
         speed, force = check_optional_byte("speed", speed), check_optional_byte("force", force)
-        self._asked().controller.command(axes, position, speed, force)
+        self._asked().controller.command(Command(axes, position, speed, force))
 
     async def move(
         self,
@@ -133,11 +132,10 @@ class Commands(Recovery):
         limit = check_timeout("timeout", timeout)
         session = self._asked()
         controller = session.controller
-        if limit is None:
-            limit = controller.move_timeout(target, axes, speed)
         ended: asyncio.Future[MoveResult] = session.waiter()
         move = Move(target, axes, now(), ended)
-        controller.move(move, speed, force)
+        usual = controller.move(move, speed, force)
+        limit = usual if limit is None else limit
         with session.counters.move() as note:
             try:
                 with anyio.move_on_after(limit):
@@ -177,6 +175,30 @@ class Commands(Recovery):
         """Close the fingers, not the connection (that is :meth:`stop`): :meth:`move` to 255."""
         return await self.move(CLOSED, fingers, speed=speed, force=force, timeout=timeout)
 
+    async def hold(self, fingers: Finger | int = Finger.ALL) -> None:
+        """Ask axes that move to stay where they are, whoever moves them; returns when it is acknowledged.
+
+        An axis in contact keeps its request and its grip, and one at rest is left alone: what a cancelled
+        move does to its axes. Awaited moves and pending requests of these axes end with MoveSupersededError,
+        and their other axes go on. When cancelled, the hold is sent all the same; one that a lost link keeps
+        from being acknowledged is made good when the link is back, unless another client moves the axes then.
+
+        In RESET and ATR_DONE, and during an activation, a release or a reset, no motion of a command is under
+        way: it returns, and nothing is sent. :meth:`halt` ends those.
+
+        Args:
+            fingers: mask of the axes.
+
+        Raises:
+            TypeError: a mask of the wrong type; nothing is sent.
+            ValueError: a mask outside its range; nothing is sent.
+            MoveSupersededError: reset() took over before it was sent.
+            NotActivatedError: the gripper lost its activation before it was sent.
+            RobotiqError: not connected, or the link went down before the acknowledgement.
+        """
+        axes, session = check_mask(fingers), self._asked()
+        await session.answered(lambda waiter: session.controller.hold(axes, waiter))
+
     async def halt(self) -> None:
         """Stop every axis now (rGTO = 0); the next command goes again, and moves only what it addresses.
 
@@ -198,10 +220,6 @@ class Commands(Recovery):
         else:
             await session.answered(session.controller.halt)
 
-    async def _deliver(
-        self, axes: Finger, *, position: int | None = None, speed: int | None = None, force: int | None = None
-    ) -> None:
+    async def _deliver(self, command: Command) -> None:
         session = self._asked()
-        await session.answered(
-            lambda waiter: session.controller.command(axes, position, speed, force, waiter)
-        )
+        await session.answered(lambda waiter: session.controller.command(command, waiter))

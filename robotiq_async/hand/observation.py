@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
 from typing import TypeVar
 
 from ..control.state_machine import StateMachine
 from ..enums import State
-from ..errors import (
-    ConnectionLostError,
-    NotStartedError,
-)
-from ..session.options import (
-    Options,
-)
+from ..errors import ConnectionLostError, NotStartedError
+from ..session.options import Options
 from ..session.session import Session
 from ..session.statistics import Counters, Statistics
 from ..session.streams import Channel, Channels, SentRequest, Stream, Transition
@@ -122,6 +119,34 @@ class Observation:
         kept = None if buffer is None else check_int("buffer", buffer, 1, 1_000_000)
         return self._open(self._channels.requests, kept)
 
+    def add_listener(
+        self, callback: Callable[[RobotiqStatus | Transition | SentRequest], None]
+    ) -> Callable[[], None]:
+        """Call a plain function with every status, change of state and request written, as it happens.
+
+        It is called in the hand's event loop, in the turn in which it happens: before any reader of a stream
+        and any caller that waits goes on. So it must be quick, and it must not block: every poll waits for
+        it. What happens is told in its order; a change of state comes before the status or the request that
+        leads to it, and what a callback brings about itself after what it is called with.
+
+        A callback that raises is logged with its traceback and not called again; the hand goes on. Added
+        before the start it waits, and it outlasts :meth:`stop`, until it is removed.
+
+        Args:
+            callback: takes a RobotiqStatus, a Transition or a SentRequest.
+
+        Returns:
+            What removes it again; calling that twice does no harm.
+
+        Raises:
+            TypeError: callback cannot be called, or is a coroutine function.
+            RuntimeError: called from another thread or event loop while the hand runs.
+        """
+        if inspect.iscoroutinefunction(callback) or not callable(callback):
+            raise TypeError(f"callback must be a plain function, got {callback!r}")
+        self._check_owner()
+        return self._channels.listeners.add(callback)
+
     async def wait_for_state(self, *states: State, timeout: float | None = None) -> State:
         """Wait until the hand is, if only for a moment, in one of these states, and return it.
 
@@ -180,8 +205,11 @@ class Observation:
         return status
 
     def _open(self, channel: Channel[T], buffer: int | None) -> Stream[T]:
-        """A stream; not from another thread while the hand runs, for the streams are not locked."""
+        self._check_owner()
+        return channel.open(buffer)
+
+    def _check_owner(self) -> None:
+        """Refuse another thread while the hand runs: neither streams nor listeners are locked."""
         session = self._session
         if session is not None and not session.is_over and not session.lost_its_loop:
-            session.check_loop("a stream of the hand")
-        return channel.open(buffer)
+            session.check_loop("a stream or a listener of the hand")

@@ -9,11 +9,7 @@ import anyio
 from ..control.state_machine import RUNNING
 from ..control.triggers import Trigger
 from ..enums import Severity, State
-from ..errors import (
-    InvalidStateError,
-    NotActivatedError,
-    StateTimeoutError,
-)
+from ..errors import InvalidStateError, NotActivatedError, StateTimeoutError
 from ..wire.checks import check_timeout
 from .observation import Observation
 
@@ -63,7 +59,7 @@ class Recovery(Observation):
             {State.RESET},
             RESET_TIMEOUT_S,
             ask=lambda: session.controller.reset(trigger),
-            failing={State.DISCONNECTED: session.link_lost},
+            failing={},
             what="the gripper did not report the reset",
         )
 
@@ -80,13 +76,14 @@ class Recovery(Observation):
             RobotiqError: the link went down.
         """
         session = self._asked()
+        # Nothing but a reset ends a release; what is found then may have been activated by another client.
+        ended = (State.RESET, State.WF_ACTIVATION, State.RUNNING_IDLE, State.FAULT)
         await session.reach(
             {State.ATR_DONE},
             RELEASE_TIMEOUT_S,
             ask=session.controller.release,
             failing={
-                State.DISCONNECTED: session.link_lost,
-                State.RESET: lambda: NotActivatedError("the gripper was reset during the automatic release"),
+                **dict.fromkeys(ended, lambda: NotActivatedError("the gripper was reset during the release")),
                 State.DO_RESET: lambda: InvalidStateError("reset() or halt() took over", State.DO_RESET),
             },
             what="the automatic release was not finished",

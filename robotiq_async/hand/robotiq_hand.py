@@ -133,14 +133,7 @@ class RobotiqHand(Commands):
             raise TypeError(f"activate must be True or False, got {activate!r}")
         running_loop()
         self._abandon_if_loop_closed()
-        before = self._session
-        self._session = session = Session(
-            self._options,
-            self._machine,
-            self._channels,
-            activate=activate,
-            first_sequence=0 if before is None else before.next_sequence,
-        )
+        self._session = session = Session(self._options, self._machine, self._channels, activate=activate)
         try:
             await session.connected()
             if activate:

@@ -12,27 +12,27 @@ import asyncio
 import contextlib
 import importlib
 import math
-from collections.abc import Callable
 from typing import Final
 
 import anyio
 
 from ..control.controller import Controller
+from ..control.waiters import fail, resolve
 from ..errors import (
     ConnectFailedError,
     ConnectionLostError,
     NotStartedError,
     ResponseTimeoutError,
     RobotiqConnectionError,
-    RobotiqError,
 )
 from ..link.modbus import HELD_S
 from ..link.transport import Transport
 from ..log import log
 from ..wire.status import RobotiqStatus
-from .reconnecting import Backoff, ReconnectPolicy
+from .options import Options
+from .reconnecting import Backoff
 from .statistics import Counters
-from .streams import SentRequest
+from .streams import Channels, SentRequest
 from .tick import Tick
 
 # anyio loads its backend when it is first used: some 20 ms that would hold up the loop in which a hand
@@ -63,13 +63,8 @@ class Poller:
         transport: Transport,
         controller: Controller,
         counters: Counters,
-        *,
-        address: str,
-        poll_interval: float,
-        policy: ReconnectPolicy | None,
-        first_sequence: int,
-        publish: Callable[[RobotiqStatus], None],
-        publish_request: Callable[[SentRequest], None],
+        channels: Channels,
+        options: Options,
     ) -> None:
         """Prepare; must be made inside a running event loop.
 
@@ -77,22 +72,14 @@ class Poller:
             transport: the link; nobody else may use it.
             controller: what decides.
             counters: what is counted.
-            address: for messages.
-            poll_interval: seconds between polls.
-            policy: what becomes of a lost link; None gives up at once.
-            first_sequence: number of the first status.
-            publish: called with each status, after the controller has seen it.
-            publish_request: called with each image that was written.
+            channels: are told of each status, after the controller has seen it, and of what is written.
+            options: of the hand.
         """
         self._transport = transport
         self._controller = controller
         self._counters = counters
-        self._address = address
-        self._interval = poll_interval
-        self._policy = policy
-        self.sequence = first_sequence
-        self._publish = publish
-        self._publish_request = publish_request
+        self._channels = channels
+        self._options = options
         self._loop = asyncio.get_running_loop()
         self.connected: asyncio.Future[None] = self._loop.create_future()
         """Done when the first status has been taken in; holds the error when there was none."""
@@ -102,7 +89,7 @@ class Poller:
         self._end_by = math.inf
         self._halt_at_stop = True
         self._interruptible: anyio.CancelScope | None = None
-        self._tick = Tick(poll_interval)
+        self._tick = Tick(options.poll_interval)
         self._last_poll = 0.0
         self._warned = -math.inf
 
@@ -127,45 +114,35 @@ class Poller:
             # An abandoned task is ended when it is collected: the hand may have been started again by then.
             if not self._loop.is_closed():
                 await self._finish()
-                self._tell_connected(NotStartedError("the hand was stopped while it connected"))
+                fail([self.connected], NotStartedError("the hand was stopped while it connected"))
 
     # -- connecting ------------------------------------------------------------------------------------
 
     async def _first_contact(self) -> bool:
         try:
             connected = await self._contact()
-        except (ResponseTimeoutError, ConnectionLostError) as error:
-            failed = ConnectFailedError(self._address, f"connected, but nobody answers: {error}")
-            failed.__cause__ = error
-            self._tell_connected(failed)
-            return False
         except RobotiqConnectionError as error:
-            self._tell_connected(error)
+            failure = error
+            if isinstance(error, (ResponseTimeoutError, ConnectionLostError)):
+                failure = ConnectFailedError(self._options.address, f"connected, but nobody answers: {error}")
+                failure.__cause__ = error
+            if not self.connected.done():  # start() may have been cancelled
+                self.connected.set_exception(failure)
             return False
         if connected:
-            self._tell_connected(None)
+            resolve([self.connected])
+            policy = self._options.policy
             # Only the start may activate unasked; from here on the policy says.
-            self._controller.activates = self._policy is not None and self._policy.activate
+            self._controller.activates = policy is not None and policy.activate
         return connected
-
-    def _tell_connected(self, failure: RobotiqError | None) -> None:
-        """Tell start(), unless it knows already or does not wait any more."""
-        if self.connected.done():
-            return
-        if failure is None:
-            self.connected.set_result(None)
-        else:
-            self.connected.set_exception(failure)
 
     async def _contact(self) -> bool:
         """Open the link and see the first status; False when asked to stop meanwhile."""
         with anyio.CancelScope() as self._interruptible:
             if not self._stopping:
                 await self._transport.open()
-                status, asked = await self._read()
-                self._controller.see(status, asked)
-                self._publish(status)
-                self._last_poll = 0.0
+                self._last_poll = 0.0  # no period counts that the link was lost in
+                await self._poll_once()
                 self._tick.start()
                 self._counters.tick = self._tick.source
                 return True
@@ -175,10 +152,10 @@ class Poller:
         """Open the link again; False when that is given up, or when asked to stop."""
         log.warning("link lost: %s", why)
         self._controller.lost(why)
-        if self._policy is None:
+        if self._options.policy is None:
             self.failure = why
             return False
-        backoff = Backoff(self._policy, self._loop.time())
+        backoff = Backoff(self._options.policy, self._loop.time())
         while not self._stopping:
             with anyio.CancelScope() as self._interruptible:
                 await asyncio.sleep(backoff.delay)
@@ -231,33 +208,26 @@ class Poller:
         try:
             await self._transport.write(request.registers)
         except RobotiqConnectionError:
-            self._publish_request(SentRequest(request, now, acknowledged=False))
+            self._channels.requests.push(SentRequest(request, now, acknowledged=False))
             raise
         self._counters.writes += 1
         self._controller.acknowledged(self._tick.time())
-        self._publish_request(SentRequest(request, now, acknowledged=True))
+        self._channels.requests.push(SentRequest(request, now, acknowledged=True))
 
     async def _poll_once(self) -> None:
         """Read, and tell everybody."""
-        counters = self._counters
-        status, asked = await self._read()
+        tick, counters = self._tick, self._counters
+        tick.late = 0.0
+        asked = tick.time()
+        registers = await self._transport.read()
+        status = RobotiqStatus(registers, tick.time(), next(self._channels.numbers))
+        counters.polls += 1
         counters.round_trips.append(status.timestamp - asked)
         if self._last_poll:
             counters.periods.append(asked - self._last_poll)
         self._last_poll = asked
         self._controller.see(status, asked)
-        self._publish(status)
-
-    async def _read(self) -> tuple[RobotiqStatus, float]:
-        """The status, and when it was asked for."""
-        tick = self._tick
-        tick.late = 0.0
-        asked = tick.time()
-        registers = await self._transport.read()
-        status = RobotiqStatus(registers, tick.time(), self.sequence)
-        self.sequence += 1
-        self._counters.polls += 1
-        return status, asked
+        self._channels.statuses.push(status)
 
     def _is_held_up(self) -> bool:
         """Whether the loop was held up since the newest status was asked for, or is at this moment.
@@ -275,8 +245,8 @@ class Poller:
         self._counters.longest_stall = self._tick.longest_late
         if missed:
             self._counters.overruns += missed
-            if missed * self._interval >= LATE_S:
-                self._warn_late(missed * self._interval)
+            if missed * self._options.poll_interval >= LATE_S:
+                self._warn_late(missed * self._options.poll_interval)
 
     def _warn_late(self, late: float) -> None:
         now = self._loop.time()
@@ -332,4 +302,4 @@ class Poller:
             await self._cycle()
             if not self._controller.machine.is_busy:
                 return
-            await asyncio.sleep(self._interval)
+            await asyncio.sleep(self._options.poll_interval)

@@ -10,7 +10,7 @@ import anyio
 
 from ..concurrency import wait_shielded
 from ..control.controller import Controller
-from ..control.state_machine import SEQUENCES, StateMachine
+from ..control.state_machine import RUNNING, SEQUENCES, StateMachine
 from ..control.triggers import Trigger
 from ..control.waiters import Waiter
 from ..enums import State
@@ -34,7 +34,7 @@ from .options import Options
 from .poller import Poller
 from .state_waiters import StateWaiters
 from .statistics import Counters
-from .streams import Channels, Stream, Transition
+from .streams import Channels, Transition
 
 T = TypeVar("T")
 Failing = Mapping[State, Callable[[], RobotiqError]]
@@ -48,13 +48,7 @@ class Session:
     """Who owns which gripper in this process."""
 
     def __init__(
-        self,
-        options: Options,
-        machine: StateMachine,
-        channels: Channels,
-        *,
-        activate: bool,
-        first_sequence: int,
+        self, options: Options, machine: StateMachine, channels: Channels, *, activate: bool
     ) -> None:
         """Claim the address and begin to connect; must be made in a running event loop.
 
@@ -63,13 +57,13 @@ class Session:
             machine: of the hand: its state outlives the session.
             channels: of the hand: they were opened before, perhaps, and are read afterwards.
             activate: whether a gripper that is found reset is activated.
-            first_sequence: number of the first status.
 
         Raises:
             InvalidStateError: the address is owned already.
         """
-        self._options = options
-        self._is_over = True  # until its task runs
+        self.options = options
+        self.is_over = True  # until its task runs
+        """Whether nothing runs any more."""
         self._loop = asyncio.get_running_loop()
         self.machine = machine
         self._claim()
@@ -78,47 +72,20 @@ class Session:
         self.counters = Counters()
         self._channels = channels
         self._waiters = StateWaiters()
-        self._until_link_lost: set[Stream[RobotiqStatus]] = set()
-        """Streams of those who wait for what the gripper does next: they end when the link goes down."""
         channels.reopen(self._loop)
         machine.changed = self._on_transition
-        self._poller = Poller(
-            options.make_transport(),
-            self.controller,
-            self.counters,
-            address=options.address,
-            poll_interval=options.poll_interval,
-            policy=options.policy,
-            first_sequence=first_sequence,
-            publish=channels.statuses.push,
-            publish_request=channels.requests.push,
-        )
+        self._poller = Poller(options.make_transport(), self.controller, self.counters, channels, options)
         machine.fire(Trigger.ASK_START)
-        self._is_over = False
+        self.is_over = False
         self._task = self._loop.create_task(self._poller.run(), name="robotiq_async poller")
         self._task.add_done_callback(self._end)
 
     # -- its end ---------------------------------------------------------------------------------------
 
     @property
-    def address(self) -> str:
-        """The gripper's, in its full form."""
-        return self._options.address
-
-    @property
-    def is_over(self) -> bool:
-        """Whether nothing runs any more."""
-        return self._is_over
-
-    @property
     def lost_its_loop(self) -> bool:
         """Whether the loop was closed under it: its task can never end then."""
-        return not self._is_over and self._loop.is_closed()
-
-    @property
-    def next_sequence(self) -> int:
-        """Number of the next status."""
-        return self._poller.sequence
+        return not self.is_over and self._loop.is_closed()
 
     async def stop(self, *, halt: bool) -> None:
         """Stop the fingers (with ``halt``) and disconnect; also when cancelled meanwhile.
@@ -139,7 +106,7 @@ class Session:
         Nobody in that loop can be told. What they wait with belongs to it and is left to it.
         """
         log.warning(
-            "%s: the event loop was closed before stop(); the fingers may still move", self._options.address
+            "%s: the event loop was closed before stop(); the fingers may still move", self.options.address
         )
         self._release()
         self._poller.abandon()
@@ -149,24 +116,24 @@ class Session:
         self.controller.stopped()
 
     def _claim(self) -> None:
-        gripper = self._options.gripper
+        gripper = self.options.gripper
         owner = self._claims.claim(gripper, self, lambda each: each.is_over)
         if owner is not None:
             is_this = owner.machine is self.machine
             who, hint = ("this hand", "") if is_this else ("another hand", gripper().hint)
             raise InvalidStateError(
-                f"{who} runs on {owner.address} already: stop() it first{hint}",
+                f"{who} runs on {owner.options.address} already: stop() it first{hint}",
                 self.machine.state,
                 {State.DISCONNECTED, State.SHUTDOWN},
             )
 
     def _release(self) -> None:
-        self._is_over = True
+        self.is_over = True
         self._claims.release(self)
 
     def _end(self, task: asyncio.Task[None]) -> None:
         """The task has ended: nobody may wait for it any longer. Called by whoever sees it first."""
-        if self._is_over:
+        if self.is_over:
             return
         self._release()
         failure: Callable[[], RobotiqError] | None = None
@@ -195,7 +162,7 @@ class Session:
             NotStartedError: it is over.
             ConnectionLostError: the hand gave up on its link.
         """
-        if self._is_over:
+        if self.is_over:
             if self._poller.failure is not None:
                 raise self.link_lost()
             raise NotStartedError("the hand is not started: use 'async with' or start()")
@@ -249,13 +216,14 @@ class Session:
             timeout: seconds; None for as long as it takes.
             what: the sentence for a timeout.
             ask: asks for it.
-            failing: states that mean it will not come.
+            failing: states that mean it will not come, as a lost link does then; None waits that out.
 
         Raises:
             StateTimeoutError: not in time.
             RobotiqError: refused, or it will not come.
         """
-        with self._waiters.watching(states, failing or {}) as reached:
+        ends = {} if failing is None else {State.DISCONNECTED: self.link_lost, **failing}
+        with self._waiters.watching(states, ends) as reached:
             if ask is not None:
                 ask()
             with anyio.move_on_after(timeout):
@@ -270,20 +238,17 @@ class Session:
         """
         if ask is None and self.machine.state not in SEQUENCES:
             return
-        ours = ask is not None or self.controller.machine.is_busy
-        wanted = {State.RUNNING_IDLE, State.RUNNING_CC}
-        faulty = {State.FAULT, State.ATR_DONE}
-        failing: dict[State, Callable[[], RobotiqError]] = {
-            State.DISCONNECTED: self.link_lost,
+        faulty = () if ask is not None or self.machine.is_busy else (State.FAULT, State.ATR_DONE)
+        failing: Failing = {
+            State.FAULT: self._fault,
+            State.ATR_DONE: self._fault,
             State.RESET: lambda: NotActivatedError("the gripper was reset during the activation"),
             State.DO_RESET: lambda: NotActivatedError("reset() or halt() took over"),
         }
-        if ours:
-            failing |= dict.fromkeys(faulty, self._fault)
         try:
             await self.reach(
-                wanted if ours else wanted | faulty,
-                self._options.activation_timeout,
+                RUNNING.union(faulty),
+                self.options.activation_timeout,
                 ask=ask,
                 failing=failing,
                 what="the activation was not finished",
@@ -298,23 +263,24 @@ class Session:
             RobotiqConnectionError: the link went down meanwhile.
             NotStartedError: the hand was stopped.
         """
-        stream = self._channels.statuses.open(1)
-        self._until_link_lost.add(stream)
-        try:
-            await anext(stream)
-        except StopAsyncIteration:
-            raise NotStartedError("the hand was stopped") from None
-        finally:
-            self._until_link_lost.remove(stream)
+        with self._waiters.watching((), {State.DISCONNECTED: self.link_lost}) as told:
+
+            def tell(item: object) -> None:
+                if isinstance(item, RobotiqStatus) and not told.done():
+                    told.set_result(self.machine.state)
+
+            remove = self._channels.listeners.add(tell)
+            try:
+                await told
+            finally:
+                remove()
 
     def _fault(self) -> GripperFaultError:
         assert self.controller.status is not None, "a fault was read from a status"
         return GripperFaultError(self.controller.status.fault)
 
     def _on_transition(self, source: State, target: State, trigger: Trigger) -> None:
-        self._channels.transitions.push(Transition(source, target, trigger, now()))
         self.counters.faults += target is State.FAULT
         self._waiters.reached(target)
-        if target is State.DISCONNECTED:
-            for stream in self._until_link_lost:
-                stream.end(self.link_lost)
+        # Last, for a listener may bring about the next one.
+        self._channels.transitions.push(Transition(source, target, trigger, now()))

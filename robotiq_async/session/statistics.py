@@ -6,7 +6,7 @@ import math
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from ..control.motion import MoveResult
@@ -57,34 +57,20 @@ class Statistics:
         object.__setattr__(self, "moves", FrozenMapping(self.moves))
 
 
+@dataclass(slots=True)
 class Counters:
-    """What the owner task counts."""
+    """What is counted from one start to the next."""
 
-    __slots__ = (
-        "faults",
-        "longest_stall",
-        "moves",
-        "overruns",
-        "periods",
-        "polls",
-        "reconnects",
-        "round_trips",
-        "tick",
-        "writes",
-    )
-
-    def __init__(self) -> None:
-        """Begin at zero."""
-        self.polls = 0
-        self.writes = 0
-        self.overruns = 0
-        self.reconnects = 0
-        self.longest_stall = 0.0
-        self.tick = ""
-        self.faults = 0
-        self.moves: Counter[str] = Counter()
-        self.periods: deque[float] = deque(maxlen=SAMPLES)
-        self.round_trips: deque[float] = deque(maxlen=SAMPLES)
+    polls: int = 0
+    writes: int = 0
+    overruns: int = 0
+    reconnects: int = 0
+    longest_stall: float = 0.0
+    tick: str = ""
+    faults: int = 0
+    moves: Counter[str] = field(default_factory=Counter)
+    periods: deque[float] = field(default_factory=lambda: deque(maxlen=SAMPLES))
+    round_trips: deque[float] = field(default_factory=lambda: deque(maxlen=SAMPLES))
 
     @contextmanager
     def move(self) -> Iterator[Callable[[MoveResult], None]]:

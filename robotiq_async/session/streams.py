@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 import weakref
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -20,6 +21,7 @@ from ..errors import RobotiqError
 from ..wire.request import Request
 from ..wire.status import RobotiqStatus
 from .event_loop import check_loop
+from .listeners import Listeners
 
 T = TypeVar("T")
 
@@ -175,8 +177,13 @@ def _wake(waiting: asyncio.Future[None]) -> None:
 class Channel(Generic[T]):
     """Spreads items over any number of streams. A stream nobody holds any more is forgotten."""
 
-    def __init__(self) -> None:
-        """Begin without readers."""
+    def __init__(self, listeners: Listeners) -> None:
+        """Begin without readers.
+
+        Args:
+            listeners: are told of every item, too.
+        """
+        self._listeners = listeners
         # Plain references: going through a WeakSet takes several times as long, at every poll.
         self._streams: list[weakref.ref[Stream[T]]] = []
         self._waited_for: set[Stream[T]] = set()
@@ -203,11 +210,12 @@ class Channel(Generic[T]):
                 stream.belong_to(loop)
 
     def push(self, item: T) -> None:
-        """Hand an item to every stream."""
+        """Hand an item to every stream and every listener."""
         for reference in self._streams:
             stream = reference()
             if stream is not None:
                 stream.push(item)
+        self._listeners.tell(item)
 
     def end(self, failure: Callable[[], RobotiqError] | None = None) -> None:
         """End every stream, quietly or with a failure."""
@@ -224,13 +232,19 @@ class Channel(Generic[T]):
 
 
 class Channels:
-    """Everything that a hand tells: its statuses, its changes of state, what is written."""
+    """Everything that a hand tells: its statuses, its changes of state, what is written.
+
+    Attributes:
+        numbers: of the statuses, from the first start on.
+    """
 
     def __init__(self) -> None:
         """Begin without readers."""
-        self.statuses: Channel[RobotiqStatus] = Channel()
-        self.transitions: Channel[Transition] = Channel()
-        self.requests: Channel[SentRequest] = Channel()
+        self.numbers = itertools.count()
+        self.listeners = Listeners()
+        self.statuses: Channel[RobotiqStatus] = Channel(self.listeners)
+        self.transitions: Channel[Transition] = Channel(self.listeners)
+        self.requests: Channel[SentRequest] = Channel(self.listeners)
         self._all: tuple[Channel[Any], ...] = (self.statuses, self.transitions, self.requests)
 
     def reopen(self, loop: asyncio.AbstractEventLoop) -> None:

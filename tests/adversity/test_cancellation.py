@@ -11,7 +11,15 @@ from typing import Any, Literal
 import anyio
 import pytest
 
-from robotiq_async import Fault, Finger, RobotiqHand, State, StateTimeoutError
+from robotiq_async import (
+    Fault,
+    Finger,
+    NotStartedError,
+    RobotiqConnectionError,
+    RobotiqHand,
+    State,
+    StateTimeoutError,
+)
 from robotiq_async.control.state_machine import RUNNING
 from tests.adversity.world import World, world
 from tests.virtual import run
@@ -100,6 +108,7 @@ WALKS = {
     "move": Walk(lambda world: world.hand.move(TARGET, A, speed=0), active),
     "open": Walk(lambda world: world.hand.open(A), moving),
     "close": Walk(lambda world: world.hand.close(A), active),
+    "hold": Walk(lambda world: world.hand.hold(), moving),
     "halt": Walk(lambda world: world.hand.halt(), moving),
     "activate": Walk(lambda world: world.hand.activate(), reset, RESTS, FAST),
     "reset": Walk(lambda world: world.hand.reset(), active, RESTS),
@@ -181,36 +190,47 @@ async def call_cancelled(world: World, call: Call, way: Way, turn: int) -> str:
 
 
 async def rest(world: World) -> None:
-    """Wait until nothing moves and the hand stays where it is."""
+    """Wait until nothing moves, nothing is written and the hand stays where it is."""
     async with asyncio.timeout(60):
         while True:
-            state = world.hand.state
+            state, writes = world.hand.state, len(world.gripper.writes)
             await asyncio.sleep(0.1)
-            if world.hand.state is state and not world.gripper.is_moving and settled(world.hand):
+            at_rest = not world.gripper.is_moving and len(world.gripper.writes) == writes
+            if world.hand.state is state and at_rest and settled(world.hand):
                 return
 
 
 def settled(hand: RobotiqHand) -> bool:
     return hand.state in (*RUNNING, State.RESET, State.FAULT, State.ATR_DONE, State.SHUTDOWN) or (
-        hand.state is State.DISCONNECTED and (hand._session is None or hand._session.is_over)
+        hand.state is State.DISCONNECTED and not is_started(hand)
     )
 
 
+def is_started(hand: RobotiqHand) -> bool:
+    try:
+        _ = hand.status
+    except NotStartedError:
+        return False
+    except RobotiqConnectionError:  # it looks for its link
+        return True
+    return True
+
+
 async def check_nothing_is_left(world: World) -> None:
-    """Nobody waits, nothing is pending, the link is in step, and the next command moves only its axis."""
+    """Nothing is pending, the link is in step, and the next command moves only its axis.
+
+    That nobody is left who waits is looked at below the hand: tests/control/test_moves.py and
+    tests/session/test_session_waits.py.
+    """
     hand = world.hand
-    session = hand._session
-    assert session is not None
-    assert not session.controller._callers.moves
-    assert session.controller._callers.pending.is_empty
-    assert not session._waiters._waiters
     assert hand.statistics.reconnects == 0
     world.check_no_stale_status()
     if hand.state is State.SHUTDOWN:
         assert not world.gripper.is_moving
         await hand.start()
+    before = world.travels() if hand.state in RUNNING else None
     await hand.recover()
-    before = world.travels()
+    before = before or world.travels()  # an activation moves everything
     # Wherever it was stopped: somewhere else.
     await hand.move(60 if world.gripper.position(B) > 100 else 180, B, speed=255)
     assert {axis for axis, travel in world.travels().items() if travel != before[axis]} == {B}

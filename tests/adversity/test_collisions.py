@@ -26,6 +26,7 @@ CALLS: dict[str, Call] = {
     "set_position": lambda world: world.hand.set_position(120, A),
     "set_force": lambda world: world.hand.set_force(9, A),
     "move": lambda world: world.hand.move(100, A | B),
+    "hold": lambda world: world.hand.hold(A),
     "halt": lambda world: world.hand.halt(),
     "reset": lambda world: world.hand.reset(),
     "activate": lambda world: world.hand.activate(),
@@ -41,7 +42,7 @@ async def active(world: World) -> None:
 
 
 READY: dict[str, tuple[Callable[[World], Awaitable[None]], tuple[str, ...]]] = {
-    "active": (active, ("set_position", "set_force", "move", "halt", "reset", "stop")),
+    "active": (active, ("set_position", "set_force", "move", "hold", "halt", "reset", "stop")),
     "reset": (in_reset, ("activate", "recover", "reset", "stop")),
     "fault": (in_fault, ("halt", "atr", "reset", "recover", "stop")),
 }

@@ -137,6 +137,10 @@ class LiveUse(RuleBasedStateMachine):
     def set_force(self, axes: Finger, force: int) -> None:
         self.call(self.hand.set_force(force, axes))
 
+    @rule(axes=masks)
+    def hold(self, axes: Finger) -> None:
+        self.call(self.hand.hold(axes))
+
     @rule()
     def halt(self) -> None:
         self.call(self.hand.halt())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import subprocess
 import sys
 from pathlib import Path
@@ -9,7 +10,7 @@ from statistics import mean
 
 import pytest
 
-from robotiq_async import Finger, RobotiqHand
+from robotiq_async import Finger, MoveTimeoutError, RobotiqHand
 from robotiq_async.calibration import (
     ForceCalibration,
     SpeedCalibration,
@@ -18,6 +19,8 @@ from robotiq_async.calibration import (
 )
 from robotiq_async.calibration.closing_time import closing_time
 from robotiq_async.calibration.csv_tables import FORCE, SPEED, TableError, thesis_table, write_table
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from tests.virtual import virtual
 
 # -- positions ---------------------------------------------------------------------------------------------
 
@@ -123,15 +126,38 @@ def test_a_table_that_says_nothing_is_refused(
 # -- the hand ----------------------------------------------------------------------------------------------
 
 
+class Lame:
+    """The clock of a gripper that is a hundred times as slow as life, from some moment on."""
+
+    def __init__(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._since: float | None = None
+
+    def __call__(self) -> float:
+        time = self._loop.time()
+        return time if self._since is None else self._since + (time - self._since) / 100
+
+    def slow_down(self) -> None:
+        self._since = self._loop.time()
+
+
+@virtual
 async def test_the_default_time_out_of_a_move_comes_from_the_calibration(tmp_path: Path) -> None:
     write_table(tmp_path / "slow.csv", SPEED, {0: (90_000,), 255: (60_000,)})
     slow = SpeedCalibration.from_csv(tmp_path / "slow.csv")
     for calibration, seconds in ((None, 2.119), (slow, 60)):
-        async with RobotiqHand(calibration=calibration) as hand:
-            session = hand._session
-            assert session is not None
-            timeout = session.controller.move_timeout(255, Finger.A, 255)
+        clock = Lame()
+        gripper = SimulatedGripper(clock, device_cycle=0.0)
+        async with (
+            SimulatorServer(gripper) as server,
+            RobotiqHand(server.address, calibration=calibration, poll_interval=0.05) as hand,
+        ):
+            clock.slow_down()
             way = 255 - hand.status.position(Finger.A)
+            began = asyncio.get_running_loop().time()
+            with pytest.raises(MoveTimeoutError):
+                await hand.move(255, Finger.A, speed=255)
+            timeout = asyncio.get_running_loop().time() - began
         assert timeout == pytest.approx(2 * way / 235 * seconds + 2, rel=0.005)
 
 

@@ -193,3 +193,18 @@ async def test_doctor_fails_when_something_is_broken(shell: Shell) -> None:
     outcome = await shell.run("doctor", "nowhere.invalid")
     outcome.assert_failed(1, "tcp://nowhere.invalid:502: name: see above")
     assert outcome.out.startswith("FAIL  name")
+
+
+async def test_doctor_of_an_agent_that_is_not_there(shell: Shell) -> None:
+    outcome = await shell.run("doctor", "zenoh://lab/cell/left?connect=tcp/127.0.0.1:1")
+    outcome.assert_failed(1, "zenoh://lab/cell/left: port: see above")
+    assert "FAIL  port           tcp/127.0.0.1:1: nobody listens" in outcome.out
+
+
+async def test_doctor_of_an_agent_takes_no_unit_id(shell: Shell) -> None:
+    outcome = await shell.run("doctor", "zenoh://lab/cell/left", "--device-id", "3")
+    outcome.assert_failed(2, "its agent's file has device_id")
+
+
+async def test_doctor_of_a_malformed_address(shell: Shell) -> None:
+    (await shell.run("doctor", "zenoh://lab/cell")).assert_failed(2, "zenoh://SITE/HOST/GRIPPER")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import inspect
 import sys
 from asyncio.subprocess import PIPE
@@ -181,8 +182,8 @@ async def test_what_does_not_move_writes_nothing(shell: Shell, server: Simulator
     async with RobotiqHand(server.address) as hand:
         await hand.move(50)
     writes = len(server.gripper.writes)
-    for command in (["status"], ["doctor"], ["record", str(file), "--seconds", "0.2"]):
-        await shell.run(*command, server.address)
+    commands = (["status"], ["doctor"], ["record", str(file), "--seconds", "0.2"])
+    await asyncio.gather(*(shell.run(*command, server.address) for command in commands))
     assert len(server.gripper.writes) == writes
 
 

@@ -8,6 +8,7 @@ from robotiq_async import Finger, MoveResult, RobotiqStatus, State
 from robotiq_async.calibration.closing_time import closing_time
 from robotiq_async.control.controller import Controller
 from robotiq_async.control.motion import Move
+from robotiq_async.control.pending import Command
 from robotiq_async.control.state_machine import StateMachine
 from robotiq_async.control.triggers import Trigger
 from robotiq_async.enums import AXES
@@ -112,7 +113,12 @@ class Scan:
         force: int | None = None,
     ) -> Outcome:
         outcome = Outcome()
-        self.controller.command(axes, position, speed, force, outcome)
+        self.controller.command(Command(axes, position, speed, force), outcome)
+        return outcome
+
+    def hold(self, axes: Finger = Finger.ALL) -> Outcome:
+        outcome = Outcome()
+        self.controller.hold(axes, outcome)
         return outcome
 
     def halt(self) -> Outcome:

@@ -5,7 +5,10 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async import ConnectionLostError, Finger, NotActivatedError
+from robotiq_async.control.motion import Move
+from robotiq_async.control.pending import Command
 from tests.control.other_client import going_to
+from tests.control.outcome import Outcome
 from tests.control.scan import Scan
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
@@ -47,11 +50,14 @@ def test_is_moving_from_the_command_until_the_end(scan: Scan) -> None:
     assert scan.gripper.position(A) == pytest.approx(200, abs=2)
 
 
+def default_timeout(scan: Scan, position: int, axes: Finger, speed: int | None = None) -> float:
+    return scan.controller.move(Move(position, axes, scan.now, Outcome()), speed, None)
+
+
 def test_the_default_timeout_follows_from_distance_and_speed(scan: Scan) -> None:
-    full = scan.controller.move_timeout(241, A, 0)
-    assert full == pytest.approx(2 * 10.021 + 2, abs=0.1)
-    assert scan.controller.move_timeout(241, A, 255) == pytest.approx(2 * 2.12 + 2, abs=0.1)
-    assert scan.controller.move_timeout(6, A, 0) == pytest.approx(2.0, abs=0.1)
+    assert default_timeout(scan, 241, A, 0) == pytest.approx(2 * 10.021 + 2, abs=0.1)
+    assert default_timeout(scan, 241, A, 255) == pytest.approx(2 * 2.12 + 2, abs=0.1)
+    assert default_timeout(scan, 6, A, 0) == pytest.approx(2.0, abs=0.1)
 
 
 def test_a_command_does_not_activate_a_gripper_that_was_reset_since_the_last_poll(scan: Scan) -> None:
@@ -67,22 +73,23 @@ def test_a_command_does_not_activate_a_gripper_that_was_reset_since_the_last_pol
 
 
 def test_the_default_timeout_goes_by_the_speed_an_axis_has_or_is_about_to_get(scan: Scan) -> None:
-    usual = scan.controller.move_timeout(241, A, None)
-    scan.controller.command(A, None, 0, None)
-    slow = scan.controller.move_timeout(241, A, None)
+    usual = default_timeout(scan, 241, A)
+    scan.controller.command(Command(A, None, 0))
+    slow = default_timeout(scan, 241, A)
     assert slow > usual
+    scan.hold()
     scan.run(0.5)
-    assert scan.controller.move_timeout(241, A, None) == slow, "it has it by now"
-    assert scan.controller.move_timeout(241, B, None) == usual
+    assert default_timeout(scan, 241, A) == slow, "it has it by now"
+    assert default_timeout(scan, 241, B) == usual
 
 
 def test_what_cannot_move_has_no_timeout() -> None:
     scan = Scan()
     with pytest.raises(ConnectionLostError):
-        scan.controller.move_timeout(241, A, 0)
+        default_timeout(scan, 241, A)
     scan.connect(activate=False)
     with pytest.raises(NotActivatedError):
-        scan.controller.move_timeout(241, A, 0)
+        default_timeout(scan, 241, A)
 
 
 def test_before_the_first_status_nothing_moves_and_nothing_is_written() -> None:

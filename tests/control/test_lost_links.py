@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from robotiq_async import ConnectionLostError, Finger, State
+from robotiq_async.control.pending import Command
 from robotiq_async.wire.request import AxisRequest, Request
 from tests.control.other_client import activated_by_another
 from tests.control.scan import POLL_S, Scan, started
@@ -101,7 +102,7 @@ def test_a_command_after_a_lost_acknowledgement_waits_until_it_is_known_what_act
 
 def test_a_lost_command_does_not_come_back_when_the_gripper_was_busy_at_the_reconnect(scan: Scan) -> None:
     scan.moved(50)
-    scan.controller.command(A, 250, None, None)
+    scan.controller.command(Command(A, 250))
     scan.now += POLL_S
     assert scan.controller.decide(scan.now) is not None  # it never arrives
     scan.controller.lost(None)

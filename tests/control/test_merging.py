@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async.control.merging import merged
-from robotiq_async.control.pending import PendingCommand
+from robotiq_async.control.pending import Command, PendingCommand
 from robotiq_async.enums import AXES, NO_AXES, Finger, Mode
 from robotiq_async.errors import MoveSupersededError
 from robotiq_async.wire.request import AxisRequest, Request
@@ -46,7 +46,7 @@ def command(
     axes: Finger, position: int | None = None, speed: int | None = None, force: int | None = None
 ) -> PendingCommand:
     pending = PendingCommand()
-    pending.merge(axes, position, speed, force)
+    pending.merge(Command(axes, position, speed, force))
     return pending
 
 
@@ -122,7 +122,7 @@ def test_a_halt_goes_alone() -> None:
     """What was asked after it follows once the gripper has stopped."""
     pending = command(B, 200, speed=9, force=9)
     pending.merge_halt(Outcome(), SUPERSEDED)
-    pending.merge(C, 200, None, None)
+    pending.merge(Command(C, 200))
     assert after(GOING, pending) == HALTED
 
 
@@ -154,7 +154,7 @@ def test_a_hold_never_sets_rgto() -> None:
 
 def test_an_axis_may_be_held_while_another_is_sent_somewhere() -> None:
     pending = hold(A | B)
-    pending.merge(B, 200, None, None)
+    pending.merge(Command(B, 200))
     assert positions(after(GOING, pending)) == (101, 200, 30, 40)
 
 
@@ -194,7 +194,7 @@ def test_whatever_is_asked_an_axis_that_nobody_addresses_is_asked_nothing_new_or
     pending = PendingCommand()
     pending.merge_hold(held, SUPERSEDED)
     for each in commands:
-        pending.merge(*each)
+        pending.merge(Command(*each))
     image = merged(base, pending, status, gripping=gripping, arrived=arrived)
     assert (image.mode, image.individual_fingers, image.individual_scissor) == (base.mode, True, True)
     assert not image.release

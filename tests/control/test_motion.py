@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async.calibration.closing_time import closing_time
-from robotiq_async.control.motion import MARGIN_S, Move, MoveResult, default_timeout
+from robotiq_async.control.motion import MARGIN_S, Move, MoveResult
 from robotiq_async.enums import AXES, Finger, ObjectStatus
 from robotiq_async.errors import ConnectionLostError, MoveSupersededError, RobotiqError
 from robotiq_async.wire.status import RobotiqStatus
@@ -188,7 +188,8 @@ SLOWEST_S, FASTEST_S = 10.021, (2097 + 2122 + 2137) / 3000
 
 def timeout(position: int, axes: Finger, at: int | tuple[int, ...], speed: int | tuple[int, ...]) -> float:
     speeds = dict(zip(AXES, speed if isinstance(speed, tuple) else (speed,) * 4, strict=True))
-    return default_timeout(position, axes, status_of(0x31, position=at), speeds, closing_time)
+    move = Move(position, axes, 0.0, Outcome())
+    return move.default_timeout(status_of(0x31, position=at), speeds, closing_time)
 
 
 @pytest.mark.parametrize(("speed", "seconds"), [(0, SLOWEST_S), (255, FASTEST_S)])

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.control.pending import PendingCommand
+from robotiq_async.control.pending import Command, PendingCommand
 from robotiq_async.enums import AXES, Finger
 from robotiq_async.errors import ConnectionLostError, MoveSupersededError
 from tests.control.outcome import Outcome
@@ -33,7 +33,7 @@ def test_a_new_command_has_nothing_to_write() -> None:
 
 def test_a_command_reaches_each_of_its_axes_and_no_other() -> None:
     pending = PendingCommand()
-    pending.merge(A | S, 10, 20, 30)
+    pending.merge(Command(A | S, 10, 20, 30))
     assert pending.positions == {A: 10, S: 10}
     assert pending.speeds == {A: 20, S: 20}
     assert pending.forces == {A: 30, S: 30}
@@ -41,7 +41,7 @@ def test_a_command_reaches_each_of_its_axes_and_no_other() -> None:
 
 def test_what_is_not_asked_is_not_changed() -> None:
     pending = PendingCommand()
-    pending.merge(ABC, None, 20, None)
+    pending.merge(Command(ABC, None, 20))
     assert not pending.positions
     assert pending.speeds == {A: 20, B: 20, C: 20}
     assert not pending.forces
@@ -49,16 +49,16 @@ def test_what_is_not_asked_is_not_changed() -> None:
 
 def test_zero_is_something_to_ask_for() -> None:
     pending = PendingCommand()
-    pending.merge(A, 0, 0, 0)
+    pending.merge(Command(A, 0, 0, 0))
     assert (pending.positions, pending.speeds, pending.forces) == ({A: 0}, {A: 0}, {A: 0})
     assert not pending.is_empty
 
 
 def test_the_last_value_wins_axis_by_axis() -> None:
     pending = PendingCommand()
-    pending.merge(ABC, 10, 1, None)
-    pending.merge(B, 20, None, 2)
-    pending.merge(B | C, 30, None, None)
+    pending.merge(Command(ABC, 10, 1))
+    pending.merge(Command(B, 20, None, 2))
+    pending.merge(Command(B | C, 30))
     assert pending.positions == {A: 10, B: 30, C: 30}
     assert pending.speeds == {A: 1, B: 1, C: 1}
     assert pending.forces == {B: 2}
@@ -78,7 +78,7 @@ def test_any_commands_leave_the_last_value_of_each_axis_and_field(
 ) -> None:
     pending = PendingCommand()
     for axes, position, speed, force in commands:
-        pending.merge(axes, position, speed, force)
+        pending.merge(Command(axes, position, speed, force))
     for field, merged in enumerate((pending.positions, pending.speeds, pending.forces)):
         for axis in AXES:
             values = [
@@ -93,7 +93,7 @@ def test_any_commands_leave_the_last_value_of_each_axis_and_field(
 
 def test_holding_an_axis_drops_its_unsent_position_and_no_other() -> None:
     pending = PendingCommand()
-    pending.merge(ABC, 100, 50, 60)
+    pending.merge(Command(ABC, 100, 50, 60))
     pending.merge_hold(A | B, SUPERSEDED)
     assert pending.positions == {C: 100}
     assert pending.speeds == {A: 50, B: 50, C: 50}
@@ -101,17 +101,10 @@ def test_holding_an_axis_drops_its_unsent_position_and_no_other() -> None:
     assert pending.hold == A | B
 
 
-def test_a_new_position_lifts_the_hold_of_its_axes_and_no_other() -> None:
-    pending = PendingCommand()
-    pending.merge_hold(ALL, SUPERSEDED)
-    pending.merge(A, 100, None, None)
-    assert pending.hold == B | C | S
-
-
 def test_a_new_speed_does_not_lift_a_hold() -> None:
     pending = PendingCommand()
     pending.merge_hold(A, SUPERSEDED)
-    pending.merge(A, None, 50, 60)
+    pending.merge(Command(A, None, 50, 60))
     assert pending.hold == A
 
 
@@ -122,21 +115,21 @@ def test_holds_add_up() -> None:
     assert pending.hold == A | B
 
 
-def test_a_hold_that_a_position_replaced_is_remembered() -> None:
-    """If the position is lost with the link, the hold is not: it was a stop."""
+def test_a_hold_that_a_position_or_a_halt_goes_before_is_remembered() -> None:
+    """If that is lost with the link, the hold is not: it was a stop."""
     pending = PendingCommand()
     pending.merge_hold(A | B, SUPERSEDED)
-    pending.merge(A, 100, None, None)
-    assert pending.replaced == A
+    pending.merge(Command(A, 100))
+    assert (pending.hold, pending.positions) == (A | B, {A: 100})
     pending.merge_halt(Outcome(), SUPERSEDED)
-    assert pending.replaced == A | B
+    assert pending.hold == A | B
 
 
 def test_who_waits_for_an_axis_that_is_held_is_told_and_nobody_else() -> None:
     pending, held, other, setting = PendingCommand(), Outcome(), Outcome(), Outcome()
-    pending.merge(A, 100, None, None, held)
-    pending.merge(B, 100, None, None, other)
-    pending.merge(A, None, 50, None, setting)
+    pending.merge(Command(A, 100), held)
+    pending.merge(Command(B, 100), other)
+    pending.merge(Command(A, None, 50), setting)
     pending.merge_hold(A, SUPERSEDED)
     assert isinstance(held.error, MoveSupersededError)
     assert not other.told
@@ -145,8 +138,8 @@ def test_who_waits_for_an_axis_that_is_held_is_told_and_nobody_else() -> None:
 
 def test_only_a_new_position_moves_an_axis() -> None:
     pending = PendingCommand()
-    pending.merge(A | S, 100, None, None)
-    pending.merge(B, None, 50, 60)
+    pending.merge(Command(A | S, 100))
+    pending.merge(Command(B, None, 50, 60))
     pending.merge_hold(C, SUPERSEDED)
     assert pending.moved == A | S
 
@@ -156,9 +149,9 @@ def test_only_a_new_position_moves_an_axis() -> None:
     [
         (lambda _: None, True, True),
         (lambda pending: pending.merge_hold(A, SUPERSEDED), False, True),
-        (lambda pending: pending.merge(A, 1, None, None), False, False),
-        (lambda pending: pending.merge(A, None, 1, None), False, False),
-        (lambda pending: pending.merge(A, None, None, 1), False, False),
+        (lambda pending: pending.merge(Command(A, 1)), False, False),
+        (lambda pending: pending.merge(Command(A, None, 1)), False, False),
+        (lambda pending: pending.merge(Command(A, None, None, 1)), False, False),
         (lambda pending: pending.merge_halt(Outcome(), SUPERSEDED), False, False),
     ],
     ids=["nothing", "hold", "position", "speed", "force", "halt"],
@@ -175,13 +168,11 @@ def test_a_pending_command_knows_whether_there_is_something_to_write(
 # -- halting -----------------------------------------------------------------------------------------------
 
 
-def test_a_halt_drops_unsent_positions_and_holds_and_keeps_speeds_and_forces() -> None:
+def test_a_halt_drops_unsent_positions_and_keeps_speeds_and_forces() -> None:
     pending, halter = PendingCommand(), Outcome()
-    pending.merge(ABC, 100, 50, 60)
-    pending.merge_hold(S, SUPERSEDED)
+    pending.merge(Command(ABC, 100, 50, 60))
     pending.merge_halt(halter, SUPERSEDED)
     assert not pending.positions
-    assert pending.hold == Finger(0)
     assert pending.speeds == {A: 50, B: 50, C: 50}
     assert pending.forces == {A: 60, B: 60, C: 60}
     assert pending.halting == [halter]
@@ -190,29 +181,37 @@ def test_a_halt_drops_unsent_positions_and_holds_and_keeps_speeds_and_forces() -
 
 def test_who_waits_for_a_position_is_told_that_a_halt_took_over() -> None:
     pending, caller = PendingCommand(), Outcome()
-    pending.merge(A, 100, None, None, caller)
+    pending.merge(Command(A, 100), caller)
     pending.merge_halt(Outcome(), SUPERSEDED)
     assert isinstance(caller.told[0], MoveSupersededError)
-    assert not pending.going
+    assert not pending.asking
 
 
 def test_who_waits_for_a_speed_goes_on_waiting_through_a_halt() -> None:
     pending, caller = PendingCommand(), Outcome()
-    pending.merge(A, None, 50, None, caller)
+    pending.merge(Command(A, None, 50), caller)
     pending.merge_halt(Outcome(), SUPERSEDED)
     assert not caller.told
-    assert pending.setting == [caller]
+    assert pending.waiters == [caller]
 
 
 def test_who_waits_for_a_speed_goes_on_waiting_though_a_halt_drops_the_position_of_another() -> None:
     """The speed stays on the pending and is delivered: its caller must not hear MoveSupersededError."""
     pending, for_speed, for_position = PendingCommand(), Outcome(), Outcome()
-    pending.merge(A, None, 50, None, for_speed)
-    pending.merge(B, 100, None, None, for_position)
+    pending.merge(Command(A, None, 50), for_speed)
+    pending.merge(Command(B, 100), for_position)
     pending.merge_halt(Outcome(), SUPERSEDED)
     assert pending.speeds == {A: 50}
     assert isinstance(for_position.told[0], MoveSupersededError)
     assert not for_speed.told
+
+
+def test_who_waits_for_a_hold_goes_on_waiting_when_a_position_replaces_it() -> None:
+    pending, holder = PendingCommand(), Outcome()
+    pending.merge_hold(A, SUPERSEDED, holder)
+    pending.merge(Command(A, 100))
+    assert pending.waiters == [holder]
+    assert not holder.is_told
 
 
 def test_every_caller_of_halt_is_kept() -> None:
@@ -225,7 +224,7 @@ def test_every_caller_of_halt_is_kept() -> None:
 def test_what_is_asked_after_a_halt_stays_pending() -> None:
     pending = PendingCommand()
     pending.merge_halt(Outcome(), SUPERSEDED)
-    pending.merge(A, 100, None, None)
+    pending.merge(Command(A, 100))
     assert pending.positions == {A: 100}
     assert pending.halting is not None
 
@@ -235,8 +234,8 @@ def test_what_is_asked_after_a_halt_stays_pending() -> None:
 
 def test_everybody_who_waits_is_told_of_a_failure_with_an_error_of_their_own() -> None:
     pending, callers, halter = PendingCommand(), [Outcome(), Outcome()], Outcome()
-    pending.merge(A, 100, None, None, callers[0])
-    pending.merge(A, None, 50, None, callers[1])
+    pending.merge(Command(A, 100), callers[0])
+    pending.merge(Command(A, None, 50), callers[1])
     pending.halting = [halter]
     pending.fail(LOST)
     errors = [each.told[0] for each in (*callers, halter)]
@@ -251,16 +250,16 @@ def test_a_command_that_nobody_waits_for_fails_quietly() -> None:
 def test_who_waits_for_the_acknowledgement_alone_does_not_include_who_halts() -> None:
     """A halt is told when the gripper shows that it has stopped."""
     pending, callers = PendingCommand(), [Outcome(), Outcome()]
-    pending.merge(A, 100, None, None, callers[0])
-    pending.merge(A, None, 50, None, callers[1])
+    pending.merge(Command(A, 100), callers[0])
+    pending.merge(Command(A, None, 50), callers[1])
     pending.halting = [Outcome()]
     assert pending.waiters == callers
 
 
 def test_commands_share_nothing() -> None:
     one, other = PendingCommand(), PendingCommand()
-    one.merge(ALL, 1, 2, 3, Outcome())
-    one.merge(ALL, None, 2, 3, Outcome())
+    one.merge(Command(ALL, 1, 2, 3), Outcome())
+    one.merge(Command(ALL, None, 2, 3), Outcome())
     one.halting = [Outcome()]
     assert other.is_empty
-    assert other.going == other.setting == []
+    assert other.asking == []

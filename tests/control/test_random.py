@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from robotiq_async import Finger, MoveResult, ObjectStatus, State
+from robotiq_async.control.contact import TOLERANCE
 from robotiq_async.control.motion import Move
 from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.enums import AXES
@@ -56,6 +57,11 @@ class RandomUse(RuleBasedStateMachine):
         self.scan.controller.abandon(move)
         self.told = [each for each in self.told if each[0] is not move]
 
+    @rule(axes=masks)
+    @precondition(lambda self: self.running)
+    def hold(self, axes: Finger) -> None:
+        self.told.append((None, self.scan.hold(axes)))
+
     @rule()
     @precondition(lambda self: self.running)
     def halt(self) -> None:
@@ -98,7 +104,8 @@ class RandomUse(RuleBasedStateMachine):
         assert self.scan.state is State.RUNNING_IDLE
         for axis in AXES:
             if axis not in contacts:
-                assert abs(self.scan.gripper.position(axis) - at[axis]) <= 1, f"{axis!r} resumed"
+                # One that close to where it was asked to go has arrived, and keeps its request.
+                assert abs(self.scan.gripper.position(axis) - at[axis]) <= TOLERANCE, f"{axis!r} resumed"
 
     @rule()
     @precondition(lambda self: self.running)

@@ -22,8 +22,8 @@ def positions(request: Request) -> list[int]:
 
 def test_before_anything_is_known_every_axis_has_the_settings_of_the_hand() -> None:
     shadow = RequestShadow(128, 64)
-    assert shadow.settings == (AxisRequest(0, 128, 64),) * 4
-    assert shadow.base == Request(axes=shadow.settings)
+    assert shadow.speeds == dict.fromkeys(AXES, 128)
+    assert shadow.base == Request(axes=(AxisRequest(0, 128, 64),) * 4)
 
 
 def test_what_a_gripper_shows_when_it_is_found_is_not_ours_but_settled(shadow: Shadow) -> None:
@@ -63,7 +63,7 @@ def test_at_rest_nothing_could_be_woken(ours: Shadow) -> None:
 def test_the_last_image_written_is_what_the_next_is_made_from(shadow: Shadow) -> None:
     shadow.write(image(200))
     assert shadow.base == image(200)
-    assert shadow.settings == image(200).axes
+    assert list(shadow.speeds.values()) == [axis.speed for axis in image(200).axes]
     assert shadow.ours == Finger.ALL
 
 

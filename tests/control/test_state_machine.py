@@ -178,7 +178,6 @@ STORIES: dict[str, Story] = {
         (Trigger.ASK_RELEASE, State.DO_ATR),
         (Trigger.SEEN_FAULT, State.DO_ATR),
         (Trigger.DELIVERED, State.WF_ATR),
-        (Trigger.SEEN_FAULT, State.WF_ATR),
         (Trigger.SEEN_RELEASED, State.ATR_DONE),
         (Trigger.ASK_RESET, State.DO_RESET),
         (Trigger.SEEN_RELEASED, State.DO_RESET),

@@ -137,6 +137,7 @@ ASKED = (
     Trigger.ASK_START,
     Trigger.ASK_ACTIVATE,
     Trigger.ASK_COMMAND,
+    Trigger.ASK_HOLD,
     Trigger.ASK_HALT,
     Trigger.ASK_RELEASE,
     Trigger.ASK_RESET,
@@ -150,21 +151,21 @@ ERRORS: dict[str, type[RobotiqError]] = {
     "not now": InvalidStateError,
 }
 CONTRACT = """
-                start()  activate()  command  halt()   atr()    reset()  stop()
-DISCONNECTED  | goes   | lost      | lost   | lost   | lost   | lost   | goes
-DO_ACTIVATION | not now| nothing   | not now| goes   | not now| goes   | goes
-WF_ACTIVATION | not now| nothing   | not now| goes   | not now| goes   | goes
-RUNNING_IDLE  | not now| nothing   | goes   | goes   | not now| goes   | goes
-RUNNING_CC    | not now| nothing   | goes   | goes   | not now| goes   | goes
-FAULT         | not now| fault     | fault  | goes   | goes   | goes   | goes
-DO_ATR        | not now| not now   | not now| goes   | not now| goes   | goes
-WF_ATR        | not now| not now   | not now| goes   | not now| goes   | goes
-ATR_DONE      | not now| fault     | fault  | nothing| not now| goes   | goes
-DO_RESET      | not now| not now   | not now| nothing| not now| nothing| goes
-WF_RESET      | not now| not now   | not now| goes   | not now| goes   | goes
-RESET         | not now| goes      | reset  | nothing| not now| goes   | goes
-DO_SHUTDOWN   | not now| off       | off    | off    | off    | off    | nothing
-SHUTDOWN      | goes   | off       | off    | off    | off    | off    | nothing
+                start()  activate()  command  hold()   halt()   atr()    reset()  stop()
+DISCONNECTED  | goes   | lost      | lost   | lost   | lost   | lost   | lost   | goes
+DO_ACTIVATION | not now| nothing   | not now| nothing| goes   | not now| goes   | goes
+WF_ACTIVATION | not now| nothing   | not now| nothing| goes   | not now| goes   | goes
+RUNNING_IDLE  | not now| nothing   | goes   | goes   | goes   | not now| goes   | goes
+RUNNING_CC    | not now| nothing   | goes   | goes   | goes   | not now| goes   | goes
+FAULT         | not now| fault     | fault  | goes   | goes   | goes   | goes   | goes
+DO_ATR        | not now| not now   | not now| nothing| goes   | not now| goes   | goes
+WF_ATR        | not now| not now   | not now| nothing| goes   | not now| goes   | goes
+ATR_DONE      | not now| fault     | fault  | nothing| nothing| not now| goes   | goes
+DO_RESET      | not now| not now   | not now| nothing| nothing| not now| nothing| goes
+WF_RESET      | not now| not now   | not now| nothing| goes   | not now| goes   | goes
+RESET         | not now| goes      | reset  | nothing| nothing| not now| goes   | goes
+DO_SHUTDOWN   | not now| off       | off    | off    | off    | off    | off    | nothing
+SHUTDOWN      | goes   | off       | off    | off    | off    | off    | off    | nothing
 """
 """What becomes of what is asked: "goes" to a state or stays, "nothing" to do, or the error."""
 

@@ -14,11 +14,14 @@ import subprocess
 import sys
 import tempfile
 from asyncio.subprocess import PIPE, STDOUT
+from collections.abc import Mapping
+from contextlib import AsyncExitStack
 from pathlib import Path
 
 import pytest
 
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from tests.docs.agents import ROOM, agent_of_the_pages
 from tests.docs.pages import DOCS, PAGES, ROOT, Block, blocks, requirements
 from tests.docs.test_tutorial import PROGRAM, TEST, TYPED, agree
 
@@ -68,10 +71,13 @@ def quietly(*command: str) -> None:
     subprocess.run(command, check=True, capture_output=True, text=True)
 
 
-async def run(*command: str, folder: Path, typed: str | None = None) -> str:
+async def run(
+    *command: str, folder: Path, typed: str | None = None, variables: Mapping[str, str] | None = None
+) -> str:
     """What a command prints, in an environment without the variables that would lend it modules."""
+    variables = {"PATH": "/usr/bin:/bin", **(variables or {})}
     process = await asyncio.create_subprocess_exec(
-        *command, stdin=PIPE, stdout=PIPE, stderr=STDOUT, cwd=folder, env={"PATH": "/usr/bin:/bin"}
+        *command, stdin=PIPE, stdout=PIPE, stderr=STDOUT, cwd=folder, env=variables
     )
     async with asyncio.timeout(PATIENCE):
         printed, _ = await process.communicate(None if typed is None else typed.encode())
@@ -84,9 +90,12 @@ async def run(*command: str, folder: Path, typed: str | None = None) -> str:
 
 async def at_the_prompt(python: str, code: str, folder: Path) -> str:
     """Type it, and an empty line after it."""
-    async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
+    async with AsyncExitStack() as stack:
+        server = await stack.enter_async_context(SimulatorServer(SimulatedGripper(speedup=20)))
+        variables = await stack.enter_async_context(agent_of_the_pages()) if ROOM in code else {}
         typed = code.replace("tcp://192.168.1.11", server.address)
-        return await run(python, "-P", "-m", "asyncio", folder=folder, typed=f"{typed}\n")
+        command = (python, "-P", "-m", "asyncio")
+        return await run(*command, folder=folder, typed=f"{typed}\n", variables=variables)
 
 
 # -- the pages ---------------------------------------------------------------------------------------------

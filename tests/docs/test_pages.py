@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import inspect
 import re
+from contextlib import AsyncExitStack
 from pathlib import Path
 from types import CodeType, FunctionType
 from typing import Any
@@ -16,6 +17,7 @@ from robotiq_async.control.state_machine import TABLE, Verdict
 from robotiq_async.control.triggers import Trigger
 from robotiq_async.enums import State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from tests.docs.agents import ROOM, agent_of_the_pages
 from tests.docs.pages import DOCS, PAGES, ROOT, Block, blocks, prose, requirements
 
 FRONT = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]
@@ -117,8 +119,14 @@ def compiled(page: Path, block: Block, address: str) -> CodeType:
 
 
 @pytest.mark.parametrize(("page", "block"), CODE, ids=lambda value: name(value) or f"line {value.line}")
-async def test_code_runs(page: Path, block: Block, restored_logging: None) -> None:
-    async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
+async def test_code_runs(
+    page: Path, block: Block, restored_logging: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with AsyncExitStack() as stack:
+        server = await stack.enter_async_context(SimulatorServer(SimulatedGripper(speedup=20)))
+        if ROOM in block.text:
+            for variable, value in (await stack.enter_async_context(agent_of_the_pages())).items():
+                monkeypatch.setenv(variable, value)
         names: dict[str, Any] = {}
         outcome = FunctionType(compiled(page, block, server.address), names)()
         if inspect.iscoroutine(outcome):

@@ -24,6 +24,7 @@ from robotiq_async import (
     Statistics,
     Stream,
     Transition,
+    fleet,
     simulator,
 )
 from robotiq_async.cli.app import COMMANDS
@@ -40,14 +41,24 @@ def public(kind: type) -> Iterator[str]:
         yield from (field.name for field in dataclasses.fields(kind))
 
 
-@pytest.mark.parametrize("name", [*robotiq_async.__all__, *simulator.__all__])
+@pytest.mark.parametrize("name", [*robotiq_async.__all__, *simulator.__all__, *fleet.__all__])
 def test_every_public_name_is_there(name: str) -> None:
     assert name in WORDS
 
 
 @pytest.mark.parametrize(
     "kind",
-    [RobotiqHand, RobotiqStatus, MoveResult, Statistics, ReconnectPolicy, Transition],
+    [
+        RobotiqHand,
+        RobotiqStatus,
+        MoveResult,
+        Statistics,
+        ReconnectPolicy,
+        Transition,
+        fleet.RemoteHand,
+        fleet.Fleet,
+        fleet.Member,
+    ],
     ids=lambda k: k.__name__,
 )
 def test_every_public_attribute_is_there(kind: type) -> None:
@@ -118,4 +129,4 @@ def _line_of(text: str, name: str) -> int:
 
 
 def test_every_command_is_there() -> None:
-    assert {command.__name__ for command in COMMANDS} <= WORDS
+    assert {command.__name__ for command in COMMANDS} | {"fleet", "measure"} <= WORDS

@@ -1,7 +1,9 @@
 """A network in one virtual loop, with the troubles that networks have, for agents and clients to meet in.
 
 Between each two buses there are two streams, one in each direction, and what is sent on one arrives in its
-order, as over TCP: whatever is lost is only late, and so is all that follows.
+order, as over TCP: whatever is lost is only late, and so is all that follows. A link over which one side has
+not heard the other for LINK_LEASE_S is closed, with all that was under way on it; it is up again soon after
+the trouble is over. A network that ``keeps_links`` closes none, and delivers all of it then, as routers do.
 """
 
 from __future__ import annotations
@@ -16,6 +18,10 @@ from dataclasses import dataclass, field
 from robotiq_async.fleet.network.bus import Question, Reply, Undo, Urgency
 
 LATENCY_S = 0.0002
+LINK_LEASE_S = 1.0
+RECONNECT_S = 0.2
+IN_ORDER_S = 1e-8
+"""From one message to the next: timers of the same instant come in any order."""
 
 
 def matches(expression: str, key: str) -> bool:
@@ -34,6 +40,7 @@ class Stream:
         delay: seconds, added to every message.
         loss: share of messages that have to be sent again.
         rate: bytes a second.
+        jitter: seconds, at most; each message has its own, and the order is lost.
         copies: times each message arrives.
         lateness: seconds by which the second copy is late.
     """
@@ -43,6 +50,7 @@ class Stream:
     delay: float = 0.0
     loss: float = 0.0
     rate: float = float("inf")
+    jitter: float = 0.0
     copies: int = 1
     lateness: float = 0.1
     free_at: float = 0.0
@@ -50,14 +58,22 @@ class Stream:
 
 
 class Network:
-    """All streams, and all that is announced."""
+    """All streams, and all that is announced.
+
+    Attributes:
+        keeps_links: whether no link is ever closed.
+    """
 
     def __init__(self, seed: int = 1) -> None:
+        self.loop = asyncio.get_running_loop()
         self.streams: dict[tuple[str, str], Stream] = {}
         self.buses: list[MemoryBus] = []
         self.random = random.Random(seed)
         self.wrong_key: Callable[[str], str] = lambda key: key
         """Under which key something arrives."""
+        self.keeps_links = False
+        self.pending: set[_Ask] = set()
+        self._parted: set[frozenset[str]] = set()
 
     def stream(self, source: str, target: str) -> Stream:
         return self.streams.setdefault((source, target), Stream())
@@ -65,35 +81,94 @@ class Network:
     def both(self, one: str, other: str) -> list[Stream]:
         return [self.stream(one, other), self.stream(other, one)]
 
+    def cut(self, *ways: tuple[str, str]) -> None:
+        """Let nothing arrive any more; each way is a source and a target."""
+        for source, target in ways:
+            self.stream(source, target).is_cut = True
+            self.loop.call_later(LINK_LEASE_S, self._look, source, target)
+
+    def _look(self, source: str, target: str) -> None:
+        if self.stream(source, target).is_cut and not self.keeps_links:
+            self.part(source, target)
+
     def mend(self, *streams: Stream) -> None:
         for stream in streams:
             stream.is_cut = False
             kept, stream.kept = stream.kept, []
             for deliver in kept:
-                asyncio.get_running_loop().call_later(LATENCY_S, deliver)
+                self.loop.call_later(LATENCY_S, deliver)
+        for (source, target), stream in self.streams.items():
+            if stream in streams and not self.is_up(source, target):
+                self.loop.call_later(RECONNECT_S, self.join, source, target)
+
+    def is_up(self, one: str, other: str) -> bool:
+        """Whether there is a link between two buses."""
+        return frozenset((one, other)) not in self._parted
+
+    def part(self, one: str, other: str) -> None:
+        """Close a link: what was asked over it ends without an answer, and neither side sees the other."""
+        if not self.is_up(one, other):
+            return
+        self._parted.add(frozenset((one, other)))
+        for stream in self.both(one, other):
+            stream.kept.clear()
+        for ask in list(self.pending):
+            if {ask.source, ask.target} == {one, other}:
+                ask.end()
+        self._show_each_other(one, other, is_there=False)
+
+    def join(self, one: str, other: str) -> None:
+        """Open it again, unless what closed it goes on."""
+        if not self.is_up(one, other) and not any(each.is_cut for each in self.both(one, other)):
+            self._parted.discard(frozenset((one, other)))
+            self._show_each_other(one, other, is_there=True)
+
+    def _show_each_other(self, one: str, other: str, *, is_there: bool) -> None:
+        for bus in self.buses:
+            for peer in self.buses:
+                if {bus.name, peer.name} == {one, other}:
+                    for key in peer.tokens:
+                        bus.see(key, is_there)
 
     def carry(
-        self, source: str, target: str, size: int, deliver: Callable[[], None], urgency: Urgency
+        self, source: str, target: MemoryBus, size: int, deliver: Callable[[], None], urgency: Urgency
     ) -> None:
-        loop, stream = asyncio.get_running_loop(), self.stream(source, target)
+        loop, stream = self.loop, self.stream(source, target.name)
+        if not self.is_up(source, target.name):
+            return
+
+        # On the host it is for: that one may stand still.
+        def arrive() -> None:
+            target.loop.call_soon(deliver)
+
         if stream.is_cut:
             if stream.keeps and urgency is not Urgency.NEWS:
-                stream.kept.append(deliver)
+                stream.kept.append(arrive)
             return
-        if urgency is Urgency.NEWS and stream.free_at - loop.time() > 0.05:
+        if urgency is Urgency.NEWS and stream.free_at - loop.time() > 0.05 + stream.delay:
             return  # dropped rather than waited for
         again = 0.0
         while self.random.random() < stream.loss:
             again = 2 * again or 0.2
         begins = max(loop.time(), stream.free_at - stream.delay) + again + size / stream.rate
-        stream.free_at = begins + stream.delay
+        stream.free_at = begins + stream.delay + IN_ORDER_S
         for copy in range(stream.copies):
-            loop.call_at(stream.free_at + LATENCY_S + copy * stream.lateness, deliver)
+            jitter = self.random.uniform(0.0, stream.jitter)
+            loop.call_at(stream.free_at + LATENCY_S + jitter + copy * stream.lateness, arrive)
 
-    def bus(self, name: str) -> MemoryBus:
-        bus = MemoryBus(self, name)
+    def bus(self, name: str, host: asyncio.AbstractEventLoop | None = None) -> MemoryBus:
+        bus = MemoryBus(self, name, host or self.loop)
         self.buses.append(bus)
         return bus
+
+
+@dataclass(eq=False)
+class _Ask:
+    """A request without an answer yet, and what ends it without one."""
+
+    source: str
+    target: str
+    end: Callable[[], None]
 
 
 class _Question:
@@ -113,8 +188,9 @@ class _Reply:
 class MemoryBus:
     """One side's bus."""
 
-    def __init__(self, network: Network, name: str) -> None:
+    def __init__(self, network: Network, name: str, loop: asyncio.AbstractEventLoop) -> None:
         self.name = name
+        self.loop = loop
         self.network = network
         self.subscribers: list[tuple[str, Callable[[str, bytes], None]]] = []
         self.queryables: list[tuple[str, Callable[[Question], None]]] = []
@@ -123,7 +199,11 @@ class MemoryBus:
         self.is_closed = False
 
     def _others(self) -> list[MemoryBus]:
-        return [bus for bus in self.network.buses if bus is not self and not bus.is_closed]
+        return [
+            bus
+            for bus in self.network.buses
+            if bus is not self and not bus.is_closed and self.network.is_up(self.name, bus.name)
+        ]
 
     def publisher(self, key: str, urgency: Urgency) -> Callable[[bytes], None]:
         def publish(payload: bytes) -> None:
@@ -131,7 +211,7 @@ class MemoryBus:
                 if self.is_closed or not any(matches(each, key) for each, _ in other.subscribers):
                     continue
                 deliver = functools.partial(other.hear, key, payload)
-                self.network.carry(self.name, other.name, len(payload), deliver, urgency)
+                self.network.carry(self.name, other, len(payload), deliver, urgency)
 
         return publish
 
@@ -151,23 +231,42 @@ class MemoryBus:
         self.queryables.append(entry)
         return lambda: self.queryables.remove(entry) if entry in self.queryables else None
 
-    async def ask(self, key: str, payload: bytes, *, timeout: float, urgency: Urgency) -> Reply | None:
+    def ask(
+        self, key: str, payload: bytes, *, timeout: float, urgency: Urgency
+    ) -> asyncio.Future[Reply | None]:
+        return asyncio.ensure_future(self._ask(key, payload, timeout=timeout, urgency=urgency))
+
+    async def _ask(self, key: str, payload: bytes, *, timeout: float, urgency: Urgency) -> Reply | None:
         answered: asyncio.Future[Reply | None] = asyncio.get_running_loop().create_future()
-        for other in self._others():
-            for expression, handler in other.queryables:
-                if matches(expression, key) and not self.is_closed:
-                    self._carry_question(other, handler, key, payload, answered, urgency)
-                    break
-            else:
-                continue
-            break
-        else:
+        found = self._find(key)
+        if found is None or self.is_closed:
             return None
+        other, handler = found
+
+        def give_up() -> None:
+            if not answered.done():
+                answered.set_result(None)
+
+        def end() -> None:
+            self.loop.call_soon(give_up)
+
+        asked = _Ask(self.name, other.name, end)
+        self.network.pending.add(asked)
+        self._carry_question(other, handler, key, payload, answered, urgency)
         try:
             async with asyncio.timeout(timeout):
                 return await answered
         except TimeoutError:
             return None
+        finally:
+            self.network.pending.discard(asked)
+
+    def _find(self, key: str) -> tuple[MemoryBus, Callable[[Question], None]] | None:
+        for other in self._others():
+            for expression, handler in other.queryables:
+                if matches(expression, key):
+                    return other, handler
+        return None
 
     def _carry_question(
         self,
@@ -186,13 +285,13 @@ class MemoryBus:
 
         def back(data: bytes, attachment: bytes) -> None:
             deliver = functools.partial(take, _Reply(data, attachment))
-            network.carry(other.name, self.name, len(data) + len(attachment), deliver, urgency)
+            network.carry(other.name, self, len(data) + len(attachment), deliver, urgency)
 
         def arrive() -> None:
             if not other.is_closed:
                 handler(_Question(network.wrong_key(key), payload, back))
 
-        network.carry(self.name, other.name, len(payload), arrive, urgency)
+        network.carry(self.name, other, len(payload), arrive, urgency)
 
     def announce(self, key: str) -> Undo:
         self.tokens.add(key)
@@ -206,11 +305,15 @@ class MemoryBus:
         return undo
 
     def _show(self, key: str, is_there: bool) -> None:
-        loop = asyncio.get_running_loop()
         for bus in self.network.buses:
-            for expression, listener in bus.watchers:
-                if matches(expression, key):
-                    loop.call_later(LATENCY_S, listener, key, is_there)
+            if self.network.is_up(self.name, bus.name):
+                bus.see(key, is_there)
+
+    def see(self, key: str, is_there: bool) -> None:
+        """A token has come or gone."""
+        for expression, listener in self.watchers:
+            if matches(expression, key):
+                self.loop.call_later(LATENCY_S, listener, key, is_there)
 
     async def announced(self, expression: str, *, timeout: float) -> list[str]:  # noqa: ARG002
         await asyncio.sleep(LATENCY_S)
@@ -227,12 +330,15 @@ class MemoryBus:
         self.watchers.append(entry)
         for bus in self.network.buses:
             for key in bus.tokens:
-                if matches(expression, key):
-                    asyncio.get_running_loop().call_later(LATENCY_S, listener, key, True)
+                if matches(expression, key) and self.network.is_up(self.name, bus.name):
+                    self.loop.call_later(LATENCY_S, listener, key, True)
         return lambda: self.watchers.remove(entry) if entry in self.watchers else None
 
     async def close(self) -> None:
         self.is_closed = True
+        for ask in list(self.network.pending):
+            if self.name in (ask.source, ask.target):
+                ask.end()
         for key in list(self.tokens):
             self._show(key, False)
         self.tokens.clear()

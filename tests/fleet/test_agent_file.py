@@ -23,7 +23,7 @@ def read(folder: Path, text: str) -> AgentSettings:
 def put_keys(folder: Path) -> Path:
     keys = folder / "cell-1"
     keys.mkdir()
-    for name in ("ca.pem", "cert.pem", "key.pem"):
+    for name in ("ca.pem", "cert.pem", "key.pem", "access.toml"):
         (keys / name).touch()
     return keys
 

@@ -10,6 +10,8 @@ import pytest
 from robotiq_async import RobotiqHand, State
 from robotiq_async.simulator import SimulatorServer
 
+pytestmark = pytest.mark.virtual_time
+
 BAD_BYTES = [256, -1, 1.0, True, "7", None, 1e300, float("nan")]
 BAD_MASKS = [0, 16, -1, True, 1.5, "A", None]
 
@@ -50,6 +52,7 @@ async def test_masks(hand: RobotiqHand, server: SimulatorServer, mask: Any) -> N
     await refused(server, mask, lambda: hand.set_position(3, mask), "fingers")
     await refused(server, mask, lambda: hand.move(3, mask), "fingers")
     await refused(server, mask, lambda: hand.command(mask, position=3), "fingers")
+    await refused(server, mask, lambda: hand.hold(mask), "fingers")
 
 
 @pytest.mark.parametrize("timeout", [0, -1, "1", True, float("inf"), float("nan")], ids=repr)

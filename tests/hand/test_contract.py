@@ -31,6 +31,8 @@ from robotiq_async import (
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.wire.request import Request
 
+pytestmark = pytest.mark.virtual_time
+
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 
 
@@ -180,6 +182,30 @@ async def test_halt(hand: RobotiqHand, server: SimulatorServer) -> None:
     await hand.move(30, A)
 
 
+async def test_hold(hand: RobotiqHand, server: SimulatorServer) -> None:
+    server.gripper.place_object(B, position=20)
+    moves = [asyncio.create_task(hand.move(255, axis, speed=0)) for axis in (A, B, C)]
+    assert (await moves[1]).contacts == B
+    await hand.hold(A | B)
+    with pytest.raises(MoveSupersededError, match="hold"):
+        await moves[0]
+    assert last_write(server).position(A) < 255
+    assert [last_write(server).position(axis) for axis in (B, C)] == [255, 255], "a grip, and a motion"
+    await hand.hold()
+    with pytest.raises(MoveSupersededError):
+        await moves[2]
+    assert last_write(server).position(B) == 255
+    async for _ in hand.statuses():
+        if not hand.is_moving:
+            break
+    writes = len(server.gripper.writes)
+    await hand.hold()
+    assert len(server.gripper.writes) == writes, "nothing moves"
+    await hand.reset()
+    await hand.hold()
+    assert hand.state is State.RESET
+
+
 async def test_status_before_the_first_one(server: SimulatorServer) -> None:
     hand = RobotiqHand(server.address)
     with pytest.raises(NotStartedError):
@@ -187,7 +213,8 @@ async def test_status_before_the_first_one(server: SimulatorServer) -> None:
     for what in ("is_moving", "is_activated", "is_reset"):
         with pytest.raises(NotStartedError):
             getattr(hand, what)
-    for call in (hand.move(3), hand.set_position(3), hand.halt(), hand.reset(), hand.atr(), hand.activate()):
+    stops = (hand.hold(), hand.halt(), hand.reset())
+    for call in (hand.move(3), hand.set_position(3), *stops, hand.atr(), hand.activate()):
         with pytest.raises(NotStartedError):
             await call
     with pytest.raises(NotStartedError):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from collections.abc import Sequence
 
 import pytest
@@ -21,11 +20,10 @@ from robotiq_async.control.state_machine import SEQUENCES
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.wire.registers import Registers
 from robotiq_async.wire.request import Request
+from tests.conftest import Clock
+from tests.virtual import VirtualLoop
 
-
-@pytest.fixture
-def gripper(server: SimulatorServer) -> SimulatedGripper:
-    return server.gripper
+pytestmark = pytest.mark.virtual_time
 
 
 async def reach(hand: RobotiqHand, state: State) -> asyncio.Task[None]:
@@ -93,6 +91,26 @@ async def test_after_a_release_a_halt_has_nothing_to_do(
     await hand.halt()
     assert hand.state is State.ATR_DONE
     assert len(server.gripper.writes) == writes
+
+
+async def test_a_release_that_another_client_ends_with_an_activation_is_told_at_once(
+    hand: RobotiqHand, gripper: SimulatedGripper, clock: Clock
+) -> None:
+    """It waited out its 60 s when the reset fell between two polls."""
+    gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    await hand.wait_for_state(State.FAULT)
+    releasing = asyncio.create_task(hand.atr())
+    async for status in hand.statuses():
+        if status.fault is Fault.AUTOMATIC_RELEASE:
+            break
+    for word in (0x0000, 0x0100):
+        gripper.write(0, [word])
+        clock.ahead += 0.02
+        gripper.status_registers()
+    async with asyncio.timeout(2):
+        with pytest.raises(NotActivatedError, match="reset during the release"):
+            await releasing
+    assert hand.state in (State.WF_ACTIVATION, State.RUNNING_IDLE)
 
 
 async def test_a_halt_in_the_first_activation_ends_the_start(
@@ -168,7 +186,8 @@ class Wire:
     """A gripper without a network, that notes what it is asked."""
 
     def __init__(self) -> None:
-        self.gripper = SimulatedGripper(speedup=20)
+        self.loop = asyncio.get_running_loop()
+        self.gripper = SimulatedGripper(self.loop.time, speedup=20)
         self.is_open = False
         self.asked: list[str] = []
         self.holds_up = 0.0
@@ -182,7 +201,8 @@ class Wire:
 
     async def read(self) -> Registers:
         self.asked.append("read")
-        time.sleep(self.holds_up)  # noqa: ASYNC251
+        assert isinstance(self.loop, VirtualLoop)
+        self.loop.hold_up(self.holds_up)
         self.holds_up = 0.0
         return self.gripper.status_registers()
 

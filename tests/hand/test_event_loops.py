@@ -17,11 +17,6 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 ADVICE = "call_soon_threadsafe|run_coroutine_threadsafe"
 
 
-@pytest.fixture
-def gripper(server: SimulatorServer) -> SimulatedGripper:
-    return server.gripper
-
-
 async def in_a_thread(work: Callable[[], object]) -> BaseException | None:
     """What a call from another thread raises, or None."""
 
@@ -42,6 +37,7 @@ CALLS: dict[str, Callable[[RobotiqHand], Coroutine[Any, Any, object]]] = {
     "set_force": lambda hand: hand.set_force(3),
     "move": lambda hand: hand.move(200),
     "close": lambda hand: hand.close(),
+    "hold": lambda hand: hand.hold(),
     "halt": lambda hand: hand.halt(),
     "reset": lambda hand: hand.reset(),
     "activate": lambda hand: hand.activate(),

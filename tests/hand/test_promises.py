@@ -476,7 +476,7 @@ async def test_while_the_link_is_down_no_sequence_can_be_asked_for(
     server.cut()
     await hand.wait_for_state(State.DISCONNECTED)
     writes = len(server.gripper.writes)
-    for call in (hand.activate, hand.reset, hand.atr, hand.halt, hand.recover):
+    for call in (hand.activate, hand.reset, hand.atr, hand.hold, hand.halt, hand.recover):
         with pytest.raises(ConnectionLostError):
             await call()
     assert hand.state is State.DISCONNECTED
@@ -491,7 +491,7 @@ async def test_nothing_can_be_asked_for_while_it_connects(server: SimulatorServe
     hand = RobotiqHand(server.address)
     starting = asyncio.create_task(hand.start(activate=False))
     await asyncio.sleep(0)
-    for call in (hand.activate, hand.reset, hand.atr, hand.halt):
+    for call in (hand.activate, hand.reset, hand.atr, hand.hold, hand.halt):
         with pytest.raises(ConnectionLostError):
             await call()
     await starting

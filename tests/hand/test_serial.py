@@ -12,7 +12,7 @@ import pytest_asyncio
 
 from robotiq_async import ConnectFailedError, ConnectionLostError, Fault, Finger, RobotiqHand, State
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
-from tests.hand.conftest import Clock
+from tests.conftest import Clock
 from tests.serial_line import SerialLine
 
 A = Finger.A

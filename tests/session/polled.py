@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from typing import TypeVar
 
 from robotiq_async.calibration.closing_time import closing_time
 from robotiq_async.control.controller import Controller
@@ -12,16 +14,31 @@ from robotiq_async.control.state_machine import StateMachine
 from robotiq_async.control.triggers import Trigger
 from robotiq_async.enums import State
 from robotiq_async.errors import ConnectionLostError
+from robotiq_async.session.listeners import Listeners
 from robotiq_async.session.poller import STOP_S, Poller
 from robotiq_async.session.reconnecting import ReconnectPolicy
 from robotiq_async.session.statistics import Counters
-from robotiq_async.session.streams import SentRequest
+from robotiq_async.session.streams import Channel, Channels, SentRequest
 from robotiq_async.wire.status import RobotiqStatus
+from tests.session.sessions import options
 from tests.session.wire import Wire
 from tests.virtual import VirtualLoop
 
+T = TypeVar("T")
+
 POLL_S = 0.01
 LOST = ConnectionLostError("unplugged")
+
+
+class Published(Channel[T]):
+    """What is told, and what goes wrong where it is told goes wrong in the poller."""
+
+    def __init__(self, push: Callable[[T], None]) -> None:
+        super().__init__(Listeners())
+        self._push = push
+
+    def push(self, item: T) -> None:
+        self._push(item)
 
 
 class Polled:
@@ -36,17 +53,11 @@ class Polled:
         self.counters = Counters()
         self.statuses: list[RobotiqStatus] = []
         self.requests: list[SentRequest] = []
-        self.poller = Poller(
-            self.wire,
-            self.controller,
-            self.counters,
-            address="wire",
-            poll_interval=POLL_S,
-            policy=policy,
-            first_sequence=7,
-            publish=self.publish,
-            publish_request=self.requests.append,
-        )
+        channels = Channels()
+        channels.statuses = Published(self.publish)
+        channels.requests = Published(self.requests.append)
+        channels.numbers = itertools.count(7)
+        self.poller = Poller(self.wire, self.controller, self.counters, channels, options(self.wire, policy))
         self.at_next_status: Callable[[], None] | None = None
         self.task: asyncio.Task[None]
 

@@ -18,6 +18,21 @@ from tests.session.wire import Wire
 LOST = ConnectionLostError("unplugged")
 
 
+def options(wire: Wire, policy: ReconnectPolicy | None, key: str = "wire") -> Options:
+    """Those of a hand at this wire."""
+    return Options(
+        make_transport=lambda: wire,
+        address="wire",
+        gripper=lambda: Gripper(key),
+        poll_interval=0.01,
+        activation_timeout=20.0,
+        policy=policy,
+        speed=128,
+        force=64,
+        closing_time=closing_time,
+    )
+
+
 class Run:
     """What outlives a session, and the means to make one."""
 
@@ -27,22 +42,10 @@ class Run:
         self.wire = Wire(speedup)
         self.machine = StateMachine()
         self.channels = Channels()
-        self.options = Options(
-            make_transport=lambda: self.wire,
-            address="wire",
-            gripper=lambda: Gripper(key),
-            poll_interval=0.01,
-            activation_timeout=20.0,
-            policy=policy,
-            speed=128,
-            force=64,
-            closing_time=closing_time,
-        )
+        self.options = options(self.wire, policy, key)
 
-    def session(self, *, activate: bool = False, first_sequence: int = 0) -> Session:
-        return Session(
-            self.options, self.machine, self.channels, activate=activate, first_sequence=first_sequence
-        )
+    def session(self, *, activate: bool = False) -> Session:
+        return Session(self.options, self.machine, self.channels, activate=activate)
 
 
 @asynccontextmanager

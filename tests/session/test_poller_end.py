@@ -6,6 +6,7 @@ import asyncio
 
 import pytest
 
+from robotiq_async.control.pending import Command
 from robotiq_async.enums import Finger, State
 from robotiq_async.errors import NotStartedError
 from robotiq_async.session.poller import SHUTDOWN_S
@@ -18,7 +19,7 @@ from tests.virtual import virtual
 @virtual
 async def test_the_end_stops_the_fingers_and_sees_it_before_it_disconnects() -> None:
     async with polled() as here:
-        here.controller.command(Finger.ABC, 200, 0, None)
+        here.controller.command(Command(Finger.ABC, 200, 0))
         await here.polls(20)
         assert here.wire.gripper.is_moving
         here.poller.request_stop(halt=True)
@@ -31,7 +32,7 @@ async def test_the_end_stops_the_fingers_and_sees_it_before_it_disconnects() -> 
 @virtual
 async def test_an_end_that_only_looks_leaves_the_fingers_to_what_they_do() -> None:
     async with polled() as here:
-        here.controller.command(Finger.ABC, 200, 0, None)
+        here.controller.command(Command(Finger.ABC, 200, 0))
         await here.polls(20)
         here.poller.request_stop(halt=False)
         await here.end()
@@ -43,7 +44,7 @@ async def test_an_end_that_only_looks_leaves_the_fingers_to_what_they_do() -> No
 async def test_a_stop_that_was_not_heard_is_sent_again() -> None:
     """Unlike a motion: a gripper that lost its client goes on moving."""
     async with polled() as here:
-        here.controller.command(Finger.ABC, 200, 0, None)
+        here.controller.command(Command(Finger.ABC, 200, 0))
         await here.polls(20)
         here.wire.failing["write"] = LOST
         here.poller.request_stop(halt=True)
@@ -57,7 +58,7 @@ async def test_a_stop_that_was_not_heard_is_sent_again() -> None:
 @virtual
 async def test_a_link_that_is_down_is_tried_once_more_at_the_end() -> None:
     async with polled(ReconnectPolicy(first_delay=5.0, max_delay=5.0)) as here:
-        here.controller.command(Finger.ABC, 200, 0, None)
+        here.controller.command(Command(Finger.ABC, 200, 0))
         await here.polls(20)
         here.wire.failing["read"] = LOST
         await asyncio.sleep(0.1)
@@ -74,7 +75,7 @@ async def test_the_end_comes_in_time_also_when_nobody_answers(
     silent: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     async with polled() as here:
-        here.controller.command(Finger.ABC, 200, 0, None)
+        here.controller.command(Command(Finger.ABC, 200, 0))
         await here.polls(20)
         here.wire.silent.add(silent)
         if silent == "open":
@@ -118,7 +119,7 @@ async def test_a_bug_does_not_keep_the_fingers_from_being_stopped() -> None:
     await here.wire.activate()
     here.start()
     await here.poller.connected
-    here.controller.command(Finger.ABC, 200, 0, None)
+    here.controller.command(Command(Finger.ABC, 200, 0))
     await here.polls(20)
 
     def bug() -> None:

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import pytest
 
+from robotiq_async.control.pending import Command
 from robotiq_async.control.triggers import Trigger
 from robotiq_async.enums import Finger, State
 from robotiq_async.errors import (
@@ -48,22 +49,22 @@ async def test_a_session_that_could_not_begin_leaves_the_address_free() -> None:
 
     broken = replace(here.options, make_transport=fail)
     with pytest.raises(ZeroDivisionError):
-        Session(broken, here.machine, here.channels, activate=False, first_sequence=0)
+        Session(broken, here.machine, here.channels, activate=False)
     await begins_and_ends(here)
 
 
 @virtual
 async def test_the_numbers_of_statuses_go_on_from_session_to_session() -> None:
     here = Run()
-    first = here.session(first_sequence=5)
+    first = here.session()
     await first.connected()
     await asyncio.sleep(0.1)
     await first.stop(halt=False)
-    assert first.next_sequence == 5 + first.counters.polls > 10
-    second = here.session(first_sequence=first.next_sequence)
+    assert first.counters.polls > 5
+    second = here.session()
     await second.connected()
     assert second.controller.status is not None
-    assert second.controller.status.sequence == first.next_sequence
+    assert second.controller.status.sequence == first.counters.polls
     assert second.counters.polls == 1
     await second.stop(halt=False)
 
@@ -86,7 +87,7 @@ async def test_a_session_is_over_when_it_was_stopped_and_may_be_stopped_again() 
 @virtual
 async def test_a_stop_that_is_cancelled_stops_all_the_same() -> None:
     async with running() as (here, session):
-        session.controller.command(Finger.ABC, 200, 0, None)
+        session.controller.command(Command(Finger.ABC, 200, 0))
         await asyncio.sleep(0.1)
         stopping = asyncio.create_task(session.stop(halt=True))
         await asyncio.sleep(0)
@@ -113,7 +114,7 @@ async def test_who_waits_when_a_session_ends_is_told_why() -> None:
     async with running() as (here, session):
         state = asyncio.create_task(session.reach({State.FAULT}, None, what="never"))
         position = asyncio.create_task(
-            session.answered(lambda waiter: session.controller.command(Finger.A, 100, None, None, waiter))
+            session.answered(lambda waiter: session.controller.command(Command(Finger.A, 100), waiter))
         )
         stream = here.channels.transitions.open(None)
         await asyncio.sleep(0)
@@ -146,7 +147,7 @@ async def test_who_waits_when_the_task_fails_is_told_too(caplog: pytest.LogCaptu
     async with running() as (_, session):
         state = asyncio.create_task(session.reach({State.FAULT}, None, what="never"))
         await asyncio.sleep(0)
-        session.controller.command(Finger.A, 256, None, None)  # checked above; here it has no place in a byte
+        session.controller.command(Command(Finger.A, 256))  # checked above; here it has no place in a byte
         with pytest.raises(ConnectionLostError, match="internal error: ValueError"):
             await state
         assert session.is_over
@@ -195,7 +196,7 @@ class TestClosedLoop:
             assert here.machine.state is State.RUNNING_IDLE
             assert here.wire.is_open
             assert session.counters.polls == pytest.approx(polls + 10, abs=1)
-            session.controller.command(Finger.A, 100, None, None)
+            session.controller.command(Command(Finger.A, 100))
             await session.stop(halt=False)
 
         run(again)

@@ -6,6 +6,7 @@ import asyncio
 
 import pytest
 
+from robotiq_async.control.pending import Command
 from robotiq_async.enums import Fault, Finger, State
 from robotiq_async.errors import (
     ActivationTimeoutError,
@@ -26,7 +27,7 @@ from tests.virtual import virtual
 async def test_who_asks_is_answered_when_the_gripper_has_acknowledged() -> None:
     async with running() as (here, session):
         asked = here.wire.calls.count("write")
-        await session.answered(lambda waiter: session.controller.command(Finger.A, 100, None, None, waiter))
+        await session.answered(lambda waiter: session.controller.command(Command(Finger.A, 100), waiter))
         assert here.wire.calls.count("write") == asked + 1
 
 
@@ -34,9 +35,7 @@ async def test_who_asks_is_answered_when_the_gripper_has_acknowledged() -> None:
 async def test_what_is_refused_is_told_at_once() -> None:
     async with running(active=False) as (here, session):
         with pytest.raises(NotActivatedError):
-            await session.answered(
-                lambda waiter: session.controller.command(Finger.A, 100, None, None, waiter)
-            )
+            await session.answered(lambda waiter: session.controller.command(Command(Finger.A, 100), waiter))
         assert "write" not in here.wire.calls
 
 
@@ -45,9 +44,7 @@ async def test_who_asks_is_told_that_the_link_went_down_before_the_acknowledgeme
     async with running(policy=ReconnectPolicy()) as (here, session):
         here.wire.failing["write"] = LOST
         with pytest.raises(ConnectionLostError, match="before this was done: unplugged") as caught:
-            await session.answered(
-                lambda waiter: session.controller.command(Finger.A, 100, None, None, waiter)
-            )
+            await session.answered(lambda waiter: session.controller.command(Command(Finger.A, 100), waiter))
         assert caught.value.__cause__ is LOST
         here.wire.failing.clear()
 
@@ -62,7 +59,7 @@ async def test_a_state_that_is_reached_is_returned_also_when_it_lasts_no_time() 
             {State.RUNNING_CC},
             1.0,
             what="never",
-            ask=lambda: session.controller.command(Finger.A, 100, None, None),
+            ask=lambda: session.controller.command(Command(Finger.A, 100)),
         )
         assert reached is State.RUNNING_CC
 
@@ -93,6 +90,19 @@ async def test_nobody_waits_for_what_was_refused() -> None:
     async with running() as (_, session):
         with pytest.raises(NotActivatedError):
             await session.reach({State.WF_ATR}, 1.0, what="", ask=refuse)
+        assert not session._waiters._waiters
+
+
+@virtual
+async def test_nobody_is_left_who_waits_after_a_cancellation() -> None:
+    async with running() as (_, session):
+        reaching = asyncio.create_task(session.reach({State.ATR_DONE}, 9.0, what=""))
+        activating = asyncio.create_task(session.activated(session.controller.activate))
+        await asyncio.sleep(0.1)
+        assert session._waiters._waiters
+        for task in (reaching, activating):
+            task.cancel()
+        await asyncio.gather(reaching, activating, return_exceptions=True)
         assert not session._waiters._waiters
 
 

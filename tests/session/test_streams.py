@@ -13,6 +13,7 @@ import pytest
 from robotiq_async.control.triggers import Trigger
 from robotiq_async.enums import State
 from robotiq_async.errors import ConnectionLostError, RobotiqError
+from robotiq_async.session.listeners import Listeners
 from robotiq_async.session.streams import Channel, Stream, Transition
 
 
@@ -41,7 +42,7 @@ async def reading(stream: Stream[int]) -> asyncio.Task[int]:
 
 @pytest.fixture
 def channel() -> Channel[int]:
-    return Channel()
+    return Channel(Listeners())
 
 
 # -- newest wins -------------------------------------------------------------------------------------------

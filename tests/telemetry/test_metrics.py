@@ -82,10 +82,13 @@ async def test_it_ends_with_the_block(hand: RobotiqHand) -> None:
 
 
 async def test_several_hands_are_told_apart(hand: RobotiqHand) -> None:
-    async with RobotiqHand() as other, serve_metrics(hand, other, port=0) as where:
+    other = RobotiqHand()
+    await other.start(activate=False)
+    async with serve_metrics(hand, other, port=0) as where:
         text = await page(where)
         for each in (hand, other):
             assert f'robotiq_polls_total{{hand="{each.address}"}}' in text
+    await other.stop()
 
 
 async def test_wrong_arguments(hand: RobotiqHand) -> None:

@@ -348,7 +348,9 @@ from robotiq_async import RobotiqHand
 from robotiq_async.telemetry.recorder import Recorder
 
 async def main():
-    async with RobotiqHand() as hand, Recorder(hand, {str(file)!r}):
+    hand = RobotiqHand()
+    await hand.start(activate=False)
+    async with Recorder(hand, {str(file)!r}):
         async for status in hand.statuses():
             print(status.sequence, flush=True)
 
@@ -358,7 +360,7 @@ asyncio.run(main())
     assert process.stdout is not None
     last = 0
     async with asyncio.timeout(60):
-        while last < 1500:
+        while last < 600:
             last = int(await process.stdout.readline())
     process.send_signal(signal.SIGKILL)
     rest, _ = await process.communicate()

@@ -10,6 +10,8 @@ from robotiq_async import Finger, RobotiqHand, State
 from robotiq_async.actions import ACTIONS, Operator
 from robotiq_async.telemetry.services import SERVICES
 
+pytestmark = pytest.mark.virtual_time
+
 
 @pytest.fixture
 async def operator(hand: RobotiqHand) -> Operator:

@@ -33,9 +33,8 @@ LINUX = SOCKETS.exists()
 
 
 @pytest.fixture
-async def operator(server: SimulatorServer) -> AsyncIterator[Operator]:
-    async with RobotiqHand(server.address) as hand:
-        yield Operator(hand)
+async def operator(hand: RobotiqHand) -> Operator:
+    return Operator(hand)
 
 
 @contextlib.asynccontextmanager

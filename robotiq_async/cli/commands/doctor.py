@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ...fleet.network.route import is_remote
 from ...link.address import parse_address
-from ..arguments import Address, Unit
-from ..failures import CommandError, usage
+from ...telemetry.payloads import printable
+from ..addresses import full_address
+from ..arguments import Address, Unit, need
+from ..failures import CommandError, UsageError
 
 if TYPE_CHECKING:
     from ...doctor import Finding
@@ -21,30 +24,39 @@ async def doctor(
     """Find out what is wrong with a connection. Nothing moves and nothing is written.
 
     Name, port, Modbus, unit id, register addresses, round trip and rate, activation,
-    fault, other clients: one line each, with what to do about it. It takes some
+    fault, other clients: one line each, with what to do about it. Of a gripper on
+    another host: certificates, port, agent, access, round trip, statuses, the gripper,
+    who commands it, and whether commands are refused that must be. It takes some
     seconds. Exits with 1 when something is broken.
 
     For example:
 
         robotiq-async doctor tcp://192.168.1.11
         robotiq-async doctor rtu:///dev/ttyUSB0
+        robotiq-async doctor "zenoh://lab/cell-1/left?connect=tls/192.168.1.20:7447"
 
     Args:
         device_id: Modbus unit id (default: 2 over TCP, 9 over a serial line).
     """
-    from ...doctor import Level, examine
+    from ...doctor import Level, examine, examine_remote
 
-    with usage():
-        parsed = parse_address(address)
+    full = full_address(address)
     bad: list[str] = []
 
     def report(finding: Finding) -> None:
-        print(f"{finding.level.value:<5} {finding.what:<14} {finding.found}", flush=True)
+        print(f"{finding.level.value:<5} {finding.what:<14} {printable(finding.found)}", flush=True)
         if finding.advice:
-            print(f"{'':<20} {finding.advice}", flush=True)
+            print(f"{'':<20} {printable(finding.advice)}", flush=True)
         if finding.level is Level.BAD:
             bad.append(finding.what)
 
-    await examine(parsed, report, device_id=device_id)
+    if is_remote(address):
+        need("zenoh", "fleet")
+        need("cryptography", "fleet")
+        if device_id is not None:
+            raise UsageError("a gripper on another host is set up there: its agent's file has device_id")
+        await examine_remote(address, report)
+    else:
+        await examine(parse_address(address), report, device_id=device_id)
     if bad:
-        raise CommandError(f"{parsed}: {', '.join(bad)}: see above")
+        raise CommandError(f"{full}: {', '.join(bad)}: see above")

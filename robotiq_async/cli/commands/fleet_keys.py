@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Parameter
 
+from ...fleet.keys.key_folder import DAYS
 from ..arguments import need
 from ..failures import CommandError, UsageError, usage
 
 if TYPE_CHECKING:
     from ...fleet.keys.access_list import Role
 
-DAYS: Final = 825
 _MAY: Final = {"read": "watch", "halt": "watch and halt", "operate": "watch, halt and command"}
 
-Names = Annotated[tuple[str, ...], Parameter(metavar="NAME", negative=())]
-Agents = Annotated[tuple[str, ...], Parameter(metavar="NAME[=HOST,...]", negative=())]
+Names = Annotated[tuple[str, ...], Parameter(metavar="NAME", negative=(), show_default=False)]
+Agents = Annotated[tuple[str, ...], Parameter(metavar="NAME[=HOST,...]", negative=(), show_default=False)]
 
 
 def keys(
@@ -29,7 +29,7 @@ def keys(
     read: Names = (),
     halt: Names = (),
     operate: Names = (),
-    days: Annotated[int, Parameter(metavar="N")] = DAYS,
+    days: Annotated[int, Parameter(metavar="N", show_default=False)] = DAYS,
 ) -> None:
     """Make the keys by which agents and clients know each other, and who may do what.
 

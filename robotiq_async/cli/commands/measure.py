@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ...errors import MeasuringError
-from ..arguments import is_simulated, need
+from ..addresses import is_simulated
+from ..arguments import need
 from ..consent import read_line
 from ..failures import CommandError, UsageError
 

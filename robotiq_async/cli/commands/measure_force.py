@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from ...enums import DEFAULT_SPEED
-from ..arguments import Address, Byte, Yes, full_address
+from ..addresses import full_address
+from ..arguments import Address, Byte, Yes
 from ..consent import consent
 from ..failures import CommandError, UsageError
 from .measure import NoPlot, Runs, Speedup, asked, carry_out, check, gripper, load_rich, refused, told

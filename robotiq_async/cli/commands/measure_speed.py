@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ...enums import Finger
-from ..arguments import Address, Fingers, Yes, full_address
+from ..addresses import full_address
+from ..arguments import Address, Fingers, Yes
 from ..consent import consent
 from ..failures import UsageError
 from .measure import NoPlot, Runs, Speedup, carry_out, check, gripper, load_rich, refused, told

@@ -15,7 +15,7 @@ from ...actions import Operator
 from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...errors import RobotiqError
 from ...telemetry.payloads import printable
-from ..arguments import USUAL, Address, Byte, Link, Port, full_address, is_loopback, need
+from ..arguments import USUAL, Address, Byte, Link, Port, is_loopback, need
 from ..browser import open_page
 from ..failures import CommandError, UsageError, usage
 
@@ -181,8 +181,9 @@ def _text(file: Path) -> str:
 
 
 def _refuse_doubles(addresses: Sequence[str]) -> None:
+    """A simulated hand has an address of its own; any other that comes twice is one gripper."""
     for address in addresses:
-        if addresses.count(address) > 1 and not full_address(address).startswith("sim:"):
+        if addresses.count(address) > 1:
             raise UsageError(f"{address} is there twice")
 
 

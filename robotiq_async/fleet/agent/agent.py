@@ -37,7 +37,14 @@ class Agent:
     """
 
     def __init__(
-        self, site: str, host: str, hands: Mapping[str, RobotiqHand], bus: Bus, *, window: float = WINDOW_S
+        self,
+        site: str,
+        host: str,
+        hands: Mapping[str, RobotiqHand],
+        bus: Bus,
+        *,
+        window: float = WINDOW_S,
+        asleep: Callable[[], float] | None = None,
     ) -> None:
         """Serve hands that are not started over an open bus; nothing is sent yet.
 
@@ -47,7 +54,10 @@ class Agent:
             hands: by the names of their grippers.
             bus: is left open.
             window: of the leases, in seconds; see :class:`~robotiq_async.fleet.control.lease.Lease`.
+            asleep: seconds for which this machine has been suspended so far; None asks the system.
         """
+        self._asleep = asleep or _asleep
+        self._slept = self._asleep()
         self.epoch = secrets.randbits(EPOCH_BITS)
         self._bus = bus
         self._window = window
@@ -73,6 +83,7 @@ class Agent:
         try:
             await self._refuse_if_served()
             undo += [self._bus.announce(each.name.key("alive", str(self.epoch))) for each in self._all]
+            await self._refuse_if_another_began()
             undo.append(self._bus.watch(f"{self._prefix}/*/alive/*", self._see_agent))
             undo += [
                 self._bus.serve(f"{self._prefix}/*/{verb}", self._hear)
@@ -93,20 +104,50 @@ class Agent:
 
     async def _refuse_if_served(self) -> None:
         await asyncio.sleep(LOOK_S)
-        for key in await self._bus.announced(f"{self._prefix}/*/alive/*", timeout=LOOK_S):
-            name = GripperName.of_key(key)
-            if name.gripper in self.hands:
-                raise AgentError(f"another agent serves {name} already: nothing was done")
+        for _, name in await self._others():
+            raise AgentError(f"another agent serves {name} already: nothing was done")
+
+    async def _refuse_if_another_began(self) -> None:
+        """Of agents that start at the same moment the one with the lowest epoch stays."""
+        for is_last in (False, True):
+            await asyncio.sleep(LOOK_S)
+            others = await self._others()
+            for epoch, name in others:
+                # One that does not go has been there for longer; it was only seen late.
+                if is_last or epoch < self.epoch:
+                    raise AgentError(f"another agent serves {name} too: nothing was done")
+            if not others:
+                return
+
+    async def _others(self) -> list[tuple[int, GripperName]]:
+        """Which grippers of this agent are served by others, each with the other's epoch."""
+        keys = await self._bus.announced(f"{self._prefix}/*/alive/*", timeout=LOOK_S)
+        return [other for other in map(self._other, keys) if other is not None]
+
+    def _other(self, key: str) -> tuple[int, GripperName] | None:
+        """Whose token this is, if it is another agent's for one of our grippers."""
+        try:
+            epoch, name = int(key.rpartition("/")[2]), GripperName.of_key(key)
+        except ValueError:
+            log.warning("a token that no agent makes: %r", key)
+            return None
+        return (epoch, name) if epoch != self.epoch and name.gripper in self.hands else None
 
     def _see_agent(self, key: str, is_there: bool) -> None:
-        if is_there and not key.endswith(f"/{self.epoch}"):
-            name = GripperName.of_key(key)
-            if name.gripper in self.hands:
-                log.error("another agent serves %s too: one of them has to go", name)
-                self.hands[name.gripper].news.add({"kind": "conflict", "key": key})
+        other = self._other(key)
+        if is_there and other is not None:
+            _, name = other
+            log.error("another agent serves %s too: one of them has to go", name)
+            self.hands[name.gripper].news.add({"kind": "conflict", "key": key})
 
     def _hear(self, question: Question) -> None:
-        name = GripperName.of_key(question.key)
+        self._look_at_clocks()
+        try:
+            name = GripperName.of_key(question.key)
+        except ValueError as no_name:
+            refused = AgentError(f"not a request for one gripper: {no_name}")
+            question.reply(Answer("", 0, self.epoch, error=error_fields(refused)).pack())
+            return
         served = self.hands.get(name.gripper)
         if served is None:
             error = AgentError(f"no gripper of this name here: {name}; there are: {', '.join(self.hands)}")
@@ -117,7 +158,7 @@ class Agent:
     async def _tell(self) -> None:
         """Signs of life, summaries, and an eye on the clock."""
         interval = self._window / BEATS
-        summary_due, slept = now(), _asleep()
+        summary_due = now()
         while True:
             for each in self._all:
                 each.news.beat(interval)
@@ -125,12 +166,16 @@ class Agent:
                 summary_due += SUMMARY_S
                 for each in self._all:
                     each.news.send_summary()
-            # The clock that everything goes by stands still while the machine is suspended.
-            if _asleep() - slept > self._window:
-                slept = _asleep()
-                for each in self._all:
-                    each.end_lease("expired")
+            self._look_at_clocks()
             await asyncio.sleep(interval)
+
+    def _look_at_clocks(self) -> None:
+        """The clock that everything goes by stands still while the machine is suspended."""
+        slept = self._asleep()
+        if slept - self._slept > self._window / BEATS:
+            self._slept = slept
+            for each in self._all:
+                each.wake()
 
 
 def _asleep() -> float:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import json
 from collections import deque
+from itertools import islice
 from typing import Any, Final
 
-from ...enums import State
 from ...errors import RobotiqError
 from ...hand import RobotiqHand
 from ...session.clock import now
@@ -23,7 +23,9 @@ from ..wire.status_message import StatusMessage
 from ..wire.values import Fields, request_fields, statistics_fields, transition_fields
 
 KEPT: Final = 2000
-"""Events that are kept for those who have missed them: 10 s of a loop that commands at 200 Hz."""
+"""Events that are kept for those who have missed them: some seconds of a loop that commands at 200 Hz."""
+AT_ONCE: Final = 40
+"""Events in one answer: of the longest ones as many as a message may hold."""
 
 
 class News:
@@ -37,6 +39,7 @@ class News:
         """Tell of this hand; nothing is sent yet."""
         self.problem = ""
         self._name = name
+        self._mark = name.mark
         self._hand = hand
         self._epoch = epoch
         self._lease = lease
@@ -60,12 +63,14 @@ class News:
         self._count += 1
         event = {"index": self._count, **event}
         self._events.append(event)
-        self._send(json.dumps({**self._head(), "events": [event]}).encode())
-        self.send_status()
+        # The status that it leads to comes with it: who waits for a state finds both.
+        status = self.status_message().hex()
+        self._sent_at = now()
+        self._send(json.dumps({**self._head(), "events": [event], "status": status}).encode())
 
     def events_since(self, index: int) -> list[Fields]:
-        """The events after one, as far as they are kept."""
-        return [event for event in self._events if event["index"] > index]
+        """The next events after one, as far as they are kept: not more than fit into an answer."""
+        return list(islice((event for event in self._events if event["index"] > index), AT_ONCE))
 
     def send_status(self) -> None:
         """Tell where the hand is."""
@@ -81,7 +86,7 @@ class News:
         """Where the hand is."""
         stamp, status = now(), self._status()
         return StatusMessage(
-            mark=self._name.mark,
+            mark=self._mark,
             epoch=self._epoch,
             stamp=stamp,
             state=self._hand.state,
@@ -115,7 +120,7 @@ class News:
         }
 
     def _head(self) -> dict[str, Any]:
-        return {"mark": self._name.mark, "epoch": self._epoch}
+        return {"mark": self._mark, "epoch": self._epoch}
 
     def _status(self) -> RobotiqStatus | None:
         try:
@@ -124,9 +129,7 @@ class News:
             return None
 
     def _is_moving(self) -> bool:
-        if self._hand.state in (State.DISCONNECTED, State.SHUTDOWN):
-            return False
         try:
             return self._hand.is_moving
-        except RobotiqError:
+        except RobotiqError:  # not connected: nobody knows
             return False

@@ -79,6 +79,8 @@ class ServedHand:
         self._requests: dict[int, _Request] = {}
         self._commanded = Finger(0)
         """The axes that the holder has commanded."""
+        self._owed = Finger(0)
+        """The axes that are to be held as soon as the gripper is reached again."""
         self._tasks: set[asyncio.Task[Any]] = set()
         self._expiry: asyncio.TimerHandle | None = None
 
@@ -103,8 +105,9 @@ class ServedHand:
             await self._hand.start(activate=False)
             self.news.problem = ""
             await self._hold_what_moves()
-            async for _ in self._hand.transitions():
-                pass
+            async for transition in self._hand.transitions():
+                if transition.target in RUNNING and self._owed:
+                    await self._hold(self._owed)
         except RobotiqError as error:
             if str(error) != self.news.problem:
                 log.warning("%s: %s", self.name, error)
@@ -133,7 +136,7 @@ class ServedHand:
             self._admission.check_meant(call)
             self._expire()
             value = self._answer(verb, call, question)
-        except (RobotiqError, TypeError, ValueError) as error:
+        except (RobotiqError, TypeError, ValueError, OverflowError) as error:  # JSON may hold infinity
             log.info("%s: %s refused: %s", self.name, verb, error)
             self._reply(question, failure(call, self._epoch, error))
         else:
@@ -192,6 +195,8 @@ class ServedHand:
             return
         holder = self._lease.holder
         label = str(call.arguments.get("label", "somebody"))[:200]
+        if take:
+            self._lease.intervene(call.client, "taken")
         if holder is not None and (take or holder.client == call.client):
             # Of the same client: it has lost the thread, and what it asked before is not to go on.
             self.end_lease("expired" if holder.client == call.client else "taken", label)
@@ -235,10 +240,20 @@ class ServedHand:
         self.news.add({"kind": "lease", "number": self._lease.number, "holder": None, "reason": reason})
 
     async def _hold(self, axes: Finger) -> None:
+        self._owed &= ~axes
         try:
             await self._hand.hold(axes)
+        except RobotiqConnectionError as error:
+            self._owed |= axes
+            log.warning("%s: the fingers are held when the gripper is reached: %s", self.name, error)
         except RobotiqError as error:
             log.warning("%s: the fingers could not be held: %s", self.name, error)
+
+    def wake(self) -> None:
+        """The machine was suspended: nobody has proven anything since."""
+        log.warning("%s: this machine was suspended", self.name)
+        self._lease.wake(now())
+        self.end_lease("expired")
 
     def _expire(self) -> None:
         if self._lease.has_expired(now()):
@@ -261,6 +276,7 @@ class ServedHand:
         if self._admission.is_of_holder(call):
             self._admission.bar(call)
         else:
+            self._lease.intervene(call.client, "halted")
             # Or a control loop would undo it in ten milliseconds.
             self.end_lease("halted", str(call.arguments.get("label", "somebody"))[:200])
         self._start(_Request("halt", call, question), self._hand.halt)
@@ -275,7 +291,9 @@ class ServedHand:
             return
         work = self._work(name, call)
         self._admission.admit(call, now())
-        self._commanded |= _axes(name, call.arguments)
+        axes = _axes(name, call.arguments)
+        self._commanded |= axes
+        self._owed &= ~axes
         request = self._requests[call.number] = _Request(name, call, question)
         if len(self._requests) > _REMEMBERED:
             self._forget()

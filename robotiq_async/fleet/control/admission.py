@@ -83,6 +83,7 @@ class Admission:
         holder = self.lease.holder
         if holder is not None:
             raise ControlLostError(f"{holder.label} commands the gripper", "held")
+        self._check_again(call)
         self._newest = call.number
         return self.lease.grant(Holder(call.client, label), call.seen)
 
@@ -94,6 +95,21 @@ class Admission:
         """
         self._check_holder(call, now)
         self.lease.renew(call.seen)
+
+    def _check_again(self, call: Call) -> None:
+        """Refuse a client that comes back by itself when somebody else has stepped in since it left.
+
+        Raises:
+            ControlLostError: somebody has.
+        """
+        again = call.arguments.get("again")
+        if again is None:
+            return
+        # Numbers of another run say nothing here: then it is enough that somebody has stepped in in this one.
+        number = again if type(again) is int and call.arguments.get("run") == self._epoch else 0
+        reason = self.lease.why_not_again(number)
+        if reason:
+            raise ControlLostError(f"the gripper was {reason} since: acquire() it when people agree", reason)
 
     def is_of_holder(self, call: Call) -> bool:
         """Whether a request comes from who holds the lease, under this lease."""

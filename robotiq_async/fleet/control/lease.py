@@ -48,7 +48,12 @@ class Lease:
         self.number = 0
         self.holder: Holder | None = None
         self._proven = 0.0
+        self._awake_since = 0.0
         self._ends: dict[int, str] = {}
+        self._last = ""
+        """The client that held it last."""
+        self._barred = -1, ""
+        """Number of the newest lease whose holder may not come back by itself, and why."""
 
     @property
     def expires(self) -> float:
@@ -61,12 +66,13 @@ class Lease:
 
     def is_fresh(self, seen: float, now: float) -> bool:
         """Whether whoever has heard of ``seen`` has heard it within the window, and not from the future."""
-        return now - self.window <= seen <= now
+        return max(now - self.window, self._awake_since) <= seen <= now
 
     def grant(self, holder: Holder, seen: float) -> int:
         """Give a lease that nobody holds to a client; returns its number."""
         self.number += 1
         self.holder = holder
+        self._last = holder.client
         self._proven = seen
         return self.number
 
@@ -82,6 +88,23 @@ class Lease:
             self._ends.pop(self.number - _KEPT, None)
             self.number += 1
         return holder
+
+    def wake(self, now: float) -> None:
+        """The machine was suspended, and its clock with it: nothing from before that is fresh any more."""
+        self._awake_since = now
+
+    def intervene(self, client: str, reason: str) -> None:
+        """A client has halted the gripper, or taken the lease: who held it before does not return by itself.
+
+        Call it before the lease is ended or granted. The last holder's own halt bars nobody.
+        """
+        if client != self._last:
+            self._barred = self.number, reason
+
+    def why_not_again(self, number: int) -> str:
+        """Why who held the lease of a number may not come back by itself; empty if it may."""
+        barred, reason = self._barred
+        return reason if number <= barred else ""
 
     def end_of(self, number: int) -> str:
         """Why the lease of a number ended."""

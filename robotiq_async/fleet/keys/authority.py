@@ -69,22 +69,21 @@ class Authority:
         """To be kept: the key is secret."""
         return _pair(self.certificate, self.key)
 
-    def certify(self, common_name: str, days: int, server_names: Sequence[str] = ()) -> Pair:
+    def certify(self, common_name: str, until: datetime, server_names: Sequence[str] = ()) -> Pair:
         """A new key, and a certificate for it.
 
         Args:
             common_name: whose it is.
-            days: how long it is valid.
+            until: when it ends.
             server_names: host names and IP addresses under which it opens a server; with none it opens none.
 
         Raises:
             ValueError: the authority ends before, or no such host can be.
         """
-        until = datetime.now(UTC) + timedelta(days=days)
-        if until > self.certificate.not_valid_after_utc:
+        end = self.certificate.not_valid_after_utc
+        if until > end:
             raise ValueError(
-                f"days must be fewer: the authority ends on {self.certificate.not_valid_after_utc:%Y-%m-%d}, "
-                f"got {days}"
+                f"the authority ends on {end:%Y-%m-%d}, the certificate would on {until:%Y-%m-%d}"
             )
         key = ec.generate_private_key(ec.SECP256R1())
         builder = _builder(_name(common_name), self.certificate.subject, key, until)

@@ -13,18 +13,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Final
 
 from ...wire.checks import check_int
 from .access_list import AccessList, Role, check_subject
 from .authority import DAYS_MAX, Authority, Pair
-from .key_folder import ACCESS, AUTHORITY, CERTIFICATE, KEY
+from .key_folder import ACCESS, AUTHORITY, CERTIFICATE, DAYS, KEY
 
 AUTHORITY_KEY: Final = "ca.key"
 AUTHORITY_DAYS: Final = 3650
-DAYS: Final = 825
-"""How long a certificate is valid; some systems accept none for longer."""
 HERE: Final = ("localhost", "127.0.0.1", "::1")
 """By these every agent can be connected to on its own machine."""
 
@@ -89,7 +88,8 @@ def issue(folder: Path, name: str, role: Role, *, hosts: Sequence[str] = (), day
     authority = _load(folder)
     clients = AccessList.read_file(folder / ACCESS)
     server_names = tuple(dict.fromkeys((*hosts, *HERE))) if role is Role.AGENT else ()
-    pair = authority.certify(role.common_name(name), days, server_names)
+    until = datetime.now(UTC) + timedelta(days=days)
+    pair = authority.certify(role.common_name(name), until, server_names)
     own.mkdir(mode=0o700)
     _write_new(own / KEY, pair.key, secret=True)
     _write_new(own / CERTIFICATE, pair.certificate)

@@ -12,6 +12,8 @@ KEY: Final = "key.pem"
 """Secret: whoever has it is the one whose name is in the certificate."""
 ACCESS: Final = "access.toml"
 """Which client may do what; only agents have it."""
+DAYS: Final = 825
+"""How long a certificate is valid unless told otherwise; some systems accept none for longer."""
 
 
 def check_key_folder(folder: Path) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 from enum import Enum
 from typing import Protocol
@@ -60,8 +61,13 @@ class Bus(Protocol):
     def serve(self, expression: str, handler: Callable[[Question], None]) -> Undo:
         """Call a handler with each request under matching keys."""
 
-    async def ask(self, key: str, payload: bytes, *, timeout: float, urgency: Urgency) -> Reply | None:
-        """Ask, once. None: nobody serves the key, or may be asked, or answers in time."""
+    def ask(
+        self, key: str, payload: bytes, *, timeout: float, urgency: Urgency
+    ) -> asyncio.Future[Reply | None]:
+        """Ask, once. None: nobody serves the key, or may be asked, or answers in time.
+
+        What is asked first, of the same urgency, arrives first: the request goes out in this call.
+        """
 
     def announce(self, key: str) -> Undo:
         """Let others see this key for as long as this process lives and can be reached."""

@@ -9,7 +9,7 @@ from typing import Final
 from urllib.parse import parse_qsl
 
 from ..wire.names import SCHEME, GripperName
-from .configuration import LOOPBACK, client_configuration
+from .configuration import LOOPBACK, LOOPBACK_TLS, client_configuration
 
 FORM: Final = "zenoh://SITE/HOST/GRIPPER[?connect=tls/HOST:7447][&keys=FOLDER]"
 CONNECT_VARIABLE: Final = "ROBOTIQ_ASYNC_CONNECT"
@@ -22,14 +22,19 @@ class Route:
     """How to get to agents.
 
     Attributes:
-        connect: zenoh endpoints of agents or routers.
+        connect: zenoh endpoints of agents or routers; empty for an agent on this machine.
         keys: folder with the certificates of this client; None for none.
         insecure: whether to go beyond loopback without certificates.
     """
 
-    connect: tuple[str, ...] = (LOOPBACK,)
+    connect: tuple[str, ...] = ()
     keys: Path | None = None
     insecure: bool = False
+
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """Where it leads: to an agent on this machine, if nothing else was said."""
+        return self.connect or (LOOPBACK if self.keys is None else LOOPBACK_TLS,)
 
     def configuration(self) -> dict[str, object]:
         """The configuration of a session that takes this route.
@@ -37,14 +42,14 @@ class Route:
         Raises:
             TypeError, ValueError: a malformed or unprotected endpoint, or a folder that lacks a file.
         """
-        return client_configuration(self.connect, keys=self.keys, insecure=self.insecure)
+        return client_configuration(self.endpoints, keys=self.keys, insecure=self.insecure)
 
 
 def default_route() -> Route:
     """The route that the environment names, else loopback."""
     connect = tuple(filter(None, os.environ.get(CONNECT_VARIABLE, "").split(",")))
     keys = os.environ.get(KEYS_VARIABLE)
-    return Route(connect or (LOOPBACK,), Path(keys) if keys else None)
+    return Route(connect, Path(keys) if keys else None)
 
 
 def is_remote(address: object) -> bool:

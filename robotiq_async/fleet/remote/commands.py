@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import asyncio
+from contextlib import nullcontext
+from dataclasses import replace
 from typing import Final
 
 from ...control.motion import MoveResult
-from ...control.state_machine import RUNNING
+from ...control.state_machine import RUNNING, refusal
+from ...control.triggers import Trigger
 from ...enums import CLOSED, OPEN, Finger
-from ...errors import InvalidStateError
-from ...session.clock import now
+from ...errors import ConnectionLostError, NotStartedError
 from ...wire.checks import check_byte, check_mask, check_optional_byte, check_timeout
 from ..network.bus import Urgency
-from ..wire.values import Fields, read_result
+from ..wire.values import Fields, read_result, reading
 from .observation import RemoteObservation
-from .requests import NoAnswerError, label
-from .session import HALT_S
+from .persistence import until_answered
+from .requests import label, plainly
+from .session import HALT_S, RemoteSession
 
-ATTEMPT_S: Final = 0.3
-"""From one attempt to halt to the next."""
 COMMAND_S: Final = 5.0
 """For what ends when the gripper acknowledges it."""
 SEQUENCE_S: Final = 130.0
@@ -91,7 +92,7 @@ class RemoteCommands(RemoteObservation):
             for name, value in (("position", position), ("speed", speed), ("force", force))
         }
         if all(value is None for value in changes.values()):
-            raise ValueError("command() needs at least one of position, speed and force")
+            raise ValueError("command() needs at least one of position, speed and force in 0..255, got none")
         session = self._asked()
         session.check_control()
         self._refuse_unless_running()
@@ -135,7 +136,9 @@ class RemoteCommands(RemoteObservation):
         value = await self._ask("move", arguments, limit)
         session = self._session
         assert session is not None
-        return read_result(value, session.mirror.clock)
+        with reading("a result"):
+            result = read_result(value, session.mirror.clock)
+            return replace(result, status=session.mirror.renumbered(result.status))
 
     async def open(
         self,
@@ -178,18 +181,25 @@ class RemoteCommands(RemoteObservation):
                 connected to its agent.
             RobotiqError: the agent could not stop them.
         """
-        session, deadline = self._asked(), now() + HALT_S
-        while True:
-            left = deadline - now()
-            try:
-                await session.ask(
-                    "halt", {"label": label()}, timeout=min(ATTEMPT_S, left), urgency=Urgency.STOP
-                )
-            except NoAnswerError:
-                if deadline - now() < ATTEMPT_S / 2:
-                    raise
-            else:
-                return
+        session = self._asked()
+        assert self._outbox is not None
+        self._outbox.clear()
+        halting = session.spawn(self._halt(session))
+        try:
+            with plainly():
+                await asyncio.shield(halting)
+        except asyncio.CancelledError:
+            if not halting.cancelled():
+                # Nobody looks at what becomes of it any more; it goes on all the same.
+                halting.add_done_callback(lambda task: task.cancelled() or task.exception())
+            elif session.is_over:
+                raise NotStartedError("the hand was stopped") from None
+            raise
+
+    async def _halt(self, session: RemoteSession) -> None:
+        await until_answered(
+            lambda left: session.ask("halt", {"label": label()}, timeout=left, urgency=Urgency.STOP), HALT_S
+        )
 
     # -- activation, faults ----------------------------------------------------------------------------
 
@@ -233,18 +243,27 @@ class RemoteCommands(RemoteObservation):
 
     def _refuse_unless_running(self) -> None:
         if self.state not in RUNNING:
-            raise InvalidStateError(f"the hand takes no commands in {self.state.name}", self.state, RUNNING)
+            status = None if self._session is None else self._session.mirror.status
+            raise refusal(Trigger.ASK_COMMAND, self.state, status)
 
     async def _ask(self, name: str, arguments: Fields, timeout: float) -> Fields:
-        """Have the agent's hand do something; when cancelled, the agent calls it off."""
-        session = self._asked()
+        """Have the agent's hand do something; when nobody waits for it any more, the agent calls it off."""
+        session, outbox = self._asked(), self._outbox
+        assert outbox is not None
         if self._control is None and not session.is_in_control and session.lost is None:
-            await session.acquire()
+            with plainly():
+                await session.acquire()
         session.check_control()
+        outbox.flush()
         call = session.call(arguments)
         try:
-            value: Fields = await session.send(call, f"cmd/{name}", timeout=timeout, urgency=Urgency.COMMAND)
-        except asyncio.CancelledError:
-            session.call_off(call)
+            with plainly(), outbox.motion() if name in ("move", "set_position") else nullcontext():
+                value: Fields = await session.send(
+                    call, f"cmd/{name}", timeout=timeout, urgency=Urgency.COMMAND
+                )
+        except (asyncio.CancelledError, ConnectionLostError):
+            cancelling = session.call_off(call)
+            if cancelling is not None and name in ("move", "set_position"):
+                outbox.count_motion(cancelling)
             raise
         return value

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import Final
 
 from ...control.triggers import Trigger
 from ...enums import State
-from ...errors import ProtocolError
 from ...log import log
 from ...session.streams import Channels, Transition
 from ...wire.status import RobotiqStatus
+from ..control.lease import WINDOW_S
 from ..wire.status_message import StatusMessage
-from ..wire.values import Fields, read_request, read_transition
+from ..wire.values import Fields, read_request, read_transition, reading
 
+_RUNS: Final = 16
+"""So many runs of an agent are told apart."""
 DRIFT: Final = 200e-6
 """How far two clocks may part: seconds a second."""
 _SEEN: Final = {
@@ -23,13 +26,20 @@ _SEEN: Final = {
     State.ATR_DONE: Trigger.SEEN_RELEASED,
     State.RESET: Trigger.SEEN_RESET,
 }
+_OFF: Final = (State.DO_SHUTDOWN, State.SHUTDOWN)
+
+
+def as_seen_from_here(state: State) -> State:
+    """The state of a remote hand whose agent's hand is in a state: that one's end is not the end of ours."""
+    return State.DISCONNECTED if state in _OFF else state
 
 
 class AgentClock:
     """Makes times of this process of times of the agent.
 
     A message takes at least no time. So the smallest difference of arrival and stamp is the best guess of how
-    far the clocks are apart; it may grow slowly, for clocks drift.
+    far the clocks are apart; it may grow slowly, for clocks drift. What an answer says was said after its
+    question: a smaller difference cannot be (the agent's host was suspended, and its clock with it).
     """
 
     def __init__(self) -> None:
@@ -37,13 +47,15 @@ class AgentClock:
         self._offset: float | None = None
         self._at = 0.0
 
-    def hear(self, stamp: float, arrival: float) -> None:
-        """A message with this stamp of the agent has arrived."""
+    def hear(self, stamp: float, arrival: float, asked: float | None = None) -> None:
+        """A message with this stamp of the agent has arrived; it was asked for at ``asked``, if it was."""
         difference = arrival - stamp
         if self._offset is None:
             self._offset = difference
         else:
             self._offset = min(difference, self._offset + DRIFT * (arrival - self._at))
+        if asked is not None and self._offset < asked - stamp:
+            self._offset = difference
         self._at = arrival
 
     def __call__(self, stamp: float) -> float:
@@ -65,8 +77,21 @@ class Mirror:
         misrouted: messages that were about another gripper, and dropped.
     """
 
-    def __init__(self, mark: int, channels: Channels, entered: Callable[[State], None]) -> None:
-        """Mirror the gripper with this mark; ``entered`` is told of each state."""
+    def __init__(
+        self,
+        mark: int,
+        channels: Channels,
+        entered: Callable[[State], None],
+        before: Mirror | None = None,
+    ) -> None:
+        """Mirror the gripper with this mark.
+
+        Args:
+            mark: see :attr:`~robotiq_async.fleet.wire.names.GripperName.mark`.
+            channels: what happens is handed on there.
+            entered: is told of each state.
+            before: of the run before this one, if there was one: states and sequences go on from there.
+        """
         self.clock = AgentClock()
         self.newest: StatusMessage | None = None
         self.status: RobotiqStatus | None = None
@@ -77,8 +102,17 @@ class Mirror:
         self._mark = mark
         self._channels = channels
         self._entered = entered
-        self._pushed = -1
-        """Sequence of the last status that was handed on."""
+        self._is_over = False
+        self._told = State.DISCONNECTED if before is None else before.state
+        """The state that the last transition led to: the next one begins there."""
+        self._told_at = 0.0
+        self._followed = State.DISCONNECTED
+        """Where the events so far have led; statuses may be ahead of them."""
+        self._pushed: RobotiqStatus | None = None
+        """The last status that was handed on."""
+        self._clocks: dict[int, AgentClock] = {}
+        """Of each run of the agent that was heard, the present one last."""
+        self._first = 0 if before is None else before.next_sequence
         self._base = 0
         """Added to the agent's sequences: they begin anew with each run of the agent, ours do not."""
 
@@ -92,6 +126,11 @@ class Mirror:
         """The run of the agent; 0 before its first message."""
         return 0 if self.newest is None else self.newest.epoch
 
+    @property
+    def next_sequence(self) -> int:
+        """What no status has been numbered with, and none before it."""
+        return self._first if self.status is None else self.status.sequence + 1
+
     def is_about_another(self, mark: object) -> bool:
         """Whether a message is about another gripper: it came under a wrong key, and is dropped."""
         if mark == self._mark:
@@ -100,26 +139,53 @@ class Mirror:
         log.warning("a message about another gripper was dropped (%d so far)", self.misrouted)
         return True
 
-    def hear(self, message: StatusMessage, arrival: float, *, in_turn: bool) -> None:
-        """A message has arrived.
+    def is_superseded(self, message: StatusMessage, arrival: float, window: float = WINDOW_S) -> bool:
+        """Whether a message is of a run of the agent that another one has followed.
+
+        Either it was late; or two agents serve the gripper, and that other one is heard.
+        """
+        clock = self._clocks.get(message.epoch)
+        if message.epoch == self.epoch or clock is None:
+            return False
+        return not self.is_silent or arrival - clock(message.stamp) > window
+
+    def hear(
+        self,
+        message: StatusMessage,
+        arrival: float,
+        *,
+        in_turn: bool,
+        window: float = WINDOW_S,
+        asked: float | None = None,
+    ) -> bool:
+        """A message has arrived. Returns whether it is current: one that was on its way for long is not.
 
         Args:
-            message: about this gripper.
+            message: about this gripper, and not superseded.
             arrival: our time.
             in_turn: whether it came among the news, where every status has its turn. One that came with an
                 answer has overtaken others: readers get theirs first.
+            window: seconds for which it is current.
+            asked: our time at which it was asked for; None if it was not.
         """
         if message.epoch != self.epoch:
-            self._begin_anew(message)
-        self.clock.hear(message.stamp, arrival)
+            self._begin_anew(message, arrival)
+        self.clock.hear(message.stamp, arrival, asked)
+        is_current = arrival - self.clock(message.stamp) <= window
         status = self._status(message)
         if message.stamp >= self.stamp:
             self.newest = message
             self.status = status or self.status
-            self._enter(message.state, arrival)
-        if in_turn and status is not None and status.sequence > self._pushed:
-            self._pushed = status.sequence
+            if is_current:
+                self._enter(as_seen_from_here(message.state), arrival)
+        if (
+            in_turn
+            and status is not None
+            and (self._pushed is None or status.sequence > self._pushed.sequence)
+        ):
+            self._pushed = status
             self._channels.statuses.push(status)
+        return is_current
 
     def hear_events(self, events: Iterable[Fields]) -> bool:
         """Events have arrived. Returns whether some before them are missing: they wait for those."""
@@ -136,29 +202,53 @@ class Mirror:
         """The agent has forgotten those up to this one."""
         self.events = max(self.events, index)
 
+    def has_missed(self) -> bool:
+        """Whether the agent has told of more events than have arrived."""
+        return self.newest is not None and self.newest.events > self.events
+
+    def renumbered(self, status: RobotiqStatus) -> RobotiqStatus:
+        """A status that came within an answer, numbered as ours are."""
+        return RobotiqStatus(status.registers, status.timestamp, self._base + status.sequence)
+
+    def begin(self, at: float) -> None:
+        """The run begins: nothing is heard yet."""
+        self._tell(State.DISCONNECTED, Trigger.ASK_START, at)
+
     def fall_silent(self, at: float) -> None:
         """Nothing is heard of the agent any more."""
-        if not self.is_silent:
+        if not (self.is_silent or self._is_over):
             self.is_silent = True
-            source, self.state = self.state, State.DISCONNECTED
-            if source is not State.DISCONNECTED:
-                self._tell(Transition(source, State.DISCONNECTED, Trigger.LINK_LOST, at))
+            self.state = State.DISCONNECTED
+            self._tell(State.DISCONNECTED, Trigger.LINK_LOST, at)
             self._entered(State.DISCONNECTED)
 
-    def _begin_anew(self, message: StatusMessage) -> None:
+    def shut_down(self, state: State, trigger: Trigger, at: float) -> None:
+        """The run ends: what is still heard changes the state no more."""
+        self._is_over = True
+        self.state = state
+        self._tell(state, trigger, at)
+
+    def _begin_anew(self, message: StatusMessage, arrival: float) -> None:
         """Another run of the agent: its clock, its events and its polls are others."""
-        self.clock = AgentClock()
+        self.fall_silent(arrival)
+        # What is late from a run that was heard before is told by the clock of that run.
+        self.clock = self._clocks.pop(message.epoch) if message.epoch in self._clocks else AgentClock()
+        self._clocks[message.epoch] = self.clock
+        while len(self._clocks) > _RUNS:
+            del self._clocks[next(iter(self._clocks))]
         self.newest = None
         self.events = message.events
-        if self.status is not None:
-            self._base = self.status.sequence + 1
+        self._followed = as_seen_from_here(message.state)
+        self._base = self.next_sequence if message.sequence < self.next_sequence else 0
 
     def _enter(self, state: State, arrival: float) -> None:
+        if self._is_over:
+            return
         source, self.state = self.state, state
         if self.is_silent:
             self.is_silent = False
-            if state is not State.DISCONNECTED:
-                self._tell(Transition(source, state, _SEEN.get(state, Trigger.SEEN_BUSY), arrival))
+            # What came meanwhile, the events tell: they may be late.
+            self._tell(self._followed, _SEEN.get(self._followed, Trigger.SEEN_BUSY), arrival)
         if source is not state:
             self._entered(state)
 
@@ -166,24 +256,40 @@ class Mirror:
         """The status that a message carries, as the reader gets it."""
         if message.registers is None:
             return None
-        before, sequence = self.status, self._base + message.sequence
-        if before is not None and before.sequence == sequence:
-            return before
+        newest, sequence = self.status, self._base + message.sequence
+        if newest is not None and newest.sequence == sequence:
+            return newest
+        # The guess of the clocks' difference becomes smaller and larger; the times that are told only rise.
         at = self.clock(message.stamp - message.age)
-        if before is not None and before.sequence < sequence:
-            at = max(at, before.timestamp)  # the guess of the clocks' difference may have become smaller
+        for other in (self._pushed, newest):
+            if other is not None:
+                at = max(at, other.timestamp) if other.sequence < sequence else min(at, other.timestamp)
         return RobotiqStatus(message.registers, at, sequence)
 
     def _hand_on(self, event: Fields) -> None:
-        try:
+        with reading("an event"):
             if event["kind"] == "transition":
-                self._tell(read_transition(event, self.clock))
+                self._follow(read_transition(event, self.clock))
             elif event["kind"] == "request":
-                self._channels.requests.push(read_request(event, self.clock))
-        except (KeyError, TypeError, ValueError) as error:
-            raise ProtocolError(f"the agent sent an event that cannot be read: {event!r:.200}") from error
+                sent = read_request(event, self.clock)
+                self._channels.requests.push(replace(sent, timestamp=self._in_order(sent.timestamp)))
 
-    def _tell(self, transition: Transition) -> None:
-        self._channels.transitions.push(transition)
-        # Also a state that lasted too short for any message.
-        self._entered(transition.target)
+    def _follow(self, transition: Transition) -> None:
+        source, target = as_seen_from_here(transition.source), as_seen_from_here(transition.target)
+        self._followed = target
+        if not (self.is_silent or self._is_over):
+            # Those between, if any, the agent has forgotten.
+            self._tell(source, _SEEN.get(source, Trigger.SEEN_BUSY), transition.timestamp)
+            self._tell(target, transition.trigger, transition.timestamp)
+
+    def _tell(self, state: State, trigger: Trigger, at: float) -> None:
+        """Hand on a change of state, if it is one."""
+        source, self._told = self._told, state
+        if source is not state:
+            self._channels.transitions.push(Transition(source, state, trigger, self._in_order(at)))
+            # Also a state that lasted too short for any message.
+            self._entered(state)
+
+    def _in_order(self, at: float) -> float:
+        self._told_at = max(self._told_at, at)
+        return self._told_at

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import asyncio
+from typing import TypeVar
 
 from ...enums import State
 from ...errors import ConnectionLostError, NotStartedError, StateTimeoutError
+from ...session.event_loop import check_loop
 from ...session.statistics import Counters, Statistics
-from ...session.streams import Channels, SentRequest, Stream, Transition
+from ...session.streams import Channel, Channels, SentRequest, Stream, Transition
 from ...wire.checks import check_int, check_timeout
 from ...wire.status import RobotiqStatus
 from ..wire.names import GripperName
 from .outbox import Outbox
 from .session import RemoteSession
+
+T = TypeVar("T")
 
 
 class RemoteObservation:
@@ -85,19 +89,19 @@ class RemoteObservation:
 
     def statuses(self, buffer: int = 1) -> Stream[RobotiqStatus]:
         """Every status that is heard from now on, for one reader; see :meth:`RobotiqHand.statuses`."""
-        return self._channels.statuses.open(check_int("buffer", buffer, 1, 1_000_000))
+        return self._open_stream(self._channels.statuses, check_int("buffer", buffer, 1, 1_000_000))
 
     def transitions(self) -> Stream[Transition]:
         """Every change of state from now on, none lost that the agent still knows of.
 
         Losing the agent, and hearing it again, are changes too.
         """
-        return self._channels.transitions.open(None)
+        return self._open_stream(self._channels.transitions, None)
 
     def requests(self, buffer: int | None = None) -> Stream[SentRequest]:
         """Every request the agent's hand writes from now on, by whomever it was asked for."""
         kept = None if buffer is None else check_int("buffer", buffer, 1, 1_000_000)
-        return self._channels.requests.open(kept)
+        return self._open_stream(self._channels.requests, kept)
 
     async def wait_for_state(self, *states: State, timeout: float | None = None) -> State:
         """Wait until the hand is, if only for a moment, in one of these states, and return it.
@@ -122,7 +126,9 @@ class RemoteObservation:
                     return await reached
             except TimeoutError:
                 names = " or ".join(state.name for state in states)
-                raise StateTimeoutError(f"{names} was not reached within {limit:g} s") from None
+                raise StateTimeoutError(
+                    f"{names} was not reached within {limit:g} s (now {self.state.name})"
+                ) from None
 
     # -- inside ----------------------------------------------------------------------------------------
 
@@ -145,3 +151,10 @@ class RemoteObservation:
                 "the agent or its gripper is not heard: what the gripper does is not known"
             )
         return status
+
+    def _open_stream(self, channel: Channel[T], buffer: int | None) -> Stream[T]:
+        """A stream; not from another thread while the hand runs, for the streams are not locked."""
+        session = self._session
+        if session is not None and not session.is_over and not session.lost_its_loop:
+            check_loop(session.loop, "a stream of the hand")
+        return channel.open(buffer)

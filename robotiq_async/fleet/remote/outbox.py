@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Final
+import asyncio
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any, Final
 
 from ...enums import AXES, Finger
-from ...errors import ControlLostError, RobotiqError
+from ...errors import ControlLostError, NotStartedError, RobotiqError
 from ...log import log
 from ..network.bus import Urgency
+from ..wire.envelope import Call
+from .requests import Posted
 from .session import RemoteSession
 
 UNDER_WAY: Final = 4
@@ -16,11 +22,13 @@ ANSWER_S: Final = 1.0
 
 
 class Outbox:
-    """Merges what is asked while enough is under way."""
+    """Merges what is asked while enough is under way. What it sends keeps its place among other requests."""
 
     def __init__(self, session: RemoteSession) -> None:
         """Send through a session."""
         self._session = session
+        self._asked: Call | None = None
+        """As which the oldest of those that wait would have gone out: its lease, and what was heard then."""
         self._waiting: dict[Finger, dict[str, int]] = {}
         self._under_way = 0
         self._motions = 0
@@ -32,29 +40,75 @@ class Outbox:
 
     def put(self, axes: Finger, changes: dict[str, int]) -> None:
         """Ask axes for something."""
+        if self._asked is None or not self._is_under_this_lease(self._asked):
+            self.clear()
+            self._asked = self._session.call()
         for axis in AXES:
             if axis in axes:
                 self._waiting.setdefault(axis, {}).update(changes)
         self._send_next()
 
-    def _send_next(self) -> None:
-        if self._waiting and self._under_way < UNDER_WAY and not self._session.is_over:
-            self._under_way += 1
-            self._session.spawn(self._send())
+    def clear(self) -> None:
+        """What waits is not to be sent any more."""
+        self._waiting.clear()
+        self._asked = None
 
-    async def _send(self) -> None:
+    def flush(self) -> None:
+        """Send what waits now: something is asked for after it."""
+        asked, self._asked = self._asked, None
         waiting, self._waiting = self._waiting, {}
-        is_motion = any("position" in changes for changes in waiting.values())
-        self._motions += is_motion
-        arguments = {"axes": {str(int(axis)): changes for axis, changes in waiting.items()}}
+        if waiting and asked is not None and self._is_under_this_lease(asked):
+            is_motion = any("position" in changes for changes in waiting.values())
+            arguments = {"axes": {str(int(axis)): changes for axis, changes in waiting.items()}}
+            # The time it has waited here counts like the time on its way.
+            call = replace(self._session.call(arguments), seen=asked.seen)
+            posted = self._session.post(call, "cmd/command", timeout=ANSWER_S, urgency=Urgency.COMMAND)
+            self._under_way += 1
+            asking = self._session.spawn(self._await(posted))
+            asking.add_done_callback(lambda _: self._done())
+            if is_motion:
+                self.count_motion(asking)
+
+    def _is_under_this_lease(self, asked: Call) -> bool:
+        now = self._session
+        return now.is_in_control and (asked.epoch, asked.lease) == (now.mirror.epoch, now.lease)
+
+    def count_motion(self, asking: asyncio.Task[Any]) -> None:
+        """Something is under way that may set axes going."""
+        self._motions += 1
+
+        def done(_: object) -> None:
+            self._motions -= 1
+
+        asking.add_done_callback(done)
+
+    @contextmanager
+    def motion(self) -> Iterator[None]:
+        """A motion is asked for, and waited for."""
+        self._motions += 1
         try:
-            if waiting:
-                await self._session.ask("cmd/command", arguments, timeout=ANSWER_S, urgency=Urgency.COMMAND)
-        except ControlLostError:
+            yield
+        finally:
+            self._motions -= 1
+
+    def _send_next(self) -> None:
+        if self._under_way < UNDER_WAY and not self._session.is_over:
+            self.flush()
+
+    def _done(self) -> None:
+        self._under_way -= 1
+        try:
+            self._send_next()
+        except RobotiqError as error:
+            log.warning("%s: a command was not sent: %s", self._session.name, error)
+
+    async def _await(self, posted: Posted) -> None:
+        try:
+            await self._session.answer(posted)
+        except NotStartedError:
             pass  # the next command() raises it
+        except ControlLostError as error:
+            if error.reason == "late":  # any other is raised by the next command()
+                log.warning("%s: a command was not carried out: %s", self._session.name, error)
         except (RobotiqError, TypeError, ValueError) as error:
             log.warning("%s: a command was not carried out: %s", self._session.name, error)
-        finally:
-            self._under_way -= 1
-            self._motions -= is_motion
-            self._send_next()

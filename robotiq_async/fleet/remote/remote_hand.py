@@ -14,6 +14,7 @@ from ..network.bus import Bus
 from ..network.route import parse_remote_address
 from .commands import RemoteCommands
 from .outbox import Outbox
+from .requests import plainly
 from .session import CONNECT_S, RemoteSession
 
 
@@ -21,7 +22,7 @@ class RemoteHand(RemoteCommands):
     """A Robotiq 3-Finger gripper on another host, served by ``robotiq-async agent`` there.
 
     A :class:`~robotiq_async.protocol.Hand`: the names, errors and promises are those of
-    :class:`~robotiq_async.RobotiqHand`, and docs/reference/fleet-protocol.md lists what differs. Commanding
+    :class:`~robotiq_async.RobotiqHand`, and docs/how-to/fleet.md lists what differs. Commanding
     takes a lease, which this hand acquires when it starts and renews from its own event loop; a program that
     hangs loses it, and what it had set going is then held. Reading is free, and so is :meth:`halt`.
 
@@ -58,7 +59,8 @@ class RemoteHand(RemoteCommands):
         self._connect_timeout = check_seconds("connect_timeout", connect_timeout, 0.1, 60.0)
         self._control = control
         self._shared = bus
-        self._own: Bus | None = None
+        self._opening: object = None
+        """Stands for the start that opens a session; None if there is none, or if it is to end."""
         self._channels = Channels()
         self._session: RemoteSession | None = None
         self._outbox: Outbox | None = None
@@ -94,16 +96,28 @@ class RemoteHand(RemoteCommands):
         """
         if not isinstance(activate, bool):
             raise TypeError(f"activate must be True or False, got {activate!r}")
-        loop = running_loop()
-        if self._session is not None and not self._session.is_over and self._session.loop is loop:
-            raise InvalidStateError("this hand is started already", self.state, {State.SHUTDOWN})
+        running_loop()
+        self._abandon_if_loop_closed()
+        before = self._session
+        if self._opening is not None or (before is not None and not before.has_ended):
+            raise InvalidStateError(
+                "this hand is started already: stop() it first",
+                self.state,
+                {State.DISCONNECTED, State.SHUTDOWN},
+            )
         bus = await self._open()
         self._session = session = RemoteSession(
-            self._name, bus, self._channels, wants_control=self._control is True
+            self._name,
+            bus,
+            self._channels,
+            wants_control=self._control is True,
+            owns_bus=bus is not self._shared,
+            before=None if before is None else before.mirror,
         )
         self._outbox = Outbox(session)
         try:
-            await session.connect(self._connect_timeout)
+            with plainly():
+                await session.connect(self._connect_timeout)
             if activate and self._control:
                 await self._activate_if_reset()
         except BaseException:
@@ -120,31 +134,46 @@ class RemoteHand(RemoteCommands):
             halt: False leaves the fingers to what they do.
 
         Raises:
-            RuntimeError: called in another event loop than the hand runs in.
+            RuntimeError: called in another event loop than the hand runs in; it goes on. (When that loop
+                has been closed, the hand counts as stopped, and its agent holds what moves.)
         """
         if not isinstance(halt, bool):
             raise TypeError(f"halt must be True or False, got {halt!r}")
+        self._abandon_if_loop_closed()
+        self._opening = None
         session = self._session
-        if session is None or session.is_over:
-            return
-        session.check_loop()
-        try:
-            await session.close(NotStartedError("the hand was stopped"), halt=halt)
-        finally:
-            if self._own is not None:
-                bus, self._own = self._own, None
-                await bus.close()
+        if session is not None and not session.has_ended:
+            session.check_loop()
+            await session.close(halt=halt)
 
     async def _open(self) -> Bus:
+        """The session to use.
+
+        Raises:
+            NotStartedError: stop() was called meanwhile.
+            RobotiqError: none could be opened.
+        """
         if self._shared is not None:
             return self._shared
         from ..network.zenoh_bus import open_bus  # noqa: PLC0415  # needs the extra
 
-        self._own = await open_bus(self._route.configuration(), str(self._name))
-        return self._own
+        self._opening = opening = object()
+        try:
+            bus = await open_bus(self._route.configuration(), str(self._name))
+            if self._opening is not opening:
+                await bus.close()
+                raise NotStartedError("stop() was called meanwhile")
+        finally:
+            if self._opening is opening:
+                self._opening = None
+        return bus
+
+    def _abandon_if_loop_closed(self) -> None:
+        if self._session is not None and self._session.lost_its_loop:
+            self._session.abandon()
 
     async def _activate_if_reset(self) -> None:
-        if self.state is State.RESET:
+        if self.state in (State.RESET, State.DO_ACTIVATION, State.WF_ACTIVATION):
             await self.activate()
 
     # -- the lease -------------------------------------------------------------------------------------
@@ -161,7 +190,8 @@ class RemoteHand(RemoteCommands):
             ControlLostError: another client commands the gripper.
             RobotiqError: not started, or the agent does not answer.
         """
-        await self._asked().acquire()
+        with plainly():
+            await self._asked().acquire()
 
     async def take(self) -> None:
         """Get the lease, whoever has it: what that one commanded and still moves is held.
@@ -169,7 +199,8 @@ class RemoteHand(RemoteCommands):
         Raises:
             RobotiqError: not started, or the agent does not answer.
         """
-        await self._asked().acquire(take=True)
+        with plainly():
+            await self._asked().acquire(take=True)
 
     async def release(self, *, halt: bool = True) -> None:
         """Give the lease back, and read on.
@@ -180,7 +211,8 @@ class RemoteHand(RemoteCommands):
         Raises:
             RobotiqError: not started, the agent does not answer, or the fingers were not seen to stop.
         """
-        await self._asked().release(halt=halt)
+        with plainly():
+            await self._asked().release(halt=halt)
 
     def __repr__(self) -> str:
         """Address and state."""

@@ -7,62 +7,118 @@ import getpass
 import os
 import secrets
 import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, Final
 
 from ...errors import AgentError, ConnectionLostError, NotAllowedError
 from ...session.clock import now
-from ..network.bus import Bus, Urgency
+from ..network.bus import Bus, Reply, Urgency
 from ..wire.envelope import Answer, Call, unpack_answer
 from ..wire.names import GripperName
 from ..wire.values import Fields
 from .mirror import Mirror
 
 RECENT_S: Final = 0.5
-"""So recently the agent must have been heard for an empty answer to mean that the request is not allowed."""
+"""So soon the agent must be heard after an empty answer for that to mean that the request is not allowed."""
+AT_ONCE_S: Final = 0.25
+"""Sooner than any time is over: nobody was there for the request."""
 
 
 class NoAnswerError(ConnectionLostError):
     """No answer came; whether it was carried out is not known."""
 
 
+@contextmanager
+def plainly() -> Iterator[None]:
+    """Around what users call: that no answer came is a lost connection to them.
+
+    Raises:
+        ConnectionLostError: no answer came.
+    """
+    try:
+        yield
+    except NoAnswerError as error:
+        raise ConnectionLostError(str(error)) from error
+
+
+@dataclass(frozen=True, slots=True)
+class Posted:
+    """A request on its way.
+
+    Attributes:
+        call: the request.
+        verb: the last part of the key it went to.
+        timeout: seconds for its answer.
+        urgency: of both.
+        asked_at: when it was sent.
+        asking: waits for the reply.
+    """
+
+    call: Call
+    verb: str
+    timeout: float
+    urgency: Urgency
+    asked_at: float
+    asking: asyncio.Future[Reply | None]
+
+
 class Requests:
     """Numbers requests, sends each once, and ends the wait when the agent falls silent."""
 
     def __init__(self, name: GripperName, bus: Bus) -> None:
-        """Ask the agent that serves a gripper; it counts as heard."""
+        """Ask the agent that serves a gripper."""
         self._name = name
         self._bus = bus
         self._client = secrets.token_hex(8)
         self._number = 0
-        self._heard_at = now()
-        self._silence: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._loop = asyncio.get_running_loop()
+        self._silence: asyncio.Future[None] = self._loop.create_future()
+        self._sign: asyncio.Future[None] = self._loop.create_future()
+        """Done as soon as the agent is heard."""
+        self._closed: asyncio.Future[None] = self._loop.create_future()
+        self._asking: set[asyncio.Future[Reply | None]] = set()
 
     def hear(self) -> None:
         """The agent is heard."""
-        self._heard_at = now()
-        if self._silence.done():
-            self._silence = asyncio.get_running_loop().create_future()
+        if not self._sign.done():
+            self._sign.set_result(None)
 
     def fall_silent(self) -> None:
-        """The agent is not heard any more: nobody waits for its answers."""
-        if not self._silence.done():
-            self._silence.set_result(None)
+        """The agent is not heard any more: nobody waits for the answers to what was asked until now."""
+        silence, self._silence = self._silence, self._loop.create_future()
+        silence.set_result(None)
+
+    async def close(self) -> None:
+        """Nobody waits for any answer any more."""
+        if not self._closed.done():
+            self._closed.set_result(None)
+        for asking in self._asking:
+            asking.cancel()
+        await asyncio.gather(*self._asking, return_exceptions=True)
 
     def make(self, mirror: Mirror, lease: int, arguments: Fields) -> Call:
         """The next request."""
         self._number += 1
         return Call(self._name.base, self._client, mirror.epoch, lease, self._number, mirror.stamp, arguments)
 
-    async def send(
-        self, call: Call, verb: str, *, timeout: float, urgency: Urgency = Urgency.COMMAND
-    ) -> tuple[Answer, bytes]:
-        """Send a request and wait for its answer; returns it, and the status that came with it.
+    def post(self, call: Call, verb: str, *, timeout: float, urgency: Urgency = Urgency.COMMAND) -> Posted:
+        """Send a request: before whatever is posted after it.
 
         Args:
             call: the request.
             verb: the last part of the key it goes to.
-            timeout: seconds.
-            urgency: a halt is asked for also when the agent has been silent for a while.
+            timeout: seconds for its answer.
+            urgency: the answer to a halt is waited for also when the agent falls silent.
+        """
+        asking = self._bus.ask(self._name.key(verb), call.pack(), timeout=timeout, urgency=urgency)
+        self._asking.add(asking)
+        asking.add_done_callback(self._asking.discard)
+        return Posted(call, verb, timeout, urgency, now(), asking)
+
+    async def answer(self, posted: Posted) -> tuple[Answer, bytes]:
+        """Wait for the answer to a request; returns it, and the status that came with it.
 
         Raises:
             NoAnswerError: no answer; it may have been carried out.
@@ -70,32 +126,50 @@ class Requests:
             AgentError: the answer was another's, or of another version.
             ProtocolError: it is none.
         """
-        asked_at = now()
-        asking = asyncio.ensure_future(
-            self._bus.ask(self._name.key(verb), call.pack(), timeout=timeout, urgency=urgency)
-        )
-        awaited: set[asyncio.Future[Any]] = {asking}
-        if urgency is not Urgency.STOP:
+        reply, at_once = await self._wait(posted)
+        if reply is None and at_once and await self._hears_on():
+            # Just after a link has come up nobody seems to be there. Nothing is done twice: the number is the
+            # same, and so is what had been heard when it was asked.
+            again = self.post(posted.call, posted.verb, timeout=posted.timeout, urgency=posted.urgency)
+            reply, at_once = await self._wait(again)
+            if reply is None and at_once and await self._hears_on():
+                raise NotAllowedError(f"{self._name}: nobody there answers to {posted.verb}: access denied")
+        if reply is None:
+            raise NoAnswerError(f"{self._name}: no answer in time; {posted.verb} may have been carried out")
+        answer = unpack_answer(reply.payload)
+        if answer.to != self._name.base or answer.number not in (0, posted.call.number):
+            raise AgentError(
+                f"{self._name}: another answer came to {posted.verb}; it may have been carried out"
+            )
+        return answer, reply.attachment
+
+    async def _wait(self, posted: Posted) -> tuple[Reply | None, bool]:
+        """Wait for a reply; returns it, and whether it came at once: as where access rules say no.
+
+        Raises:
+            NoAnswerError: the agent fell silent, or the run ended.
+        """
+        asking = posted.asking
+        awaited: set[asyncio.Future[Any]] = {asking, self._closed}
+        if posted.urgency is not Urgency.STOP:
             awaited.add(self._silence)
         try:
             await asyncio.wait(awaited, return_when=asyncio.FIRST_COMPLETED)
         finally:
             asking.cancel()
-        if not asking.done():
-            raise NoAnswerError(f"{self._name}: the agent fell silent; {verb} may have been carried out")
-        reply = asking.result()
-        if reply is None:
-            raise self._silent(verb, at_once=now() - asked_at < timeout / 2)
-        answer = unpack_answer(reply.payload)
-        if answer.to != self._name.base or answer.number not in (0, call.number):
-            raise AgentError(f"{self._name}: another answer came to {verb}; it may have been carried out")
-        return answer, reply.attachment
+        if not asking.done() or asking.cancelled():
+            raise NoAnswerError(
+                f"{self._name}: the agent fell silent; {posted.verb} may have been carried out"
+            )
+        return asking.result(), now() - posted.asked_at < min(AT_ONCE_S, posted.timeout / 2)
 
-    def _silent(self, verb: str, *, at_once: bool) -> NotAllowedError | NoAnswerError:
-        """What it means that nobody answered: access rules answer nothing, and at once."""
-        if at_once and now() - self._heard_at < RECENT_S:
-            return NotAllowedError(f"{self._name}: nobody there answers to {verb}: access denied")
-        return NoAnswerError(f"{self._name}: no answer in time; {verb} may have been carried out")
+    async def _hears_on(self) -> bool:
+        """Whether the agent is heard from now on; a link that is down may have been up a moment ago."""
+        if self._sign.done():
+            self._sign = self._loop.create_future()
+        sign = self._sign
+        await asyncio.wait({sign, self._closed}, timeout=RECENT_S, return_when=asyncio.FIRST_COMPLETED)
+        return sign.done()
 
 
 def label() -> str:

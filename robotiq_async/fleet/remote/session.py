@@ -9,14 +9,15 @@ from contextlib import suppress
 from typing import Any, Final
 
 from ...concurrency import wait_shielded
+from ...control.triggers import Trigger
 from ...enums import State
 from ...errors import (
     ConnectFailedError,
     ConnectionLostError,
     ControlLostError,
+    MoveTimeoutError,
     NotAllowedError,
     NotStartedError,
-    ProtocolError,
     RobotiqError,
 )
 from ...log import log
@@ -30,17 +31,14 @@ from ..network.bus import Bus, Undo
 from ..wire.envelope import Call
 from ..wire.names import GripperName
 from ..wire.status_message import unpack
-from ..wire.values import Fields, read_statistics
+from ..wire.values import Fields, read_statistics, reading
+from .lease_keeper import ANSWER_S, RENEWALS, LeaseKeeper
 from .mirror import Mirror
-from .requests import NoAnswerError, Requests, label
+from .missed_events import MissedEvents
+from .requests import NoAnswerError, Posted, Requests
 
-RENEWALS: Final = 5
-"""So often in a window the lease is renewed, and silence looked for."""
-ANSWER_S: Final = 0.5
-"""For an answer that the agent gives at once; asked again within the time that there is."""
 CONNECT_S: Final = 5.0
 HALT_S: Final = 2.0
-RELEASE_S: Final = 1.5
 
 
 class RemoteSession:
@@ -49,32 +47,54 @@ class RemoteSession:
     Attributes:
         mirror: what has been heard.
         waiters: who waits for a state.
-        is_in_control: whether this hand holds the lease, as far as it knows.
-        is_over: whether the run has ended.
-        lost: why control was lost; None while it is held, or was never asked for.
+        is_over: whether the run has ended, or is about to.
+        has_ended: whether nothing of it is left.
+        window: of the leases, in seconds.
     """
 
-    def __init__(self, name: GripperName, bus: Bus, channels: Channels, *, wants_control: bool) -> None:
-        """Begin to listen."""
+    def __init__(
+        self,
+        name: GripperName,
+        bus: Bus,
+        channels: Channels,
+        *,
+        wants_control: bool,
+        owns_bus: bool = False,
+        before: Mirror | None = None,
+    ) -> None:
+        """Begin to listen.
+
+        Args:
+            name: the gripper's.
+            bus: an open session.
+            channels: of the hand: they were opened before, perhaps, and are read afterwards.
+            wants_control: whether the lease is acquired, and again when the agent was lost.
+            owns_bus: whether the bus is closed at the end.
+            before: what the run before this one has heard.
+        """
         self.name = name
         self.loop = asyncio.get_running_loop()
         self.waiters = StateWaiters()
-        self.mirror = Mirror(name.mark, channels, self.waiters.reached)
+        self.mirror = Mirror(name.mark, channels, self.waiters.reached, before)
         self.is_over = False
-        self.is_in_control = False
-        self.lost: ControlLostError | None = None
+        self.has_ended = False
         self.statistics: Statistics = Counters().snapshot(0)
         self._bus = bus
         self._channels = channels
-        self._wants_control = wants_control
-        self._lease = 0
-        self._window = WINDOW_S
-        self._heard_at = 0.0
+        self._owns_bus = owns_bus
+        self._closing: asyncio.Task[None] | None = None
+        self.window = WINDOW_S
+        self._heard_at = 0.0  # something current
+        self._arrived_at = 0.0  # anything
         self._requests = Requests(name, bus)
         self._tasks: set[asyncio.Task[Any]] = set()
-        self._is_catching_up = False
-        self._renewing: asyncio.Task[Any] | None = None
+        self._missed = MissedEvents(
+            self.mirror, lambda since: self.ask("info", {"since": since}, timeout=ANSWER_S), self.spawn
+        )
+        self._keeper = LeaseKeeper(self, wants_control=wants_control)
+        self._looking: asyncio.Task[Any] | None = None
         channels.reopen(self.loop)
+        self.mirror.begin(now())
         # One wildcard, and every payload says what it is about: samples may come under the wrong key.
         self._undo: Undo = bus.subscribe(name.key("*"), self._hear)
 
@@ -94,8 +114,7 @@ class RemoteSession:
             if now() >= deadline:
                 await self._give_up()
             await asyncio.sleep(0.05)
-        if self._wants_control:
-            await self.acquire()
+        await self._keeper.begin(deadline)
         self.spawn(self._keep())
         await self._wait_for_gripper(deadline)
 
@@ -112,6 +131,8 @@ class RemoteSession:
             try:
                 async with asyncio.timeout(max(ANSWER_S, deadline - now())):
                     await reached
+                # A change of state is heard before the status that shows it; an answer carries both.
+                await self.ask("info", timeout=ANSWER_S)
             except TimeoutError:
                 problem = (await self.ask("info", timeout=ANSWER_S))["problem"]
                 raise ConnectFailedError(
@@ -124,8 +145,9 @@ class RemoteSession:
             info = await self.ask("info", timeout=min(ANSWER_S, max(0.05, deadline - now())))
         except (NoAnswerError, NotAllowedError):
             return False
-        self._window = float(info["window"])
-        self.statistics = read_statistics(info["statistics"])
+        with reading("its figures"):
+            self.window = float(info["window"])
+            self.statistics = read_statistics(info["statistics"])
         return True
 
     async def _give_up(self) -> None:
@@ -138,29 +160,49 @@ class RemoteSession:
             "no agent of it is heard: none runs, or the network or a certificate is in the way",
         )
 
-    async def close(self, failure: NotStartedError, *, halt: bool) -> None:
-        """End the run; within two seconds, also when cancelled meanwhile."""
-        self.is_over = True
-        work = asyncio.ensure_future(self._close(failure, halt=halt))
-        await wait_shielded(work)
-        work.result()
+    async def close(self, *, halt: bool) -> None:
+        """End the run; within two seconds, also when cancelled meanwhile, and whoever asks waits for it."""
+        if self._closing is None:
+            self.is_over = True
+            self.mirror.shut_down(State.DO_SHUTDOWN, Trigger.ASK_STOP, now())
+            self._closing = self.loop.create_task(self._close(halt=halt))
+        await wait_shielded(self._closing)
+        self._closing.result()
 
-    async def _close(self, failure: NotStartedError, *, halt: bool) -> None:
-        if self.is_in_control:
-            self.is_in_control = False
-            try:
-                await self.ask("lease", {"what": "release", "halt": halt}, timeout=RELEASE_S)
-            except RobotiqError as error:
-                log.warning(
-                    "%s: the agent did not acknowledge the end (%s): it holds what moves", self.name, error
-                )
-        self._undo()
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-        self._requests.fall_silent()
-        self.waiters.fail(lambda: failure)
+    async def _close(self, *, halt: bool) -> None:
+        try:
+            await self._keeper.end(halt=halt)
+        except RobotiqError as error:
+            log.warning(
+                "%s: the agent did not acknowledge the end (%s): it holds what moves", self.name, error
+            )
+        finally:
+            self._undo()
+            for task in self._tasks:
+                task.cancel()
+            await self._requests.close()
+            await asyncio.gather(*self._tasks, return_exceptions=True)
+            if self._owns_bus:
+                await self._bus.close()
+            self._end()
+
+    def _end(self) -> None:
+        self.is_over = self.has_ended = True
+        self.mirror.shut_down(State.SHUTDOWN, Trigger.STOPPED, now())
+        self.waiters.fail(lambda: NotStartedError("the hand was stopped"))
         self._channels.end()
+
+    @property
+    def lost_its_loop(self) -> bool:
+        """Whether the loop was closed under it: its tasks can never end then."""
+        return not self.has_ended and self.loop.is_closed()
+
+    def abandon(self) -> None:
+        """Count as over when the loop was closed under it; the agent holds what moves by itself."""
+        log.warning("%s: the event loop was closed before stop()", self.name)
+        self._keeper.abandon()
+        self.waiters = StateWaiters()
+        self._end()
 
     def check_running(self) -> None:
         """Refuse what only a hand that runs can do.
@@ -169,7 +211,9 @@ class RemoteSession:
             NotStartedError: it does not.
         """
         if self.is_over:
-            raise NotStartedError("the hand was stopped")
+            raise NotStartedError("the hand is not started: use 'async with' or start()")
+        if self.loop.is_closed():
+            raise NotStartedError("the event loop that the hand ran in was closed: start() it again")
 
     def check_loop(self) -> None:
         """Refuse a call from another thread or event loop.
@@ -183,123 +227,94 @@ class RemoteSession:
 
     def _hear(self, _key: str, payload: bytes) -> None:
         try:
-            if payload[:1] == b"{":
-                self._hear_fields(json.loads(payload))
-            else:
-                self._hear_status(payload, in_turn=True)
-        except (ProtocolError, ValueError, KeyError, TypeError) as error:
+            with reading("news"):
+                if payload[:1] == b"{":
+                    self._hear_fields(json.loads(payload))
+                else:
+                    self._hear_status(payload, in_turn=True)
+        except RobotiqError as error:
             log.warning("%s: %s", self.name, error)
+        if self.mirror.has_missed() and not self.is_over:
+            self._missed.fetch()  # an event was dropped on the way
 
-    def _hear_status(self, payload: bytes, *, in_turn: bool) -> None:
-        message = unpack(payload)
+    def _hear_status(self, payload: bytes, *, in_turn: bool, asked: float | None = None) -> bool:
+        """A status has arrived; returns whether it is about the gripper as it is."""
+        message, arrival = unpack(payload), now()
         if self.mirror.is_about_another(message.mark):
-            return
+            return False
+        if self.mirror.is_superseded(message, arrival, self.window):
+            return False
         if self.mirror.epoch not in (0, message.epoch):
-            self._lose_control("closed", "the agent was started anew")
-        self._heard_at = now()
-        self.mirror.hear(message, self._heard_at, in_turn=in_turn)
+            self._keeper.lose("closed", "the agent was started anew")
+            self._requests.fall_silent()  # what the former one was asked it does not answer
+        self._arrived_at = arrival
+        if not self.mirror.hear(message, arrival, in_turn=in_turn, window=self.window, asked=asked):
+            return True  # it has been on its way for so long that it says nothing about now
+        self._heard_at = arrival
         self._requests.hear()
-        if self.is_in_control and message.lease > self._lease and in_turn:
-            self.spawn(self._renew())  # it says why
-        if message.events > self.mirror.events and in_turn:
-            self._catch_up()  # an event was dropped on the way
+        if in_turn:
+            self._keeper.hear(message.lease)
+        return True
 
     def _hear_fields(self, fields: Mapping[str, Any]) -> None:
         if self.mirror.is_about_another(fields["mark"]):
             return
         if "statistics" in fields:
             self.statistics = read_statistics(fields["statistics"])
-        elif fields["epoch"] == self.mirror.epoch and self.mirror.hear_events(fields["events"]):
-            self._catch_up()
-
-    def _catch_up(self) -> None:
-        if not self._is_catching_up and not self.is_over:
-            self._is_catching_up = True
-            self.spawn(self._fetch_events())
-
-    async def _fetch_events(self) -> None:
-        """Ask for the events that were missed."""
-        try:
-            while self.mirror.newest is not None and self.mirror.newest.events > self.mirror.events:
-                info = await self.ask("info", {"since": self.mirror.events}, timeout=ANSWER_S)
-                events = info["events"]
-                if info["epoch"] == self.mirror.epoch and events:
-                    self.mirror.skip_events(events[0]["index"] - 1)
-                    self.mirror.hear_events(events)
-                await asyncio.sleep(0.02)
-        except (RobotiqError, KeyError, TypeError) as error:
-            log.info("%s: missed events could not be fetched: %s", self.name, error)
-        finally:
-            self._is_catching_up = False
+            return
+        if self._hear_status(bytes.fromhex(fields["status"]), in_turn=True):
+            self.mirror.hear_events(fields["events"])
 
     async def _keep(self) -> None:
         """Look for silence, renew the lease, and acquire it again when that is due."""
-        interval, woken = self._window / RENEWALS, now()
+        interval, woken = self.window / RENEWALS, now()
         while True:
             await asyncio.sleep(interval)
             late, woken = now() - woken - interval, now()
             # After a hold-up of this loop, what has arrived meanwhile is heard first.
-            if late < interval and woken - self._heard_at > self._window:
+            if late < interval and woken - self._heard_at > self.window:
                 self._fall_silent(woken)
-            if self.is_in_control and (self._renewing is None or self._renewing.done()):
-                self._renewing = self.spawn(self._renew())
-            elif self._wants_control and not self.is_in_control and not self.mirror.is_silent:
-                await self._acquire_again()
+            if self.mirror.is_silent and woken - self._arrived_at < interval:
+                self._look_again()
+            await self._keeper.look()
 
-    async def _acquire_again(self) -> None:
-        try:
-            await self.acquire()
-        except ControlLostError:
-            self._wants_control = False  # somebody else was first; whose turn it is then people decide
-        except RobotiqError:
-            pass  # again in a moment
+    def _look_again(self) -> None:
+        """What is heard seems to be old: it is, or the agent's clock stood still. An answer tells."""
+        if self._looking is None or self._looking.done():
+            self._looking = self.spawn(self.ask_quietly("info", {}, ANSWER_S))
 
     def _fall_silent(self, at: float) -> None:
         if self.mirror.is_silent:
             return
         log.warning("%s: the agent is silent", self.name)
         self.mirror.fall_silent(at)
-        self._lose_control("expired", "the agent is silent")
+        self._keeper.lose("expired", "the agent is silent")
         self._requests.fall_silent()
 
     # -- control ---------------------------------------------------------------------------------------
 
-    async def acquire(self, *, take: bool = False) -> None:
-        """Get the lease.
+    @property
+    def is_in_control(self) -> bool:
+        """Whether this hand holds the lease, as far as it knows."""
+        return self._keeper.is_in_control
 
-        Raises:
-            ControlLostError: another client holds it, and it is not to be taken away.
-            RobotiqError: the agent did not answer.
-        """
-        what = {"what": "take" if take else "acquire", "label": label()}
-        value = await self.ask("lease", what, timeout=ANSWER_S)
-        self._lease = value["lease"]
-        self.is_in_control, self._wants_control, self.lost = True, True, None
+    @property
+    def lease(self) -> int:
+        """Number of the lease it holds, or held last."""
+        return self._keeper.lease
+
+    @property
+    def lost(self) -> ControlLostError | None:
+        """Why control was lost; None while it is held, or was never asked for."""
+        return self._keeper.lost
+
+    async def acquire(self, *, take: bool = False) -> None:
+        """Get the lease; see :meth:`LeaseKeeper.acquire`."""
+        await self._keeper.acquire(take=take)
 
     async def release(self, *, halt: bool) -> None:
-        """Give the lease back.
-
-        Raises:
-            RobotiqError: the agent did not answer, or the fingers were not seen to stop.
-        """
-        self._wants_control = False
-        if self.is_in_control:
-            self._lose_control("released", "it was given back")
-            await self.ask("lease", {"what": "release", "halt": halt}, timeout=RELEASE_S)
-
-    async def _renew(self) -> None:
-        with suppress(RobotiqError):
-            await self.ask("lease", {"what": "renew"}, timeout=self._window)
-
-    def _lose_control(self, reason: str, why: str) -> None:
-        if not self.is_in_control:
-            return
-        self.is_in_control = False
-        # After a halt or a take of somebody else nobody takes it back without having been asked to.
-        self._wants_control = self._wants_control and reason not in ("taken", "halted", "held", "released")
-        self.lost = ControlLostError(f"{self.name} is not commanded from here any more: {why}", reason)
-        if reason != "released":
-            log.warning("%s", self.lost)
+        """Give the lease back; see :meth:`LeaseKeeper.release`."""
+        await self._keeper.release(halt=halt)
 
     def check_control(self) -> None:
         """Refuse commands of a hand that only reads, or has lost the lease.
@@ -310,52 +325,63 @@ class RemoteSession:
         """
         if self.mirror.is_silent:
             raise ConnectionLostError(f"{self.name}: the agent is silent: nothing was asked")
-        if not self.is_in_control:
-            lost = self.lost
-            if lost is None:
-                raise ControlLostError("this hand only reads: acquire() the lease first", "released")
-            raise ControlLostError(str(lost), lost.reason)
+        self._keeper.check()
 
     # -- asking ----------------------------------------------------------------------------------------
 
     async def ask(self, verb: str, arguments: Fields | None = None, **how: Any) -> Any:  # noqa: ANN401
-        """Ask the agent, once; see :meth:`Requests.send` for what else it takes and raises."""
+        """Ask the agent, once; see :meth:`Requests.post` for what else it takes and raises."""
         return await self.send(self.call(arguments), verb, **how)
 
     def call(self, arguments: Fields | None = None) -> Call:
         """The next request, under the present lease."""
-        return self._requests.make(self.mirror, self._lease, arguments or {})
+        return self._requests.make(self.mirror, self.lease, arguments or {})
+
+    def post(self, call: Call, verb: str, **how: Any) -> Posted:  # noqa: ANN401
+        """Send a request; see :meth:`Requests.post`."""
+        return self._requests.post(call, verb, **how)
 
     async def send(self, call: Call, verb: str, **how: Any) -> Any:  # noqa: ANN401
-        """Send a request and wait for its answer; see :meth:`Requests.send`.
+        """Send a request and wait for its answer; see :meth:`answer`."""
+        return await self.answer(self.post(call, verb, **how))
+
+    async def answer(self, posted: Posted) -> Any:  # noqa: ANN401
+        """Wait for the answer to a request; see :meth:`Requests.answer`.
 
         Raises:
             NotStartedError: the run has ended meanwhile.
         """
         try:
-            answer, news = await self._requests.send(call, verb, **how)
+            answer, news = await self._requests.answer(posted)
         except NoAnswerError:
             self.check_running()
             raise
         if news:
-            self._hear_status(news, in_turn=False)
+            self._hear_status(news, in_turn=False, asked=posted.asked_at)
         try:
             return answer.outcome(self.mirror.clock)
+        except MoveTimeoutError as error:
+            error.status = self.mirror.renumbered(error.status)
+            raise
         except ControlLostError as error:
-            if verb != "halt" and error.reason != "late" and call.lease == self._lease:
-                self._lose_control(error.reason, str(error))
+            if posted.verb != "lease":
+                self.check_running()  # the lease was given back at the end of the run
+            if posted.verb != "halt" and error.reason != "late" and posted.call.lease == self.lease:
+                self._keeper.lose(error.reason, str(error))
             raise
 
-    def call_off(self, call: Call) -> None:
+    async def ask_quietly(self, verb: str, arguments: Fields, timeout: float) -> None:
+        """Ask for what the answer does by itself."""
+        with suppress(RobotiqError):
+            await self.ask(verb, arguments, timeout=timeout)
+
+    def call_off(self, call: Call) -> asyncio.Task[Any] | None:
         """Nobody waits for a request any more: what it set going is to be held."""
-        if self.is_in_control and not self.is_over:
-            cancel = self.ask("cmd/cancel", {"number": call.number}, timeout=self._window)
+        if not self.is_in_control or self.is_over:
+            return None
 
-            async def ask() -> None:
-                with suppress(RobotiqError):  # then the lease ends, and the agent holds by itself
-                    await cancel
-
-            self.spawn(ask())
+        # If it is not heard the lease ends, and the agent holds by itself.
+        return self.spawn(self.ask_quietly("cmd/cancel", {"number": call.number}, self.window))
 
     def spawn(self, work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
         """Do something beside; it ends with the run."""
@@ -366,4 +392,4 @@ class RemoteSession:
 
     def current_state(self) -> State:
         """Where the hand is."""
-        return State.SHUTDOWN if self.is_over else self.mirror.state
+        return self.mirror.state

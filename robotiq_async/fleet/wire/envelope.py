@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import math
+import sys
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -39,9 +39,7 @@ class Call:
 
     def pack(self) -> bytes:
         """The request as bytes."""
-        return json.dumps(
-            {"version": VERSION} | {name: getattr(self, name) for name in self.__slots__}
-        ).encode()
+        return _pack(self)
 
 
 def unpack_call(data: bytes) -> Call:
@@ -69,7 +67,8 @@ def _is_well_formed(call: Call) -> bool:
         and 0 < len(values["client"]) <= 64
         and all(type(values[name]) is int and values[name] >= 0 for name in _INTEGERS)
         and type(values["seen"]) in (int, float)
-        and math.isfinite(values["seen"])
+        # Not isfinite(): an int may be too long for it.
+        and abs(values["seen"]) <= sys.float_info.max
         and isinstance(values["arguments"], dict)
     )
 
@@ -94,9 +93,7 @@ class Answer:
 
     def pack(self) -> bytes:
         """The answer as bytes."""
-        return json.dumps(
-            {"version": VERSION} | {name: getattr(self, name) for name in self.__slots__}
-        ).encode()
+        return _pack(self)
 
     def outcome(self, clock: Clock) -> Any:  # noqa: ANN401  # what each request returns
         """What the request returned.

@@ -9,7 +9,7 @@ from zlib import crc32
 
 SCHEME: Final = "zenoh://"
 ROOT: Final = "robotiq/v1"
-"""Every key begins with it; the number is the version of the protocol (docs/reference/fleet-protocol.md)."""
+"""Every key begins with it; the number is the version of the protocol (docs/fleet-protocol.md)."""
 FORM: Final = "zenoh://SITE/HOST/GRIPPER"
 _NAME: Final = re.compile(r"[A-Za-z0-9_.-]{1,64}")
 

@@ -31,6 +31,7 @@ SIZE: Final = _LAYOUT.size
 _STATES: Final = tuple(State)
 _PLACES: Final = {state: place for place, state in enumerate(_STATES)}
 _READ, _MOVES, _HELD = 1, 2, 4
+_NO_REGISTERS: Final = (0,) * 8
 
 
 class StatusMessage(NamedTuple):
@@ -64,19 +65,20 @@ class StatusMessage(NamedTuple):
 
     def pack(self) -> bytes:
         """The message as bytes."""
-        flags = _READ * (self.registers is not None) | _MOVES * self.is_moving | _HELD * self.is_held
+        mark, epoch, stamp, state, lease, is_held, events, is_moving, sequence, age, registers = self
+        flags = _READ * (registers is not None) | _MOVES * is_moving | _HELD * is_held
         return _LAYOUT.pack(
             VERSION,
-            _PLACES[self.state],
+            _PLACES[state],
             flags,
-            self.mark,
-            self.lease,
-            self.events,
-            self.epoch,
-            self.sequence,
-            self.stamp,
-            self.age,
-            *(self.registers or (0,) * 8),
+            mark,
+            lease,
+            events,
+            epoch,
+            sequence,
+            stamp,
+            age,
+            *(registers or _NO_REGISTERS),
         )
 
 

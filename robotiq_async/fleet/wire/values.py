@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict
 from typing import Any, Final
 
@@ -10,7 +11,16 @@ from ... import errors
 from ...control.motion import MoveResult
 from ...control.triggers import Trigger
 from ...enums import Fault, Finger, ObjectStatus, State
-from ...errors import AgentError, ProtocolError, RobotiqError
+from ...errors import (
+    AgentError,
+    ConnectFailedError,
+    ControlLostError,
+    GripperFaultError,
+    InvalidStateError,
+    MoveTimeoutError,
+    ProtocolError,
+    RobotiqError,
+)
 from ...session.statistics import Statistics
 from ...session.streams import SentRequest, Transition
 from ...wire.request import Request
@@ -23,10 +33,23 @@ Clock = Callable[[float], float]
 _KINDS: Final = {
     name: kind
     for name, kind in vars(errors).items()
-    if isinstance(kind, type) and issubclass(kind, RobotiqError)
+    if isinstance(kind, type) and issubclass(kind, RobotiqError) and kind is not errors.NotAllStoppedError
 } | {"TypeError": TypeError, "ValueError": ValueError}
 _WORDS: Final = ("address", "reason")
 """What errors know in words."""
+
+
+@contextmanager
+def reading(what: str) -> Iterator[None]:
+    """Read what an agent has sent; it may be one of another version, or none at all.
+
+    Raises:
+        ProtocolError: what is read is not there, or of the wrong kind.
+    """
+    try:
+        yield
+    except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
+        raise ProtocolError(f"the agent sent {what} that cannot be read: {error!r:.200}") from error
 
 
 # -- statuses ----------------------------------------------------------------------------------------------
@@ -73,25 +96,31 @@ def error_fields(error: Exception) -> Fields:
 def read_error(fields: Fields, clock: Clock) -> Exception:
     """The error in an object; one of a kind that is not known here is an AgentError."""
     try:
-        kind, message = _KINDS.get(fields["kind"]), str(fields["message"])
-        if kind is None:
-            return AgentError(f"{fields['kind']}: {message}")
-        error: Exception = kind.__new__(kind)
-        error.args = (message,)
-        known: dict[str, object] = {}
-        if "state" in fields:
-            known["state"] = State(fields["state"])
-            known["allowed"] = frozenset(map(State, fields["allowed"]))
-        if "fault" in fields:
-            known["fault"] = Fault(fields["fault"])
-        if "status" in fields:
-            known["status"] = read_status(fields["status"], clock)
-        known |= {name: str(fields[name]) for name in _WORDS if name in fields}
-        vars(error).update(known)
-    except (KeyError, TypeError, ValueError) as malformed:
-        unreadable = ProtocolError(f"the agent sent an error that cannot be read: {fields!r:.200}")
-        unreadable.__cause__ = malformed
+        with reading("an error"):
+            return _error(fields, clock)
+    except ProtocolError as unreadable:
         return unreadable
+
+
+def _error(fields: Fields, clock: Clock) -> Exception:
+    kind, message = _KINDS.get(fields["kind"]), str(fields["message"])
+    if kind is None:
+        return AgentError(f"{fields['kind']}: {message}")
+    error: Exception = kind.__new__(kind)
+    error.args = (message,)
+    known: dict[str, object] = {}
+    if issubclass(kind, InvalidStateError):
+        known["state"] = State(fields["state"])
+        known["allowed"] = frozenset(map(State, fields["allowed"]))
+    if issubclass(kind, GripperFaultError):
+        known["fault"] = Fault(fields["fault"])
+    if issubclass(kind, MoveTimeoutError):
+        known["status"] = read_status(fields["status"], clock)
+    if issubclass(kind, ConnectFailedError):
+        known["address"] = str(fields["address"])
+    if issubclass(kind, ControlLostError):
+        known["reason"] = str(fields["reason"])
+    vars(error).update(known)
     return error
 
 

@@ -1,4 +1,4 @@
-"""What is wrong with my connection? Finding after finding, each with advice.
+"""A gripper that this host reaches: name, port, Modbus, rate, activation, fault, other clients.
 
 It only reads: nothing is written, nothing moves, and other clients of the gripper are not disturbed.
 """
@@ -7,21 +7,20 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from enum import Enum
+from dataclasses import replace
 from typing import Final
 
-from .enums import Severity
-from .errors import ConnectFailedError, ProtocolError, ResponseTimeoutError, RobotiqConnectionError
-from .link.address import Address
-from .link.host_names import addresses_of
-from .link.modbus import ModbusTransport
-from .link.simulated import SimulatedTransport, new_gripper
-from .link.transport import Transport
-from .session.statistics import percentile
-from .wire.registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap
-from .wire.status import RobotiqStatus
+from ..enums import Severity
+from ..errors import ConnectFailedError, ProtocolError, ResponseTimeoutError, RobotiqConnectionError
+from ..link.address import Address
+from ..link.host_names import addresses_of
+from ..link.modbus import ModbusTransport
+from ..link.simulated import SimulatedTransport, new_gripper
+from ..link.transport import Transport
+from ..session.statistics import percentile
+from ..wire.registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap
+from ..wire.status import RobotiqStatus
+from .findings import Finding, GiveUpError, Level, Report
 
 REACH_S: Final = 3.0
 """Timeout for resolving the name, and for connecting to the port."""
@@ -36,38 +35,6 @@ UNITS: Final = (2, 9, 1, 0, 255)
 """Unit ids that are tried when the usual one does not answer."""
 SLOW_S: Final = 0.005
 """The period of 200 Hz: a longer round trip does not fit."""
-
-
-class Level(Enum):
-    """Severity of a finding."""
-
-    GOOD = "ok"
-    DOUBT = "warn"
-    BAD = "FAIL"
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """The result of one check.
-
-    Attributes:
-        level: severity.
-        what: what was checked.
-        found: the result.
-        advice: what to do about it; empty if there is nothing to do.
-    """
-
-    level: Level
-    what: str
-    found: str
-    advice: str = ""
-
-
-Report = Callable[[Finding], None]
-
-
-class _GiveUpError(Exception):
-    """No further check is possible."""
 
 
 async def examine(address: Address, report: Report, *, device_id: int | None = None) -> None:
@@ -87,11 +54,11 @@ async def examine(address: Address, report: Report, *, device_id: int | None = N
         link = await _answer(address, registers, report)
         try:
             await _timing(link, report)
-            _state(RobotiqStatus.from_registers(await link.read()), report)
+            report_state(RobotiqStatus.from_registers(await link.read()), report)
             await _others(link, report)
         finally:
             await link.close()
-    except _GiveUpError:
+    except GiveUpError:
         pass
     except RobotiqConnectionError as error:
         advice = "Look at cable, switch and power; something between here and the gripper drops packets."
@@ -107,7 +74,7 @@ async def _reach(address: Address, report: Report) -> None:
         why = "no answer" if isinstance(error, TimeoutError) else str(error)
         advice = "Check the spelling, or use the IP address (shipped as 192.168.1.11)."
         report(Finding(Level.BAD, "name", f"{address.host} cannot be resolved: {why}", advice))
-        raise _GiveUpError from error
+        raise GiveUpError from error
     report(Finding(Level.GOOD, "name", f"{address.host} is {', '.join(found)}"))
     try:
         async with asyncio.timeout(REACH_S):
@@ -115,13 +82,13 @@ async def _reach(address: Address, report: Report) -> None:
     except TimeoutError as error:
         advice = "Is it switched on, on this network, in this subnet? A firewall may drop the packets."
         report(Finding(Level.BAD, "port", f"{address.port} does not answer within {REACH_S:g} s", advice))
-        raise _GiveUpError from error
+        raise GiveUpError from error
     except OSError as error:
         advice = "The host is up, but nothing listens on this port: is it the right address and port?"
         if not isinstance(error, ConnectionRefusedError):
             advice = "There is no way to it: check cable, IP address and subnet mask of this computer."
         report(Finding(Level.BAD, "port", f"{address.port}: {error.strerror or error}", advice))
-        raise _GiveUpError from error
+        raise GiveUpError from error
     report(Finding(Level.GOOD, "port", f"{address.port} is open"))
 
 
@@ -154,7 +121,7 @@ async def _answer(address: Address, usual: RegisterMap, report: Report) -> Trans
         except ConnectFailedError as error:
             await link.close()
             report(Finding(Level.BAD, "open", error.args[0], _advice_for_opening(address, str(error))))
-            raise _GiveUpError from error
+            raise GiveUpError from error
         except RobotiqConnectionError as error:
             await link.close()
             first = first or error
@@ -167,7 +134,7 @@ async def _answer(address: Address, usual: RegisterMap, report: Report) -> Trans
         return link
     assert first is not None
     report(Finding(Level.BAD, "Modbus", str(first), _advice_for_silence(first)))
-    raise _GiveUpError
+    raise GiveUpError
 
 
 def _candidates(address: Address, usual: RegisterMap) -> list[RegisterMap]:
@@ -263,7 +230,7 @@ async def _timing(link: Transport, report: Report) -> None:
     report(Finding(Level.GOOD if enough else Level.DOUBT, "rate", f"up to {rate:.0f} reads a second", advice))
 
 
-def _state(status: RobotiqStatus, report: Report) -> None:
+def report_state(status: RobotiqStatus, report: Report) -> None:
     """Activation and fault."""
     if status.is_activated:
         report(Finding(Level.GOOD, "activation", "active"))

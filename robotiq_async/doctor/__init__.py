@@ -1,0 +1,10 @@
+"""What is wrong with my connection? Finding after finding, each with advice.
+
+Nothing moves, whatever is examined: a gripper that this host reaches, or one that an agent serves.
+"""
+
+from .findings import Finding, Level, Report
+from .fleet import examine_remote
+from .gripper import examine
+
+__all__ = ["Finding", "Level", "Report", "examine", "examine_remote"]

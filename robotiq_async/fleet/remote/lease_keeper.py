@@ -1,0 +1,193 @@
+"""LeaseKeeper: the lease as its client sees it. It is renewed, lost, and acquired again when nobody minds."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Coroutine
+from typing import Any, Final, Protocol
+
+from ...errors import ControlLostError, RobotiqError
+from ...log import log
+from ...session.clock import now
+from ..wire.envelope import Call
+from ..wire.names import GripperName
+from ..wire.values import Fields, reading
+from .mirror import Mirror
+from .requests import NoAnswerError, label
+
+RENEWALS: Final = 5
+"""So often in a window the lease is renewed, and silence looked for."""
+ANSWER_S: Final = 0.5
+"""For an answer that the agent gives at once; asked again within the time that there is."""
+RELEASE_S: Final = 0.9
+"""With the second that closing a session of zenoh may take, within the two of a stop."""
+BY_OTHERS: Final = ("taken", "halted", "held")
+"""Reasons for which nobody comes back without having been asked to."""
+
+
+class Asking(Protocol):
+    """What the keeper needs of a run: to know whom it is about, and to ask."""
+
+    name: GripperName
+    mirror: Mirror
+    window: float
+
+    def call(self, arguments: Fields | None = None) -> Call:
+        """The next request, under the present lease."""
+
+    async def send(self, call: Call, verb: str, **how: Any) -> Any:  # noqa: ANN401
+        """Send a request and wait for its answer."""
+
+    async def ask_quietly(self, verb: str, arguments: Fields, timeout: float) -> None:
+        """Ask for what the answer does by itself."""
+
+    def spawn(self, work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
+        """Do something beside; it ends with the run."""
+
+
+class LeaseKeeper:
+    """One run's lease.
+
+    Attributes:
+        is_in_control: whether this client holds the lease, as far as it knows.
+        lease: number of the lease it holds, or held last.
+        lost: why control was lost; None while it is held, or was never asked for.
+    """
+
+    def __init__(self, run: Asking, *, wants_control: bool) -> None:
+        """Hold nothing yet."""
+        self.is_in_control = False
+        self.lease = 0
+        self.lost: ControlLostError | None = None
+        self._run = run
+        self._wants_control = wants_control
+        self._lease_run = 0
+        """The run of the agent that the number is of."""
+        self._acquiring = asyncio.Lock()
+        self._renewing: asyncio.Task[Any] | None = None
+        self._finding_out: asyncio.Task[Any] | None = None
+
+    async def begin(self, deadline: float) -> None:
+        """Acquire the lease if that is wanted; again when an answer was lost, until it is time to give up.
+
+        Raises:
+            ControlLostError: another client commands the gripper.
+            RobotiqError: the agent did not answer.
+        """
+        while self._wants_control and not self.is_in_control:
+            try:
+                await self.acquire()
+            except (NoAnswerError, ControlLostError) as error:
+                if getattr(error, "reason", "late") != "late" or now() >= deadline:
+                    raise
+
+    async def end(self, *, halt: bool) -> None:
+        """The run ends: give the lease back.
+
+        Raises:
+            RobotiqError: the agent did not acknowledge it.
+        """
+        self._wants_control = False
+        if self.is_in_control:
+            self.is_in_control = False
+            await self._give_back(halt=halt)
+
+    def abandon(self) -> None:
+        """Nothing can be sent any more."""
+        self.is_in_control = self._wants_control = False
+
+    async def acquire(self, *, take: bool = False) -> None:
+        """Get the lease.
+
+        Raises:
+            ControlLostError: another client holds it, and it is not to be taken away.
+            RobotiqError: the agent did not answer.
+        """
+        async with self._acquiring:
+            if self.is_in_control:
+                await self._renew()  # it may have been lost without a word
+            if self.is_in_control:
+                return  # asked for again, the agent would take what is under way for forgotten
+            await self._acquire({"what": "take" if take else "acquire"})
+
+    async def release(self, *, halt: bool) -> None:
+        """Give the lease back.
+
+        Raises:
+            RobotiqError: the agent did not answer, or the fingers were not seen to stop.
+        """
+        self._wants_control = False
+        if self.is_in_control:
+            self.lose("released", "it was given back")
+            await self._give_back(halt=halt)
+
+    async def look(self) -> None:
+        """Renew the lease, or acquire it again when that is due; several times in a window."""
+        if self.is_in_control:
+            if self._renewing is None or self._renewing.done():
+                self._renewing = self._run.spawn(self._renew())
+        elif self._wants_control and not self._run.mirror.is_silent:
+            await self._acquire_again()
+
+    def hear(self, lease: int) -> None:
+        """The agent has told the number of the present lease."""
+        is_asking = self._finding_out is not None and not self._finding_out.done()
+        if self.is_in_control and lease > self.lease and not is_asking:
+            # The answer to a request under the former one says why it ended.
+            self._finding_out = self._run.spawn(self._find_out())
+
+    def lose(self, reason: str, why: str) -> None:
+        """The lease has ended."""
+        if not self.is_in_control:
+            return
+        self.is_in_control = False
+        # After a halt or a take of somebody else nobody takes it back without having been asked to.
+        self._wants_control = self._wants_control and reason not in (*BY_OTHERS, "released")
+        self.lost = ControlLostError(f"{self._run.name} is not commanded from here any more: {why}", reason)
+        if reason != "released":
+            log.warning("%s", self.lost)
+
+    def check(self) -> None:
+        """Refuse commands without a lease.
+
+        Raises:
+            ControlLostError: there is none.
+        """
+        if not self.is_in_control:
+            if self.lost is None:
+                raise ControlLostError("this hand only reads: acquire() the lease first", "released")
+            raise ControlLostError(str(self.lost), self.lost.reason)
+
+    # -- inside ----------------------------------------------------------------------------------------
+
+    async def _acquire(self, what: Fields) -> None:
+        call = self._run.call({**what, "label": label()})
+        value = await self._run.send(call, "lease", timeout=ANSWER_S)
+        with reading("a lease"):
+            self.lease, self._lease_run = int(value["lease"]), self._run.mirror.epoch
+        self.is_in_control, self._wants_control, self.lost = True, True, None
+
+    async def _acquire_again(self) -> None:
+        try:
+            async with self._acquiring:
+                await self._acquire({"what": "acquire", "again": self.lease, "run": self._lease_run})
+        except ControlLostError as error:
+            if error.reason in BY_OTHERS:
+                # Somebody else was first, or has stepped in meanwhile; whose turn it is people decide.
+                self._wants_control, self.lost = False, error
+        except RobotiqError:
+            pass  # again in a moment
+
+    async def _give_back(self, *, halt: bool) -> None:
+        call = self._run.call({"what": "release", "halt": halt})
+        await self._run.send(call, "lease", timeout=RELEASE_S)
+
+    async def _renew(self) -> None:
+        await self._run.ask_quietly("lease", {"what": "renew"}, self._run.window)
+
+    async def _find_out(self) -> None:
+        lease, run = self.lease, self._lease_run
+        await self._run.ask_quietly("lease", {"what": "renew"}, self._run.window / RENEWALS)
+        if (lease, run) == (self.lease, self._run.mirror.epoch):
+            # Nobody answers. When the lease is asked for again the agent says whether somebody stepped in.
+            self.lose("expired", "its agent says that the lease has ended")

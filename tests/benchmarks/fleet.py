@@ -1,0 +1,240 @@
+"""Hands on other hosts beside hands of the own process, in one run: how quick, how cheap, how many.
+
+    python -m tests.benchmarks.fleet --json FILE
+
+Agent, clients and grippers (gripper.c) run in processes of their own on one machine, over zenoh on loopback.
+What is compared takes turns, round after round, and medians of the rounds are shown. Needs gcc.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from importlib.metadata import version
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from tests.benchmarks.__main__ import Row, say, table
+from tests.benchmarks.native import MissingToolError, build, grippers
+
+PARTS = ("commands", "agents", "overview")
+ROOT = Path(__file__).parents[2]
+HANDS = (1, 8, 16, 32)
+READERS = (0, 1, 5)
+OVERVIEW = 1000
+WATCHED = 100
+Figures = dict[str, Any]
+
+
+class Role:
+    """A process that takes a part; see fleet_roles.py."""
+
+    def __init__(self, process: subprocess.Popen[str]) -> None:
+        self._process = process
+        self._hear("ready")
+
+    def begin(self) -> None:
+        """Have it begin to measure."""
+        self._say("begin")
+
+    def end(self, seconds: float = 0) -> Figures:
+        """Its figures; of one that measures by itself, after so many seconds."""
+        self._say(f"end {seconds}")
+        figures: Figures = json.loads(self._hear())
+        return figures
+
+    def _say(self, line: str) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{line}\n")
+        self._process.stdin.flush()
+
+    def _hear(self, expected: str = "") -> str:
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline().strip()
+        if not line or (expected and line != expected):
+            raise RuntimeError(f"{self._process.args!r} failed")
+        return line
+
+
+@contextmanager
+def role(*arguments: object) -> Iterator[Role]:
+    """Start one; it has ended at the end of the block."""
+    command = [sys.executable, "-m", "tests.benchmarks.fleet_roles", *map(str, arguments)]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT
+    ) as process:
+        try:
+            yield Role(process)
+        finally:
+            assert process.stdin is not None
+            process.stdin.close()
+            try:
+                process.wait(10)
+            except subprocess.TimeoutExpired:
+                process.kill()
+
+
+def endpoint() -> str:
+    """Where nobody listens yet."""
+    with socket.socket() as reserved:
+        reserved.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{reserved.getsockname()[1]}"
+
+
+class Benchmarks:
+    """One run of all that is asked for."""
+
+    def __init__(self, folder: Path, rounds: int, seconds: float) -> None:
+        self.gripper = build("gripper", folder)
+        self.rounds = rounds
+        self.seconds = seconds
+        self.results: dict[str, Any] = {}
+
+    def commands(self) -> Iterator[Row]:
+        """From a command to its acknowledgement, and from a halt to the status that shows it."""
+        who = ("local", "remote", f"remote, beside {WATCHED} streams of 200 Hz")
+        rounds: dict[str, list[Figures]] = {each: [] for each in who}
+        for number in range(self.rounds):
+            for each in who:
+                say(f"commands, round {number + 1} of {self.rounds}: {each}")
+                rounds[each].append(self._commands(who.index(each)))
+        self.results["commands"] = rounds
+        for what in ("set_speed", "halt"):
+            for each in who:
+                figures = [it[what] for it in rounds[each]]
+                yield {
+                    "what": what,
+                    "hand": each,
+                    **{f"{key}, ms": f"{median(it[key] for it in figures):.2f}" for key in ("p50", "p99")},
+                    "times": str(sum(it["times"] for it in rounds[each])),
+                }
+
+    def _commands(self, kind: int) -> Figures:
+        with ExitStack() as stack:
+            (port,) = stack.enter_context(grippers(self.gripper, 1))
+            if kind == 0:
+                it = stack.enter_context(role("local_commander", "-", port))
+                return it.end(self.seconds)
+            where = endpoint()
+            stack.enter_context(role("agent", where, port))
+            if kind == 1:
+                return stack.enter_context(role("commander", where)).end(self.seconds)
+            other = endpoint()
+            stack.enter_context(role("generator", other, WATCHED))
+            return stack.enter_context(role("busy_commander", where, other)).end(self.seconds)
+
+    def agents(self) -> Iterator[Row]:
+        """What serving costs, and what it does to the polls; each hand is polled 200 times a second."""
+        cases = [(count, readers) for count in HANDS for readers in (None, *READERS)]
+        rounds: dict[str, list[Figures]] = {f"{count} {readers}": [] for count, readers in cases}
+        for number in range(self.rounds):
+            for count, readers in cases:
+                what = "without an agent" if readers is None else f"{readers} readers"
+                say(f"agents, round {number + 1} of {self.rounds}: {count} hands, {what}")
+                rounds[f"{count} {readers}"].append(self._agent(count, readers))
+        self.results["agents"] = rounds
+        for count, readers in cases:
+            own = rounds[f"{count} {readers}"]
+            bare = rounds[f"{count} None"]
+            ratio = median(it["period_p99"] / base["period_p99"] for it, base in zip(own, bare, strict=True))
+            yield {
+                "hands": str(count),
+                "readers": "no agent" if readers is None else str(readers),
+                "CPU of the process": f"{100 * median(it['cpu'] for it in own):.1f} %",
+                "polls kept": f"{100 * median(it['kept'] for it in own):.1f} %",
+                "period p99, ms": f"{median(it['period_p99'] for it in own):.2f}",
+                "against no agent": f"{ratio:.2f}",
+                **reader_cells([it["readers"] for it in own], count),
+            }
+
+    def _agent(self, count: int, readers: int | None) -> Figures:
+        with ExitStack() as stack:
+            ports = stack.enter_context(grippers(self.gripper, count))
+            where = endpoint()
+            serving = stack.enter_context(role("local" if readers is None else "agent", where, *ports))
+            reading = [stack.enter_context(role("reader", where, count)) for _ in range(readers or 0)]
+            time.sleep(1.0)
+            for each in (serving, *reading):
+                each.begin()
+            time.sleep(self.seconds)
+            return {**serving.end(), "readers": [each.end() for each in reading]}
+
+    def overview(self) -> Iterator[Row]:
+        """Summaries of a thousand grippers, one a second each, in one client."""
+        rounds: list[Figures] = []
+        for number in range(self.rounds):
+            say(f"overview, round {number + 1} of {self.rounds}")
+            with ExitStack() as stack:
+                where = endpoint()
+                stack.enter_context(role("summaries", where, OVERVIEW))
+                client = stack.enter_context(role("overview", where))
+                time.sleep(2.5)
+                client.begin()
+                time.sleep(self.seconds)
+                rounds.append(client.end())
+        self.results["overview"] = rounds
+        yield {
+            "grippers heard of": f"{median(it['members'] for it in rounds):.0f}",
+            "CPU of the client": f"{100 * median(it['cpu'] for it in rounds):.1f} %",
+        }
+
+
+def reader_cells(rounds: list[list[Figures]], count: int) -> Row:
+    """What readers saw, and what it cost them."""
+    every = [each for readers in rounds for each in readers]
+    names = ("reader: CPU a hand", "statuses a second", "late p50, ms", "late p99, ms")
+    if not every:
+        return dict.fromkeys(names, "")
+    values = (
+        f"{100 * median(it['cpu'] for it in every) / count:.1f} %",
+        f"{median(it['rate'] for it in every):.0f}",
+        f"{median(it['latency']['p50'] for it in every):.2f}",
+        f"{median(it['latency']['p99'] for it in every):.2f}",
+    )
+    return dict(zip(names, values, strict=True))
+
+
+def main() -> int:
+    """Read the options and run."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"which: {', '.join(PARTS)} (default: all)")
+    parser.add_argument("--rounds", type=int, default=3, help="how often each takes its turn (default: 3)")
+    parser.add_argument("--seconds", type=float, default=10.0, help="how long each turn is (default: 10)")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write all figures there")
+    options = parser.parse_args()
+    unknown = set(options.parts) - set(PARTS)
+    if unknown:
+        parser.error(f"no such part: {', '.join(sorted(unknown))}; there are {', '.join(PARTS)}")
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            it = Benchmarks(Path(folder), options.rounds, options.seconds)
+        except MissingToolError as why:
+            print(f"the benchmarks cannot run: {why}", file=sys.stderr)  # noqa: T201
+            return 1
+        for part in options.parts or PARTS:
+            measure = getattr(it, part)
+            print(f"\n{measure.__doc__}\n\n{table(list(measure()))}", flush=True)  # noqa: T201
+    it.results["of"] = {
+        "python": platform.python_version(),
+        **{each: version(each) for each in ("eclipse-zenoh", "pymodbus")},
+        "rounds": options.rounds,
+        "seconds": options.seconds,
+    }
+    if options.json is not None:
+        options.json.write_text(json.dumps(it.results), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,146 @@
+"""Every command on a gripper of another host: an agent in a process of its own, and zenoh between."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import signal
+import socket
+from asyncio.subprocess import Process
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+
+from robotiq_async import Finger
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from tests.cli.conftest import Shell
+from tests.conftest import Clock
+
+pytest.importorskip("zenoh")
+
+ADDRESS = "zenoh://lab/cell/left"
+
+
+def free_endpoint() -> str:
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        return f"tcp/127.0.0.1:{free.getsockname()[1]}"
+
+
+@pytest.fixture
+def endpoint(monkeypatch: pytest.MonkeyPatch) -> str:
+    """Where the agent listens; the commands find it in their environment."""
+    endpoint = free_endpoint()
+    monkeypatch.setitem(os.environ, "ROBOTIQ_ASYNC_CONNECT", endpoint)
+    return endpoint
+
+
+@pytest.fixture
+async def gripper() -> AsyncIterator[tuple[SimulatedGripper, str]]:
+    async with SimulatorServer(SimulatedGripper(Clock(), speedup=20, spread=False)) as server:
+        yield server.gripper, server.address
+
+
+@pytest.fixture
+async def agent(
+    shell: Shell, endpoint: str, gripper: tuple[SimulatedGripper, str], tmp_path: Path
+) -> Process:
+    file = tmp_path / "FLEET.toml"
+    file.write_text(
+        f'site = "lab"\nhost = "cell"\nlisten = ["{endpoint}"]\n[grippers.left]\naddress = "{gripper[1]}"\n'
+    )
+    process = await shell.start("agent", str(file))
+    assert await shell.read_line(process) == ADDRESS
+    return process
+
+
+async def test_status_and_move(shell: Shell, agent: Process) -> None:
+    moved = await shell.run("move", "100", "--yes", "--fingers", "A", "--speed", "255", ADDRESS)
+    moved.assert_succeeded()
+    outcome = await shell.run("status", "--json", ADDRESS)
+    outcome.assert_succeeded()
+    assert abs(json.loads(outcome.out)["axes"]["A"]["position"] - 100) <= 2
+
+
+async def test_a_move_asks_first(shell: Shell, agent: Process) -> None:
+    (await shell.run("move", "100", ADDRESS)).assert_failed(
+        2, "this moves the gripper at zenoh://lab/cell/left"
+    )
+
+
+async def test_the_demo(shell: Shell, agent: Process) -> None:
+    outcome = await shell.run("demo", "--yes", ADDRESS)
+    outcome.assert_succeeded()
+    assert f"async with RemoteHand('{ADDRESS}') as hand:" in outcome.out
+
+
+async def test_monitor_and_record(shell: Shell, agent: Process, tmp_path: Path) -> None:
+    watching = await shell.start("monitor", "--json", ADDRESS)
+    assert "state" in await shell.read_line(watching)
+    recording = await shell.start("record", str(tmp_path / "a.mcap"), ADDRESS)
+    (await shell.run("move", "60", "--yes", ADDRESS)).assert_succeeded()
+    for process in (watching, recording):
+        process.send_signal(signal.SIGINT)
+        (await shell.finish(process)).assert_succeeded()
+    assert (tmp_path / "a.mcap").stat().st_size > 1000
+
+
+async def test_options_of_the_link_belong_to_the_agent(shell: Shell, endpoint: str) -> None:
+    outcome = await shell.run("status", "--device-id", "3", ADDRESS)
+    outcome.assert_failed(2, "a gripper on another host is set up there")
+
+
+async def test_nobody_there(shell: Shell, endpoint: str) -> None:
+    (await shell.run("status", ADDRESS)).assert_failed(1, "cannot connect to zenoh://lab/cell/left")
+
+
+async def test_a_list_and_a_halt(shell: Shell, agent: Process, gripper: tuple[SimulatedGripper, str]) -> None:
+    listed = await shell.run("fleet", "--json")
+    listed.assert_succeeded()
+    assert json.loads(listed.out)["address"] == ADDRESS
+    moving = await shell.start("move", "255", "--yes", "--speed", "0", ADDRESS)
+    async with asyncio.timeout(20):
+        while gripper[0].position(Finger.A) < 20:  # noqa: ASYNC110  # what is waited for tells nobody
+            await asyncio.sleep(0.01)
+    halted = await shell.run("fleet", "halt", "lab")
+    halted.assert_succeeded()
+    assert halted.out == f"{ADDRESS}  stopped\n"
+    (await shell.finish(moving)).assert_failed(1, "halted")
+    assert not gripper[0].is_moving
+
+
+async def test_a_halt_of_nobody_is_a_failure(shell: Shell, endpoint: str) -> None:
+    (await shell.run("fleet", "halt")).assert_failed(1, "nothing was stopped")
+
+
+async def test_an_agent_that_is_told_to_end_stops_the_fingers(
+    shell: Shell, agent: Process, gripper: tuple[SimulatedGripper, str]
+) -> None:
+    moving = await shell.start("move", "255", "--yes", "--speed", "0", ADDRESS)
+    async with asyncio.timeout(20):
+        while gripper[0].position(Finger.A) < 20:  # noqa: ASYNC110  # what is waited for tells nobody
+            await asyncio.sleep(0.01)
+    agent.send_signal(signal.SIGTERM)
+    (await shell.finish(agent)).assert_succeeded()
+    assert not gripper[0].is_moving
+    assert (await shell.finish(moving)).code == 1
+
+
+async def test_a_second_agent_is_refused(shell: Shell, agent: Process, endpoint: str, tmp_path: Path) -> None:
+    file = tmp_path / "second.toml"
+    file.write_text(
+        f'site = "lab"\nhost = "cell"\nlisten = ["{free_endpoint()}"]\nconnect = ["{endpoint}"]\n'
+        '[grippers.left]\naddress = "sim://"\n'
+    )
+    (await shell.run("agent", str(file))).assert_failed(1, "another agent serves zenoh://lab/cell/left")
+
+
+async def test_a_file_is_checked(shell: Shell, tmp_path: Path) -> None:
+    file = tmp_path / "FLEET.toml"
+    file.write_text('site = "lab"\nhost = "cell"\n[grippers.left]\naddress = "tcp://192.168.1.11"\n')
+    outcome = await shell.run("agent", "--check", str(file))
+    outcome.assert_succeeded()
+    assert outcome.out.split() == [ADDRESS, "tcp://192.168.1.11"]
+    file.write_text('site = "lab"\n[grippers.left]\nadress = "tcp://192.168.1.11"\n')
+    (await shell.run("agent", "--check", str(file))).assert_failed(2, "adress", "address", "line 3")

@@ -1,0 +1,325 @@
+"""From start() to stop(), and again."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from typing import cast
+
+import pytest
+
+from robotiq_async import (
+    ConnectFailedError,
+    Fault,
+    GripperFaultError,
+    InvalidStateError,
+    NotStartedError,
+    RobotiqHand,
+    State,
+)
+from robotiq_async.fleet.network.bus import Bus
+from robotiq_async.fleet.remote.remote_hand import RemoteHand
+from robotiq_async.protocol import Hand
+from tests.contract.bench import LOCAL, REMOTE, A, bench, contract, ended, statuses
+
+
+@pytest.mark.parametrize("where", [LOCAL, REMOTE])
+def test_constructing_needs_no_loop(where: str) -> None:
+    hand: Hand = (
+        RobotiqHand("tcp://192.0.2.1")
+        if where == LOCAL
+        else RemoteHand("zenoh://lab/cell/left", bus=cast("Bus", object()))
+    )
+    assert hand.state is State.DISCONNECTED
+    assert hand.address in repr(hand)
+    assert hand.statistics.polls == 0
+
+
+@contract
+async def test_an_active_gripper_is_adopted_and_nothing_is_written(where: str) -> None:
+    async with bench(where) as here:
+        writes, travels = here.writes, here.travels
+        hand = here.make()
+        await hand.start()
+        assert hand.state is State.RUNNING_IDLE
+        assert hand.is_activated
+        assert not hand.is_reset
+        assert not hand.is_moving
+        await statuses(hand, 20)
+        assert (here.writes, here.travels) == (writes, travels)
+        await hand.stop()
+        assert hand.state is State.SHUTDOWN
+
+
+@contract
+async def test_a_reset_gripper_is_activated(where: str) -> None:
+    async with bench(where, active=False) as here, here.make() as hand:
+        assert hand.state is State.RUNNING_IDLE
+        assert hand.is_activated
+
+
+@contract
+async def test_without_activation_nothing_is_written(where: str) -> None:
+    async with bench(where, active=False) as here:
+        hand = here.make()
+        await hand.start(activate=False)
+        assert hand.state is State.RESET
+        assert hand.is_reset
+        await hand.stop(halt=False)
+        assert not here.writes
+
+
+@contract
+async def test_one_in_fault_is_left_there(where: str) -> None:
+    async with bench(where) as here:
+        here.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+        await asyncio.sleep(0.1)
+        writes = here.writes
+        async with here.make() as hand:
+            assert hand.state is State.FAULT
+            assert here.writes == writes
+
+
+@contract
+async def test_an_activation_under_way_is_waited_for(where: str) -> None:
+    async with bench(where, active=False) as here:
+        first = here.make()
+        await first.start(activate=False)
+        activating = asyncio.create_task(first.activate())
+        await here.moves()
+        activating.cancel()
+        await ended(activating)
+        await first.stop(halt=False)
+        assert here.gripper.is_moving
+        async with here.make() as hand:
+            assert hand.state is State.RUNNING_IDLE
+            assert hand.is_activated
+
+
+@contract
+async def test_an_activation_that_ends_in_a_fault_fails_the_start(where: str) -> None:
+    async with bench(where, active=False) as here:
+        here.gripper.fail_activation = True
+        hand = here.make()
+        with pytest.raises(GripperFaultError) as caught:
+            await hand.start()
+        assert caught.value.fault is Fault.ACTIVATION_FAULT
+        assert hand.state is State.SHUTDOWN
+        await hand.start()
+        assert hand.state is State.FAULT
+        await hand.stop()
+
+
+@contract
+async def test_starting_twice_is_refused_and_changes_nothing(where: str) -> None:
+    async with bench(where) as here, here.make() as hand:
+        with pytest.raises(InvalidStateError) as caught:
+            await hand.start()
+        assert caught.value.state is State.RUNNING_IDLE
+        await hand.move(50, A)
+
+
+@contract
+async def test_starting_twice_at_once_is_refused(where: str) -> None:
+    async with bench(where) as here:
+        hand = here.make()
+        first, second = await asyncio.gather(hand.start(), hand.start(), return_exceptions=True)
+        assert (first, type(second)) == (None, InvalidStateError)
+        await hand.move(50, A)
+        await hand.stop()
+
+
+@contract
+async def test_it_may_be_started_again(where: str) -> None:
+    async with bench(where) as here:
+        hand, newest = here.make(), -1
+        for _ in range(3):
+            await hand.start()
+            assert hand.status.sequence > newest, "sequences go on"
+            await hand.move(50, A)
+            newest = hand.status.sequence
+            await hand.stop()
+            assert hand.state is State.SHUTDOWN
+            assert hand.status.sequence >= newest, "the last status stays"
+
+
+@contract
+async def test_stop_stops_the_fingers_and_keeps_the_activation(where: str) -> None:
+    async with bench(where) as here:
+        async with here.make() as hand:
+            await hand.set_position(255)
+            await here.moves()
+        assert (here.last_write.activate, here.last_write.go) == (True, False)
+        assert not here.gripper.is_moving
+        await hand.stop()
+        await hand.stop()
+
+
+@contract
+async def test_stop_may_leave_the_fingers_to_what_they_do(where: str) -> None:
+    async with bench(where) as here:
+        hand = here.make()
+        await hand.start()
+        await hand.set_position(200)
+        await here.moves()
+        writes = here.writes
+        await hand.stop(halt=False)
+        await asyncio.sleep(10)
+        assert here.writes == writes
+        assert here.gripper.position(A) >= 195
+
+
+@contract
+async def test_stop_before_any_start(where: str) -> None:
+    async with bench(where) as here:
+        await here.make().stop()
+
+
+@contract
+async def test_everybody_who_stops_it_waits_until_it_has_stopped(where: str) -> None:
+    async with bench(where) as here:
+        hand = here.make()
+        await hand.start()
+        await hand.set_position(255)
+        await here.moves()
+
+        async def stop() -> bool:
+            await hand.stop()
+            return here.gripper.is_moving
+
+        assert await asyncio.gather(*(stop() for _ in range(3))) == [False] * 3
+
+
+@contract
+async def test_a_start_right_after_a_stop_that_was_not_waited_for(where: str) -> None:
+    async with bench(where) as here:
+        hand = here.make()
+        await hand.start()
+        stopping = asyncio.create_task(hand.stop())
+        await asyncio.sleep(0)
+        with pytest.raises(InvalidStateError):
+            await hand.start()
+        await stopping
+        assert hand.state is State.SHUTDOWN
+
+
+@contract
+async def test_a_cancelled_stop_still_stops(where: str) -> None:
+    async with bench(where) as here:
+        hand = here.make()
+        await hand.start()
+        await hand.set_position(255)
+        await here.moves()
+        stopping = asyncio.create_task(hand.stop())
+        await asyncio.sleep(0)
+        stopping.cancel()
+        assert isinstance(await ended(stopping), asyncio.CancelledError)
+        assert hand.state is State.SHUTDOWN
+        assert not here.gripper.is_moving
+
+
+@contract
+async def test_a_stop_while_it_starts_ends_the_start(where: str) -> None:
+    async with bench(where, active=False) as here:
+        hand = here.make()
+        starting = asyncio.create_task(hand.start())
+        await asyncio.sleep(0)
+        await hand.stop()
+        assert isinstance(await ended(starting), NotStartedError)
+        assert hand.state is State.SHUTDOWN
+        await asyncio.sleep(1)
+        assert not here.gripper.is_moving
+
+
+@contract
+async def test_a_cancelled_start_takes_its_activation_back(where: str) -> None:
+    async with bench(where, active=False) as here:
+        hand = here.make()
+        starting = asyncio.create_task(hand.start())
+        await here.moves()
+        starting.cancel()
+        assert isinstance(await ended(starting), asyncio.CancelledError)
+        assert hand.state is State.SHUTDOWN
+        assert not here.gripper.is_moving
+        assert not here.last_write.activate
+        await hand.start(activate=False)
+        assert hand.state is State.RESET
+        await hand.stop()
+
+
+@contract
+async def test_leaving_through_an_exception_stops_the_fingers(where: str) -> None:
+    async with bench(where) as here:
+
+        async def fail() -> None:
+            async with here.make() as hand:
+                await hand.set_position(255)
+                await here.moves()
+                raise ZeroDivisionError
+
+        with pytest.raises(ZeroDivisionError):
+            await fail()
+        assert not here.gripper.is_moving
+
+
+@contract
+async def test_leaving_by_cancellation_stops_the_fingers(where: str) -> None:
+    async with bench(where) as here:
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(0.5), here.make() as hand:
+                await hand.move(255, speed=0)
+        assert not here.gripper.is_moving
+
+
+@contract
+async def test_nobody_there(where: str) -> None:
+    async with bench(where) as here:
+        hand = here.make()
+        if here.lab is None:
+            here.server.refuse()
+            here.server.cut()
+        else:
+            await here.lab.end_agent()
+        with pytest.raises(ConnectFailedError) as caught:
+            await hand.start()
+        assert caught.value.address == hand.address
+        assert hand.state is State.SHUTDOWN
+
+
+@contract
+async def test_what_it_was_told_while_it_did_not_run(where: str) -> None:
+    async with bench(where) as here:
+        hand = here.make()
+        for _ in range(2):
+            for call in (
+                lambda: hand.move(3),
+                lambda: hand.open(),
+                lambda: hand.close(),
+                lambda: hand.set_position(3),
+                lambda: hand.set_speed(3),
+                lambda: hand.set_force(3),
+                lambda: hand.halt(),
+                lambda: hand.reset(),
+                lambda: hand.atr(),
+                lambda: hand.activate(),
+                lambda: hand.recover(),
+            ):
+                with pytest.raises(NotStartedError):
+                    await call()
+            with pytest.raises(NotStartedError):
+                hand.command(position=3)
+            with pytest.raises(NotStartedError):
+                await hand.wait_for_state(State.FAULT)
+            await hand.start()
+            await hand.stop()
+
+
+@contract
+@pytest.mark.parametrize("value", [1, None, "yes"])
+async def test_flags_are_flags(where: str, value: object) -> None:
+    async with bench(where) as here:
+        hand = here.make()
+        with pytest.raises(TypeError, match="activate"):
+            await hand.start(activate=value)  # type: ignore[arg-type]
+        with pytest.raises(TypeError, match="halt"):
+            await hand.stop(halt=value)  # type: ignore[arg-type]

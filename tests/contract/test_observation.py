@@ -1,0 +1,151 @@
+"""What a hand shows: state, status, statistics, and what moves."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+
+import pytest
+
+from robotiq_async import ConnectionLostError, NotStartedError, RobotiqStatus, State
+from robotiq_async.protocol import Hand
+from tests.contract.bench import A, Bench, at_rest, bench, contract, ended, statuses
+
+PROPERTIES = ("is_moving", "is_activated", "is_reset")
+
+
+async def lose_the_gripper(here: Bench, hand: Hand) -> None:
+    here.server.refuse()
+    here.server.cut()
+    await hand.wait_for_state(State.DISCONNECTED)
+
+
+@contract
+async def test_before_the_start_nothing_is_known(where: str) -> None:
+    async with bench(where) as here:
+        hand = here.make()
+        assert hand.state is State.DISCONNECTED
+        for name in ("status", *PROPERTIES):
+            with pytest.raises(NotStartedError):
+                getattr(hand, name)
+        assert hand.statistics.polls == 0
+
+
+@contract
+async def test_after_the_stop_only_the_last_status(where: str) -> None:
+    async with bench(where) as here:
+        async with here.make() as hand:
+            await hand.move(100, A)
+        assert hand.state is State.SHUTDOWN
+        assert hand.status.position(A) == pytest.approx(100, abs=2)
+        for name in PROPERTIES:
+            with pytest.raises(NotStartedError):
+                getattr(hand, name)
+
+
+@contract
+async def test_while_the_link_is_down(where: str) -> None:
+    async with bench(where) as here, here.make() as hand:
+        await hand.move(50, A)
+        await lose_the_gripper(here, hand)
+        assert hand.state is State.DISCONNECTED
+        assert hand.status.position(A) == pytest.approx(50, abs=2)
+        for name in PROPERTIES:
+            with pytest.raises(ConnectionLostError):
+                getattr(hand, name)
+        with pytest.raises(ConnectionLostError):
+            hand.command(position=3)
+        for call in (
+            lambda: hand.move(3),
+            lambda: hand.set_speed(3),
+            lambda: hand.halt(),
+            lambda: hand.reset(),
+            lambda: hand.activate(),
+            lambda: hand.atr(),
+            lambda: hand.recover(),
+        ):
+            with pytest.raises(ConnectionLostError):
+                await call()
+        writes = here.writes
+        await here.server.accept()
+        await hand.wait_for_state(State.RUNNING_IDLE)
+        await at_rest(hand)
+        assert here.writes == writes, "nothing is sent later"
+        await hand.move(30, A)
+
+
+@contract
+async def test_a_lost_link_ends_a_move(where: str) -> None:
+    async with bench(where) as here, here.make() as hand:
+        moving = asyncio.create_task(hand.move(255, speed=0))
+        await here.moves()
+        await lose_the_gripper(here, hand)
+        assert isinstance(await ended(moving), ConnectionLostError)
+        await here.server.accept()
+        await hand.wait_for_state(State.RUNNING_IDLE)
+
+
+@contract
+async def test_the_newest_status(where: str) -> None:
+    async with bench(where) as here, here.make() as hand:
+        async for status in hand.statuses():
+            assert status is hand.status
+            assert isinstance(status, RobotiqStatus)
+            if status.sequence > 50:
+                break
+
+
+@contract
+async def test_it_moves_from_the_call_until_the_end_of_a_move(where: str) -> None:
+    async with bench(where) as here, here.make() as hand:
+        moving = asyncio.create_task(hand.move(100, A))
+        await asyncio.sleep(0)
+        assert hand.is_moving
+        stream = hand.statuses()
+        while not moving.done():
+            await anext(stream)
+            assert hand.is_moving or moving.done() or not here.gripper.is_moving
+        await moving
+        assert not hand.is_moving
+
+
+@contract
+async def test_timestamps_are_of_this_process_and_only_rise(where: str) -> None:
+    async with bench(where) as here, here.make() as hand:
+        now = asyncio.get_running_loop().time
+        stream, transitions, requests = hand.statuses(buffer=10_000), hand.transitions(), hand.requests()
+        began = now()
+        for value in (20, 100, 30):
+            await hand.move(value, A)
+            assert 0 <= now() - hand.status.timestamp < 0.05
+        stamps = [status.timestamp for status in stream.drain()]
+        assert len(stamps) > 50
+        assert all(before < after for before, after in itertools.pairwise(stamps))
+        for told in (
+            [each.timestamp for each in transitions.drain()],
+            [each.timestamp for each in requests.drain()],
+        ):
+            assert told == sorted(told)
+            assert began - 0.01 <= told[0] <= told[-1] <= now()
+
+
+@contract
+async def test_statistics(where: str) -> None:
+    async with bench(where) as here, here.make() as hand:
+        before = hand.statistics
+        await hand.move(60)
+        here.gripper.place_object(A, 150)
+        await hand.move(255)
+        moving = asyncio.create_task(hand.move(0, speed=0))
+        await here.moves()
+        moving.cancel()
+        await ended(moving)
+        await asyncio.sleep(1.1)
+        statistics = hand.statistics
+        assert statistics.polls > before.polls + 100
+        assert statistics.writes >= before.writes + 4
+        assert statistics.moves == {"reached": 1, "contact": 1, "cancelled": 1}
+        assert 0.004 < statistics.period_p50 < 0.006
+        assert 0 < statistics.round_trip_p50 <= statistics.round_trip_p99
+        assert statistics.reconnects == statistics.foreign_commands == statistics.faults == 0
+        assert len(await statuses(hand, 3)) == 3

@@ -1,0 +1,258 @@
+"""Holds that somebody asks for: what moves stays where it is, what grips keeps its grip."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from robotiq_async import (
+    ConnectionLostError,
+    Fault,
+    Finger,
+    MoveSupersededError,
+    NotActivatedError,
+    NotStartedError,
+    ObjectStatus,
+    State,
+)
+from tests.control.other_client import going_to, moved_by_another
+from tests.control.scan import Scan, started
+
+A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
+
+
+@pytest.mark.parametrize("device_cycle", [0.0, 0.005, 0.03, 0.2])
+def test_axes_that_move_are_held_and_their_moves_end(device_cycle: float) -> None:
+    scan = started(device_cycle)
+    _, held = scan.move(200, A)
+    _, other = scan.move(200, B)
+    scan.run(0.5)
+    at = scan.positions()[A]
+    asked = scan.hold(A)
+    assert isinstance(held.error, MoveSupersededError)
+    scan.until(lambda: asked.is_told, 0.6)
+    assert asked.told == [None]
+    scan.until(lambda: other.is_told)
+    assert other.result.positions[B] == 200
+    assert scan.positions()[A] <= at + 1 + 30 * device_cycle
+    assert scan.state is State.RUNNING_IDLE
+
+
+def test_a_hold_is_told_when_it_is_acknowledged(scan: Scan) -> None:
+    scan.move(200, A)
+    scan.run(0.5)
+    written = len(scan.written)
+    asked = scan.hold()
+    assert scan.state is State.RUNNING_CC
+    scan.step()
+    assert (len(scan.written), asked.told, scan.state) == (written + 1, [None], State.RUNNING_IDLE)
+    scan.run(1.0)
+    assert len(scan.written) == written + 1
+
+
+def test_a_grip_is_kept_and_an_axis_at_rest_is_left_alone(scan: Scan) -> None:
+    scan.gripper.place_object(A, 60)
+    scan.moved(255, A)
+    scan.moved(90, B)
+    scan.move(200, C)
+    scan.run(0.5)
+    before = scan.last_image
+    scan.hold()
+    scan.run(0.5)
+    held = scan.last_image
+    assert held == before.with_positions({C: held.position(C)})
+    assert held.position(C) < 200
+    assert scan.latest.finger_status(A) is ObjectStatus.CONTACT_CLOSING
+
+
+def test_where_nothing_moves_nothing_is_written(scan: Scan) -> None:
+    scan.moved(100)
+    scan.run(0.5)
+    written = len(scan.written)
+    asked = scan.hold()
+    scan.step()
+    assert (len(scan.written), asked.told, scan.state) == (written, [None], State.RUNNING_IDLE)
+
+
+def test_a_motion_that_was_written_and_does_not_act_yet_is_held() -> None:
+    scan = started(device_cycle=0.2)
+    scan.command(A, position=200)
+    scan.step()
+    asked = scan.hold(A)
+    scan.run(2.0)
+    assert asked.told == [None]
+    assert scan.positions()[A] <= 10
+
+
+def test_what_was_not_sent_yet_is_dropped(scan: Scan) -> None:
+    dropped, other = scan.command(A, position=200), scan.command(B, position=100)
+    asked = scan.hold(A)
+    assert isinstance(dropped.error, MoveSupersededError)
+    scan.until(lambda: asked.is_told)
+    scan.run(2.0)
+    assert other.told == [None]
+    assert scan.positions()[A] <= 7
+    assert scan.positions()[B] == 100
+
+
+def test_a_command_after_a_hold_moves_again(scan: Scan) -> None:
+    scan.move(200, A)
+    scan.run(0.5)
+    asked = scan.hold(A)
+    again = scan.moved(220, A)
+    assert asked.told == [None]
+    assert again.positions[A] == 220
+
+
+def test_a_halt_does_for_whoever_waits_for_a_hold(scan: Scan) -> None:
+    scan.move(200, A)
+    scan.run(0.5)
+    asked, halted = scan.hold(A), scan.halt()
+    scan.until(lambda: halted.is_told, 0.6)
+    assert asked.told == [None]
+    assert not scan.gripper.is_moving
+
+
+def test_a_hold_after_a_halt_is_told_too(scan: Scan) -> None:
+    scan.move(200, A)
+    scan.run(0.5)
+    halted, asked = scan.halt(), scan.hold(A)
+    scan.until(lambda: asked.is_told, 0.6)
+    scan.until(lambda: halted.is_told, 0.6)
+    assert not scan.gripper.is_moving
+
+
+# -- what another client moves -----------------------------------------------------------------------------
+
+
+def test_what_another_client_moves_is_held_too() -> None:
+    scan = moved_by_another()
+    asked = scan.hold(A)
+    scan.until(lambda: asked.is_told, 0.6)
+    at = scan.positions()
+    scan.run(2.0)
+    assert scan.positions()[A] <= at[A] + 1
+    assert scan.positions()[B] > at[B] + 5
+
+
+def test_a_hold_survives_that_another_client_takes_over_before_it_is_written(scan: Scan) -> None:
+    scan.move(255, A, speed=0)
+    scan.run(0.5)
+    asked = scan.hold(A)
+    scan.gripper.write(0, going_to(200, speed=0))
+    scan.run(0.02)
+    scan.until(lambda: asked.is_told, 0.6)
+    at = scan.positions()[A]
+    scan.run(2.0)
+    assert scan.positions()[A] <= at + 1
+
+
+# -- states ------------------------------------------------------------------------------------------------
+
+
+def begun(begin: Callable[[Scan], None]) -> Scan:
+    scan = Scan()
+    scan.connect(activate=False)
+    begin(scan)
+    return scan
+
+
+@pytest.mark.parametrize("steps", [0, 5])
+def test_in_an_activation_a_hold_does_nothing(steps: int) -> None:
+    scan = begun(lambda scan: scan.controller.activate())
+    for _ in range(steps):
+        scan.step()
+    written = len(scan.written)
+    assert scan.hold().told == [None]
+    scan.until(lambda: scan.state is State.RUNNING_IDLE)
+    assert len(scan.written) == max(written, 1)
+
+
+def test_in_reset_a_hold_does_nothing() -> None:
+    scan = begun(lambda _: None)
+    assert scan.hold().told == [None]
+    scan.run(0.1)
+    assert not scan.written
+
+
+def test_in_a_release_a_hold_does_nothing(scan: Scan) -> None:
+    scan.moved(200)
+    scan.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    scan.step()
+    scan.controller.release()
+    scan.step()
+    written = len(scan.written)
+    assert scan.hold().told == [None]
+    scan.until(lambda: scan.state is State.ATR_DONE, 60)
+    assert scan.hold().told == [None]
+    scan.run(0.1)
+    assert len(scan.written) == written
+
+
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_a_hold_is_told_in_a_fault(scan: Scan, when: str) -> None:
+    scan.move(200, A)
+    scan.run(0.5)
+    asked = scan.hold(A) if when == "before" else None
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 1.0)
+    scan.controller.see(scan.status())
+    assert scan.state is State.FAULT
+    asked = asked or scan.hold(A)
+    scan.until(lambda: asked.is_told, 0.6)
+    assert asked.told == [None]
+    at = scan.positions()[A]
+    scan.run(3.0)
+    assert scan.positions()[A] <= at + 2
+
+
+def test_a_hold_is_refused_while_the_link_is_down_and_after_the_end(scan: Scan) -> None:
+    scan.controller.lost(None)
+    with pytest.raises(ConnectionLostError):
+        scan.hold()
+    scan.connect()
+    scan.controller.stop()
+    with pytest.raises(NotStartedError):
+        scan.hold()
+
+
+# -- how it may fail ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sent", [False, True])
+def test_a_hold_that_was_not_acknowledged_before_the_link_was_lost_is_made_good(
+    scan: Scan, sent: bool
+) -> None:
+    scan.move(255, A, speed=0)
+    scan.run(0.5)
+    asked = scan.hold(A)
+    if sent:
+        scan.step(answer=False)
+    else:
+        scan.controller.lost(None)
+    assert isinstance(asked.error, ConnectionLostError)
+    scan.now += 0.5
+    scan.connect(activate=False)
+    scan.run(0.5)
+    at = scan.positions()[A]
+    scan.run(2.0)
+    assert scan.positions()[A] <= at + 1
+
+
+def test_a_reset_takes_over(scan: Scan) -> None:
+    scan.move(255, A)
+    scan.run(0.5)
+    asked = scan.hold(A)
+    scan.controller.reset()
+    assert isinstance(asked.error, MoveSupersededError)
+
+
+def test_a_gripper_that_lost_its_activation_is_not_written_to(scan: Scan) -> None:
+    scan.move(255, A)
+    scan.run(0.5)
+    written = len(scan.written)
+    asked = scan.hold(A)
+    scan.gripper.power_cycle()
+    scan.run(0.5)
+    assert isinstance(asked.error, NotActivatedError)
+    assert len(scan.written) == written

@@ -1,0 +1,97 @@
+"""Automatic releases that somebody else ends."""
+
+from __future__ import annotations
+
+import pytest
+
+from robotiq_async import Fault, Finger, State
+from robotiq_async.wire.request import Request
+from tests.control.scan import Scan
+
+
+@pytest.fixture
+def releasing(scan: Scan) -> Scan:
+    """A gripper whose fingers open, and whose status has said so."""
+    scan.moved(200)
+    scan.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    scan.step()
+    scan.controller.release()
+    scan.until(lambda: scan.latest.fault is Fault.AUTOMATIC_RELEASE)
+    assert scan.state is State.WF_ATR
+    return scan
+
+
+def reset_and_activated_unseen(scan: Scan, seconds: float) -> None:
+    """By another client, between two polls; what follows is seen so many seconds after its activation."""
+    scan.gripper.write(0, [0x0000])
+    scan.now += 0.02
+    scan.gripper.status_registers()
+    scan.gripper.write(0, [0x0100])
+    scan.now += seconds
+
+
+@pytest.mark.parametrize(("seconds", "state"), [(1.0, State.WF_ACTIVATION), (20.0, State.RUNNING_IDLE)])
+def test_a_release_ends_at_once_when_another_client_has_reset_and_activated_the_gripper(
+    releasing: Scan, seconds: float, state: State
+) -> None:
+    """The hand waited in WF_ATR until the time for the release was over, and for ever after that."""
+    reset_and_activated_unseen(releasing, seconds)
+    releasing.step()
+    assert releasing.state is state
+    releasing.until(lambda: releasing.state is State.RUNNING_IDLE)
+    releasing.moved(100, Finger.A)
+    assert not any(Request.from_registers(image).release for image in releasing.written[-1:])
+
+
+def test_a_release_ends_at_once_in_the_fault_that_an_activation_has_come_to_meanwhile(
+    releasing: Scan,
+) -> None:
+    releasing.gripper.fail_activation = True
+    reset_and_activated_unseen(releasing, 20.0)
+    releasing.step()
+    assert releasing.latest.fault is Fault.ACTIVATION_FAULT
+    assert releasing.state is State.FAULT
+
+
+@pytest.mark.parametrize("seconds", [1.0, 20.0])
+def test_a_release_that_was_never_seen_to_begin_ends_too(scan: Scan, seconds: float) -> None:
+    scan.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    scan.step()
+    scan.controller.release()
+    scan.step()
+    assert scan.state is State.WF_ATR
+    assert scan.latest.fault is Fault.SCISSOR_BLOCKED
+    reset_and_activated_unseen(scan, seconds)
+    scan.step()
+    assert scan.state in (State.WF_ACTIVATION, State.RUNNING_IDLE)
+
+
+def test_a_shutdown_after_a_release_that_another_client_ended_does_not_release_again(releasing: Scan) -> None:
+    """What was written last has rATR set, and looks like what the gripper shows: rATR has no echo."""
+    reset_and_activated_unseen(releasing, 20.0)
+    releasing.step()
+    releasing.gripper.write(0, [0x0900])
+    releasing.run(0.1)
+    written = len(releasing.written)
+    releasing.stop()
+    assert len(releasing.written) == written + 1
+    assert not releasing.last_image.release
+    assert not releasing.gripper.is_moving
+
+
+def test_a_release_that_is_called_off_leaves_the_hand_where_the_gripper_is(scan: Scan) -> None:
+    """The gripper gets reset before the release is written, and a fault stays: so did WF_ATR."""
+    scan.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    scan.step()
+    scan.controller.release()
+    written = len(scan.written)
+    scan.gripper.write(0, [0x0000])
+    scan.now += 0.02
+    scan.gripper.status_registers()
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
+    scan.step()
+    assert len(scan.written) == written
+    assert (scan.state, scan.latest.activation_echo) == (State.FAULT, False)
+    scan.run(1.0)
+    assert len(scan.written) == written
+    assert scan.state is State.FAULT

@@ -1,0 +1,209 @@
+"""What the pages about hands on other hosts say of files, bytes and objects is what the code has."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import re
+import struct
+from dataclasses import MISSING, fields
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+from robotiq_async import Finger, MoveResult, ObjectStatus, RobotiqHand, State, Transition, Trigger
+from robotiq_async.errors import ControlLostError
+from robotiq_async.fleet import GripperName
+from robotiq_async.fleet.agent.agent_file import AgentSettings, GripperSettings, read_agent_file
+from robotiq_async.fleet.agent.news import AT_ONCE, KEPT, News
+from robotiq_async.fleet.agent.served_hand import COMMANDS, ServedHand
+from robotiq_async.fleet.control.lease import Lease
+from robotiq_async.fleet.wire import status_message
+from robotiq_async.fleet.wire.envelope import Answer, Call, failure
+from robotiq_async.fleet.wire.names import ROOT
+from robotiq_async.fleet.wire.status_message import StatusMessage
+from robotiq_async.fleet.wire.values import request_fields, result_fields, transition_fields
+from robotiq_async.session.streams import SentRequest
+from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.wire.status import RobotiqStatus
+from tests.docs.pages import DOCS, blocks
+from tests.fleet.network import Network
+
+PROTOCOL: Final = (DOCS / "fleet-protocol.md").read_text(encoding="utf-8")
+HOW_TO: Final = (DOCS / "how-to" / "fleet.md").read_text(encoding="utf-8")
+NAME: Final = GripperName("lab", "cell-1", "left")
+EPOCH: Final = 4503599627370497
+CLIENT: Final = "5f0c3a9e1b7d2468"
+LABEL: Final = "bob@desk:4711"
+REGISTERS: Final = (0xF900, 0xFF00, 0x0064, 0x6400, 0x0606, 0x0000, 0x0606, 0x0089)
+STATUS: Final = RobotiqStatus(REGISTERS, 812.4375, 20114)
+MESSAGE: Final = StatusMessage(
+    mark=NAME.mark,
+    epoch=EPOCH,
+    stamp=812.4375,
+    state=State.RUNNING_IDLE,
+    lease=3,
+    is_held=True,
+    events=41,
+    is_moving=False,
+    sequence=20114,
+    age=0.0009765625,
+    registers=REGISTERS,
+)
+RESULT: Final = MoveResult(
+    outcomes={Finger.A: ObjectStatus.AT_POSITION},
+    positions={Finger.A: 100},
+    contacts=Finger(0),
+    duration=0.75,
+    peak_current_ma={Finger.A: 310},
+    status=STATUS,
+)
+IMAGE: Final = Request(activate=True, go=True, axes=(AxisRequest(100, 128, 64),) * 4)
+
+
+def call(number: int, lease: int = 3, **arguments: Any) -> Call:
+    return Call(NAME.base, CLIENT, EPOCH, lease, number, 812.4375, arguments)
+
+
+def event(index: int, what: dict[str, Any]) -> dict[str, Any]:
+    return {"index": index, **what}
+
+
+def told(what: dict[str, Any]) -> dict[str, Any]:
+    return {"mark": NAME.mark, "epoch": EPOCH, "events": [what], "status": MESSAGE.pack().hex()}
+
+
+BEGUN: Final = Transition(State.RUNNING_IDLE, State.RUNNING_CC, Trigger.ASK_COMMAND, 811.5)
+MOVE: Final = call(7, position=100, fingers=1, speed=None, force=None, timeout=None)
+EXAMPLES: Final = [
+    told(event(38, transition_fields(BEGUN))),
+    event(39, request_fields(SentRequest(IMAGE, 811.53125, acknowledged=True))),
+    event(40, {"kind": "lease", "number": 3, "holder": LABEL, "reason": "granted"}),
+    event(41, {"kind": "conflict", "key": NAME.key("alive", "77")}),
+    json.loads(MOVE.pack()),
+    json.loads(Answer(NAME.base, 7, EPOCH, result_fields(RESULT)).pack()),
+    json.loads(
+        failure(MOVE, EPOCH, ControlLostError("the lease has ended (taken), ...", "taken")).pack(),
+    ),
+    json.loads(call(1, 0, what="acquire", label=LABEL).pack()),
+    json.loads(Answer(NAME.base, 1, EPOCH, {"lease": 3, "window": 1.0}).pack()),
+]
+"""In the order of the page."""
+
+
+def shown(language: str, page: str) -> list[str]:
+    return [block.text for block in blocks(page) if block.language == language]
+
+
+def test_the_objects_are_those_of_the_code() -> None:
+    assert [json.loads(text) for text in shown("json", PROTOCOL)] == json.loads(json.dumps(EXAMPLES))
+
+
+def test_the_example_of_a_status() -> None:
+    (text,) = shown("text", PROTOCOL)
+    assert bytes.fromhex(text) == MESSAGE.pack()
+    assert status_message.unpack(bytes.fromhex(text)) == MESSAGE
+
+
+def test_a_status_byte_by_byte() -> None:
+    rows = re.findall(r"^\| (\d+) \| (\d+) \| `(\w+)` \|", PROTOCOL, re.MULTILINE)
+    offset = 0
+    for begins, size, kind in rows:
+        assert (int(begins), int(size)) == (offset, struct.calcsize(f"<{kind}"))
+        offset += int(size)
+    packed = "<" + "".join(kind for _, _, kind in rows)
+    assert packed == status_message._LAYOUT.format
+    assert f"`{packed}`" in PROTOCOL
+    assert offset == status_message.SIZE
+    assert f"{status_message.SIZE} bytes" in PROTOCOL
+
+
+def test_every_state_has_its_number() -> None:
+    numbers = re.findall(r"(\d+) ([A-Z_]+)", PROTOCOL[PROTOCOL.index("The states:") :].partition("\n\n")[0])
+    assert [(int(number), name) for number, name in numbers] == [
+        (number, state.name) for number, state in enumerate(State)
+    ]
+
+
+async def test_an_event_is_told_as_the_page_has_it() -> None:
+    network = Network()
+    heard: list[bytes] = []
+    network.bus("client").subscribe(NAME.key("*"), lambda _, payload: heard.append(payload))
+    news = News(NAME, RobotiqHand("sim://"), network.bus("agent"), EPOCH, Lease())
+    news.add({"kind": "conflict", "key": NAME.key("alive", "77")})
+    while not heard:  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
+    (first,) = [json.loads(each) for each in heard]
+    example = json.loads(shown("json", PROTOCOL)[0])
+    assert first.keys() == example.keys()
+    assert (first["mark"], first["epoch"]) == (example["mark"], example["epoch"])
+    assert len(bytes.fromhex(first["status"])) == status_message.SIZE
+    assert f"at most {AT_ONCE}" in PROTOCOL
+
+
+async def test_a_summary_and_an_info() -> None:
+    hand, bus = RobotiqHand("sim://"), Network().bus("agent")
+    summary = News(NAME, hand, bus, EPOCH, Lease()).summary()
+    served = ServedHand(NAME, hand, bus, epoch=EPOCH, window=1.0)
+    info = served._info(call(1))
+    for name in {*summary, *info}:
+        assert re.search(rf"^\| .*`{name}`", PROTOCOL, re.MULTILINE), name
+
+
+def test_every_command_and_key_is_there() -> None:
+    for name in (*COMMANDS, "command", "cancel"):
+        assert f"`{name}`" in PROTOCOL, name
+    for key in ("feed", "summary", "info", "lease", "halt", "cmd/NAME", "alive/EPOCH"):
+        assert f"| `{key}` |" in PROTOCOL, key
+    assert ROOT in PROTOCOL
+    assert f"{KEPT:,}" in PROTOCOL
+
+
+def test_every_reason_for_losing_control_is_there() -> None:
+    assert ControlLostError.__doc__ is not None
+    for reason in re.findall(r'"(\w+)"', ControlLostError.__doc__):
+        assert f"`{reason}`" in PROTOCOL, reason
+
+
+# -- FLEET.toml --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("settings", [AgentSettings, GripperSettings])
+def test_every_key_of_the_file_has_its_row(settings: type[AgentSettings | GripperSettings]) -> None:
+    for each in fields(settings):
+        key = "[grippers.NAME]" if each.name == "grippers" else each.name
+        rows = re.findall(rf"^\| `{re.escape(key)}` \| ([^|]+) \|", HOW_TO, re.MULTILINE)
+        assert len(rows) == 1, key
+        if isinstance(each.default, int | float) and not isinstance(each.default, bool):
+            assert rows == [f"`{each.default}`"]
+        if each.default is MISSING and each.default_factory is MISSING:
+            assert rows == ["needed"]
+
+
+@pytest.mark.parametrize("page", ["fleet.md", "fleet-keys.md"])
+def test_the_files_on_the_pages_are_taken(page: str, tmp_path: Path) -> None:
+    text = (DOCS / "how-to" / page).read_text(encoding="utf-8")
+    keys = tmp_path / "agent-cell-1"
+    keys.mkdir()
+    for name in ("ca.pem", "cert.pem", "key.pem"):
+        (keys / name).touch()
+    (keys / "access.toml").write_text('operate = ["bob"]\n', encoding="utf-8")
+    files = [each for each in shown("toml", text) if "site" in each]
+    assert files
+    for each in files:
+        (tmp_path / "FLEET.toml").write_text(each, encoding="utf-8")
+        settings = read_agent_file(tmp_path / "FLEET.toml")
+        assert (settings.site, settings.host, [*settings.grippers]) == ("lab", "cell-1", ["left"])
+
+
+def test_two_more_lines_make_it_listen_to_others(tmp_path: Path) -> None:
+    (file,) = shown("toml", HOW_TO)
+    lines = re.findall(r"^ +((?:keys|listen) = .*)$", HOW_TO, re.MULTILINE)
+    assert len(lines) == 2
+    (tmp_path / "agent-cell-1").mkdir()
+    for name in ("ca.pem", "cert.pem", "key.pem"):
+        (tmp_path / "agent-cell-1" / name).touch()
+    (tmp_path / "agent-cell-1" / "access.toml").write_text("", encoding="utf-8")
+    (tmp_path / "FLEET.toml").write_text("\n".join((*lines, file)), encoding="utf-8")
+    assert read_agent_file(tmp_path / "FLEET.toml").listen == ("tls/0.0.0.0:7447",)

@@ -1,0 +1,134 @@
+"""Sessions of zenoh over loopback, with keys: an agent's side that answers everything, and clients."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from collections.abc import AsyncIterator, Callable
+from contextlib import AsyncExitStack, asynccontextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from zenoh import SampleKind
+from zenoh.handlers import Callback
+
+from robotiq_async.fleet.network.bus import Question, Urgency
+from robotiq_async.fleet.network.configuration import (
+    agent_configuration,
+    client_configuration,
+    session_configuration,
+)
+from robotiq_async.fleet.network.zenoh_bus import ZenohBus, open_bus
+from robotiq_async.fleet.wire.names import GripperName
+
+LEFT: Final = GripperName("lab", "cell-1", "left")
+NEWS: Final = b"news"
+PATIENCE: Final = 10.0
+
+
+def free_port() -> int:
+    with socket.socket() as reserved:
+        reserved.bind(("127.0.0.1", 0))
+        return int(reserved.getsockname()[1])
+
+
+@dataclass
+class Client:
+    """A client's session."""
+
+    bus: ZenohBus
+    connected: asyncio.Event = field(default_factory=asyncio.Event)
+    disconnected: asyncio.Event = field(default_factory=asyncio.Event)
+    kept: list[object] = field(default_factory=list)
+
+    async def may(self, *parts: str) -> bool:
+        """Whether a request is answered."""
+        question = LEFT.key(*parts)
+        return await self.bus.ask(question, b"?", timeout=PATIENCE, urgency=Urgency.COMMAND) is not None
+
+    def subscribe(self, expression: str) -> asyncio.Event:
+        """Set when something comes."""
+        heard = asyncio.Event()
+        self.kept.append(self.bus.subscribe(expression, lambda *_: heard.set()))
+        return heard
+
+    def watch(self, expression: str) -> asyncio.Event:
+        """Set when an agent is seen."""
+        seen = asyncio.Event()
+        self.kept.append(self.bus.watch(expression, lambda *_: seen.set()))
+        return seen
+
+
+@dataclass
+class Agent:
+    """Something that answers to every key of an agent."""
+
+    bus: ZenohBus
+    publish: Callable[[str], None]
+    """Takes the last part of the key."""
+    heard: asyncio.Event = field(default_factory=asyncio.Event)
+    """Whether somebody has published something."""
+
+
+@dataclass
+class Line:
+    """A port, and what is opened at it; closed at the end."""
+
+    endpoint: str
+    stack: AsyncExitStack
+
+    async def _open(self, configuration: dict[str, object]) -> ZenohBus:
+        bus = await open_bus(configuration, self.endpoint)
+        self.stack.push_async_callback(bus.close)
+        return bus
+
+    async def agent(self, keys: Path) -> Agent:
+        """The agent's side."""
+        bus = await self._open(agent_configuration("lab", "cell-1", [self.endpoint], keys=keys))
+
+        def answer(question: Question) -> None:
+            question.reply(b"!")
+
+        for verb in ("info", "lease", "halt", "cmd/*"):
+            self.stack.callback(bus.serve(f"robotiq/v1/lab/cell-1/*/{verb}", answer))
+        self.stack.callback(bus.announce(LEFT.key("alive", "77")))
+        publish = {name: bus.publisher(LEFT.key(name), Urgency.NEWS) for name in ("feed", "summary", "other")}
+        agent = Agent(bus, lambda name: publish[name](NEWS))
+        # What it publishes itself is heard too.
+        self.stack.callback(
+            bus.subscribe("**", lambda _, payload: None if payload == NEWS else agent.heard.set())
+        )
+        return agent
+
+    async def server(self, keys: Path) -> None:
+        """Something that listens with any keys."""
+        await self._open(session_configuration([self.endpoint], [], keys))
+
+    async def client(self, keys: Path | None, mode: str = "peer") -> Client:
+        """A client that has tried to connect; without keys it is one that zenoh's own tools would be."""
+        configuration: dict[str, Any]
+        if keys is None:
+            configuration = session_configuration([], [self.endpoint])
+        else:
+            configuration = client_configuration([self.endpoint], keys=keys)
+        return self._client(await self._open(configuration | {"mode": mode}))
+
+    def _client(self, bus: ZenohBus) -> Client:
+        client = Client(bus)
+
+        def tell(event: Any) -> None:
+            is_there = event.kind == SampleKind.PUT
+            bus._mailbox.put((client.connected if is_there else client.disconnected).set)
+
+        listener = bus._session.info.declare_transport_events_listener(
+            Callback(tell, indirect=False), history=True
+        )
+        client.kept.append(listener)
+        return client
+
+
+@asynccontextmanager
+async def line(host: str = "127.0.0.1") -> AsyncIterator[Line]:
+    async with AsyncExitStack() as stack, asyncio.timeout(PATIENCE):
+        yield Line(f"tls/{host}:{free_port()}", stack)

@@ -1,0 +1,403 @@
+"""What is wrong with my connection to an agent? Each ailment is found, and told with what to do."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from robotiq_async import Finger
+from robotiq_async.doctor import Finding, Level, examine_remote
+from robotiq_async.doctor.certificates import examine_keys
+from robotiq_async.doctor.findings import GiveUpError
+from robotiq_async.fleet.agent.agent import Agent
+from robotiq_async.fleet.keys.access_list import Role
+from robotiq_async.fleet.keys.certificates import issue, make_authority
+from robotiq_async.fleet.network.bus import Question, Urgency
+from robotiq_async.fleet.wire.envelope import Answer
+from robotiq_async.fleet.wire.names import GripperName
+from robotiq_async.hand import RobotiqHand
+from robotiq_async.simulator import SimulatorServer
+from tests.fleet.lab import Lab, lab
+from tests.fleet.network import MemoryBus, Network
+from tests.virtual import virtual
+
+LEFT = GripperName("lab", "cell", "left")
+HEALTHY = [
+    "address",
+    "agent",
+    "access",
+    "version",
+    "round trip",
+    "statuses",
+    "gripper",
+    "activation",
+    "fault",
+    "commanded by",
+    "no lease",
+    "another run",
+]
+
+
+async def findings(address: str, bus: MemoryBus | None = None) -> dict[str, Finding]:
+    told: list[Finding] = []
+    await examine_remote(address, told.append, bus=bus)
+    assert all(finding.advice for finding in told if finding.level is not Level.GOOD)
+    return {finding.what: finding for finding in told}
+
+
+def levels(found: dict[str, Finding]) -> set[Level]:
+    return {finding.level for finding in found.values()}
+
+
+async def examined(here: Lab) -> dict[str, Finding]:
+    return await findings(str(LEFT), here.network.bus("doctor"))
+
+
+# -- an agent and a gripper --------------------------------------------------------------------------------
+
+
+@virtual
+async def test_a_healthy_one() -> None:
+    async with lab() as here:
+        writes = len(here.gripper.writes)
+        found = await examined(here)
+        assert len(here.gripper.writes) == writes
+    assert list(found) == HEALTHY
+    assert levels(found) == {Level.GOOD}
+    assert " a second, 0.0 % lost" in found["statuses"].found
+    assert found["commanded by"].found == "nobody"
+
+
+@virtual
+async def test_whoever_commands_keeps_the_lease() -> None:
+    async with lab() as here, here.client() as hand:
+        examining = asyncio.create_task(examined(here))
+        for _ in range(4):
+            await hand.move(100, Finger.A)
+            await hand.move(0, Finger.A)
+        found = await examining
+        assert hand.is_in_control
+    assert levels(found) == {Level.GOOD}
+    assert "@" in found["commanded by"].found
+
+
+@virtual
+async def test_a_gripper_of_another_name() -> None:
+    async with lab() as here:
+        found = await findings("zenoh://lab/cell/right", here.network.bus("doctor"))
+    assert list(found) == ["address", "agent"]
+    assert found["agent"].level is Level.BAD
+    assert str(LEFT) in found["agent"].found
+
+
+@virtual
+async def test_nobody_at_all() -> None:
+    found = await findings(str(LEFT), Network().bus("doctor"))
+    assert list(found) == ["address", "agent"]
+    assert "robotiq-async agent" in found["agent"].advice
+
+
+@virtual
+async def test_two_agents_for_one_gripper() -> None:
+    async with lab() as here:
+        here.network.bus("other").announce(LEFT.key("alive", "1"))
+        found = await examined(here)
+    assert found["agent"].level is Level.BAD
+    assert "2 serve" in found["agent"].found
+
+
+@virtual
+async def test_an_agent_that_does_not_reach_its_gripper() -> None:
+    async with lab() as here:
+        here.server.refuse()
+        here.server.cut()
+        found = await examined(here)
+    assert found["gripper"].level is Level.BAD
+    assert "robotiq-async doctor tcp://" in found["gripper"].advice
+
+
+@virtual
+async def test_a_fault() -> None:
+    async with lab() as here:
+        here.gripper.inject_fault(13)
+        await asyncio.sleep(0.1)
+        found = await examined(here)
+    assert found["fault"].level is Level.BAD
+    assert "0x0D" in found["fault"].found
+
+
+@virtual
+async def test_messages_under_the_wrong_key() -> None:
+    async with lab() as here:
+        publish = here.network.bus("stray").publisher(LEFT.key("feed"), Urgency.NEWS)
+        other = GripperName("lab", "cell", "right")
+
+        async def stray() -> None:
+            while True:
+                publish(json.dumps({"mark": other.mark}).encode())
+                await asyncio.sleep(0.1)
+
+        task = asyncio.create_task(stray())
+        found = await examined(here)
+        task.cancel()
+    assert found["misrouted"].level is Level.DOUBT
+
+
+@virtual
+async def test_a_slow_network() -> None:
+    async with lab() as here:
+        for stream in here.network.both("agent", "doctor"):
+            stream.delay = 0.15
+        found = await examined(here)
+    assert found["round trip"].level is Level.BAD
+    assert "lose the lease" in found["round trip"].advice
+
+
+# -- agents of another kind --------------------------------------------------------------------------------
+
+
+def info(**changes: object) -> dict[str, object]:
+    usual: dict[str, object] = {
+        "epoch": 1,
+        "stamp": 0.0,
+        "version": "9.9.9",
+        "window": 1.0,
+        "statistics": {"period_p99": 0.005},
+        "problem": "",
+        "state": "running_idle",
+        "address": "sim://",
+        "holder": None,
+    }
+    return usual | changes
+
+
+async def examined_beside(answer: Callable[[str], Any]) -> dict[str, Finding]:
+    """An agent that says what it is told to: a value, an error's object, or bytes."""
+    network = Network()
+    bus = network.bus("agent")
+    bus.announce(LEFT.key("alive", "1"))
+
+    def hear(question: Question) -> None:
+        verb = question.key.removeprefix(f"{LEFT.base}/")
+        number = json.loads(question.payload)["number"]
+        said = answer(verb)
+        if isinstance(said, bytes):
+            question.reply(said)
+        elif said is not None and "kind" in said:
+            question.reply(Answer(LEFT.base, number, 1, error=said).pack())
+        elif said is not None:
+            question.reply(Answer(LEFT.base, number, 1, said).pack())
+
+    for verb in ("info", "cmd/*"):
+        bus.serve(f"{LEFT.base}/{verb}", hear)
+    return await findings(str(LEFT), network.bus("doctor"))
+
+
+@virtual
+async def test_one_that_carries_out_what_must_be_refused() -> None:
+    found = await examined_beside(lambda verb: info() if verb == "info" else {})
+    assert found["no lease"].level is Level.BAD
+    assert "do not work near the fingers" in found["no lease"].advice
+
+
+@virtual
+async def test_one_that_lets_it_in_and_fails_then() -> None:
+    refused = {"kind": "ValueError", "message": "fingers must be 1..15, got 0"}
+    found = await examined_beside(lambda verb: info() if verb == "info" else refused)
+    assert found["no lease"].level is Level.BAD
+
+
+@virtual
+async def test_one_that_takes_what_was_meant_for_another_run() -> None:
+    refused = {"kind": "ControlLostError", "message": "nobody", "reason": "expired"}
+    found = await examined_beside(lambda verb: info() if verb == "info" else refused)
+    assert found["no lease"].level is Level.GOOD
+    assert found["another run"].level is Level.BAD
+
+
+@virtual
+async def test_one_whose_statuses_are_not_heard() -> None:
+    found = await examined_beside(lambda _: info())
+    assert found["statuses"].level is Level.BAD
+    assert found["version"].found.startswith("9.9.9 there")
+
+
+@virtual
+async def test_one_that_does_not_answer() -> None:
+    found = await examined_beside(lambda _: None)
+    assert list(found) == ["address", "agent", "access"]
+    assert found["access"].level is Level.BAD
+
+
+@virtual
+@pytest.mark.parametrize(
+    "said", [b"?", b'{"version": 2}', b'{"version": 1}', {"state": "running_idle"}], ids=str
+)
+async def test_one_of_another_version(said: Any) -> None:
+    found = await examined_beside(lambda _: said)
+    assert list(found) == ["address", "agent", "access"]
+    assert found["access"].level is Level.BAD
+
+
+# -- certificates ------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def authority(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder: Path = tmp_path_factory.mktemp("keys")
+    make_authority(folder)
+    issue(folder, "bob", Role.OPERATE)
+    issue(folder, "alice", Role.READ)
+    issue(folder, "panel", Role.HALT, days=20)
+    issue(folder, "cell", Role.AGENT)
+    return folder
+
+
+def examined_keys(folder: Path, *, days: float = 0) -> tuple[Role | None, dict[str, Finding]]:
+    told: list[Finding] = []
+    role = None
+    try:
+        role = examine_keys(folder, told.append, now=datetime.now(UTC) + timedelta(days=days))
+    except GiveUpError:
+        assert told[-1].level is Level.BAD
+    return role, {finding.what: finding for finding in told}
+
+
+def test_what_a_certificate_is_for(authority: Path) -> None:
+    role, found = examined_keys(authority / "operate-bob")
+    assert role is Role.OPERATE
+    assert levels(found) == {Level.GOOD}
+    role, found = examined_keys(authority / "agent-cell")
+    assert role is Role.AGENT
+    assert found["role"].level is Level.BAD
+
+
+def test_one_that_ends_soon_and_one_that_has_ended(authority: Path) -> None:
+    role, found = examined_keys(authority / "halt-panel")
+    assert (role, found["certificate"].level) == (Role.HALT, Level.DOUBT)
+    for days in (21, -2):
+        _, found = examined_keys(authority / "halt-panel", days=days)
+        assert list(found) == ["certificate"]
+
+
+@pytest.mark.parametrize("name", ["ca.pem", "cert.pem", "key.pem"])
+@pytest.mark.parametrize("how", ["missing", "malformed", "another's"])
+def test_files_that_do_not_belong_together(authority: Path, tmp_path: Path, name: str, how: str) -> None:
+    folder = tmp_path / "bob"
+    folder.mkdir()
+    for file in (authority / "operate-bob").iterdir():
+        (folder / file.name).write_bytes(file.read_bytes())
+    make_authority(tmp_path / "other")
+    other = issue(tmp_path / "other", "bob", Role.OPERATE)
+    if how == "missing":
+        (folder / name).unlink()
+    else:
+        (folder / name).write_bytes(b"?" if how == "malformed" else (other / name).read_bytes())
+    _, found = examined_keys(folder)
+    assert list(found) == ["certificate"]
+    assert name in found["certificate"].found or how == "another's"
+
+
+def test_a_key_that_others_may_read(authority: Path) -> None:
+    key = authority / "read-alice" / "key.pem"
+    key.chmod(0o640)
+    _, found = examined_keys(authority / "read-alice")
+    assert found["private key"].level is Level.DOUBT
+    key.chmod(0o600)
+
+
+# -- the way there -----------------------------------------------------------------------------------------
+
+
+@asynccontextmanager
+async def listening(hear: Callable[..., Any]) -> AsyncIterator[str]:
+    server = await asyncio.start_server(hear, "127.0.0.1", 0)
+    async with server:
+        yield f"127.0.0.1:{server.sockets[0].getsockname()[1]}"
+
+
+async def hang_up(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    writer.close()
+
+
+async def test_nobody_listens() -> None:
+    async with listening(hang_up) as where:
+        pass
+    found = await findings(f"{LEFT}?connect=tcp/{where}")
+    assert list(found) == ["address", "port"]
+    assert found["port"].found == f"tcp/{where}: nobody listens"
+
+
+async def test_a_name_that_does_not_exist() -> None:
+    found = await findings(f"{LEFT}?connect=tcp/nowhere.invalid:7447&insecure=1")
+    assert list(found) == ["address", "port"]
+    assert "spelling" in found["port"].advice
+
+
+async def test_somebody_without_certificates(authority: Path) -> None:
+    async with listening(hang_up) as where:
+        found = await findings(f"{LEFT}?connect=tls/{where}&keys={authority / 'operate-bob'}")
+    assert found["port"].level is Level.GOOD
+    assert found["certificates"].level is Level.BAD
+
+
+async def test_a_way_that_is_not_protected() -> None:
+    found = await findings(f"{LEFT}?connect=tcp/192.0.2.1:7447")
+    assert list(found) == ["address", "way"]
+    assert "open to everybody" in found["way"].found
+
+
+@pytest.mark.parametrize("address", ["zenoh://lab/cell", "zenoh://lab/cell/*", "zenoh://a/b/c?x=1"])
+async def test_a_malformed_address(address: str) -> None:
+    with pytest.raises(ValueError, match="malformed"):
+        await findings(address)
+
+
+# -- all of it, over zenoh ---------------------------------------------------------------------------------
+
+
+@asynccontextmanager
+async def serving(keys: Path) -> AsyncIterator[str]:
+    """An agent over zenoh with keys; gives its endpoint."""
+    from robotiq_async.fleet.network.configuration import agent_configuration  # noqa: PLC0415
+    from robotiq_async.fleet.network.zenoh_bus import open_bus  # noqa: PLC0415
+
+    async with listening(hang_up) as where:
+        pass
+    configuration = agent_configuration("lab", "cell", [f"tls/{where}"], keys=keys)
+    async with SimulatorServer() as server:
+        bus = await open_bus(configuration, where)
+        agent = Agent("lab", "cell", {"left": RobotiqHand(server.address)}, bus)
+        ready = asyncio.Event()
+        task = asyncio.create_task(agent.run(ready.set))
+        try:
+            await ready.wait()
+            yield f"tls/{where}"
+        finally:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+            await bus.close()
+
+
+async def test_each_role_over_zenoh(authority: Path, tmp_path: Path) -> None:
+    make_authority(tmp_path)
+    stranger = issue(tmp_path, "bob", Role.OPERATE)
+    folders = [authority / "operate-bob", authority / "read-alice", stranger]
+    async with serving(authority / "agent-cell") as endpoint:
+        operator, reader, refused = await asyncio.gather(
+            *(findings(f"{LEFT}?connect={endpoint}&keys={folder}") for folder in folders)
+        )
+    for found in (operator, reader):
+        assert {each.what for each in found.values() if each.level is Level.BAD} == set()
+        assert found["no certificate"].found == "refused, as it must be"
+    assert operator["no lease"].level is Level.GOOD
+    assert reader["commands"].found == "not let in with a certificate to read, as it must be"
+    assert refused["certificates"].level is Level.BAD
+    assert "agent" not in refused

@@ -1,0 +1,103 @@
+"""What comes from zenoh's threads is handled in the loop: in its order, and much of it at once."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import threading
+from functools import partial
+
+import pytest
+
+from robotiq_async.fleet.network.zenoh_bus import GATHER_S, Mailbox
+from tests.virtual import virtual
+
+
+class Postman:
+    """Brings letters, and knows when each was opened."""
+
+    def __init__(self) -> None:
+        self.loop = asyncio.get_running_loop()
+        self.mailbox = Mailbox()
+        self.late: list[float] = []
+        self.opened: list[int] = []
+
+    def bring(self, number: int, *, urgent: bool = False) -> None:
+        self.mailbox.put(partial(self._open, number, self.loop.time()), urgent=urgent)
+
+    def _open(self, number: int, brought_at: float) -> None:
+        self.opened.append(number)
+        self.late.append(self.loop.time() - brought_at)
+
+    async def bring_many(self, every: float) -> None:
+        for number in range(20):
+            self.bring(number)
+            await asyncio.sleep(every)
+
+
+@virtual
+async def test_the_news_of_one_hand_do_not_wait() -> None:
+    postman = Postman()
+    await postman.bring_many(every=0.005)
+    assert max(postman.late) == 0.0
+
+
+@virtual
+async def test_the_news_of_many_are_gathered() -> None:
+    postman = Postman()
+    await postman.bring_many(every=0.0001)
+    await asyncio.sleep(2 * GATHER_S)
+    assert postman.opened == list(range(20))
+    assert sum(late > 0.0 for late in postman.late) > 10
+    assert max(postman.late) <= GATHER_S * 1.001
+
+
+@virtual
+async def test_what_is_urgent_is_not_kept_waiting_nor_does_it_overtake() -> None:
+    postman = Postman()
+    await postman.bring_many(every=0.0001)
+    await asyncio.sleep(2 * GATHER_S)
+    for number in (20, 21):  # the second finds the mailbox opened a moment ago
+        postman.bring(number)
+        await asyncio.sleep(0.0001)
+    postman.bring(22)
+    postman.bring(23, urgent=True)
+    await asyncio.sleep(0)
+    await asyncio.sleep(0)
+    assert postman.opened[-2:] == [22, 23]
+    assert postman.late[-1] == 0.0
+    await asyncio.sleep(2 * GATHER_S)
+    assert postman.opened == list(range(24))
+
+
+@virtual
+async def test_a_letter_that_fails_keeps_no_other(caplog: pytest.LogCaptureFixture) -> None:
+    postman = Postman()
+    postman.mailbox.put(partial(json.loads, "?"))
+    postman.bring(1)
+    await asyncio.sleep(0.01)
+    assert postman.opened == [1]
+    assert "could not be handled" in caplog.text
+
+
+async def test_letters_of_another_thread() -> None:
+    postman, there = Postman(), asyncio.Event()
+
+    def work() -> None:
+        for number in range(1000):
+            postman.bring(number)
+        postman.mailbox.put(there.set)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    async with asyncio.timeout(10):
+        await there.wait()
+    thread.join()
+    assert postman.opened == list(range(1000))
+
+
+def test_a_loop_that_has_been_closed_is_told_nothing() -> None:
+    async def make() -> Mailbox:
+        return Mailbox()
+
+    asyncio.run(make()).put(lambda: None)

@@ -1,0 +1,43 @@
+"""What programs import of the room."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from robotiq_async import errors, fleet
+
+WITHOUT = """\
+import sys
+
+sys.modules["zenoh"] = sys.modules["cryptography"] = None
+from robotiq_async.fleet import *
+from robotiq_async.fleet import Agent, Fleet, RemoteHand
+
+RemoteHand("zenoh://lab/cell/left")
+Fleet("lab")
+print(Agent.__name__)
+"""
+
+
+def test_the_names_are_there_without_zenoh_and_cryptography() -> None:
+    done = subprocess.run([sys.executable, "-c", WITHOUT], capture_output=True, text=True, timeout=60)
+    assert done.stdout == "Agent\n", done.stderr
+
+
+def test_they_are_sorted() -> None:
+    assert sorted(fleet.__all__) == fleet.__all__
+
+
+@pytest.mark.parametrize("name", [name for name in fleet.__all__ if name.endswith("Error")])
+def test_its_errors_are_those_of_the_library(name: str) -> None:
+    assert getattr(fleet, name) is getattr(errors, name)
+
+
+@pytest.mark.parametrize("name", fleet.__all__)
+def test_every_class_has_a_docstring_of_its_own(name: str) -> None:
+    doc = vars(getattr(fleet, name)).get("__doc__")
+    assert doc
+    assert not doc.startswith(f"{name}(")

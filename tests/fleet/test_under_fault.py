@@ -1,0 +1,63 @@
+"""Every trouble in every phase: the table of docs/fleet-under-fault.md, cell by cell."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from robotiq_async import Finger
+from tests.fleet.cell import PHASES, TARGET, Doing, moving, outcome, told
+from tests.fleet.table import Cell, cells
+from tests.fleet.troubles import TROUBLES
+from tests.fleet.world import world
+from tests.virtual import run, virtual
+
+CELLS = list(cells())
+HALTED_AFTER_S = 0.25
+"""In the midst of all troubles that last."""
+
+
+@pytest.mark.parametrize("cell", CELLS, ids=lambda cell: f"{cell.phase}-{cell.trouble}".replace(" ", "_"))
+def test_cell(cell: Cell) -> None:
+    async def main() -> None:
+        async with world() as here:
+            came = await outcome(here, cell.phase, TROUBLES[cell.trouble])
+            assert came.words in cell.outcomes
+            if cell.held_after is not None and came.held_after is not None:
+                assert came.held_after <= cell.held_after
+
+    run(main)
+
+
+def test_the_table_is_complete() -> None:
+    assert {(cell.trouble, cell.phase) for cell in CELLS} == {
+        (trouble, phase) for trouble in TROUBLES for phase in PHASES
+    }
+
+
+@pytest.mark.parametrize("trouble", TROUBLES)
+@virtual
+async def test_a_halt_in_the_midst(trouble: str) -> None:
+    """Whoever asks is told the truth, and the old holder does not come back."""
+    async with world() as here:
+        doing = Doing(here)
+        await moving(doing)
+        going_on = asyncio.create_task(TROUBLES[trouble](here))
+        await asyncio.sleep(HALTED_AFTER_S)
+        at = here.now()
+        heard = await here.other.do(told(here.other.hand.halt()))
+        assert here.now() - at <= 2.5
+        if heard == "done":
+            assert not here.gripper.is_moving
+        else:
+            assert heard == "ConnectionLost"
+        await going_on
+        await asyncio.sleep(2.5)
+        assert not here.gripper.is_moving or heard != "done"
+        if heard == "done":
+            assert here.gripper.position(Finger.A) < TARGET / 2
+        if not here.holder.host.is_dead:
+            assert heard != "done" or not here.holder.hand.is_in_control
+            assert doing.call is not None
+            await here.until(doing.call.done)

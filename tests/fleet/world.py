@@ -1,0 +1,282 @@
+"""Two grippers, their agent and its clients, each on a host of its own, and an eye on what is promised."""
+
+from __future__ import annotations
+
+import asyncio
+from bisect import bisect_right
+from collections.abc import AsyncIterator, Callable, Coroutine
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from typing import Any, TypeVar
+
+from robotiq_async import Finger, RobotiqError, RobotiqHand, RobotiqStatus, State
+from robotiq_async.enums import AXES
+from robotiq_async.fleet.agent.agent import Agent
+from robotiq_async.fleet.remote.remote_hand import RemoteHand
+from robotiq_async.simulator import SimulatorServer
+from robotiq_async.wire.request import Request
+from tests.adversity.world import StampedGripper
+from tests.fleet.hosts import Host
+from tests.fleet.lab import activate_beforehand
+from tests.fleet.network import LINK_LEASE_S, RECONNECT_S, MemoryBus, Network
+
+T = TypeVar("T")
+WINDOW_S = 1.0
+PROMPT_S = 0.2
+"""Allowed beside the window."""
+LOOK_S = 0.01
+POLL_S = 0.02
+"""Seldom enough for a few hundred cells to take no more than a minute."""
+NAMES = ("left", "right")
+
+
+class World:
+    """All there is in one test: the holder's troubles are its own, and those of the agent are everybody's.
+
+    Attributes:
+        holder: commands left.
+        other: on a host of its own; reads left.
+        neighbour: commands right, and does nothing.
+    """
+
+    def __init__(self) -> None:
+        loop = asyncio.get_running_loop()
+        self.network = Network()
+        self.grippers = {
+            name: StampedGripper(loop.time, speedup=1.0, device_cycle=0.005, spread=False) for name in NAMES
+        }
+        self.servers: dict[str, SimulatorServer] = {}
+        self.agents: list[ServingAgent] = []
+        self.holder = Client(self, "holder", "left")
+        self.other = Client(self, "other", "left")
+        self.neighbour = Client(self, "neighbour", "right")
+
+    @property
+    def gripper(self) -> StampedGripper:
+        return self.grippers["left"]
+
+    @property
+    def agent(self) -> ServingAgent:
+        return self.agents[-1]
+
+    @property
+    def clients(self) -> tuple[Client, ...]:
+        return (self.holder, self.other, self.neighbour)
+
+    def now(self) -> float:
+        return asyncio.get_running_loop().time()
+
+    async def until(self, condition: Callable[[], bool], limit: float = 30.0) -> None:
+        async with asyncio.timeout(limit):
+            while not condition():  # noqa: ASYNC110  # what is waited for tells nobody
+                await asyncio.sleep(LOOK_S)
+
+    async def start_agent(self, name: str, **options: Any) -> ServingAgent:
+        agent = ServingAgent(self, name, options)
+        self.agents.append(agent)
+        await agent.start()
+        return agent
+
+    def cut(self, client: Client, *, out: bool = True, back: bool = True) -> None:
+        """Take away what goes to the agent, what comes from it, or both."""
+        here, there = client.host.name, self.agent.host.name
+        self.network.cut(*[(here, there)] * out, *[(there, here)] * back)
+
+    def mend(self, client: Client) -> None:
+        self.network.mend(*self.network.both(client.host.name, self.agent.host.name))
+
+    def freeze(self, host: Host) -> None:
+        """SIGSTOP: the links of the host are closed when its peers have not heard it for long enough."""
+        host.freeze()
+        self.network.loop.call_later(LINK_LEASE_S, self._part_if_frozen, host)
+
+    def thaw(self, host: Host) -> None:
+        host.thaw()
+        for bus in self.network.buses:
+            self.network.loop.call_later(RECONNECT_S, self.network.join, host.name, bus.name)
+
+    def kill(self, host: Host) -> None:
+        """SIGKILL: its connections are reset at once."""
+        host.kill()
+        self._part_if_frozen(host)
+        for bus in self.network.buses:
+            if bus.name == host.name:
+                bus.is_closed = True
+                bus.tokens.clear()
+
+    def _part_if_frozen(self, host: Host) -> None:
+        if host.is_frozen:
+            for bus in self.network.buses:
+                if bus.name != host.name:
+                    self.network.part(host.name, bus.name)
+
+    def travels(self, name: str = "left") -> dict[Finger, float]:
+        return {axis: self.grippers[name].travel(axis) for axis in AXES}
+
+    def moved(self, axis: Finger, name: str = "left") -> float:
+        """How far an axis has moved since :meth:`settle`."""
+        return self.grippers[name].travel(axis) - self._before[name][axis]
+
+    async def settle(self) -> None:
+        """Note where everything is before the trouble begins."""
+        self._before = {name: self.travels(name) for name in NAMES}
+
+    def check(self) -> None:
+        """What is promised whatever happens."""
+        assert not any(self.moved(axis, "right") for axis in AXES), "the wrong gripper moved"
+        for client in self.clients:
+            client.check()
+
+
+class ServingAgent:
+    """An agent on a host, in its own run."""
+
+    def __init__(self, world: World, name: str, options: dict[str, Any]) -> None:
+        self.world = world
+        self.options = options
+        self.host = Host(name)
+        self.bus = world.network.bus(name, self.host)
+        self.hands: dict[str, RobotiqHand] = {}
+        self.agent: Agent | None = None
+        self.serving: asyncio.Task[None] | None = None
+
+    async def start(self) -> None:
+        ready = asyncio.Event()
+        # Each on a host of its own: two hands of one process may not use the same address.
+        place = len(self.world.agents)
+
+        async def serve() -> None:
+            self.hands = {
+                name: RobotiqHand(f"tcp://127.0.0.{place}:{server.port}", poll_interval=POLL_S)
+                for name, server in self.world.servers.items()
+            }
+            self.agent = Agent("lab", "cell", self.hands, self.bus, window=WINDOW_S, **self.options)
+            try:
+                await self.agent.run(lambda: self.world.network.loop.call_soon(ready.set))
+            finally:
+                await self.bus.close()
+
+        self.serving = self.host.start(serve())
+        async with asyncio.timeout(5):
+            await ready.wait()
+
+    async def end(self) -> None:
+        """SIGTERM."""
+        assert self.serving is not None
+        self.serving.cancel()
+        await self.world.until(self.serving.done)
+
+
+class Client:
+    """A client on a host, and what it could see."""
+
+    def __init__(self, world: World, name: str, gripper: str) -> None:
+        self.world = world
+        self.gripper = gripper
+        self.host = Host(name)
+        self.bus: MemoryBus = world.network.bus(name, self.host)
+        self.hand: RemoteHand
+        self.states: list[State] = []
+        self.statuses: list[RobotiqStatus] = []
+        self.had_control: list[bool] = []
+        self._watching: asyncio.Task[None] | None = None
+
+    async def start(self, **options: Any) -> None:
+        async def begin() -> None:
+            self.hand = RemoteHand(f"zenoh://lab/cell/{self.gripper}", bus=self.bus, **options)
+            await self.hand.start()
+            self.hand_statuses = self.hand.statuses(100_000)
+
+        await self.do(begin())
+        self._watching = self.host.start(self._watch())
+
+    async def do(self, work: Coroutine[Any, Any, T]) -> T:
+        return await self.host.do(work)
+
+    async def stop(self) -> None:
+        if not self.host.is_dead:
+            assert self._watching is not None
+            self._watching.cancel()
+            with suppress(RobotiqError):
+                await self.do(self.hand.stop())
+            self.statuses = await self.do(_all_of(self.hand_statuses))
+
+    async def _watch(self) -> None:
+        """Look at the hand as a program would, and compare what is shown as current with what is."""
+        while True:
+            state = self.hand.state
+            if not self.states or self.states[-1] is not state:
+                self.states.append(state)
+            if not self.had_control or self.had_control[-1] is not self.hand.is_in_control:
+                self.had_control.append(self.hand.is_in_control)
+            if state is not State.DISCONNECTED:
+                self._check_current(self.hand.status)
+            await asyncio.sleep(LOOK_S)
+
+    def _check_current(self, status: RobotiqStatus) -> None:
+        """A status that is shown without a word is no older than the window and one look for silence."""
+        gripper, number = self.world.grippers[self.gripper], status.registers[7] & 0xFF
+        given = self.given_at(status)
+        # One that says it is old may be: then the agent has not read a newer one.
+        said, age = self.world.now() - status.timestamp, self.world.now() - given
+        assert age <= max(said, WINDOW_S * 1.2) + PROMPT_S, f"stale: {age:.2f} s, said {said:.2f} s"
+        assert gripper.stamps, number
+
+    def given_at(self, status: RobotiqStatus) -> float:
+        """When the gripper gave this status out, by the number it wrote into it: the last time before now."""
+        stamps, number = self.world.grippers[self.gripper].stamps, status.registers[7] & 0xFF
+        # 256 numbers at 200 Hz are 1.3 s: start from when the client thinks it was.
+        index = bisect_right([at for at, _ in stamps[-4000:]], status.timestamp + 0.1) - 1
+        recent = stamps[-4000:][: index + 1]
+        for at, each in reversed(recent):
+            if each == number:
+                return at
+        raise AssertionError("a status that this gripper never gave out")
+
+    def check(self) -> None:
+        assert self._watching is None or not self._watching.done() or self._watching.cancelled(), (
+            self._watching.exception()
+        )
+
+
+async def _all_of(stream: Any) -> list[RobotiqStatus]:
+    return [status async for status in stream]
+
+
+@asynccontextmanager
+async def world(**options: Any) -> AsyncIterator[World]:
+    """Everything is up: left is active and open, and the holder commands it. Options are the agent's."""
+    here = World()
+    async with AsyncExitStack() as stack:
+        for name, gripper in here.grippers.items():
+            here.servers[name] = await stack.enter_async_context(SimulatorServer(gripper))
+            await activate_beforehand(gripper)
+            await asyncio.sleep(20)
+        await here.start_agent("agent", **options)
+        await here.holder.start()
+        await here.other.start(control=False)
+        await here.neighbour.start()
+        await here.settle()
+        try:
+            yield here
+            here.check()
+        finally:
+            for client in here.clients:
+                await client.stop()
+            for agent in here.agents:
+                if not agent.host.is_dead:
+                    await agent.end()
+            for host in [*(each.host for each in here.clients), *(each.host for each in here.agents)]:
+                await host.bury()
+
+
+def motions(world: World, since: int) -> list[tuple[float, tuple[int, int]]]:
+    """What went to finger A by each write that set axes going: when, and position and speed."""
+    found: list[tuple[float, tuple[int, int]]] = []
+    for write in world.gripper.writes[since:]:
+        image = Request.from_registers(write.registers)
+        if image.go:
+            found.append((write.time, (image.axes[0].position, image.axes[0].speed)))
+    return found
+
+
+__all__ = ["Client", "ServingAgent", "World", "motions", "world"]

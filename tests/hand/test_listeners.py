@@ -1,0 +1,130 @@
+"""add_listener(): what it is called with, when, and for how long."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from typing import Any
+
+import pytest
+
+from robotiq_async import Finger, RobotiqHand, RobotiqStatus, SentRequest, State, Transition
+from robotiq_async.simulator import SimulatorServer
+
+A = Finger.A
+
+
+async def test_a_listener_is_told_what_the_streams_are(hand: RobotiqHand) -> None:
+    told: list[Any] = []
+    statuses, transitions, requests = hand.statuses(1000), hand.transitions(), hand.requests()
+    remove = hand.add_listener(told.append)
+    await hand.move(60, A)
+    await hand.stop()
+    remove()
+    for kind, items in (
+        (RobotiqStatus, [*statuses.drain()]),
+        (Transition, [*transitions.drain()]),
+        (SentRequest, [*requests.drain()]),
+    ):
+        assert [each for each in told if type(each) is kind] == items, kind
+    first = next(index for index, each in enumerate(told) if isinstance(each, SentRequest))
+    asked, *between, delivered, request = told[: first + 1]
+    assert (asked.target, delivered.target) == (State.RUNNING_CC, State.RUNNING_IDLE)
+    assert {type(each) for each in between} == {RobotiqStatus}
+    assert request.acknowledged
+
+
+async def test_it_is_called_before_any_reader_and_any_caller_goes_on(hand: RobotiqHand) -> None:
+    order: list[str] = []
+
+    def listen(item: object) -> None:
+        if isinstance(item, RobotiqStatus):
+            assert item is hand.status
+            order.append(f"told {item.sequence}")
+        elif isinstance(item, SentRequest):
+            order.append("told of the request")
+
+    async def read() -> None:
+        async for status in hand.statuses():
+            order.append(f"read {status.sequence}")  # noqa: PERF401  # as it comes
+
+    async def ask() -> None:
+        await hand.set_position(30, A)
+        order.append("acknowledged")
+
+    remove = hand.add_listener(listen)
+    reading = asyncio.create_task(read())
+    await ask()
+    result = await hand.move(60, A)
+    order.append(f"moved {result.status.sequence}")
+    reading.cancel()
+    assert sum(each.startswith("read") for each in order) > 2
+    remove()
+    assert order.index("told of the request") < order.index("acknowledged")
+    for what in [each for each in order if each.startswith(("read", "moved"))]:
+        assert order.index(f"told {what.split()[1]}") < order.index(what)
+
+
+async def test_a_command_of_a_listener_goes_out_in_the_same_turn(
+    hand: RobotiqHand, server: SimulatorServer
+) -> None:
+    """It is decided on the status that the listener was called with."""
+    told: list[object] = []
+
+    def listen(item: object) -> None:
+        told.append(item)
+        if len(told) == 1:
+            hand.command(A, position=100)
+
+    remove = hand.add_listener(listen)
+    await hand.wait_for_state(State.RUNNING_CC)
+    await hand.wait_for_state(State.RUNNING_IDLE)
+    remove()
+    kinds = [type(each) for each in told[:4]]
+    assert kinds[0] is RobotiqStatus
+    assert kinds.count(RobotiqStatus) == 1, "no other status came between"
+    assert SentRequest in kinds
+
+
+async def test_a_listener_added_before_the_start_outlasts_the_stop(server: SimulatorServer) -> None:
+    hand, targets = RobotiqHand(server.address), []
+    remove = hand.add_listener(
+        lambda each: targets.append(each.target) if isinstance(each, Transition) else None
+    )
+    for _ in range(2):
+        await hand.start(activate=False)
+        await hand.stop()
+    assert targets.count(State.SHUTDOWN) == 2
+    remove()
+    count = len(targets)
+    await hand.start(activate=False)
+    await hand.stop()
+    assert len(targets) == count
+
+
+async def test_a_listener_that_raises_does_not_end_the_hand(
+    hand: RobotiqHand, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fail(item: object) -> None:
+        raise ZeroDivisionError
+
+    with caplog.at_level(logging.ERROR, logger="robotiq_async"):
+        hand.add_listener(fail)
+        await hand.move(40, A)
+    assert [record.levelno for record in caplog.records] == [logging.ERROR]
+    assert hand.state is State.RUNNING_IDLE
+
+
+async def coroutine(item: object) -> None:
+    raise AssertionError("nobody would await it")
+
+
+@pytest.mark.parametrize("callback", [None, 3, coroutine], ids=["None", "3", "coroutine"])
+def test_what_is_no_plain_function_is_refused(callback: Any) -> None:
+    with pytest.raises(TypeError, match="callback must be a plain function"):
+        RobotiqHand().add_listener(callback)
+
+
+async def test_another_thread_is_refused_while_the_hand_runs(hand: RobotiqHand) -> None:
+    with pytest.raises(RuntimeError, match="outside of the event loop"):
+        await asyncio.to_thread(hand.add_listener, print)
