@@ -29,7 +29,7 @@ show: $(STAMP)  ## Run the demo with the hand in three dimensions on a page in y
 	@$(BIN)/python -m robotiq_async demo --show $(ADDRESS)
 
 test: $(STAMP)  ## Run all tests
-	@$(BIN)/python -m pytest --numprocesses auto --dist worksteal
+	@$(BIN)/python -m pytest -rs --numprocesses auto --dist worksteal
 
 pages: $(STAMP)  ## Run the code of every page in the environment that the page names (needs the package index)
 	@$(BIN)/python -m pytest --numprocesses auto tests/docs/environments.py

@@ -56,7 +56,7 @@ return scene.getObjectByName(arguments[0]).children[0].material.color.getHexStri
 class Browser:
     """One browser with its own profile; a window at a time is driven."""
 
-    def __init__(self, *, nice: int = 5) -> None:
+    def __init__(self) -> None:
         assert BROWSER is not None
         assert DRIVER is not None
         self._profile = tempfile.mkdtemp(prefix="robotiq_async-")
@@ -66,7 +66,7 @@ class Browser:
             options.add_argument(flag)
         options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
         # On other machines the page is drawn by another computer: here the drawing must not starve the hand.
-        service = Service(DRIVER, popen_kw={"preexec_fn": lambda: os.nice(nice)})
+        service = Service(DRIVER, popen_kw={"preexec_fn": lambda: os.nice(10)})
         self.driver = webdriver.Chrome(options=options, service=service)
 
     def quit(self) -> None:

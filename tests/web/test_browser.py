@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 from functools import partial
 from time import monotonic
 
 import pytest
+
+pytest.importorskip("nicegui", reason="the page needs the extra web")
+pytest.importorskip("selenium", reason="a browser is driven with the extra dev")
+
 from selenium.webdriver.common.action_chains import ActionChains
 
 from robotiq_async import Fault, Finger, RobotiqHand, RobotiqStatus, State
@@ -16,8 +20,8 @@ from robotiq_async.description import hand_model
 from robotiq_async.kinematics import JOINTS, joint_angles
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.web.server import PageServer
-from tests.web.browser import COLOR, VISIBLE, Browser
-from tests.web.conftest import shown
+from tests.web.browser import BROWSER, COLOR, DRIVER, MISSING, VISIBLE, Browser
+from tests.web.showing import shown
 
 
 async def press(browser: Browser, name: str) -> None:
@@ -33,6 +37,32 @@ async def press(browser: Browser, name: str) -> None:
 async def page(hand: RobotiqHand) -> AsyncIterator[PageServer]:
     async with shown(hand) as page:
         yield page
+
+
+@pytest.fixture(scope="module")
+def shared_browser() -> Iterator[Browser]:
+    """One for all tests: it takes a second to start."""
+    if BROWSER is None or DRIVER is None:
+        pytest.skip(MISSING)
+    browser = Browser()
+    yield browser
+    browser.quit()
+
+
+@pytest.fixture
+def browser(shared_browser: Browser) -> Iterator[Browser]:
+    """It, with one window, and nothing in its logs."""
+    driver = shared_browser.driver
+    driver.set_window_size(1280, 900)
+    shared_browser.requested()
+    shared_browser.complaints()
+    yield shared_browser
+    first, *others = driver.window_handles
+    for other in others:
+        driver.switch_to.window(other)
+        driver.close()
+    driver.switch_to.window(first)
+    driver.get("about:blank")
 
 
 class Pace:
@@ -116,20 +146,22 @@ async def test_what_it_holds_is_drawn_and_what_touches_glows(
     await browser.until(lambda: not browser.driver.execute_script(VISIBLE, "object"))
 
 
-@pytest.mark.parametrize("how", ["button", "space"])
-async def test_halt_stops_it(browser: Browser, how: str) -> None:
+async def test_halt_stops_it_and_so_does_the_space_bar(browser: Browser) -> None:
     async with slow_hand() as hand, shown(hand) as page:
         await browser.open(page.url)
         await press(browser, "close")
         await seen(hand, moving=True)
-        if how == "button":
-            await browser.click("halt")
-        else:  # while the button that was clicked has the focus: it would press it again
-            await browser.do(lambda: ActionChains(browser.driver).send_keys(" ").perform())
+        await browser.click("halt")
         status = await seen(hand, moving=False)
         assert status.position(Finger.A) < 200
         assert not status.go_echo
         await browser.says("events", "halt: every axis stands still")
+        # While the button that was clicked has the focus: the space bar would press it again.
+        await press(browser, "open")
+        await seen(hand, moving=True)
+        await browser.do(lambda: ActionChains(browser.driver).send_keys(" ").perform())
+        await seen(hand, moving=False)
+        assert not hand.status.go_echo
 
 
 async def test_what_it_shows_of_a_gripper_that_dies_and_comes_back(
@@ -256,24 +288,14 @@ async def share_of_polls(hand: RobotiqHand) -> float:
     return best
 
 
-@pytest.mark.usefixtures("browser")
-async def test_the_hand_keeps_its_polls_with_two_pages_open() -> None:
+async def test_the_hand_keeps_its_polls_with_two_pages_open(browser: Browser) -> None:
     """99 % of 200 a second, while it moves."""
-    # The browser of a person draws on another machine, or with a graphics card: here it steps aside.
-    polite = Browser(nice=19)
-    try:
-        async with (
-            SimulatorServer(SimulatedGripper(speedup=2)) as server,
-            RobotiqHand(server.address) as hand,
-            shown(hand) as page,
-        ):
-            await polite.open(page.url)
-            await polite.run("window.open(location.href)")
-            await polite.until(lambda: page.pages == 2)
-            closing = asyncio.create_task(hand.close(speed=0))
-            share = await share_of_polls(hand)
-            closing.cancel()
-            await asyncio.gather(closing, return_exceptions=True)
-    finally:
-        polite.quit()
+    async with slow_hand() as hand, shown(hand) as page:
+        await browser.open(page.url)
+        await browser.run("window.open(location.href)")
+        await browser.until(lambda: page.pages == 2)
+        closing = asyncio.create_task(hand.close())
+        share = await share_of_polls(hand)
+        closing.cancel()
+        await asyncio.gather(closing, return_exceptions=True)
     assert share >= 0.99, f"{share:.2%} of the polls"

@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+pytest.importorskip("nicegui", reason="the page needs the extra web")
+
 from robotiq_async import CLOSED, Fault, Finger, RobotiqHand, State
 from robotiq_async.actions import Operator
 from robotiq_async.description import hand_model
