@@ -71,7 +71,7 @@ class Gate:
         self._lock = threading.Lock()
         self._sockets: set[socket.socket] = set()
         self._slots = threading.BoundedSemaphore(CONNECTIONS)
-        self._listening = _listen(host, port)
+        self._listening = listen(host, port)
         self.port = int(self._listening.getsockname()[1])
         threading.Thread(target=self._accept, name="robotiq_async gate", daemon=True).start()
 
@@ -114,6 +114,9 @@ class Gate:
             self._slots.release()
 
     def _may_pass(self, head: bytes) -> bool:
+        # Anything else could be followed by a second request, which nobody looks at.
+        if [value.lower() for value in _values(head, b"upgrade")] != ["websocket"]:
+            return False
         origins = _values(head, b"origin")
         if not origins:
             return True
@@ -148,7 +151,12 @@ class Gate:
         _close(each)
 
 
-def _listen(host: str, port: int) -> socket.socket:
+def listen(host: str, port: int) -> socket.socket:
+    """A socket that listens; nobody else may have the port.
+
+    Raises:
+        OSError: the port is taken, or there is no such interface.
+    """
     family, kind, _, _, address = socket.getaddrinfo(
         host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
     )[0]

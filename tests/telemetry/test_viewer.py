@@ -193,6 +193,17 @@ async def test_the_server_behind_is_not_where_pages_look(operator: Operator) -> 
     assert all(interface.endswith("7F") for interface in others)
 
 
+async def test_only_websockets_pass(operator: Operator) -> None:
+    """After another request a second one could come, which the gate does not look at."""
+    async with Viewer(operator.hand, port=0) as viewer:
+        reader, writer = await asyncio.open_connection("127.0.0.1", viewer.port)
+        writer.write(b"GET / HTTP/1.1\r\nHost: x\r\n\r\n")
+        async with asyncio.timeout(5):
+            assert (await reader.read()).startswith(b"HTTP/1.1 403")
+        writer.close()
+        await writer.wait_closed()
+
+
 async def test_who_says_no_end_of_things_is_sent_away(operator: Operator) -> None:
     async with Viewer(operator.hand, port=0) as viewer:
         reader, writer = await asyncio.open_connection("127.0.0.1", viewer.port)

@@ -62,7 +62,7 @@ class Browser:
         self._profile = tempfile.mkdtemp(prefix="robotiq_async-")
         options = webdriver.ChromeOptions()
         options.binary_location = BROWSER
-        for flag in (*FLAGS, "--window-size=1280,900", f"--user-data-dir={self._profile}"):
+        for flag in (*FLAGS, "--window-size=700,650", f"--user-data-dir={self._profile}"):
             options.add_argument(flag)
         options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
         # On other machines the page is drawn by another computer: here the drawing must not starve the hand.

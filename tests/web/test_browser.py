@@ -53,7 +53,7 @@ def shared_browser() -> Iterator[Browser]:
 def browser(shared_browser: Browser) -> Iterator[Browser]:
     """It, with one window, and nothing in its logs."""
     driver = shared_browser.driver
-    driver.set_window_size(1280, 900)
+    driver.set_window_size(700, 650)
     shared_browser.requested()
     shared_browser.complaints()
     yield shared_browser

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import sys
 from contextlib import suppress
 from tempfile import mkdtemp
 
+from ...telemetry.gate import listen
 from ..settings import PageSettings
 from .pipes import Pipes
 
@@ -29,7 +29,7 @@ def main() -> int:
         return 1
     settings = PageSettings.read(line)
     try:
-        listening = _listen(settings)
+        listening = listen(settings.host, settings.port)
     except OSError as error:
         pipes.say({"failed": f"{settings.host}:{settings.port}: {error.strerror or error}"})
         return 1
@@ -44,22 +44,6 @@ def main() -> int:
         with suppress(OSError):
             os.rmdir(os.environ["NICEGUI_STORAGE_PATH"])
     return 0
-
-
-def _listen(settings: PageSettings) -> socket.socket:
-    family, kind, _, _, address = socket.getaddrinfo(
-        settings.host, settings.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
-    )[0]
-    listening = socket.socket(family, kind)
-    try:
-        if os.name == "posix":  # elsewhere it would let two servers have one port
-            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listening.bind(address)
-        listening.listen(64)
-    except OSError:
-        listening.close()
-        raise
-    return listening
 
 
 if __name__ == "__main__":

@@ -62,7 +62,7 @@ class Visits:
         return touch
 
     def _arrive(self, page: str, touch: Touch) -> None:
-        touch.__init__()  # type: ignore[misc]  # it has come back: what it sent before counts no more
+        touch.begin()
         self._present.add(page)
         self._mirror.count(len(self._present))
 

@@ -48,6 +48,12 @@ class Touch:
     def __init__(self) -> None:
         """In touch, for now: it has just asked for the page."""
         self.is_lost = False
+        self._newest = 0.0
+        self.begin()
+
+    def begin(self) -> None:
+        """It has just connected."""
+        self.is_lost = False
         self._newest = monotonic()
 
     @staticmethod
