@@ -41,7 +41,7 @@ async def main() -> None:
         async with SimulatorServer(gripper, port=5020) as server, RobotiqHand(server.address) as hand:
             settings = PageSettings(port=0, control=True, addresses=(hand.address,), speed=128, force=64)
             async with PageServer([hand], settings, operators=[Operator(hand)]) as page:
-                await resize(browser, 1200, 760)
+                await resize(browser, 1040, 600)
                 await browser.open(page.url)
                 await browser.says("statistics", "polls")
                 await animation(browser, hand, gripper)

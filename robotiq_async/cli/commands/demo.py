@@ -67,6 +67,7 @@ async def _shown(hand: Hand) -> AsyncIterator[None]:
         except TimeoutError:
             print("Nobody looks; it begins.", flush=True)
         yield
+        await asyncio.sleep(LOOK_S)  # the end is worth seeing, too
 
 
 def _program() -> ModuleType:
