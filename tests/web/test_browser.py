@@ -13,6 +13,7 @@ import pytest
 pytest.importorskip("nicegui", reason="the page needs the extra web")
 pytest.importorskip("selenium", reason="a browser is driven with the extra dev")
 
+from selenium.common.exceptions import WebDriverException
 from selenium.webdriver.common.action_chains import ActionChains
 
 from robotiq_async import Fault, Finger, RobotiqHand, RobotiqStatus, State
@@ -188,9 +189,13 @@ async def test_what_is_dangerous_is_asked_about(
     await browser.click("reset")
     await browser.until(lambda: browser.find("yes-reset").is_displayed())
     assert hand.state is State.RUNNING_IDLE
-    await asyncio.sleep(0.4)  # nobody has read it before
-    await browser.click("yes-reset")
-    await hand.wait_for_state(State.RESET, timeout=10)
+
+    def insist() -> bool:  # a question takes no yes before anybody can have read it
+        with contextlib.suppress(WebDriverException):
+            browser.find("yes-reset").click()
+        return hand.state is State.RESET
+
+    await browser.until(insist)
     await browser.says("state", "reset")
 
 
