@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import importlib
 import json
 import signal
 import sys
@@ -22,9 +21,6 @@ from robotiq_async.fleet.network.zenoh_bus import open_bus
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.wire.request import AxisRequest, Request
-
-with contextlib.suppress(ImportError):
-    importlib.import_module("tests.fleet.conftest")  # what RobotiqHand does not have yet
 
 NAMES = ("left", "right")
 B_STANDS = {"left": 0, "right": 100}
