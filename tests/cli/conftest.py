@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import functools
 import logging
 import os
 import signal
@@ -16,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 import warnings
 from asyncio.subprocess import DEVNULL, PIPE, Process
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
@@ -25,7 +25,6 @@ from typing import Any
 
 import pytest
 
-import robotiq_async.simulator
 from robotiq_async.cli import main
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.terminal import ROOT, Terminal
@@ -183,8 +182,9 @@ def _run_virtually(work: Coroutine[Any, Any, object]) -> None:
 def virtually(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is called, and its own gripper, live in virtual time: minutes take none, and nothing is late."""
     monkeypatch.setattr(asyncio, "run", _run_virtually)
-    timed = functools.partial(SimulatedGripper, lambda: asyncio.get_running_loop().time())
-    monkeypatch.setattr(robotiq_async.simulator, "SimulatedGripper", timed)
+    defaults = (lambda: asyncio.get_running_loop().time(),)
+    assert SimulatedGripper.__init__.__defaults__ == (time.monotonic,)
+    monkeypatch.setattr(SimulatedGripper.__init__, "__defaults__", defaults)
 
 
 # -- in a process of its own -------------------------------------------------------------------------------

@@ -89,6 +89,7 @@ async def test_a_stream_that_is_closed_is_no_terminal(
     assert not server.gripper.writes
 
 
+@pytest.mark.usefixtures("virtually")
 def test_a_simulated_gripper_inside_the_program_needs_nobody(call: Call) -> None:
     outcome = call("move", "10", "sim://")
     outcome.assert_succeeded()
