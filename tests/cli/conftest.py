@@ -1,19 +1,34 @@
-"""The command line as a user runs it: in a process of its own."""
+"""The command line as a user runs it: in this process (`call`), and in one of its own (`shell`, `beside`).
+
+A process takes half a second of a CPU to start. It is for what needs one: signals, terminals, streams that
+are closed, what happens at an import, a second program that runs at the same time, and once for each command.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import os
 import signal
+import subprocess
 import sys
+import tempfile
+import threading
+import time
+import warnings
 from asyncio.subprocess import DEVNULL, PIPE, Process
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from typing import Any
 
 import pytest
 
+from robotiq_async.cli import main
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.terminal import ROOT, Terminal
+from tests.virtual import VirtualLoop
 
 WITHOUT = """
 import importlib.util, sys
@@ -47,6 +62,180 @@ class Outcome:
         assert "Traceback" not in self.err
         for word in words:
             assert word in self.err
+
+
+# -- in this process ---------------------------------------------------------------------------------------
+
+
+def _environs() -> dict[str, object]:
+    """What a command may change in its process while it runs, and no longer."""
+    loggers = [logging.getLogger(name) for name in ("", "robotiq_async", "foxglove", "asyncio", "pymodbus")]
+    return {
+        "signal handlers": {number: signal.getsignal(number) for number in signal.valid_signals()},
+        "log handlers": [(logger.handlers[:], logger.level) for logger in loggers],
+        "streams": (sys.stdin, sys.stdout, sys.stderr),
+    }
+
+
+def _end_threads(before: set[threading.Thread]) -> None:
+    """Fail when there are more threads than before, and do not end at once either."""
+    for thread in set(threading.enumerate()) - before:
+        thread.join(2)
+        assert not thread.is_alive(), f"left running: {thread}"
+
+
+@dataclass
+class Call:
+    """Runs commands in this process, as if nothing else were in it; they must leave it as they found it."""
+
+    _capfd: pytest.CaptureFixture[str]
+
+    def __call__(self, *arguments: str, stdin: bytes = b"") -> Outcome:
+        """Run a command to its end; what it reads is no terminal, and neither is where it writes."""
+        self._capfd.readouterr()
+        with ExitStack() as stack:
+            file = stack.enter_context(tempfile.TemporaryFile())
+            file.write(stdin)
+            file.seek(0)
+            before = sys.stdin
+            sys.stdin = stack.enter_context(open(file.fileno(), encoding="utf-8", closefd=False))
+            stack.callback(setattr, sys, "stdin", before)
+            # Pytest's: without them the log goes where a process has it.
+            root = logging.getLogger()
+            handlers, root.handlers = root.handlers, []
+            stack.callback(setattr, root, "handlers", handlers)
+            environs, filters, threads = _environs(), warnings.filters[:], set(threading.enumerate())
+            code = main(arguments)
+            _end_threads(threads)
+            assert _environs() == environs
+            # Those that came to it are of modules that were imported: numpy has some.
+            assert [each for each in warnings.filters if each in filters] == filters
+            assert signal.set_wakeup_fd(-1) == -1
+        out, err = self._capfd.readouterr()
+        return Outcome(code, out, err)
+
+
+@pytest.fixture
+def call(capfd: pytest.CaptureFixture[str]) -> Call:
+    return Call(capfd)
+
+
+@pytest.fixture
+def without(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+    """Lets a module be missing."""
+
+    def miss(module: str) -> None:
+        monkeypatch.setitem(sys.modules, module, None)
+
+    return miss
+
+
+@contextmanager
+def served(gripper: SimulatedGripper) -> Iterator[SimulatorServer]:
+    """Serve a gripper from a thread, to what is called in this one."""
+    server = SimulatorServer(gripper)
+    loop = asyncio.new_event_loop()
+    thread = threading.Thread(target=loop.run_forever)
+    thread.start()
+    try:
+        asyncio.run_coroutine_threadsafe(server.start(), loop).result(PATIENCE)
+        try:
+            yield server
+        finally:
+            asyncio.run_coroutine_threadsafe(server.stop(), loop).result(PATIENCE)
+    finally:
+        loop.call_soon_threadsafe(loop.stop)
+        thread.join()
+        left = asyncio.all_tasks(loop)
+        loop.close()
+    assert not left, f"tasks left running: {left}"
+
+
+@pytest.fixture
+def there() -> Iterator[SimulatorServer]:
+    """A fast gripper for what is called."""
+    with served(SimulatedGripper(speedup=20)) as server:
+        yield server
+
+
+class _LoneLoop(VirtualLoop):
+    """A virtual loop without threads: what goes to one is done at once, while time stands still."""
+
+    def run_in_executor(self, _executor: object, function: Callable[..., Any], *arguments: object) -> Any:
+        done = self.create_future()
+        try:
+            done.set_result(function(*arguments))
+        except Exception as error:  # noqa: BLE001  # whoever waits gets it
+            done.set_exception(error)
+        return done
+
+
+def _run_virtually(work: Coroutine[Any, Any, object]) -> None:
+    with asyncio.Runner(loop_factory=_LoneLoop) as runner:
+        loop = runner.get_loop()
+        assert isinstance(loop, _LoneLoop)
+        runner.run(work)
+        assert not loop.complaints
+
+
+@pytest.fixture
+def virtually(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is called, and its own gripper, live in virtual time: minutes take none, and nothing is late."""
+    monkeypatch.setattr(asyncio, "run", _run_virtually)
+    defaults = (lambda: asyncio.get_running_loop().time(),)
+    assert SimulatedGripper.__init__.__defaults__ == (time.monotonic,)
+    monkeypatch.setattr(SimulatedGripper.__init__, "__defaults__", defaults)
+
+
+# -- in a process of its own -------------------------------------------------------------------------------
+
+
+class Beside:
+    """A command that runs at the same time as what is called."""
+
+    def __init__(self, *arguments: str) -> None:
+        command = [sys.executable, "-m", "robotiq_async", *arguments]
+        environment = os.environ | {"PYTHONPATH": str(ROOT)}
+        self.process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env=environment,
+            text=True,
+        )
+
+    def read_line(self) -> str:
+        """The next line of its standard output, which is empty when it has ended."""
+        assert self.process.stdout is not None
+        return self.process.stdout.readline().rstrip("\n")
+
+    def read_error(self) -> str:
+        """The next line of its standard error."""
+        assert self.process.stderr is not None
+        return self.process.stderr.readline().rstrip("\n")
+
+    def finish(self, number: signal.Signals | None = None) -> Outcome:
+        """Send it a signal, if one is given, and wait until it has ended."""
+        if number is not None:
+            self.process.send_signal(number)
+        out, err = self.process.communicate(timeout=PATIENCE)
+        return Outcome(self.process.returncode, out, err)
+
+
+@pytest.fixture
+def beside() -> Iterator[Callable[..., Beside]]:
+    """Starts commands; those that still run at the end of the test are killed."""
+    started: list[Beside] = []
+
+    def start(*arguments: str) -> Beside:
+        started.append(Beside(*arguments))
+        return started[-1]
+
+    yield start
+    for each in started:
+        each.process.kill()
+        each.process.communicate()
 
 
 @dataclass

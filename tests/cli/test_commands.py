@@ -18,7 +18,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.wire import registers as reg
 
 if TYPE_CHECKING:
-    from tests.cli.conftest import Shell
+    from tests.cli.conftest import Call, Shell
 
 ACTIVATE = (0x0100, 0, 0, 0, 0, 0, 0, 0)
 
@@ -47,9 +47,9 @@ async def server() -> AsyncIterator[SimulatorServer]:
         yield server
 
 
-async def test_status_as_json(shell: Shell, server: SimulatorServer) -> None:
-    server.gripper.write(0, ACTIVATE)
-    outcome = await shell.run("status", "--json", server.address)
+def test_status_as_json(call: Call, there: SimulatorServer) -> None:
+    there.gripper.write(0, ACTIVATE)
+    outcome = call("status", "--json", there.address)
     outcome.assert_succeeded()
     reading = json.loads(outcome.out)
     assert reading["fault"] == {"code": 0, "name": "NONE", "severity": "none", "description": "no fault"}
@@ -59,78 +59,78 @@ async def test_status_as_json(shell: Shell, server: SimulatorServer) -> None:
     assert reading["mode"] == "BASIC"
 
 
-async def test_status_of_a_gripper_at_rest_and_in_words(shell: Shell, server: SimulatorServer) -> None:
-    outcome = await shell.run("status", server.address)
+def test_status_of_a_gripper_at_rest_and_in_words(call: Call, there: SimulatorServer) -> None:
+    outcome = call("status", there.address)
     outcome.assert_succeeded()
     assert outcome.out.startswith("RESET: reset, not moving\n")
     assert "SCISSOR" in outcome.out
 
 
-async def test_status_only_reads(shell: Shell, server: SimulatorServer) -> None:
+def test_status_only_reads(call: Call, there: SimulatorServer) -> None:
     for form in (["status"], ["status", "--json"]):
-        assert (await shell.run(*form, server.address)).code == 0
-    assert server.gripper.writes == ()
+        assert call(*form, there.address).code == 0
+    assert there.gripper.writes == ()
 
 
-async def test_status_shows_a_fault(shell: Shell, server: SimulatorServer) -> None:
-    server.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
-    outcome = await shell.run("status", server.address)
+def test_status_shows_a_fault(call: Call, there: SimulatorServer) -> None:
+    there.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    outcome = call("status", there.address)
     assert outcome.code == 0
     assert "FAULT" in outcome.out
     assert "major fault 0x0E: interference on the scissor for more than 20 s" in outcome.out
-    reading = json.loads((await shell.run("status", "--json", server.address)).out)
+    reading = json.loads(call("status", "--json", there.address).out)
     assert (reading["fault"]["code"], reading["fault"]["severity"]) == (14, "major")
 
 
-async def test_move_activates_and_closes(shell: Shell, server: SimulatorServer) -> None:
-    outcome = await shell.run("move", "255", "--yes", server.address)
+def test_move_activates_and_closes(call: Call, there: SimulatorServer) -> None:
+    outcome = call("move", "255", "--yes", there.address)
     outcome.assert_succeeded()
     assert outcome.out.startswith("Activating: the fingers open and close.\n")
     assert outcome.out.count("AT_POSITION") == 3
     assert "no contact" in outcome.out
-    assert server.gripper.position(Finger.A) >= 240
+    assert there.gripper.position(Finger.A) >= 240
 
 
-async def test_move_takes_fingers_speed_and_force(shell: Shell, server: SimulatorServer) -> None:
+def test_move_takes_fingers_speed_and_force(call: Call, there: SimulatorServer) -> None:
     arguments = ["--fingers", "a,scissor", "--speed", "200", "--force", "10", "--timeout", "20"]
-    outcome = await shell.run("move", "100", "--yes", server.address, *arguments)
+    outcome = call("move", "100", "--yes", there.address, *arguments)
     assert outcome.code == 0
-    assert abs(server.gripper.position(Finger.A) - 100) <= 2
-    assert abs(server.gripper.position(Finger.SCISSOR) - 100) <= 2
-    assert server.gripper.position(Finger.B) < 10
-    last = [write.registers for write in server.gripper.writes if reg.rGTO.read(write.registers)][-1]
+    assert abs(there.gripper.position(Finger.A) - 100) <= 2
+    assert abs(there.gripper.position(Finger.SCISSOR) - 100) <= 2
+    assert there.gripper.position(Finger.B) < 10
+    last = [write.registers for write in there.gripper.writes if reg.rGTO.read(write.registers)][-1]
     assert (reg.rSP[0].read(last), reg.rFR[0].read(last)) == (200, 10)
 
 
-async def test_a_contact_is_a_success(shell: Shell, server: SimulatorServer) -> None:
-    server.gripper.write(0, ACTIVATE)
-    assert (await shell.run("move", "0", "--yes", server.address)).code == 0
-    server.gripper.place_object(Finger.B, position=120)
-    outcome = await shell.run("move", "255", "--yes", server.address)
+def test_a_contact_is_a_success(call: Call, there: SimulatorServer) -> None:
+    there.gripper.write(0, ACTIVATE)
+    assert call("move", "0", "--yes", there.address).code == 0
+    there.gripper.place_object(Finger.B, position=120)
+    outcome = call("move", "255", "--yes", there.address)
     assert outcome.code == 0
     assert outcome.out.count("CONTACT_CLOSING") == 1
     assert "an object is in the way" in outcome.out
 
 
-async def test_move_in_fault_fails(shell: Shell, server: SimulatorServer) -> None:
-    server.gripper.inject_fault(Fault.ACTIVATION_FAULT)
-    (await shell.run("move", "255", "--yes", server.address)).assert_failed(1, "fault")
+def test_move_in_fault_fails(call: Call, there: SimulatorServer) -> None:
+    there.gripper.inject_fault(Fault.ACTIVATION_FAULT)
+    call("move", "255", "--yes", there.address).assert_failed(1, "fault")
 
 
 @pytest.mark.parametrize(
     "command", [["status"], ["status", "--json"], ["move", "3", "--yes"], ["demo", "--yes"]]
 )
-async def test_nobody_there(shell: Shell, command: list[str]) -> None:
+def test_nobody_there(call: Call, command: list[str]) -> None:
     # Bound and not listening: connections are refused, and nobody else gets the port.
     with socket.socket() as reserved:
         reserved.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{reserved.getsockname()[1]}"
-        outcome = await shell.run(command[0], *command[1:], address)
+        outcome = call(command[0], *command[1:], address)
     outcome.assert_failed(1, address)
 
 
-async def test_no_such_serial_port(shell: Shell) -> None:
-    (await shell.run("status", "rtu:///dev/no-such-port")).assert_failed(1, "/dev/no-such-port")
+def test_no_such_serial_port(call: Call) -> None:
+    call("status", "rtu:///dev/no-such-port").assert_failed(1, "/dev/no-such-port")
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
@@ -189,22 +189,22 @@ async def test_doctor_finds_nothing_wrong_with_the_simulator(shell: Shell) -> No
     assert not any(line.startswith(("FAIL", "warn")) for line in lines)
 
 
-async def test_doctor_fails_when_something_is_broken(shell: Shell) -> None:
-    outcome = await shell.run("doctor", "nowhere.invalid")
+def test_doctor_fails_when_something_is_broken(call: Call) -> None:
+    outcome = call("doctor", "nowhere.invalid")
     outcome.assert_failed(1, "tcp://nowhere.invalid:502: name: see above")
     assert outcome.out.startswith("FAIL  name")
 
 
-async def test_doctor_of_an_agent_that_is_not_there(shell: Shell) -> None:
-    outcome = await shell.run("doctor", "zenoh://lab/cell/left?connect=tcp/127.0.0.1:1")
+def test_doctor_of_an_agent_that_is_not_there(call: Call) -> None:
+    outcome = call("doctor", "zenoh://lab/cell/left?connect=tcp/127.0.0.1:1")
     outcome.assert_failed(1, "zenoh://lab/cell/left: port: see above")
     assert "FAIL  port           tcp/127.0.0.1:1: nobody listens" in outcome.out
 
 
-async def test_doctor_of_an_agent_takes_no_unit_id(shell: Shell) -> None:
-    outcome = await shell.run("doctor", "zenoh://lab/cell/left", "--device-id", "3")
+def test_doctor_of_an_agent_takes_no_unit_id(call: Call) -> None:
+    outcome = call("doctor", "zenoh://lab/cell/left", "--device-id", "3")
     outcome.assert_failed(2, "its agent's file has device_id")
 
 
-async def test_doctor_of_a_malformed_address(shell: Shell) -> None:
-    (await shell.run("doctor", "zenoh://lab/cell")).assert_failed(2, "zenoh://SITE/HOST/GRIPPER")
+def test_doctor_of_a_malformed_address(call: Call) -> None:
+    call("doctor", "zenoh://lab/cell").assert_failed(2, "zenoh://SITE/HOST/GRIPPER")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import inspect
 import sys
 from asyncio.subprocess import PIPE
@@ -12,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from robotiq_async import RobotiqHand
 from robotiq_async.cli.app import COMMANDS
 from robotiq_async.cli.commands.measure_force import force
 from robotiq_async.cli.commands.measure_speed import speed
@@ -20,7 +18,7 @@ from robotiq_async.simulator import SimulatorServer
 from tests.cli.terminal import ROOT, Terminal
 
 if TYPE_CHECKING:
-    from tests.cli.conftest import Shell
+    from tests.cli.conftest import Call, Outcome, Shell
 
 COMMAND_LINE = ("-m", "robotiq_async")
 PROGRAM = (str(ROOT / "demo" / "demo.py"),)
@@ -31,6 +29,8 @@ MOVING = {
     "measure speed": (*COMMAND_LINE, "measure", "speed", "--no-plot"),
     "measure force": (*COMMAND_LINE, "measure", "force", "--no-plot"),
 }
+NOBODY = "tcp://127.0.0.1:1"
+"""Whoever connects to it ends with 1."""
 ELSEWHERE = """
 import os, sys
 os.dup2(os.open({!r}, os.O_WRONLY | os.O_CREAT), {})
@@ -54,25 +54,27 @@ def written(file: Path) -> str:
 # -- nobody to ask -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("command", MOVING)
-@pytest.mark.parametrize("typed", [None, b"y\n"])
-async def test_without_a_terminal_nothing_is_sent(
-    shell: Shell, server: SimulatorServer, file: Path, command: str, typed: bytes | None
-) -> None:
-    server.refuse()  # whoever connects would end with 1
-    if typed is None:
-        process = await shell.python(*MOVING[command], server.address)
-    else:
-        process = await shell.python(*MOVING[command], server.address, stdin=PIPE)
-        assert process.stdin is not None
-        process.stdin.write(typed)
-    outcome = await shell.finish(process)
+def assert_nothing_was_sent(outcome: Outcome, folder: Path) -> None:
     assert (outcome.code, outcome.err.count("\n")) == (2, 1), outcome.err
     assert "--yes" in outcome.err
-    assert server.address in outcome.err
+    assert NOBODY in outcome.err
     assert outcome.out == ""
-    assert not server.gripper.writes
-    assert list(file.parent.iterdir()) == []
+    assert list(folder.iterdir()) == []
+
+
+@pytest.mark.parametrize("command", [each for each in MOVING if each != "demo.py"])
+@pytest.mark.parametrize("typed", [b"", b"y\n"])
+def test_without_a_terminal_nothing_is_sent(call: Call, file: Path, command: str, typed: bytes) -> None:
+    outcome = call(*MOVING[command][len(COMMAND_LINE) :], NOBODY, stdin=typed)
+    assert_nothing_was_sent(outcome, file.parent)
+
+
+@pytest.mark.parametrize("command", ["demo.py", "move"])
+async def test_a_process_without_a_terminal_sends_nothing(shell: Shell, file: Path, command: str) -> None:
+    process = await shell.python(*MOVING[command], NOBODY, stdin=PIPE)
+    assert process.stdin is not None
+    process.stdin.write(b"y\n")
+    assert_nothing_was_sent(await shell.finish(process), file.parent)
 
 
 @pytest.mark.parametrize("closed", [0, 1])
@@ -87,8 +89,9 @@ async def test_a_stream_that_is_closed_is_no_terminal(
     assert not server.gripper.writes
 
 
-async def test_a_simulated_gripper_inside_the_program_needs_nobody(shell: Shell) -> None:
-    outcome = await shell.run("move", "10", "sim://")
+@pytest.mark.usefixtures("virtually")
+def test_a_simulated_gripper_inside_the_program_needs_nobody(call: Call) -> None:
+    outcome = call("move", "10", "sim://")
     outcome.assert_succeeded()
     assert "[y/N]" not in outcome.out
 
@@ -152,18 +155,18 @@ async def test_the_question_is_where_it_is_seen(server: SimulatorServer, file: P
     assert server.gripper.writes
 
 
-async def test_no_question_after_yes(shell: Shell, server: SimulatorServer) -> None:
-    outcome = await shell.run("move", "30", "-y", server.address)
+def test_no_question_after_yes(call: Call, there: SimulatorServer) -> None:
+    outcome = call("move", "30", "-y", there.address)
     outcome.assert_succeeded()
-    assert server.gripper.writes
+    assert there.gripper.writes
 
 
-async def test_nothing_is_asked_when_there_is_nothing_left_to_measure(
-    shell: Shell, server: SimulatorServer, file: Path
+def test_nothing_is_asked_when_there_is_nothing_left_to_measure(
+    call: Call, there: SimulatorServer, file: Path
 ) -> None:
-    options = ("--output", "t.csv", "--step", "255", "--runs", "1", "--no-plot", server.address)
-    (await shell.run("measure", "speed", "--yes", *options)).assert_succeeded()
-    outcome = await shell.run("measure", "speed", *options)
+    options = ("--output", "t.csv", "--step", "255", "--runs", "1", "--no-plot", there.address)
+    call("measure", "speed", "--yes", *options).assert_succeeded()
+    outcome = call("measure", "speed", *options)
     outcome.assert_succeeded()
     assert "is complete: nothing is measured again" in outcome.out
 
@@ -178,13 +181,12 @@ def test_every_command_that_moves_takes_yes() -> None:
     assert {each for each in commands if "yes" in inspect.signature(each).parameters} == moving
 
 
-async def test_what_does_not_move_writes_nothing(shell: Shell, server: SimulatorServer, file: Path) -> None:
-    async with RobotiqHand(server.address) as hand:
-        await hand.move(50)
-    writes = len(server.gripper.writes)
-    commands = (["status"], ["doctor"], ["record", str(file), "--seconds", "0.2"])
-    await asyncio.gather(*(shell.run(*command, server.address) for command in commands))
-    assert len(server.gripper.writes) == writes
+def test_what_does_not_move_writes_nothing(call: Call, there: SimulatorServer, file: Path) -> None:
+    call("move", "50", "--yes", there.address).assert_succeeded()
+    writes = len(there.gripper.writes)
+    for command in (["status"], ["doctor"], ["record", str(file), "--seconds", "0.2"]):
+        assert call(*command, there.address).out
+    assert len(there.gripper.writes) == writes
 
 
 async def test_the_demo_asks_without_the_extra_too(shell: Shell, server: SimulatorServer) -> None:

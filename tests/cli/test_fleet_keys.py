@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
 from robotiq_async.cli import main
-from tests.cli.conftest import WITHOUT
 
 if TYPE_CHECKING:
-    from tests.cli.conftest import Shell
+    from tests.cli.conftest import Call
 
 
 def test_it_makes_an_authority_and_then_adds_to_it(
@@ -87,7 +87,9 @@ def test_its_help_gives_examples(capsys: pytest.CaptureFixture[str]) -> None:
     assert "robotiq-async fleet keys" in capsys.readouterr().out.partition("For example:")[2]
 
 
-async def test_without_the_extra_one_line_names_it(shell: Shell, tmp_path: Path) -> None:
-    arguments = ["fleet", "keys", str(tmp_path / "keys")]
-    outcome = await shell.finish(await shell.python("-c", WITHOUT.format("cryptography", arguments)))
+def test_without_the_extra_one_line_names_it(
+    call: Call, without: Callable[[str], None], tmp_path: Path
+) -> None:
+    without("cryptography")
+    outcome = call("fleet", "keys", str(tmp_path / "keys"))
     outcome.assert_failed(1, "cryptography", "pip install 'robotiq-async[fleet]'")

@@ -32,7 +32,7 @@ async def interrupted(shell: Shell, process: Process) -> str:
     return outcome.out
 
 
-@pytest.mark.parametrize("command", [["demo", "--yes"], ["move", "255"], ["status"], ["simulate"]])
+@pytest.mark.parametrize("command", [["demo", "--yes"], ["simulate"]])
 async def test_while_it_is_still_importing(shell: Shell, command: list[str]) -> None:
     process = await shell.python("-X", "importtime", "-m", "robotiq_async", *command)
     assert process.stderr is not None

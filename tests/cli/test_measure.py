@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import signal
 from asyncio.subprocess import PIPE
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,27 +15,21 @@ from robotiq_async.calibration.csv_tables import FORCE, SPEED, read_table, thesi
 from robotiq_async.cli import main
 from robotiq_async.measure.campaigns import read_currents
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from tests.cli.conftest import served
 
 if TYPE_CHECKING:
-    from tests.cli.conftest import Outcome, Shell
-
-WITHOUT_MATPLOTLIB = """
-import importlib.util, sys
-find = importlib.util.find_spec
-importlib.util.find_spec = lambda name, *rest: None if name == "matplotlib" else find(name, *rest)
-from robotiq_async.cli import main
-sys.exit(main(["measure", "speed"]))
-"""
+    from tests.cli.conftest import Call, Outcome, Shell
 
 
 def files_in(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-async def test_speed_writes_table_and_pictures(shell: Shell, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("virtually")
+def test_speed_writes_table_and_pictures(call: Call, tmp_path: Path) -> None:
     table = tmp_path / "mine.csv"
-    options = ("--output", str(table), "--step", "128", "--runs", "1", "--speedup", "10")
-    outcome = await shell.run("measure", "speed", *options)
+    options = ("--output", str(table), "--step", "128", "--runs", "1", "--speedup", "30")
+    outcome = call("measure", "speed", *options)
     outcome.assert_succeeded()
     written = [tmp_path / name for name in ("mine.csv", "mine.png", "mine.svg")]
     assert outcome.out.splitlines()[-3:] == [str(file) for file in written]
@@ -44,19 +39,20 @@ async def test_speed_writes_table_and_pictures(shell: Shell, tmp_path: Path) -> 
         assert line in outcome.out
     # Complete: nothing is measured again, the pictures are made anew, byte for byte.
     before = {file: file.read_bytes() for file in written}
-    outcome = await shell.run("measure", "speed", *options)
+    outcome = call("measure", "speed", *options)
     outcome.assert_succeeded()
     assert outcome.err == ""
     assert outcome.out.startswith(f"{table} is complete: nothing is measured again.")
     assert {file: file.read_bytes() for file in written} == before
 
 
-async def test_force_writes_readings_currents_and_pictures(shell: Shell, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("virtually")
+def test_force_writes_readings_currents_and_pictures(call: Call, tmp_path: Path) -> None:
     for surface in ("foam", "rigid"):
         table = tmp_path / f"force_{surface}_grams.csv"
-        outcome = await shell.run(
+        outcome = call(
             *("measure", "force", "--surface", surface, "--output", str(table)),
-            *("--step", "125", "--runs", "2", "--speed", "255", "--speedup", "10"),
+            *("--step", "125", "--runs", "2", "--speed", "255", "--speedup", "30"),
         )
         outcome.assert_succeeded()
         readings = read_table(table, FORCE)
@@ -94,11 +90,11 @@ async def test_the_scale_is_read_by_a_person(
     assert read_table(tmp_path / "f.csv", FORCE) == {0: (1500,), 250: (2500,)}
 
 
-async def test_nobody_there_to_read_the_scale(shell: Shell, tmp_path: Path) -> None:
+def test_nobody_there_to_read_the_scale(call: Call, tmp_path: Path) -> None:
     gripper = SimulatedGripper(speedup=30)
     gripper.place_object(7, 150)
-    async with SimulatorServer(gripper) as server:
-        outcome = await shell.run(
+    with served(gripper) as server:
+        outcome = call(
             *("measure", "force", "--yes", server.address, "--output", str(tmp_path / "f.csv")),
             *("--step", "250", "--runs", "1", "--speed", "255", "--no-plot"),
         )
@@ -107,7 +103,8 @@ async def test_nobody_there_to_read_the_scale(shell: Shell, tmp_path: Path) -> N
     assert not (tmp_path / "f.csv").exists()
 
 
-async def test_the_scale_is_read_from_a_table(shell: Shell, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("virtually")
+def test_the_scale_is_read_from_a_table(call: Call, tmp_path: Path) -> None:
     readings = tmp_path / "readings.csv"
     readings.write_text("force_value,run_1_g\n0,1111\n250,2222\n", encoding="utf-8")
     options = (
@@ -121,10 +118,10 @@ async def test_the_scale_is_read_from_a_table(shell: Shell, tmp_path: Path) -> N
         "--runs",
         "1",
     )
-    outcome = await shell.run("measure", "force", "--scale", str(readings), "--step", "250", *options)
+    outcome = call("measure", "force", "--scale", str(readings), "--step", "250", *options)
     outcome.assert_succeeded()
     assert read_table(tmp_path / "f.csv", FORCE) == {0: (1111,), 250: (2222,)}
-    outcome = await shell.run("measure", "force", "--scale", str(readings), "--step", "125", *options)
+    outcome = call("measure", "force", "--scale", str(readings), "--step", "125", *options)
     outcome.assert_failed(1, "has no 1 runs for the force values [125]")
 
 
@@ -148,11 +145,11 @@ async def test_ctrl_c_keeps_the_rows_and_stops_the_fingers(shell: Shell, tmp_pat
     assert files_in(tmp_path) == ["t.csv", "t.csv.origin.csv"]
 
 
-async def test_fingers_that_meet_something_end_it(shell: Shell, tmp_path: Path) -> None:
+def test_fingers_that_meet_something_end_it(call: Call, tmp_path: Path) -> None:
     gripper = SimulatedGripper(speedup=30)
     gripper.place_object(7, 150)
-    async with SimulatorServer(gripper) as server:
-        outcome = await shell.run(
+    with served(gripper) as server:
+        outcome = call(
             *("measure", "speed", "--yes", server.address, "--output", str(tmp_path / "t.csv"), "--no-plot")
         )
     assert outcome.code == 1
@@ -160,9 +157,13 @@ async def test_fingers_that_meet_something_end_it(shell: Shell, tmp_path: Path) 
     assert "0 rows are in" in outcome.err
 
 
-async def test_without_matplotlib_nothing_is_begun(shell: Shell) -> None:
-    outcome = await shell.finish(await shell.python("-c", WITHOUT_MATPLOTLIB))
-    outcome.assert_failed(1, "pip install 'robotiq-async[plot]'", "--no-plot")
+def test_without_matplotlib_nothing_is_begun(
+    call: Call, without: Callable[[str], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    without("matplotlib")
+    call("measure", "speed").assert_failed(1, "pip install 'robotiq-async[plot]'", "--no-plot")
+    assert files_in(tmp_path) == []
 
 
 @pytest.mark.parametrize(
@@ -220,32 +221,35 @@ def gave_up(outcome: Outcome, *words: str) -> None:
         assert word in outcome.err
 
 
-async def test_what_was_measured_on_another_gripper_is_not_gone_on_with(shell: Shell, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("virtually")
+def test_what_was_measured_on_another_gripper_is_not_gone_on_with(call: Call, tmp_path: Path) -> None:
     table = str(tmp_path / "t.csv")
-    first = await shell.run("measure", "speed", "--output", table, "--step", "255", "--speedup", "10", *QUICK)
+    first = call("measure", "speed", "--output", table, "--step", "255", "--speedup", "30", *QUICK)
     first.assert_succeeded()
     for options in (("10.255.255.1",), ("--fingers", "A")):
-        outcome = await shell.run("measure", "speed", *options, "--output", table, "--step", "255", *QUICK)
+        outcome = call("measure", "speed", *options, "--output", table, "--step", "255", *QUICK)
         outcome.assert_failed(1, "was measured otherwise")
 
 
-async def test_another_surface_is_another_table(shell: Shell, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("virtually")
+def test_another_surface_is_another_table(call: Call, tmp_path: Path) -> None:
     table = str(tmp_path / "t.csv")
-    options = ("--output", table, "--step", "250", "--speed", "255", "--speedup", "10", *QUICK)
-    (await shell.run("measure", "force", *options)).assert_succeeded()
-    outcome = await shell.run("measure", "force", "--surface", "rigid", *options)
+    options = ("--output", table, "--step", "250", "--speed", "255", "--speedup", "30", *QUICK)
+    call("measure", "force", *options).assert_succeeded()
+    outcome = call("measure", "force", "--surface", "rigid", *options)
     outcome.assert_failed(1, "was measured otherwise: surface foam there and rigid here")
 
 
-async def test_readings_without_their_currents_are_refused(shell: Shell, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("virtually")
+def test_readings_without_their_currents_are_refused(call: Call, tmp_path: Path) -> None:
     table, currents = tmp_path / "t.csv", tmp_path / "t_currents.csv"
-    options = ("--output", str(table), "--step", "250", "--speed", "255", "--speedup", "10", "--no-plot")
-    (await shell.run("measure", "force", *options, "--runs", "2")).assert_succeeded()
+    options = ("--output", str(table), "--step", "250", "--speed", "255", "--speedup", "30", "--no-plot")
+    call("measure", "force", *options, "--runs", "2").assert_succeeded()
     whole = currents.read_bytes()
     for damage in ("gone", "empty", "short"):
         currents.write_bytes(whole)
         damaged(currents, damage)
-        outcome = await shell.run("measure", "force", *options, "--runs", "2")
+        outcome = call("measure", "force", *options, "--runs", "2")
         outcome.assert_failed(1, "t_currents.csv")
 
 
@@ -259,16 +263,17 @@ def damaged(file: Path, how: str) -> None:
         file.write_text("".join(line for line in lines if not line.startswith("0,2,")), encoding="utf-8")
 
 
-async def test_a_picture_that_cannot_be_written_is_one_line(shell: Shell, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("virtually")
+def test_a_picture_that_cannot_be_written_is_one_line(call: Call, tmp_path: Path) -> None:
     table = tmp_path / "t.csv"
     (tmp_path / "t.png").mkdir()
-    outcome = await shell.run(
-        "measure", "speed", "--output", str(table), "--step", "255", "--runs", "1", "--speedup", "10"
+    outcome = call(
+        "measure", "speed", "--output", str(table), "--step", "255", "--runs", "1", "--speedup", "30"
     )
     gave_up(outcome, "t.png")
     assert len(read_table(table, SPEED)) == 2
 
 
-async def test_a_name_that_is_too_long_is_one_line(shell: Shell, tmp_path: Path) -> None:
+def test_a_name_that_is_too_long_is_one_line(call: Call, tmp_path: Path) -> None:
     name = str(tmp_path / ("x" * 300 + ".csv"))
-    (await shell.run("measure", "speed", "--output", name, *QUICK)).assert_failed(1, "File name too long")
+    call("measure", "speed", "--output", name, *QUICK).assert_failed(1, "File name too long")

@@ -20,7 +20,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.terminal import ROOT
 
 if TYPE_CHECKING:
-    from tests.cli.conftest import Shell
+    from tests.cli.conftest import Call, Shell
 
 
 async def test_in_a_pipe_it_prints_every_poll_as_an_object(shell: Shell, server: SimulatorServer) -> None:
@@ -144,8 +144,8 @@ def test_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
     assert "exclude" in capsys.readouterr().err
 
 
-async def test_nobody_there_is_one_line(shell: Shell) -> None:
-    (await shell.run("monitor", "tcp://127.0.0.1:1")).assert_failed(1, "127.0.0.1:1")
+def test_nobody_there_is_one_line(call: Call) -> None:
+    call("monitor", "tcp://127.0.0.1:1").assert_failed(1, "127.0.0.1:1")
 
 
 async def test_a_signal_ends_it_although_nobody_reads(shell: Shell, server: SimulatorServer) -> None:

@@ -6,6 +6,7 @@ import asyncio
 import json
 import os
 import signal
+import socket
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
@@ -24,10 +25,9 @@ from robotiq_async.cli import main
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.telemetry.recorder import Recorder
 from robotiq_async.telemetry.recordings import read_recording
-from tests.cli.conftest import WITHOUT
 
 if TYPE_CHECKING:
-    from tests.cli.conftest import Shell
+    from tests.cli.conftest import Call, Shell
 
 
 @pytest.fixture
@@ -68,30 +68,31 @@ async def test_ctrl_c_ends_a_recording_that_is_whole_and_touches_nothing(
     assert recorded == list(range(recorded[0], recorded[-1] + 1))
 
 
-async def test_it_ends_by_itself(shell: Shell, tmp_path: Path) -> None:
+def test_it_ends_by_itself(call: Call, tmp_path: Path) -> None:
     file = tmp_path / "it.mcap"
-    outcome = await shell.run("record", str(file), "--seconds", "0.5")
+    outcome = call("record", str(file), "--seconds", "0.5")
     outcome.assert_succeeded()
     assert len(list(read_recording(file))) > 20
-    again = await shell.run("record", str(file), "--seconds", "0.5")
+    again = call("record", str(file), "--seconds", "0.5")
     again.assert_failed(1, "it.mcap: File exists")
 
 
-async def test_for_ros_2(shell: Shell, tmp_path: Path) -> None:
+def test_for_ros_2(call: Call, tmp_path: Path) -> None:
     file = tmp_path / "it.mcap"
-    outcome = await shell.run("record", "--ros2", "--seconds", "0.5", str(file))
+    outcome = call("record", "--ros2", "--seconds", "0.5", str(file))
     outcome.assert_succeeded()
     with AnyReader([file]) as reader:
         assert [connection.topic for connection in reader.connections] == ["/joint_states"]
         assert f"\n{reader.message_count} polls, 0 lost" in outcome.out
     for command in ("replay", "plot"):
-        (await shell.run(command, str(file))).assert_failed(1, "it.mcap: there is no")
+        call(command, str(file)).assert_failed(1, "it.mcap: there is no")
 
 
-async def test_no_gripper_no_file(shell: Shell, tmp_path: Path) -> None:
-    async with SimulatorServer() as server:
-        address = server.address
-    outcome = await shell.run("record", str(tmp_path / "it.mcap"), address)
+def test_no_gripper_no_file(call: Call, tmp_path: Path) -> None:
+    # Bound and not listening: connections are refused, and nobody else gets the port.
+    with socket.socket() as reserved:
+        reserved.bind(("127.0.0.1", 0))
+        outcome = call("record", str(tmp_path / "it.mcap"), f"127.0.0.1:{reserved.getsockname()[1]}")
     outcome.assert_failed(1, "refused")
     assert not (tmp_path / "it.mcap").exists()
 
@@ -160,9 +161,11 @@ def test_what_is_no_recording_is_one_line(
         ("matplotlib", ["plot", "x"], "plot"),
     ],
 )
-async def test_a_missing_extra_is_named(shell: Shell, module: str, arguments: list[str], extra: str) -> None:
-    outcome = await shell.finish(await shell.python("-c", WITHOUT.format(module, arguments)))
-    outcome.assert_failed(1, f"pip install 'robotiq-async[{extra}]'")
+def test_a_missing_extra_is_named(
+    call: Call, without: Callable[[str], None], module: str, arguments: list[str], extra: str
+) -> None:
+    without(module)
+    call(*arguments).assert_failed(1, f"pip install 'robotiq-async[{extra}]'")
 
 
 @pytest.mark.parametrize("seconds", ["0", "-1", "nan", "soon"])
@@ -348,15 +351,19 @@ async def test_two_gigabytes_in_a_small_chunk_are_one_line(shell: Shell, tmp_pat
     Header("", "").write(builder)
     Chunk("zstd", data, 0, 0, 0, 2**31).write(builder)
     file.write_bytes(b"\x89MCAP0\r\n" + builder.end())  # type: ignore[no-untyped-call]
-    for command in ("replay", "recover", "plot"):
-        outcome = await shell.finish(await shell.python("-c", LITTLE_MEMORY.format([command, str(file)])))
-        outcome.assert_failed(1, "bomb.mcap: a chunk of 2147483648 bytes")
+    outcome = await shell.finish(await shell.python("-c", LITTLE_MEMORY.format(str(file))))
+    assert (outcome.code, outcome.out) == (0, "1 1 1\n"), outcome.err
+    lines = outcome.err.splitlines()
+    assert len(lines) == 3
+    for line in lines:
+        assert line.startswith("robotiq-async: ")
+        assert "bomb.mcap: a chunk of 2147483648 bytes" in line
 
 
 LITTLE_MEMORY = """
 import resource, sys
 resource.setrlimit(resource.RLIMIT_AS, (1_500_000_000, 1_500_000_000))
 from robotiq_async.cli import main
-sys.exit(main({}))
+print(*(main([command, {!r}]) for command in ("replay", "recover", "plot")))
 """
 """Of addresses; matplotlib takes most of them."""

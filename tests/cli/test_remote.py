@@ -8,14 +8,14 @@ import os
 import signal
 import socket
 from asyncio.subprocess import Process
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
 import pytest
 
 from robotiq_async import Finger
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from tests.cli.conftest import Shell
+from tests.cli.conftest import Beside, Call, Shell
 from tests.conftest import Clock
 
 pytest.importorskip("zenoh")
@@ -42,37 +42,41 @@ async def gripper() -> AsyncIterator[tuple[SimulatedGripper, str]]:
         yield server.gripper, server.address
 
 
+def fleet_file(folder: Path, endpoint: str, gripper: str) -> Path:
+    file = folder / "FLEET.toml"
+    file.write_text(
+        f'site = "lab"\nhost = "cell"\nlisten = ["{endpoint}"]\n[grippers.left]\naddress = "{gripper}"\n'
+    )
+    return file
+
+
 @pytest.fixture
 async def agent(
     shell: Shell, endpoint: str, gripper: tuple[SimulatedGripper, str], tmp_path: Path
 ) -> Process:
-    file = tmp_path / "FLEET.toml"
-    file.write_text(
-        f'site = "lab"\nhost = "cell"\nlisten = ["{endpoint}"]\n[grippers.left]\naddress = "{gripper[1]}"\n'
-    )
-    process = await shell.start("agent", str(file))
+    process = await shell.start("agent", str(fleet_file(tmp_path, endpoint, gripper[1])))
     assert await shell.read_line(process) == ADDRESS
     return process
 
 
-async def test_status_and_move(shell: Shell, agent: Process) -> None:
-    moved = await shell.run("move", "100", "--yes", "--fingers", "A", "--speed", "255", ADDRESS)
-    moved.assert_succeeded()
-    outcome = await shell.run("status", "--json", ADDRESS)
+def test_status_move_and_the_demo(
+    call: Call, beside: Callable[..., Beside], endpoint: str, there: SimulatorServer, tmp_path: Path
+) -> None:
+    agent = beside("agent", str(fleet_file(tmp_path, endpoint, there.address)))
+    assert agent.read_line() == ADDRESS
+    call("move", "100", "--yes", "--fingers", "A", "--speed", "255", ADDRESS).assert_succeeded()
+    outcome = call("status", "--json", ADDRESS)
     outcome.assert_succeeded()
     assert abs(json.loads(outcome.out)["axes"]["A"]["position"] - 100) <= 2
-
-
-async def test_a_move_asks_first(shell: Shell, agent: Process) -> None:
-    (await shell.run("move", "100", ADDRESS)).assert_failed(
-        2, "this moves the gripper at zenoh://lab/cell/left"
-    )
-
-
-async def test_the_demo(shell: Shell, agent: Process) -> None:
-    outcome = await shell.run("demo", "--yes", ADDRESS)
+    outcome = call("demo", "--yes", ADDRESS)
     outcome.assert_succeeded()
     assert f"async with RemoteHand('{ADDRESS}') as hand:" in outcome.out
+    agent.finish(signal.SIGINT).assert_succeeded()
+
+
+def test_a_move_asks_first(call: Call, endpoint: str) -> None:
+    # Nobody is there: whoever connects ends with 1.
+    call("move", "100", ADDRESS).assert_failed(2, "this moves the gripper at zenoh://lab/cell/left")
 
 
 async def test_monitor_and_record(shell: Shell, agent: Process, tmp_path: Path) -> None:
@@ -86,13 +90,13 @@ async def test_monitor_and_record(shell: Shell, agent: Process, tmp_path: Path) 
     assert (tmp_path / "a.mcap").stat().st_size > 1000
 
 
-async def test_options_of_the_link_belong_to_the_agent(shell: Shell, endpoint: str) -> None:
-    outcome = await shell.run("status", "--device-id", "3", ADDRESS)
+def test_options_of_the_link_belong_to_the_agent(call: Call, endpoint: str) -> None:
+    outcome = call("status", "--device-id", "3", ADDRESS)
     outcome.assert_failed(2, "a gripper on another host is set up there")
 
 
-async def test_nobody_there(shell: Shell, endpoint: str) -> None:
-    (await shell.run("status", ADDRESS)).assert_failed(1, "cannot connect to zenoh://lab/cell/left")
+def test_nobody_there(call: Call, endpoint: str) -> None:
+    call("status", ADDRESS).assert_failed(1, "cannot connect to zenoh://lab/cell/left")
 
 
 async def test_a_list_and_a_halt(shell: Shell, agent: Process, gripper: tuple[SimulatedGripper, str]) -> None:
@@ -110,8 +114,8 @@ async def test_a_list_and_a_halt(shell: Shell, agent: Process, gripper: tuple[Si
     assert not gripper[0].is_moving
 
 
-async def test_a_halt_of_nobody_is_a_failure(shell: Shell, endpoint: str) -> None:
-    (await shell.run("fleet", "halt")).assert_failed(1, "nothing was stopped")
+def test_a_halt_of_nobody_is_a_failure(call: Call, endpoint: str) -> None:
+    call("fleet", "halt").assert_failed(1, "nothing was stopped")
 
 
 async def test_an_agent_that_is_told_to_end_stops_the_fingers(
@@ -136,11 +140,11 @@ async def test_a_second_agent_is_refused(shell: Shell, agent: Process, endpoint:
     (await shell.run("agent", str(file))).assert_failed(1, "another agent serves zenoh://lab/cell/left")
 
 
-async def test_a_file_is_checked(shell: Shell, tmp_path: Path) -> None:
+def test_a_file_is_checked(call: Call, tmp_path: Path) -> None:
     file = tmp_path / "FLEET.toml"
     file.write_text('site = "lab"\nhost = "cell"\n[grippers.left]\naddress = "tcp://192.168.1.11"\n')
-    outcome = await shell.run("agent", "--check", str(file))
+    outcome = call("agent", "--check", str(file))
     outcome.assert_succeeded()
     assert outcome.out.split() == [ADDRESS, "tcp://192.168.1.11"]
     file.write_text('site = "lab"\n[grippers.left]\nadress = "tcp://192.168.1.11"\n')
-    (await shell.run("agent", "--check", str(file))).assert_failed(2, "adress", "address", "line 3")
+    call("agent", "--check", str(file)).assert_failed(2, "adress", "address", "line 3")

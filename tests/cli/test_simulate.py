@@ -6,6 +6,7 @@ import asyncio
 import json
 import signal
 import socket
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,12 +15,13 @@ import pytest
 from robotiq_async import Fault, RobotiqHand, State
 from robotiq_async.enums import AXES
 from robotiq_async.simulator.troubles.trouble import KINDS
+from tests.cli.conftest import Outcome
 from tests.serial_line import SerialLine
 
 if TYPE_CHECKING:
     from asyncio.subprocess import Process
 
-    from tests.cli.conftest import Shell
+    from tests.cli.conftest import Beside, Call, Shell
 
 
 async def told(process: Process) -> str:
@@ -29,41 +31,40 @@ async def told(process: Process) -> str:
         return (await process.stderr.readline()).decode().rstrip("\n")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-async def test_it_prints_its_address_serves_and_ends_cleanly(shell: Shell, number: signal.Signals) -> None:
-    process = await shell.start("simulate", "--port", "0")
-    address = await shell.read_line(process)
+@pytest.mark.parametrize(
+    ("number", "options", "position"), [(signal.SIGINT, (), 7), (signal.SIGTERM, ("--exact",), 6)]
+)
+def test_it_prints_its_address_serves_ends_cleanly_and_is_exact_only_on_request(
+    call: Call,
+    beside: Callable[..., Beside],
+    number: signal.Signals,
+    options: tuple[str, ...],
+    position: int,
+) -> None:
+    process = beside("simulate", "--port", "0", *options)
+    address = process.read_line()
     assert address.startswith("tcp://127.0.0.1:")
-    reading = json.loads((await shell.run("status", "--json", address)).out)
+    reading = json.loads(call("status", "--json", address).out)
     assert reading["reset"] is True
-    process.send_signal(number)
-    outcome = await shell.finish(process)
-    assert (outcome.code, outcome.out, outcome.err) == (0, "", "")
-
-
-@pytest.mark.parametrize(("options", "position"), [((), 7), (("--exact",), 6)])
-async def test_it_is_exact_only_on_request(shell: Shell, options: tuple[str, ...], position: int) -> None:
-    address = await shell.read_line(await shell.start("simulate", "--port", "0", *options))
-    reading = json.loads((await shell.run("status", "--json", address)).out)
     assert reading["axes"]["A"]["position"] == position
+    assert process.finish(number) == Outcome(0, "", "")
 
 
-async def test_it_keeps_the_gripper_between_two_clients(shell: Shell) -> None:
-    process = await shell.start("simulate", "--port", "0", "--speedup", "20")
-    address = await shell.read_line(process)
-    assert (await shell.run("move", "255", "--yes", address)).code == 0
-    assert json.loads((await shell.run("status", "--json", address)).out)["axes"]["C"]["position"] >= 240
-    assert "Activating" not in (await shell.run("move", "0", "--yes", address)).out
+def test_it_keeps_the_gripper_between_two_clients(call: Call, beside: Callable[..., Beside]) -> None:
+    address = beside("simulate", "--port", "0", "--speedup", "20").read_line()
+    assert call("move", "255", "--yes", address).code == 0
+    assert json.loads(call("status", "--json", address).out)["axes"]["C"]["position"] >= 240
+    assert "Activating" not in call("move", "0", "--yes", address).out
 
 
-async def test_a_port_in_use(shell: Shell) -> None:
+def test_a_port_in_use(call: Call) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        (await shell.run("simulate", "--port", str(port))).assert_failed(1, f"127.0.0.1:{port}", "in use")
+        call("simulate", "--port", str(port)).assert_failed(1, f"127.0.0.1:{port}", "in use")
 
 
-async def test_no_such_serial_device(shell: Shell) -> None:
-    (await shell.run("simulate", "--serial", "/dev/no-such-port")).assert_failed(1, "/dev/no-such-port")
+def test_no_such_serial_device(call: Call) -> None:
+    call("simulate", "--serial", "/dev/no-such-port").assert_failed(1, "/dev/no-such-port")
 
 
 @pytest.mark.parametrize(("said", "unit", "other"), [((), "9", "12"), (("--device-id", "12"), "12", "9")])
@@ -80,22 +81,21 @@ async def test_the_unit_id_on_a_serial_line(
         (await shell.finish(process)).assert_succeeded()
 
 
-async def test_the_unit_id_over_tcp(shell: Shell) -> None:
-    process = await shell.start("simulate", "--port", "0", "--device-id", "7")
-    address = await shell.read_line(process)
-    (await shell.run("status", "--device-id", "7", address)).assert_succeeded()
-    (await shell.run("status", address)).assert_failed(1, "nobody answers")
+def test_the_unit_id_over_tcp(call: Call, beside: Callable[..., Beside]) -> None:
+    address = beside("simulate", "--port", "0", "--device-id", "7").read_line()
+    call("status", "--device-id", "7", address).assert_succeeded()
+    call("status", address).assert_failed(1, "nobody answers")
 
 
 @pytest.mark.parametrize("unit", ["0", "248", "nine", "9.5"])
-async def test_a_unit_id_that_no_unit_can_have(shell: Shell, unit: str) -> None:
-    outcome = await shell.run("simulate", "--serial", "/dev/no-such-port", "--device-id", unit)
+def test_a_unit_id_that_no_unit_can_have(call: Call, unit: str) -> None:
+    outcome = call("simulate", "--serial", "/dev/no-such-port", "--device-id", unit)
     outcome.assert_failed(2, f"--device-id must be an integer in 1..247, got '{unit}'")
 
 
-async def test_other_than_loopback_is_warned_about(shell: Shell) -> None:
+def test_other_than_loopback_is_warned_about(call: Call) -> None:
     # An address for documentation (RFC 5737): no machine has it, so nothing is opened to a network.
-    outcome = await shell.run("simulate", "--host", "192.0.2.1", "--port", "0")
+    outcome = call("simulate", "--host", "192.0.2.1", "--port", "0")
     assert outcome.code == 1
     warning, failure = outcome.err.splitlines()
     assert "anyone who reaches 192.0.2.1 can command this gripper" in warning
@@ -146,9 +146,16 @@ async def test_a_trouble_is_told_when_it_begins(shell: Shell) -> None:
     assert (outcome.code, outcome.out, outcome.err) == (0, "", "")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize(
-    "words", ["power-cut", "refuse for 1000", "silence for 1000 every 2000", "drop", "close every 1000"]
+    ("words", "number"),
+    [
+        ("power-cut", signal.SIGTERM),
+        ("power-cut", signal.SIGINT),
+        ("refuse for 1000", signal.SIGTERM),
+        ("silence for 1000 every 2000", signal.SIGINT),
+        ("drop", signal.SIGTERM),
+        ("close every 1000", signal.SIGINT),
+    ],
 )
 async def test_it_ends_cleanly_while_a_plan_runs(shell: Shell, words: str, number: signal.Signals) -> None:
     process = await shell.start("simulate", "--port", "0", "--trouble", words)
@@ -159,11 +166,11 @@ async def test_it_ends_cleanly_while_a_plan_runs(shell: Shell, words: str, numbe
     assert (outcome.code, outcome.out, outcome.err) == (0, "", "")
 
 
-async def test_it_serves_on_when_the_plan_is_over(shell: Shell) -> None:
-    process = await shell.start("simulate", "--port", "0", "--trouble", "close")
-    address = await shell.read_line(process)
-    assert await told(process) == "robotiq-async: trouble: close"
-    (await shell.run("status", address)).assert_succeeded()
+def test_it_serves_on_when_the_plan_is_over(call: Call, beside: Callable[..., Beside]) -> None:
+    process = beside("simulate", "--port", "0", "--trouble", "close")
+    address = process.read_line()
+    assert process.read_error() == "robotiq-async: trouble: close"
+    call("status", address).assert_succeeded()
 
 
 @pytest.mark.parametrize(
@@ -175,19 +182,19 @@ async def test_it_serves_on_when_the_plan_is_over(shell: Shell) -> None:
         ("wrong-checksum", "wrong-checksum does not fit a simulator on tcp"),
     ],
 )
-async def test_wrong_words(shell: Shell, words: str, message: str) -> None:
-    outcome = await shell.run("simulate", "--port", "0", "--trouble", "drop", "--trouble", words)
+def test_wrong_words(call: Call, words: str, message: str) -> None:
+    outcome = call("simulate", "--port", "0", "--trouble", "drop", "--trouble", words)
     outcome.assert_failed(2, message)
     assert outcome.out == "", "it never listened"
 
 
-async def test_a_trouble_that_does_not_fit_a_serial_line(shell: Shell) -> None:
-    outcome = await shell.run("simulate", "--serial", "/dev/no-such-port", "--trouble", "refuse")
+def test_a_trouble_that_does_not_fit_a_serial_line(call: Call) -> None:
+    outcome = call("simulate", "--serial", "/dev/no-such-port", "--trouble", "refuse")
     outcome.assert_failed(2, "refuse does not fit a simulator on rtu")
 
 
-async def test_the_list_of_troubles(shell: Shell) -> None:
-    outcome = await shell.run("simulate", "--troubles")
+def test_the_list_of_troubles(call: Call) -> None:
+    outcome = call("simulate", "--troubles")
     assert (outcome.code, outcome.err) == (0, "")
     lines = outcome.out.splitlines()
     assert [line.split()[0] for line in lines] == list(KINDS)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import signal
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,11 +19,10 @@ from robotiq_async import RobotiqHand
 from robotiq_async.cli.arguments import is_loopback
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.telemetry.services import SERVICES
-from tests.cli.conftest import WITHOUT
 from tests.foxglove_client import Client
 
 if TYPE_CHECKING:
-    from tests.cli.conftest import Shell
+    from tests.cli.conftest import Call, Shell
 
 
 @asynccontextmanager
@@ -113,15 +112,15 @@ def test_who_is_outside(host: str, inside: bool) -> None:
     assert is_loopback(host) is inside
 
 
-async def test_another_interface_is_warned_about(shell: Shell) -> None:
+def test_another_interface_is_warned_about(call: Call) -> None:
     # An address for documentation (RFC 5737): no machine has it, so nothing is opened to a network.
-    outcome = await shell.run("view", "--host", "192.0.2.1", "--port", "0")
+    outcome = call("view", "--host", "192.0.2.1", "--port", "0")
     assert outcome.code == 1
     assert "anyone who reaches 192.0.2.1 can see this gripper: there is no password" in outcome.err
 
 
-async def test_commands_come_from_this_machine_only(shell: Shell) -> None:
-    outcome = await shell.run("view", "--host", "192.0.2.1", "--port", "0", "--control")
+def test_commands_come_from_this_machine_only(call: Call) -> None:
+    outcome = call("view", "--host", "192.0.2.1", "--port", "0", "--control")
     outcome.assert_failed(2, "--control needs 127.0.0.1", "ssh -L")
 
 
@@ -143,15 +142,14 @@ async def test_a_page_of_another_site_is_refused_and_named(shell: Shell, server:
         await Client(socket).meet(services=False)
 
 
-async def test_the_layout_is_handed_out(shell: Shell, tmp_path: Path) -> None:
+def test_the_layout_is_handed_out(call: Call, tmp_path: Path) -> None:
     file = tmp_path / "gripper.json"
-    outcome = await shell.run("view", "--layout", str(file))
+    outcome = call("view", "--layout", str(file))
     assert (outcome.code, outcome.out) == (0, f"{file}\n")
     assert file.read_text() == make_layout.draw()
-    (await shell.run("view", "--layout", str(file))).assert_failed(1, "exists")
+    call("view", "--layout", str(file)).assert_failed(1, "exists")
 
 
-async def test_without_the_sdk_one_line_names_the_extra(shell: Shell) -> None:
-    code = WITHOUT.format("foxglove", ["view"])
-    outcome = await shell.finish(await shell.python("-c", code))
-    outcome.assert_failed(1, "pip install 'robotiq-async[view]'")
+def test_without_the_sdk_one_line_names_the_extra(call: Call, without: Callable[[str], None]) -> None:
+    without("foxglove")
+    call("view").assert_failed(1, "pip install 'robotiq-async[view]'")

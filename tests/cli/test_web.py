@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import http.client
 import signal
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
@@ -13,12 +14,11 @@ import pytest
 
 from robotiq_async import RobotiqHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from tests.cli.conftest import WITHOUT
 
 pytest.importorskip("nicegui", reason="the page needs the extra web")
 
 if TYPE_CHECKING:
-    from tests.cli.conftest import Shell
+    from tests.cli.conftest import Call, Shell
 
 
 def status(url: str) -> int:
@@ -75,13 +75,13 @@ async def test_of_several_grippers_one_may_be_missing(shell: Shell, server: Simu
         (["--password-file", "SHORT"], 2, "8 characters or more"),
     ],
 )
-async def test_bad_input_is_one_clear_line(
-    shell: Shell, tmp_path: Path, arguments: list[str], code: int, words: str
+def test_bad_input_is_one_clear_line(
+    call: Call, tmp_path: Path, arguments: list[str], code: int, words: str
 ) -> None:
     (tmp_path / "PASSWORD").write_text("correct horse\n")
     (tmp_path / "SHORT").write_text("horse\n")
     named = [str(tmp_path / each) if each.isupper() else each for each in arguments]
-    outcome = await shell.run("web", *named)
+    outcome = call("web", *named)
     assert outcome.code == code
     assert words in outcome.err
     assert "Traceback" not in outcome.err
@@ -89,10 +89,10 @@ async def test_bad_input_is_one_clear_line(
     assert len([line for line in outcome.err.splitlines() if "left as they are" not in line]) == 1
 
 
-async def test_without_nicegui_one_line_names_the_extra(shell: Shell) -> None:
+def test_without_nicegui_one_line_names_the_extra(call: Call, without: Callable[[str], None]) -> None:
+    without("nicegui")
     for command in (["web"], ["demo", "--show"]):
-        outcome = await shell.finish(await shell.python("-c", WITHOUT.format("nicegui", command)))
-        outcome.assert_failed(1, "pip install 'robotiq-async[web]'")
+        call(*command).assert_failed(1, "pip install 'robotiq-async[web]'")
 
 
 async def test_the_demo_waits_until_somebody_looks(shell: Shell) -> None:

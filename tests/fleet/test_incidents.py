@@ -305,6 +305,8 @@ async def test_of_two_agents_that_start_at_once_one_stays() -> None:
     async with world() as here:
         await here.agent.end()
         here.agents.clear()
+        here.network.part("one", "two")  # a router that has not told yet
+        here.network.loop.call_later(0.4, here.network.join, "one", "two")
 
         async def start(name: str) -> str:
             agent = ServingAgent(here, name, {})

@@ -14,6 +14,8 @@ from .endpoints import check_connect, check_listen
 PORT: Final = 7447
 LOOPBACK: Final = f"tcp/127.0.0.1:{PORT}"
 LOOPBACK_TLS: Final = f"tls/127.0.0.1:{PORT}"
+QUEUED: Final = 16
+"""Halts, and commands, that may lie in a link until its thread gets a turn; zenoh's own default is two."""
 LINK_LEASE_MS: Final = 1000
 """A side that is frozen or unplugged is noticed after this time; zenoh's own default is ten seconds."""
 
@@ -74,7 +76,9 @@ def session_configuration(
     Raises:
         ValueError: the folder of keys lacks a file.
     """
-    link: dict[str, object] = {"tx": {"lease": LINK_LEASE_MS}}
+    # A message that finds no room within a millisecond is dropped, and each request takes a batch of its own.
+    room = {"real_time": QUEUED, "interactive_high": QUEUED}
+    link: dict[str, object] = {"tx": {"lease": LINK_LEASE_MS, "queue": {"size": room}}}
     if keys is not None:
         link["tls"] = _tls(check_key_folder(keys))
     return {

@@ -213,15 +213,20 @@ class ZenohBus:
 
     async def announced(self, expression: str, *, timeout: float) -> list[str]:
         """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
+        found: list[str] = []
+        ended = asyncio.Event()
 
-        def find() -> list[str]:
-            replies = self._session.liveliness().get(expression, timeout=timeout)
-            return [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
+        def arrive(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                found.append(str(reply.ok.key_expr))
 
-        try:
-            return await asyncio.to_thread(find)
-        except zenoh.ZError:
-            return []
+        # Not into a channel of zenoh's: it holds 256, get() itself fills it, and would wait there for ever.
+        handler = Callback(arrive, lambda: self._mailbox.put(ended.set), indirect=False)
+        with contextlib.suppress(TimeoutError, zenoh.ZError):
+            self._session.liveliness().get(expression, handler, timeout=timeout)
+            async with asyncio.timeout(2 * timeout):
+                await ended.wait()
+        return list(found)
 
     def watch(self, expression: str, listener: Callable[[str, bool], None]) -> Undo:
         """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
