@@ -45,11 +45,11 @@ PYTHON: Final = "rosidl_generator_py"
 RUNTIME: Final = ("rosidl_runtime_c", DISPATCH, "rcutils", "rmw")
 USED: Final = tuple(
     name
-    for name in ("action_msgs", "builtin_interfaces", "sensor_msgs", "service_msgs", "std_msgs")
-    + ("geometry_msgs", "unique_identifier_msgs")
-    if (PREFIX / "share" / name).is_dir()
+    for name in sorted(path.name for path in (PREFIX / "share").iterdir())
+    if name.endswith("_msgs") or name == "builtin_interfaces"
+    if next((PREFIX / "share" / name).glob("*/*.idl"), None)
 )
-"""Interface packages that definitions may refer to."""
+"""Interface packages that are here: definitions may refer to them."""
 
 
 class Package:
