@@ -17,7 +17,7 @@ from .settings import Settings
 COMMANDS: Final = ("activate", "reset", "halt", "recover", "release")
 """What the services are called, and the actions behind them."""
 MOST_CALLS: Final = 16
-"""Commands that may be under way at once; a halt is never one too many."""
+"""Commands that may be under way at once; halts are no part of them, and never one too many."""
 
 
 class RefusedError(RobotiqError):
@@ -84,10 +84,11 @@ class Connection:
             RefusedError: the node is not active, or too much is under way.
             RobotiqError: it could not be carried out.
         """
-        if name != "halt":
-            self._check_active()
-            if self._calls >= MOST_CALLS:
-                raise RefusedError(f"{MOST_CALLS} commands are under way")
+        if name == "halt":
+            return await self._operator.act(ACTIONS[name])
+        self._check_active()
+        if self._calls >= MOST_CALLS:
+            raise RefusedError(f"{MOST_CALLS} commands are under way")
         self._calls += 1
         try:
             return await self._operator.act(ACTIONS[name])

@@ -1,4 +1,4 @@
-"""A node in a process of its own, at a simulated gripper, with a client: a plugin that `make test-ros2` names."""
+"""A node in a process of its own, at a simulated gripper, with a client: a plugin of `make test-ros2`."""
 
 from __future__ import annotations
 

@@ -1,15 +1,11 @@
-"""The life of the node: transitions, parameters, what is refused when, and the ends of the process."""
+"""The life of the node: transitions, parameters, what is refused when, and how signals end it."""
 
 from __future__ import annotations
 
-import json
-import math
 import signal
-from typing import Any
 
 import pytest
 
-from robotiq_async import Finger
 from robotiq_async.ros2.settings import PARAMETERS
 from tests.ros2.live.bench import ABORTED, SUCCEEDED, Client, Simulator
 from tests.ros2.live.goals import begun, position
@@ -120,107 +116,3 @@ def test_a_signal_during_a_goal(simulator: Simulator, number: signal.Signals) ->
         assert not simulator.do(lambda gripper: gripper.request_registers[0] >> 8 & 0x08), "rGTO"
         assert position(simulator) == there
         assert "Traceback" not in process.text
-
-
-def test_a_killed_node_leaves_the_fingers_running(simulator: Simulator) -> None:
-    """What the pages warn of. A node that is started again adopts the gripper, and can halt it."""
-    with node(address=simulator.address, autostart=True) as process, Client() as client:
-        process.prints("commands are taken")
-        assert client.call("activate").success
-        begun(client.move(2.8))
-        process.send(signal.SIGKILL)
-        assert process.ends() == -signal.SIGKILL
-    assert simulator.do(lambda gripper: gripper.request_registers[0] >> 8 & 0x08), "rGTO"
-    with node(address=simulator.address, autostart=True) as process, Client() as client:
-        process.prints("commands are taken")
-        assert client.call("halt").success
-        assert client.move(0.0).ends()[0] == SUCCEEDED
-
-
-def test_a_prefix_is_before_every_joint(simulator: Simulator) -> None:
-    with (
-        Simulator() as other,
-        node(namespace="/left", address=simulator.address, autostart=True, joint_prefix="left_") as left,
-        node(namespace="/right", address=other.address, autostart=True, joint_prefix="right_") as right,
-        Client("/left/gripper") as one,
-        Client("/right/gripper") as two,
-    ):
-        for process, client in ((left, one), (right, two)):
-            process.prints("commands are taken")
-            assert client.call("activate").success
-        moving = one.move(2.8, names=["left_fingers"]), two.move(math.radians(35), names=["right_fingers"])
-        assert [goal.ends()[0] for goal in moving] == [SUCCEEDED, SUCCEEDED]
-        assert position(simulator) >= 238
-        assert position(other) == 70
-        assert one.joint_states("/left/joint_states").wait().name[0] == "left_palm_finger_1_joint"
-        assert two.joint_states("/right/joint_states").wait().name[0] == "right_palm_finger_1_joint"
-        assert one.send(["right_fingers"], [0.0]) is None
-        left.prints("goal rejected: there is no joint 'right_fingers'")
-
-
-def test_topics(simulator: Simulator, tmp_path_factory: pytest.TempPathFactory) -> None:
-    urdf = tmp_path_factory.mktemp("urdf") / "hand.urdf"
-    urdf.write_text("<robot name='hand'/>", encoding="utf-8")
-    options: dict[str, Any] = {"urdf": str(urdf), "frame_id": "palm", "publish_rate": 100.0}
-    with node(address=simulator.address, autostart=True, **options) as process, Client() as client:
-        process.prints("commands are taken")
-        assert client.description().wait(new=False).data == "<robot name='hand'/>"
-        states = client.joint_states()
-        first = states.wait()
-        assert first.header.frame_id == "palm"
-        assert len(first.name) == len(first.position) == len(first.velocity) == len(first.effort) == 11
-        assert all(math.isnan(effort) for effort in first.effort)
-        second = states.wait()
-        assert second.header.stamp != first.header.stamp
-        age = client.node.get_clock().now().nanoseconds / 1e9 - second.header.stamp.sec
-        assert abs(age) < 5
-        status = client.status()
-        fields = json.loads(status.wait(new=False).data)
-        assert fields["state"] == "RESET"
-        assert fields["takes_commands"] is True
-        diagnostics = client.diagnostics()
-        link, gripper = diagnostics.wait().status
-        assert (link.name, gripper.name) == ("/gripper: link", "/gripper: gripper")
-        assert link.level == gripper.level == b"\x00"
-        assert link.hardware_id == simulator.address
-        assert client.call("activate").success
-        simulator.do(lambda it: it.place_object(Finger.B, position=90))
-        client.move(2.8).ends()
-        fields = json.loads(status.wait().data)
-        assert fields["contacts"] == ["B"]
-        assert fields["B"]["status"] == "CONTACT_CLOSING"
-
-
-def test_a_lost_link(simulator: Simulator) -> None:
-    with node(address=simulator.address, autostart=True) as process, Client() as client:
-        process.prints("commands are taken")
-        assert client.call("activate").success
-        states, status, diagnostics = client.joint_states(), client.status(), client.diagnostics()
-        goal = begun(client.move(2.8))
-        simulator.lose_link()
-        assert goal.ends()[0] == ABORTED
-        fields = json.loads(status.wait(lambda it: not json.loads(it.data)["connected"], new=False).data)
-        assert "fault" not in fields
-        link, gripper = diagnostics.wait(lambda it: it.status[0].level != b"\x00").status
-        assert (link.level, gripper.level) == (b"\x02", b"\x03")
-        assert gripper.message == "unknown: the link is down"
-        assert not gripper.values
-        assert client.send(["fingers"], [0.0]) is None
-        process.prints("goal rejected: the link to the gripper is down")
-        assert not client.call("halt").success
-        simulator.find_link()
-        status.wait(lambda it: json.loads(it.data)["connected"])
-        states.wait()
-        assert client.move(0.0).ends()[0] == SUCCEEDED
-
-
-def test_a_deactivation_without_a_link_is_told(simulator: Simulator) -> None:
-    with node(address=simulator.address, autostart=True) as process, Client() as client:
-        process.prints("commands are taken")
-        assert client.call("activate").success
-        simulator.lose_link()
-        client.status().wait(lambda it: not json.loads(it.data)["connected"], new=False)
-        assert client.change("deactivate")
-        process.prints("no halt, the fingers MAY STILL MOVE")
-        process.send(signal.SIGINT)
-        assert process.ends() == 0
