@@ -159,7 +159,9 @@ class Client:
     def begin(self, name: str, kind: Any = Trigger, request: Any = None) -> Any:
         """Call a service of the node, without waiting for the answer."""
         if name not in self._clients:
-            self._clients[name] = self.node.create_client(kind, f"{self._name}/{name}")
+            self._clients[name] = self.node.create_client(
+                kind, f"{self._name}/{name}", qos_profile=QoSProfile(depth=1000)
+            )
         assert self._clients[name].wait_for_service(PATIENCE_S), name
         return self._clients[name].call_async(kind.Request() if request is None else request)
 
