@@ -9,6 +9,7 @@ from enum import Enum
 from typing import Final
 
 from ..control.motion import MoveResult
+from ..enums import Finger
 from ..errors import RobotiqError
 from ..log import log
 from ..protocol import Hand
@@ -16,8 +17,6 @@ from .joints import Targets
 
 FEEDBACK_S: Final = 0.05
 """From one feedback to the next: 20 Hz."""
-STILL_S: Final = 0.5
-"""For seeing that axes which were told to hold do; they take a device cycle or two."""
 
 
 class Ending(Enum):
@@ -53,6 +52,8 @@ class _Goal:
         self.work: asyncio.Task[Sequence[MoveResult]] | None = None
         self.ended: tuple[Ending, str] | None = None
         """How somebody else has ended it."""
+        self.hold: asyncio.Future[None] | None = None
+        """Done when its axes have been told to stay."""
         self.is_over = asyncio.Event()
         """Its axes belong to whoever comes next."""
 
@@ -111,8 +112,8 @@ class GoalRunner:
         if results is None:
             assert goal.ended is not None
             ending, reason = goal.ended
-            if ending is Ending.CANCELED:
-                await self._still(goal)
+            if goal.hold is not None:
+                await goal.hold
             return Outcome(ending, stalled=False, reached=False, reason=reason)
         return _judged(results, allow_stalling=allow_stalling)
 
@@ -147,25 +148,22 @@ class GoalRunner:
                 work.cancel()
                 await asyncio.wait({work})
             # What had arrived before it was ended has arrived.
-            return None if work.cancelled() else work.result()
+            if not work.cancelled():
+                return work.result()
+            if goal.ended is not None and goal.ended[0] is Ending.CANCELED:
+                # Asked for now: later it would hold what the next goal moves.
+                goal.hold = asyncio.ensure_future(self._held(goal, targets.axes))
+            return None
         finally:
             goal.is_over.set()
 
-    async def _still(self, goal: _Goal) -> None:
-        """Wait until the axes are seen to stand, or somebody else moves them."""
-        statuses = self._hand.statuses()
+    async def _held(self, goal: _Goal, axes: Finger) -> None:
+        """Wait until the gripper has acknowledged that axes are to stay; the log tells if it has not."""
         try:
-            async with asyncio.timeout(STILL_S):
-                while self._hand.is_moving and self._newest is goal:
-                    await anext(statuses)
-        except StopAsyncIteration:
-            pass  # the hand was stopped, and says itself when that failed
+            await self._hand.hold(axes)
         except RobotiqError as error:
-            log.error("a goal was canceled, and its axes were not seen to stop: %s", error)
-        except TimeoutError:
-            log.error("a goal was canceled, and its axes were not seen to stop within %g s", STILL_S)
-        finally:
-            await statuses.aclose()
+            if self._newest is goal:  # or else the next goal has them
+                log.error("a goal was canceled, and the hold was not acknowledged: %s", error)
 
 
 async def _move(hand: Hand, targets: Targets, speed: int, force: int) -> Sequence[MoveResult]:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import AsyncIterator
+from typing import Any
 
 import pytest
 
-from robotiq_async import Finger, RobotiqHand, State
+from robotiq_async import ConnectionLostError, Finger, MoveResult, RobotiqHand, State
 from robotiq_async.protocol import Hand
 from robotiq_async.ros2.goals import Ending, GoalRunner, Outcome
 from robotiq_async.ros2.hands import is_connected, make_hand, why_not
@@ -62,15 +64,53 @@ async def test_a_contact(hand: RobotiqHand, gripper: SimulatedGripper, allow: bo
     assert outcome == Outcome(ending, stalled=True, reached=False, reason="contact: A")
 
 
-async def test_a_canceled_goal_ends_when_its_axes_stand(slow: RobotiqHand) -> None:
+async def test_a_canceled_goal_ends_when_its_axes_have_been_told_to_stay(slow: RobotiqHand) -> None:
     runner = GoalRunner(slow)
     goal = begin(runner)
     await until_moving(slow)
     runner.cancel(b"1")
     outcome = await goal
     assert outcome.ending is Ending.CANCELED
-    assert not slow.is_moving
-    assert slow.status.position(A) < 200
+    there = slow.status.position(A)
+    assert there < 200
+    while slow.is_moving:
+        await anext(slow.statuses())
+    assert abs(slow.status.position(A) - there) <= 3
+
+
+async def test_a_canceled_goal_does_not_hold_what_the_next_one_moves(slow: RobotiqHand) -> None:
+    runner = GoalRunner(slow)
+    first = begin(runner)
+    await until_moving(slow)
+    runner.cancel(b"1")
+    second = begin(runner, Targets(((230, Finger.ABC),)), b"2")
+    assert (await first).ending is Ending.CANCELED
+    assert (await second).ending is Ending.SUCCEEDED
+    assert slow.status.position(A) >= 228
+
+
+class DeafHand(FakeHand):
+    """Its gripper moves for ever, and takes no hold."""
+
+    async def move(self, position: int, *_: Any, **__: Any) -> MoveResult:
+        self.command(position=position)
+        await asyncio.Event().wait()
+        raise AssertionError
+
+    async def hold(self, fingers: Finger | int = Finger.ALL) -> None:
+        raise ConnectionLostError("the link went down")
+
+
+async def test_a_hold_that_is_not_acknowledged_is_told(caplog: pytest.LogCaptureFixture) -> None:
+    async with DeafHand() as hand:
+        runner = GoalRunner(hand)
+        requests = hand.requests()
+        goal = begin(runner)
+        await anext(requests)
+        runner.cancel(b"1")
+        with caplog.at_level(logging.ERROR, "robotiq_async"):
+            assert (await goal).ending is Ending.CANCELED
+    assert "the hold was not acknowledged: the link went down" in caplog.text
 
 
 async def test_the_key_of_another_goal_cancels_nothing(hand: RobotiqHand) -> None:

