@@ -97,7 +97,7 @@ class DeafHand(FakeHand):
         await asyncio.Event().wait()
         raise AssertionError
 
-    async def hold(self, fingers: Finger | int = Finger.ALL) -> None:
+    async def hold(self, fingers: Finger | int = Finger.ALL) -> None:  # noqa: ARG002
         raise ConnectionLostError("the link went down")
 
 

@@ -200,7 +200,7 @@ class Client:
 
     def move(self, *positions: float, names: Sequence[str] = ("fingers",)) -> Goal:
         goal = self.send(names, positions)
-        assert goal is not None, "rejected"
+        assert goal is not None, "rejected: the node's log says why"
         return goal
 
     def joint_states(self, name: str = "/joint_states") -> Topic:

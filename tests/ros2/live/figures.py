@@ -66,7 +66,8 @@ def active(address: str) -> Iterator[tuple[Process, Client]]:
     """An active node at an active gripper."""
     with node(address=address, autostart=True) as process, Client() as client:
         process.prints("commands are taken")
-        client.call("activate")
+        answer = client.call("activate")
+        assert answer.success, answer.message
         yield process, client
 
 

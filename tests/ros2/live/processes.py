@@ -47,7 +47,9 @@ class Process:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: object = None, *_: object) -> None:
+        if kind is not None:  # whoever looks for the reason wants it
+            print(self.text)  # noqa: T201
         if self._child.poll() is None:
             self._child.kill()
         self._child.wait()
