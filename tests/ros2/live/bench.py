@@ -116,13 +116,14 @@ class Topic:
 class Goal:
     """A goal that was accepted."""
 
-    def __init__(self, handle: Any, feedback: Topic) -> None:
+    def __init__(self, client: Client, handle: Any, feedback: Topic) -> None:
+        self._client = client
         self._handle = handle
         self.feedback = feedback
-        self._result = handle.get_result_async()
+        self._result = client.inside(handle.get_result_async)
 
     def cancel(self) -> None:
-        waited(self._handle.cancel_goal_async())
+        waited(self._client.inside(self._handle.cancel_goal_async))
 
     def ends(self) -> tuple[int, ParallelGripperCommand.Result]:
         answer = waited(self._result)
@@ -153,6 +154,12 @@ class Client:
         self._thread.join(PATIENCE_S)
         self.node.destroy_node()
         rclpy.shutdown(context=self._context)
+
+    def inside(self, work: Callable[[], T]) -> T:
+        """Do something in the executor's thread: an action client elsewhere may miss its answer."""
+        done: Future[T] = Future()
+        self._executor.create_task(lambda: done.set_result(work()))
+        return done.result(PATIENCE_S)
 
     # -- services ------------------------------------------------------------------------------------------
 
@@ -194,9 +201,9 @@ class Client:
         feedback = Topic()
         command = JointState(name=list(names), position=[*map(float, positions)], **limits)
         goal = ParallelGripperCommand.Goal(command=command)
-        sending = self._action.send_goal_async(goal, feedback_callback=lambda it: feedback.take(it.feedback))
-        handle = waited(sending)
-        return Goal(handle, feedback) if handle.accepted else None
+        took = lambda it: feedback.take(it.feedback)  # noqa: E731
+        handle = waited(self.inside(lambda: self._action.send_goal_async(goal, feedback_callback=took)))
+        return Goal(self, handle, feedback) if handle.accepted else None
 
     def move(self, *positions: float, names: Sequence[str] = ("fingers",)) -> Goal:
         goal = self.send(names, positions)

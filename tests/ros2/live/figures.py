@@ -79,9 +79,20 @@ def under_way(client: Client) -> Goal:
     return goal
 
 
+def accepted(client: Client) -> float:
+    began = time.perf_counter()
+    goal = client.move(0.3)
+    seconds = time.perf_counter() - began
+    goal.ends()
+    return seconds
+
+
 def latencies(address: str) -> None:
     with active(address) as (process, client):
-        told("goal to accepted", [timed(lambda: client.move(0.3)) for _ in range(100)])
+        told("goal to accepted", [accepted(client) for _ in range(100)])
+        told(
+            "the same, while another one is under way", [timed(lambda: client.move(0.3)) for _ in range(100)]
+        )
         ended = []
         for _ in range(20):
             goal = under_way(client)
@@ -89,7 +100,7 @@ def latencies(address: str) -> None:
             goal.cancel()
             assert goal.ends()[0] == CANCELED
             ended.append(time.perf_counter() - began)
-        told("cancel to CANCELED, which says that they were seen to stand", ended)
+        told("cancel to CANCELED, which says that the hold was acknowledged", ended)
         halts = []
         for _ in range(20):
             under_way(client)
