@@ -53,7 +53,7 @@ lint: $(STAMP)  ## Check style, types and the directions of the imports
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo --no-cache
 
-check: lint test test-ros2 pages  ## Everything CI runs
+check: lint test test-ros2 pages  ## Everything CI runs, and more of ROS 2
 
 format: $(STAMP)  ## Put the sources into shape
 	$(BIN)/ruff check --fix
