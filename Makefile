@@ -7,6 +7,7 @@ PYTHON ?= python3
 ADDRESS ?= sim://
 MINUTES ?= 30
 LINK ?= tcp
+DISTROS ?= jazzy kilted
 VENV := .venv
 BIN := $(VENV)/bin
 # Touched last, so it stands for a complete environment.
@@ -16,10 +17,10 @@ STAMP := $(VENV)/.complete
 unexport VIRTUAL_ENV CONDA_PREFIX PYTHONHOME PYTHONPATH PYTHONSTARTUP PIP_USER PIP_TARGET PIP_PREFIX UV_PYTHON
 
 .DEFAULT_GOAL := help
-.PHONY: help demo show test pages soak fuzz explore bench lint check format constraints clean
+.PHONY: help demo show test test-ros2 pages soak fuzz explore bench lint check format constraints clean
 
 help:  ## Show this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: $(STAMP)  ## Run the demo on a simulated gripper (ADDRESS=... for a real one: it asks, and moves)
 	@$(BIN)/python -m robotiq_async demo $(ADDRESS)
@@ -30,6 +31,9 @@ show: $(STAMP)  ## Run the demo with the hand in three dimensions on a page in y
 
 test: $(STAMP)  ## Run all tests
 	@$(BIN)/python -m pytest -rs --numprocesses auto --dist worksteal
+
+test-ros2:  ## Test the ROS 2 node with real clients, each ROS in an environment of its own (DISTROS="jazzy kilted")
+	@PYTHON="$(PYTHON)" tests/ros2/run.sh $(DISTROS)
 
 pages: $(STAMP)  ## Run the code of every page in the environment that the page names (needs the package index)
 	@$(BIN)/python -m pytest --numprocesses auto tests/docs/environments.py
@@ -53,7 +57,7 @@ lint: $(STAMP)  ## Check style, types and the directions of the imports
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo --no-cache
 
-check: lint test pages  ## Everything CI runs
+check: lint test test-ros2 pages  ## Everything CI runs, and more of ROS 2
 
 format: $(STAMP)  ## Put the sources into shape
 	$(BIN)/ruff check --fix
@@ -64,7 +68,7 @@ constraints: $(STAMP)  ## Take the newest versions of all dependencies into cons
 		pyproject.toml --output-file constraints.txt
 
 clean:  ## Remove what the other commands made
-	rm -rf $(VENV) build dist site .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
+	rm -rf $(VENV) .venv-ros2 build dist site .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
 	find robotiq_async tests demo -type d -name __pycache__ -prune -exec rm -rf {} +
 
 # uv is several times quicker than pip, but nothing depends on it. When it fails, whatever the reason, pip does

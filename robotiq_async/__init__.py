@@ -13,6 +13,7 @@ What a program needs is imported from here. Where it comes from, and what stands
     web                      a page in the browser
     measure, doctor          measurements of a gripper; what is wrong with a connection
     fleet                    hands on other hosts: agents that serve them, remote hands
+    ros2                     a lifecycle node of ROS 2 around a hand
     simulator, cli           a simulated gripper with its servers; the command line
 
 Nothing of this has run on real hardware yet.

@@ -1,0 +1,62 @@
+"""The robot description: a URDF as text. Knows no ROS."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from importlib.resources import files
+from pathlib import Path
+from typing import Final
+
+PACKAGED: Final = "robotiq_3f.urdf"
+"""In the package's data, if anywhere."""
+_REFERENCES: Final = {"parent": "link", "child": "link", "mimic": "joint"}
+"""Elements of a joint that name another part, and how."""
+
+
+def robot_description(path: str, prefix: str) -> str | None:
+    """The URDF of a file as it is, or the packaged one with the prefix before its links and joints.
+
+    Args:
+        path: of a file; empty for the packaged one.
+        prefix: of the joints.
+
+    Returns:
+        The text; None if the package brings none.
+
+    Raises:
+        OSError: the file cannot be read.
+        ValueError: the file is no URDF.
+    """
+    if path:
+        text = Path(path).read_text(encoding="utf-8")
+        _parse(text, path)
+        return text
+    packaged = files("robotiq_async") / "data" / PACKAGED
+    return prefixed(packaged.read_text(encoding="utf-8"), prefix) if packaged.is_file() else None
+
+
+def prefixed(text: str, prefix: str) -> str:
+    """A URDF whose links and joints have a prefix before their names.
+
+    Raises:
+        ValueError: it is no URDF.
+    """
+    if not prefix:
+        return text
+    robot = _parse(text, PACKAGED)
+    for part in (*robot.findall("link"), *robot.findall("joint")):
+        part.set("name", prefix + part.get("name", ""))
+        for element, attribute in _REFERENCES.items():
+            for reference in part.findall(element):
+                reference.set(attribute, prefix + reference.get(attribute, ""))
+    return ET.tostring(robot, encoding="unicode")
+
+
+def _parse(text: str, where: str) -> ET.Element:
+    try:
+        robot = ET.fromstring(text)
+    except ET.ParseError as error:
+        raise ValueError(f"{where} is no URDF: {error}") from None
+    if robot.tag != "robot":
+        raise ValueError(f"{where} is no URDF: its root is <{robot.tag}>")
+    return robot

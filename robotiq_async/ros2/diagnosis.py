@@ -1,0 +1,119 @@
+"""What is told of a hand: diagnoses, and its state as JSON; nothing that is not known. Knows no ROS."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+from ..enums import AXES, Severity
+from ..errors import NotStartedError
+from ..protocol import Hand
+from ..telemetry.payloads import status_fields
+from ..wire.status import RobotiqStatus
+from .hands import is_connected
+
+
+class Level(IntEnum):
+    """The levels of ``diagnostic_msgs/DiagnosticStatus``."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+    STALE = 3
+
+
+_LEVELS = {
+    Severity.NONE: Level.OK,
+    Severity.PRIORITY: Level.OK,
+    Severity.MINOR: Level.WARN,
+    Severity.MAJOR: Level.ERROR,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """One thing that is well or not.
+
+    Attributes:
+        what: the thing.
+        level: how well it is.
+        message: in words.
+        values: figures.
+    """
+
+    what: str
+    level: Level
+    message: str
+    values: Mapping[str, str] = field(default_factory=dict)
+
+
+def diagnose(hand: Hand, now: float) -> tuple[Diagnosis, Diagnosis]:
+    """The link, and the gripper behind it.
+
+    Args:
+        hand: the hand.
+        now: monotonic seconds.
+    """
+    return _link(hand, now), _gripper(hand)
+
+
+def _link(hand: Hand, now: float) -> Diagnosis:
+    figures = hand.statistics
+    values = {
+        "polls": str(figures.polls),
+        "overruns": str(figures.overruns),
+        "period p99 [ms]": f"{figures.period_p99 * 1e3:.1f}",
+        "round trip p99 [ms]": f"{figures.round_trip_p99 * 1e3:.1f}",
+        "reconnects": str(figures.reconnects),
+        "foreign commands": str(figures.foreign_commands),
+    }
+    status = _newest(hand)
+    if status is not None:
+        values["age of the newest status [s]"] = f"{now - status.timestamp:.3f}"
+    if is_connected(hand):
+        return Diagnosis("link", Level.OK, "connected", values)
+    return Diagnosis("link", Level.ERROR, "the link is down and being opened again", values)
+
+
+def _gripper(hand: Hand) -> Diagnosis:
+    status = _newest(hand)
+    if status is None or not is_connected(hand):
+        return Diagnosis("gripper", Level.STALE, "unknown: the link is down")
+    values = {"state": hand.state.name, "fault": f"0x{int(status.fault):02X}"}
+    for axis in AXES:
+        values[f"{axis.name} position"] = str(status.position(axis))
+        values[f"{axis.name} status"] = status.finger_status(axis).name
+        values[f"{axis.name} current [mA]"] = str(status.current_ma(axis))
+    level = _LEVELS[status.fault.severity]
+    return Diagnosis(
+        "gripper", level, hand.state.name if level is Level.OK else status.fault.description, values
+    )
+
+
+def status_text(hand: Hand, *, takes_commands: bool) -> str:
+    """The state as a JSON object: with a connection all of the newest status, in the words of recordings.
+
+    Args:
+        hand: the hand.
+        takes_commands: whether the node carries out commands.
+    """
+    fields: dict[str, object] = {
+        "state": hand.state.name,
+        "connected": is_connected(hand),
+        "takes_commands": takes_commands,
+    }
+    status = _newest(hand)
+    if status is not None and is_connected(hand):
+        fields["contacts"] = [axis.name for axis in AXES if axis in status.contacts]
+        fields["fault_name"] = status.fault.name
+        fields |= status_fields(status)
+    return json.dumps(fields)
+
+
+def _newest(hand: Hand) -> RobotiqStatus | None:
+    try:
+        return hand.status
+    except NotStartedError:
+        return None

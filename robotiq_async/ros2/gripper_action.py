@@ -1,0 +1,139 @@
+"""The action ``~/gripper_cmd`` of ``control_msgs/action/ParallelGripperCommand``.
+
+Callbacks run in the executor's thread. What concerns the hand is asked of the loop, and a callback that
+raised would end the executor: every one catches all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+
+from control_msgs.action import ParallelGripperCommand
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.action.server import ServerGoalHandle
+from rclpy.callback_groups import CallbackGroup
+from rclpy.node import Node
+
+from ..errors import NotStartedError
+from .bridge import Bridge
+from .connection import Connection, RefusedError
+from .goals import Ending, Outcome
+from .joints import GoalError, Targets, targets
+from .messages import JointStates
+from .settings import Settings
+
+Configured = tuple[Connection, JointStates, Settings]
+
+
+class GripperAction:
+    """Takes goals, runs them on whatever the node is connected to, tells how they go and end."""
+
+    def __init__(
+        self, node: Node, group: CallbackGroup, bridge: Bridge, configured: Callable[[], Configured]
+    ) -> None:
+        """Offer the action.
+
+        Args:
+            node: of which.
+            group: in which callbacks may overlap.
+            bridge: into the loop.
+            configured: what the node has; raises RefusedError while it is not configured.
+        """
+        self._log = node.get_logger()
+        self._bridge = bridge
+        self._configured = configured
+        self._warned = False
+        self._server = ActionServer(
+            node,
+            ParallelGripperCommand,
+            "~/gripper_cmd",
+            execute_callback=self._execute,
+            goal_callback=self._check,
+            cancel_callback=self._cancel,
+            callback_group=group,
+        )
+
+    def destroy(self) -> None:
+        """Offer it no more."""
+        self._server.destroy()
+
+    async def _check(self, request: ParallelGripperCommand.Goal) -> GoalResponse:
+        """Accept a goal that can be begun now; else the log says why not, for the answer has no words."""
+        try:
+            connection, _, settings = self._configured()
+            _targets(request, settings)
+            await self._bridge.ask(connection.check_goal())
+        except (GoalError, RefusedError) as error:
+            self._log.warning(f"goal rejected: {error}")
+            return GoalResponse.REJECT
+        except Exception as error:  # noqa: BLE001  # would end the executor
+            self._log.error(f"goal rejected: {error!r}")
+            return GoalResponse.REJECT
+        self._warn_of_limits(request)
+        return GoalResponse.ACCEPT
+
+    def _cancel(self, handle: ServerGoalHandle) -> CancelResponse:
+        """Accept. The goal hears of it afterwards: this thread has to mark it as canceling first."""
+        try:
+            connection, _, _ = self._configured()
+            key = bytes(handle.goal_id.uuid)
+            self._bridge.loop.call_soon_threadsafe(connection.cancel_goal, key)
+        except Exception as error:  # noqa: BLE001  # would end the executor
+            self._log.warning(f"cancel of a goal that is over: {error}")
+        return CancelResponse.ACCEPT
+
+    async def _execute(self, handle: ServerGoalHandle) -> ParallelGripperCommand.Result:
+        """Run a goal to its end."""
+        result = ParallelGripperCommand.Result()
+        try:
+            if handle.is_cancel_requested:  # between its acceptance and now
+                outcome = Outcome(Ending.CANCELED, stalled=False, reached=False, reason="canceled at once")
+            else:
+                outcome = await self._run(handle, result)
+        except Exception as error:  # noqa: BLE001  # would leave the client without a result
+            outcome = Outcome(Ending.ABORTED, stalled=False, reached=False, reason=str(error) or repr(error))
+        result.stalled, result.reached_goal = outcome.stalled, outcome.reached
+        self._finish(handle, outcome)
+        return result
+
+    async def _run(self, handle: ServerGoalHandle, result: ParallelGripperCommand.Result) -> Outcome:
+        connection, joints, settings = self._configured()
+        asked = _targets(handle.request, settings)
+
+        def feedback() -> None:
+            state = joints.fresh(connection.hand.status)
+            handle.publish_feedback(ParallelGripperCommand.Feedback(state=state))
+
+        async def work() -> Outcome:
+            key = bytes(handle.goal_id.uuid)
+            try:
+                return await connection.run_goal(key, asked, settings, feedback)
+            finally:
+                with suppress(NotStartedError):  # nothing has been read
+                    result.state = joints.fresh(connection.hand.status)
+
+        return await self._bridge.ask(work())
+
+    def _finish(self, handle: ServerGoalHandle, outcome: Outcome) -> None:
+        """Enter the goal's last state. Canceled is legal only if its client has asked for it."""
+        if outcome.ending is Ending.SUCCEEDED:
+            self._log.info(f"goal succeeded: {outcome.reason}")
+            handle.succeed()
+        elif outcome.ending is Ending.CANCELED and handle.is_cancel_requested:
+            self._log.info(f"goal canceled: {outcome.reason}")
+            handle.canceled()
+        else:
+            self._log.warning(f"goal aborted: {outcome.reason}")
+            handle.abort()
+
+    def _warn_of_limits(self, request: ParallelGripperCommand.Goal) -> None:
+        if not self._warned and (any(request.command.velocity) or any(request.command.effort)):
+            self._warned = True
+            self._log.warning(
+                "velocity and effort of goals are not heeded: the parameters speed and force are (said once)"
+            )
+
+
+def _targets(request: ParallelGripperCommand.Goal, settings: Settings) -> Targets:
+    return targets(request.command.name, request.command.position, settings.joint_prefix)

@@ -1,0 +1,215 @@
+"""Joints in radians, as ROS has them, from the axes in counts, and back. Knows no ROS and no clock.
+
+A finger has one motor for three joints, so a goal for a finger is a goal for one of them: the base joint
+(``joint_1``) as far as it turns alone, the middle one (``joint_2``) beyond. The third joint and the second
+palm joint only follow. See :mod:`robotiq_async.kinematics` for where the angles come from.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import degrees, radians
+from types import MappingProxyType
+from typing import Final
+
+from ..enums import Finger
+from ..kinematics import BASE, JOINTS, MIDDLE, PALM, PREFIX, Points, joint_angles, joint_velocities
+from ..wire.status import RobotiqStatus
+
+FINGERS: Final = "fingers"
+"""The name of what stands for all three fingers in a goal: one angle, base and middle joint together."""
+_PALM_JOINT: Final = "palm_finger_1_joint"
+_BASE_LIMITS: Final = (0.0495, 1.2218)
+_MIDDLE_LIMITS: Final = (0.0, 1.5708)
+_TIP_LIMITS: Final = (-1.2217, -0.0523)
+
+LIMITS: Final = MappingProxyType(
+    {name: _BASE_LIMITS for name in JOINTS if name.endswith("_joint_1")}
+    | {name: _MIDDLE_LIMITS for name in JOINTS if name.endswith("_joint_2")}
+    | {name: _TIP_LIMITS for name in JOINTS if name.endswith("_joint_3")}
+    | {_PALM_JOINT: (-0.1784, 0.1920), "palm_finger_2_joint": (-0.1920, 0.1784)}
+)
+"""Lower and upper end of each joint in radians, as the URDF of the hand (robotiq 3f description) has them.
+
+The angles leave them at the ends: a finger that reads less than 6 counts, a scissor that reads more than 232.
+Consumers refuse a joint outside its limits, so what is published stays inside.
+"""
+_LIMITS: Final = tuple(LIMITS[name] for name in JOINTS)
+
+CLOSING_END: Final = 2.8
+"""End of the closing angle of all fingers: 70 degrees of the base and 90 of the middle joint, rounded up."""
+TOLERANCE: Final = 1e-3
+"""Radians that a goal may lie outside of its range: others round, too."""
+_STOP_TOLERANCE: Final = 0.1
+"""Radians that the base joint may be asked to stand off its stop while the middle one bends."""
+
+VELOCITY_S: Final = 0.04
+"""Velocities are taken over at least this time: a count is half a degree."""
+
+
+class GoalError(ValueError):
+    """A goal that asks for something which is not there, or cannot be."""
+
+
+@dataclass(frozen=True, slots=True)
+class Targets:
+    """Where axes are to go.
+
+    Attributes:
+        counts: for each position the axes that are to go there; no axis twice.
+    """
+
+    counts: tuple[tuple[int, Finger], ...]
+
+    @property
+    def axes(self) -> Finger:
+        """All addressed axes."""
+        return Finger(sum(int(axes) for _, axes in self.counts))
+
+
+def joint_names(prefix: str = "") -> list[str]:
+    """The eleven names, each behind the prefix."""
+    return [prefix + name for name in JOINTS]
+
+
+def positions(status: RobotiqStatus) -> list[float]:
+    """The eleven joints in radians, inside their limits."""
+    return [
+        min(max(angle, low), high) for angle, (low, high) in zip(joint_angles(status), _LIMITS, strict=True)
+    ]
+
+
+class Velocities:
+    """Joint velocities from one status to the next."""
+
+    def __init__(self) -> None:
+        """Begin with nothing to compare with."""
+        self._statuses: list[RobotiqStatus] = []
+
+    def of(self, status: RobotiqStatus) -> list[float]:
+        """Radians a second of the eleven joints, over the last hundredths of a second; 0 at first."""
+        kept = self._statuses
+        if not kept or status.timestamp > kept[-1].timestamp:
+            kept.append(status)
+        while len(kept) > 2 and status.timestamp - kept[1].timestamp >= VELOCITY_S:
+            del kept[0]
+        if kept[0].timestamp >= status.timestamp:
+            return [0.0] * len(JOINTS)
+        return list(joint_velocities(kept[0], status))
+
+    def forget(self) -> None:
+        """What comes next has nothing to do with what was: the link was down."""
+        self._statuses.clear()
+
+
+def targets(names: Sequence[str], angles: Sequence[float], prefix: str = "") -> Targets:
+    """What a goal asks of the axes.
+
+    Args:
+        names: of joints, behind the prefix; none with one angle for all fingers.
+        angles: radians, one for each name.
+        prefix: of the joints of this hand.
+
+    Raises:
+        GoalError: the goal cannot be carried out as it stands; nothing is rounded into shape.
+    """
+    asked = _pairs(names, angles, prefix)
+    counts: dict[Finger, int] = {}
+    for name, angle in asked.items():
+        if name == FINGERS:
+            for finger in PREFIX:
+                counts[finger] = _closing_counts(angle)
+        elif name == _PALM_JOINT:
+            counts[Finger.SCISSOR] = _counts(name, angle, LIMITS[name], PALM)
+    for finger, name in PREFIX.items():
+        base, middle = asked.get(f"{name}_joint_1"), asked.get(f"{name}_joint_2")
+        if base is None and middle is None:
+            continue
+        if finger in counts:
+            raise GoalError(f"two positions for one finger: {FINGERS!r} and {name!r}")
+        counts[finger] = _finger_counts(name, base, middle)
+    return Targets(
+        tuple(
+            (position, Finger(sum(axis for axis, each in counts.items() if each == position)))
+            for position in dict.fromkeys(counts.values())
+        )
+    )
+
+
+def _pairs(names: Sequence[str], angles: Sequence[float], prefix: str) -> dict[str, float]:
+    """Names without the prefix, and finite angles."""
+    if not names and len(angles) == 1:
+        names = [prefix + FINGERS]
+    if not names:
+        raise GoalError(f"no joint is named, and not one position but {len(angles)} given")
+    if len(names) != len(angles):
+        raise GoalError(f"{len(names)} joints and {len(angles)} positions")
+    asked: dict[str, float] = {}
+    for name, angle in zip(names, angles, strict=True):
+        plain = _plain_name(name, prefix)
+        if plain in asked:
+            raise GoalError(f"two positions for one joint: {name!r}")
+        if not math.isfinite(angle):
+            raise GoalError(f"the position of {name!r} is {angle}")
+        asked[plain] = angle
+    return asked
+
+
+def _plain_name(name: str, prefix: str) -> str:
+    plain = name.removeprefix(prefix)
+    if name.startswith(prefix) and plain in _COMMANDED:
+        return plain
+    commanded = ", ".join(prefix + each for each in _COMMANDED)
+    if name.startswith(prefix) and plain in JOINTS:
+        raise GoalError(f"{name!r} follows other joints and takes no goal; these do: {commanded}")
+    raise GoalError(f"there is no joint {name!r}; these take goals: {commanded}")
+
+
+def _finger_counts(name: str, base: float | None, middle: float | None) -> int:
+    """One motor turns both: the base joint up to its stop, the middle one from there on."""
+    if middle is not None:
+        counts = _counts(f"{name}_joint_2", middle, _MIDDLE_LIMITS, MIDDLE)
+        if middle > TOLERANCE:
+            if base is not None and base < radians(BASE[-1][1]) - _STOP_TOLERANCE:
+                raise GoalError(
+                    f"two positions for one finger: {name}_joint_2 bends only once {name}_joint_1 is at its "
+                    f"stop ({radians(BASE[-1][1]):.2f} rad), and not at {base:.2f} rad"
+                )
+            if base is not None:
+                _counts(f"{name}_joint_1", base, _BASE_RANGE, BASE)
+            return counts
+        if base is None:
+            return counts
+    assert base is not None
+    return _counts(f"{name}_joint_1", base, _BASE_RANGE, BASE)
+
+
+def _closing_counts(angle: float) -> int:
+    if not -TOLERANCE <= angle <= CLOSING_END + TOLERANCE:
+        raise GoalError(f"{FINGERS!r} must be in 0..{CLOSING_END} rad, got {angle:.4f}")
+    stop = radians(BASE[-1][1])
+    return _between(angle, BASE) if angle <= stop else _between(angle - stop, MIDDLE)
+
+
+def _counts(name: str, angle: float, limits: tuple[float, float], points: Points) -> int:
+    low, high = limits
+    if not low - TOLERANCE <= angle <= high + TOLERANCE:
+        raise GoalError(f"{name!r} must be in {low}..{high} rad, got {angle:.4f}")
+    return _between(angle, points)
+
+
+def _between(angle: float, points: Points) -> int:
+    (first, at_first), (last, at_last) = points
+    share = (degrees(angle) - at_first) / (at_last - at_first)
+    return round(first + (last - first) * min(max(share, 0.0), 1.0))
+
+
+_BASE_RANGE: Final = (0.0, _BASE_LIMITS[1])
+"""Of goals: 0 for an open finger is what people write, although it reads a little more there."""
+_COMMANDED: Final = (
+    *(f"{name}_joint_{number}" for name in PREFIX.values() for number in (1, 2)),
+    _PALM_JOINT,
+    FINGERS,
+)

@@ -1,0 +1,192 @@
+"""The lifecycle node: what its transitions and services do.
+
+Configure connects and reads, activate permits commands and moves nothing, deactivate halts, cleanup
+disconnects. All callbacks run in the executor's thread; the hand belongs to the loop, across the bridge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Final
+
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.context import Context
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.qos import QoSProfile
+from std_srvs.srv import Trigger
+
+from ..errors import RobotiqError
+from . import parameters
+from .bridge import Bridge, ClosedError
+from .connection import COMMANDS, Connection, RefusedError
+from .description import robot_description
+from .gripper_action import Configured, GripperAction
+from .hands import make_hand
+from .messages import JointStates
+from .publishing import Publishing
+
+NAME: Final = "gripper"
+_CALLS: Final = QoSProfile(depth=100)
+"""Calls that wait for the executor. Of ROS's usual ten a client that hammers would push out the others'."""
+_SUCCESS, _FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
+
+
+class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
+    """A gripper as a ROS 2 node. Begins unconfigured, and has no hand then."""
+
+    def __init__(self, context: Context, bridge: Bridge, failed: Callable[[BaseException], object]) -> None:
+        """Declare parameters and offer services, action and topics; connects to nothing.
+
+        Args:
+            context: of ROS.
+            bridge: into the loop.
+            failed: is called, in the loop, with what must end the process.
+        """
+        super().__init__(NAME, context=context)
+        self._bridge = bridge
+        self._now: Configured | None = None
+        """What the node has while it is configured; the loop reads it too."""
+        parameters.declare(self)
+        parameters.guard(self, lambda: self._now is not None, self._change)
+        # In the default group a halt would wait for the activation before it.
+        group = ReentrantCallbackGroup()
+        self._publishing = Publishing(self, failed)
+        self._action = GripperAction(self, group, bridge, self._configured)
+        for name in COMMANDS:
+            serve = partial(self._serve, name)
+            self.create_service(Trigger, f"~/{name}", serve, qos_profile=_CALLS, callback_group=group)
+        self._answer_illegal_transitions()
+
+    # -- transitions -----------------------------------------------------------------------------------
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002
+        """Connect and read. A failure leaves the node unconfigured."""
+        return self._transition("configure", self._configure)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002
+        """Permit commands. Nothing moves."""
+        return self._transition("activate", self._activate)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002
+        """Halt, and take no commands any more."""
+        return self._transition("deactivate", self._deactivate)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002
+        """Disconnect."""
+        return self._transition("clean up", self._clean_up)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002
+        """Halt if need be, and disconnect. The process goes on until it is told to stop."""
+        return self._transition("shut down", self._clean_up)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002
+        """Disconnect: the node is unconfigured then."""
+        return self._transition("clean up after an error", self._clean_up)
+
+    def start_by_itself(self) -> None:
+        """Configure and activate if the parameter ``autostart`` says so. In the executor's thread only."""
+        try:
+            wanted = parameters.read(self).autostart
+        except ValueError:
+            wanted = True  # the configuration tells what is wrong
+        if wanted and self.trigger_configure() == _SUCCESS:
+            self.trigger_activate()
+
+    async def close(self) -> None:
+        """Disconnect, in the loop: the process ends. Goals under way are aborted, fingers stop."""
+        await self._publishing.stop()
+        if self._now is not None:
+            await self._now[0].close("the node is shutting down")
+
+    def _transition(self, what: str, work: Callable[[], str]) -> TransitionCallbackReturn:
+        """Do the work of a transition. ROS would swallow what it raises."""
+        try:
+            self.get_logger().info(work())
+        except (RobotiqError, ValueError, OSError, ClosedError) as error:
+            self.get_logger().error(f"cannot {what}: {error}")
+            return _FAILURE
+        except Exception as error:  # noqa: BLE001  # nobody else would tell
+            self.get_logger().error(f"cannot {what}: {error!r}")
+            return _FAILURE
+        return _SUCCESS
+
+    def _configure(self) -> str:
+        settings = parameters.read(self)
+        urdf = robot_description(settings.urdf, settings.joint_prefix)
+        connection = Connection(make_hand(settings), settings)
+        joints = JointStates(self.get_clock(), settings.joint_prefix, settings.frame_id)
+        self._now = connection, joints, settings
+        try:
+            self._bridge.wait(connection.open())
+        except BaseException:
+            self._now = None
+            raise
+        self._bridge.wait(self._publishing.start(connection, joints, settings.publish_rate))
+        if urdf is not None:
+            self._publishing.describe(urdf)
+        return f"connected to {connection.hand.address}: {connection.hand.state.name}"
+
+    def _activate(self) -> str:
+        connection, _, _ = self._configured()
+        self._bridge.wait(connection.permit())
+        return "commands are taken; nothing has been moved"
+
+    def _deactivate(self) -> str:
+        connection, _, _ = self._configured()
+        self._bridge.wait(connection.forbid("the node was deactivated"))
+        return "halted; no commands are taken"
+
+    def _clean_up(self) -> str:
+        if self._now is None:
+            return "not connected"
+        connection, self._now = self._now[0], None
+        self._bridge.wait(self._publishing.stop())
+        self._bridge.wait(connection.close("the node was cleaned up"))
+        return "disconnected"
+
+    # -- services --------------------------------------------------------------------------------------
+
+    async def _serve(self, name: str, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Carry out a command. The answer says how it ended, and so does the log if it did not go well."""
+        try:
+            connection, _, _ = self._configured()
+            response.message = await self._bridge.ask(connection.command(name))
+            response.success = True
+        except Exception as error:  # noqa: BLE001  # would end the executor
+            known = isinstance(error, RobotiqError | ClosedError)
+            response.message = str(error) if known else repr(error)
+            self.get_logger().warning(f"{name}: {response.message}")
+        return response
+
+    # -- inside ----------------------------------------------------------------------------------------
+
+    def _configured(self) -> Configured:
+        if self._now is None:
+            raise RefusedError("the node is not configured")
+        return self._now
+
+    def _change(self, name: str, value: object) -> None:
+        """A parameter that counts at once."""
+        if self._now is not None:
+            connection, joints, settings = self._now
+            self._now = connection, joints, replace(settings, **{name: value})  # type: ignore[arg-type]
+
+    def _answer_illegal_transitions(self) -> None:
+        """Answer a transition that is not possible now with a no.
+
+        In rclpy before Kilted it raises in the executor, and its client waits for ever.
+        """
+        service = self._service_change_state
+        answer = service.callback
+
+        def guarded(request: object, response: object) -> object:
+            try:
+                return answer(request, response)
+            except Exception as error:  # noqa: BLE001  # would end the executor
+                self.get_logger().warning(f"transition rejected: {' '.join(str(error).split())}")
+                response.success = False  # type: ignore[attr-defined]
+                return response
+
+        service.callback = guarded

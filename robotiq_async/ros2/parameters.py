@@ -1,0 +1,77 @@
+"""The parameters as ROS has them: declared, read, and refused with a reason."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
+
+from .settings import PARAMETERS, Parameter, Settings, check_parameter, check_settings
+
+
+def declare(node: Node) -> None:
+    """Declare all parameters, whatever the node was started with: a wrong value fails the configuration.
+
+    Their types are checked here and not by ROS: for it 50 is no publish_rate, and the node would not start.
+    """
+    for name, parameter in PARAMETERS.items():
+        try:
+            node.declare_parameter(name, parameter.default, _descriptor(parameter))
+        except (InvalidParameterValueException, InvalidParameterTypeException):
+            plain = ParameterDescriptor(description=parameter.description, dynamic_typing=True)
+            node.declare_parameter(name, parameter.default, plain)
+
+
+def read(node: Node) -> Settings:
+    """The parameters, checked.
+
+    Raises:
+        ValueError: a value that will not do.
+    """
+    return check_settings({name: node.get_parameter(name).value for name in PARAMETERS})
+
+
+def guard(node: Node, is_configured: Callable[[], bool], changed: Callable[[str, object], object]) -> None:
+    """Refuse values that will not do, and changes that would come too late; the log says why.
+
+    Args:
+        node: of which.
+        is_configured: whether the node has been configured with what is there.
+        changed: is called with what may be changed then.
+    """
+
+    def check(parameters: Sequence[RosParameter]) -> SetParametersResult:
+        for each in parameters:
+            known = PARAMETERS.get(each.name)
+            if known is None:
+                continue  # one of ROS's own
+            try:
+                value = check_parameter(each.name, each.value)
+            except ValueError as error:
+                return _refused(node, str(error))
+            if is_configured() and not known.live:
+                return _refused(node, f"{each.name} counts when the node is configured: clean it up first")
+            changed(each.name, value)
+        return SetParametersResult(successful=True)
+
+    node.add_on_set_parameters_callback(check)
+
+
+def _refused(node: Node, reason: str) -> SetParametersResult:
+    node.get_logger().warning(f"parameter rejected: {reason}")
+    return SetParametersResult(successful=False, reason=reason)
+
+
+def _descriptor(parameter: Parameter) -> ParameterDescriptor:
+    descriptor = ParameterDescriptor(description=parameter.description, dynamic_typing=True)
+    if isinstance(parameter.default, float):
+        bounds = FloatingPointRange(from_value=parameter.low, to_value=parameter.high)
+        descriptor.floating_point_range = [bounds]
+    elif isinstance(parameter.default, int) and not isinstance(parameter.default, bool):
+        descriptor.integer_range = [
+            IntegerRange(from_value=int(parameter.low), to_value=int(parameter.high), step=1)
+        ]
+    return descriptor

@@ -1,0 +1,54 @@
+"""A node in a process of its own, at a simulated gripper, with a client: a plugin of `make test-ros2`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import pytest
+
+from robotiq_async.simulator import SimulatedGripper
+from tests.ros2.live.bench import Client, Simulator
+from tests.ros2.live.processes import OF_ROS, Process, isolate, node
+
+isolate()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Warnings are errors but for one of ROS's own."""
+    config.addinivalue_line("filterwarnings", f"ignore:{OF_ROS}:DeprecationWarning")
+
+
+class Cell(NamedTuple):
+    simulator: Simulator
+    node: Process
+    client: Client
+
+
+@pytest.fixture(scope="module")
+def shared() -> Iterator[Cell]:
+    """An active node at an active gripper, for all tests of a file."""
+    with (
+        Simulator() as simulator,
+        node(address=simulator.address, autostart=True) as process,
+        Client() as client,
+    ):
+        process.prints("commands are taken")
+        assert client.call("activate").success
+        yield Cell(simulator, process, client)
+
+
+@pytest.fixture
+def cell(shared: Cell) -> Cell:
+    """The same, with open fingers and nothing between them."""
+    shared.simulator.do(SimulatedGripper.remove_object)
+    shared.client.set("allow_stalling", True)
+    shared.client.move(0.0).ends()
+    return shared
+
+
+@pytest.fixture
+def simulator() -> Iterator[Simulator]:
+    """A gripper of a test's own."""
+    with Simulator() as simulator:
+        yield simulator

@@ -1,0 +1,118 @@
+"""The life of the node: transitions, parameters, what is refused when, and how signals end it."""
+
+from __future__ import annotations
+
+import signal
+
+import pytest
+
+from robotiq_async.ros2.settings import PARAMETERS
+from tests.ros2.live.bench import ABORTED, SUCCEEDED, Client, Simulator
+from tests.ros2.live.goals import begun, position
+from tests.ros2.live.processes import node
+
+
+def writes(simulator: Simulator) -> int:
+    return simulator.do(lambda gripper: len(gripper.writes))
+
+
+def test_a_life(simulator: Simulator) -> None:
+    with node(address=simulator.address) as process, Client() as client:
+        assert client.state() == "unconfigured"
+        assert "the node is not configured" in client.call("halt").message
+        assert not client.change("activate"), "that is not possible yet"
+        assert client.change("configure")
+        process.prints("connected to tcp://127.0.0.1")
+        assert client.state() == "inactive"
+        client.joint_states().wait()  # also while inactive
+        assert "the node is not active" in client.call("activate").message
+        assert client.send(["fingers"], [0.0]) is None
+        process.prints("goal rejected: the node is not active")
+        assert client.call("halt").success, "a halt is always taken"
+        assert client.change("activate")
+        assert client.send(["fingers"], [0.0]) is None
+        process.prints("goal rejected: the gripper is not activated")
+        assert writes(simulator) == 0, "nothing was written so far"
+        assert client.call("activate").success
+        goal = begun(client.move(2.8))
+        assert client.change("deactivate")
+        assert goal.ends()[0] == ABORTED
+        process.prints("goal aborted: the node was deactivated")
+        there = position(simulator)
+        assert there < 230
+        assert client.send(["fingers"], [0.0]) is None
+        assert client.change("activate")
+        assert position(simulator) == there, "activating moves nothing"
+        assert client.move(0.0).ends()[0] == SUCCEEDED
+        assert client.change("deactivate")
+        assert client.change("cleanup")
+        assert client.state() == "unconfigured"
+        assert client.change("configure")
+        process.prints("connected to", times=2)
+        assert client.change("shutdown")
+        assert client.state() == "finalized"
+        process.send(signal.SIGTERM)
+        assert process.ends() == 0
+
+
+def test_who_only_looks_leaves_the_fingers_alone(simulator: Simulator) -> None:
+    with node(address=simulator.address) as process, Client() as client:
+        assert client.change("configure")
+        client.joint_states().wait()
+        process.send(signal.SIGINT)
+        assert process.ends() == 0
+    assert writes(simulator) == 0
+
+
+def test_parameters(simulator: Simulator) -> None:
+    with node(address="tcp://", publish_rate=20, poll_interval=7) as process, Client() as client:
+        assert not client.change("configure")
+        process.prints("cannot configure: malformed address 'tcp://'")
+        assert client.state() == "unconfigured"
+        assert client.set("address", simulator.address).successful
+        assert not client.change("configure")
+        process.prints("cannot configure: poll_interval must be seconds in 0.001..0.1, got 7")
+        for name, value, reason in (
+            ("publish_rate", "fast", "publish_rate must be a number in 1.0..200.0, got 'fast'"),
+            ("speed", 256, "256"),
+            ("address", "tcp://127.1", "malformed address"),
+        ):
+            refused = client.set(name, value)
+            assert not refused.successful
+            assert reason in refused.reason
+        process.prints("parameter rejected: publish_rate must be a number")
+        assert client.set("poll_interval", 0.01).successful
+        assert client.change("configure")
+        refused = client.set("address", "sim://")
+        assert "address counts when the node is configured: clean it up first" in refused.reason
+        assert client.set("force", 20).successful
+        for name, described in zip(PARAMETERS, client.describe(*PARAMETERS), strict=True):
+            assert described.description == PARAMETERS[name].description
+        (rate,) = client.describe("publish_rate")
+        assert (rate.floating_point_range[0].from_value, rate.floating_point_range[0].to_value) == (1, 200)
+        assert process.is_running
+
+
+def test_a_gripper_that_is_not_there(simulator: Simulator) -> None:
+    with node(address="tcp://127.0.0.1:9", autostart=True) as process, Client() as client:
+        process.prints("cannot configure: cannot connect to tcp://127.0.0.1:9")
+        assert client.state() == "unconfigured"
+        assert client.set("address", simulator.address).successful
+        assert client.change("configure")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_during_a_goal(simulator: Simulator, number: signal.Signals) -> None:
+    with node(address=simulator.address, autostart=True) as process, Client() as client:
+        process.prints("commands are taken")
+        assert client.call("activate").success
+        goal = begun(client.move(2.8))
+        process.send(number)
+        process.send(number)  # launchers send several
+        assert goal.ends()[0] == ABORTED
+        assert process.ends() == 0
+        there = position(simulator)
+        assert there < 230
+        assert not simulator.do(lambda gripper: gripper.request_registers[0] >> 8 & 0x08), "rGTO"
+        assert position(simulator) == there
+        assert "Traceback" not in process.text

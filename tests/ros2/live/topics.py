@@ -1,0 +1,68 @@
+"""What the node publishes, alone and beside another one."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import pytest
+
+from robotiq_async import Finger
+from tests.ros2.live.bench import SUCCEEDED, Client, Simulator
+from tests.ros2.live.goals import position
+from tests.ros2.live.processes import node
+
+
+def test_a_prefix_is_before_every_joint(simulator: Simulator) -> None:
+    with (
+        Simulator() as other,
+        node(namespace="/left", address=simulator.address, autostart=True, joint_prefix="left_") as left,
+        node(namespace="/right", address=other.address, autostart=True, joint_prefix="right_") as right,
+        Client("/left/gripper") as one,
+        Client("/right/gripper") as two,
+    ):
+        for process, client in ((left, one), (right, two)):
+            process.prints("commands are taken")
+            assert client.call("activate").success
+        moving = one.move(2.8, names=["left_fingers"]), two.move(math.radians(35), names=["right_fingers"])
+        assert [goal.ends()[0] for goal in moving] == [SUCCEEDED, SUCCEEDED]
+        assert position(simulator) >= 238
+        assert position(other) == 70
+        assert one.joint_states("/left/joint_states").wait().name[0] == "left_palm_finger_1_joint"
+        assert two.joint_states("/right/joint_states").wait().name[0] == "right_palm_finger_1_joint"
+        assert one.send(["right_fingers"], [0.0]) is None
+        left.prints("goal rejected: there is no joint 'right_fingers'")
+
+
+def test_topics(simulator: Simulator, tmp_path_factory: pytest.TempPathFactory) -> None:
+    urdf = tmp_path_factory.mktemp("urdf") / "hand.urdf"
+    urdf.write_text("<robot name='hand'/>", encoding="utf-8")
+    options: dict[str, Any] = {"urdf": str(urdf), "frame_id": "palm", "publish_rate": 100.0}
+    with node(address=simulator.address, autostart=True, **options) as process, Client() as client:
+        process.prints("commands are taken")
+        assert client.description().wait(new=False).data == "<robot name='hand'/>"
+        states = client.joint_states()
+        first = states.wait()
+        assert first.header.frame_id == "palm"
+        assert len(first.name) == len(first.position) == len(first.velocity) == len(first.effort) == 11
+        assert all(math.isnan(effort) for effort in first.effort)
+        second = states.wait()
+        assert second.header.stamp != first.header.stamp
+        age = client.node.get_clock().now().nanoseconds / 1e9 - second.header.stamp.sec
+        assert abs(age) < 5
+        status = client.status()
+        fields = json.loads(status.wait(new=False).data)
+        assert fields["state"] == "RESET"
+        assert fields["takes_commands"] is True
+        diagnostics = client.diagnostics()
+        link, gripper = diagnostics.wait().status
+        assert (link.name, gripper.name) == ("/gripper: link", "/gripper: gripper")
+        assert link.level == gripper.level == b"\x00"
+        assert link.hardware_id == simulator.address
+        assert client.call("activate").success
+        simulator.do(lambda it: it.place_object(Finger.B, position=90))
+        client.move(2.8).ends()
+        fields = json.loads(status.wait().data)
+        assert fields["contacts"] == ["B"]
+        assert fields["B"]["status"] == "CONTACT_CLOSING"

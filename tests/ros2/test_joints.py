@@ -1,0 +1,175 @@
+"""Joints and counts: no ROS is needed here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robotiq_async import Finger, RobotiqStatus
+from robotiq_async.kinematics import JOINTS, joint_angles
+from robotiq_async.ros2.joints import (
+    LIMITS,
+    GoalError,
+    Targets,
+    Velocities,
+    joint_names,
+    positions,
+    targets,
+)
+from tests.register_words import status_of
+
+A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
+
+
+def reading(a: int = 6, b: int = 6, c: int = 6, scissor: int = 137, *, at: float = 0.0) -> RobotiqStatus:
+    return status_of(0x31, position=(a, b, c, scissor), at=at)
+
+
+byte = st.integers(0, 255)
+
+
+# -- joint states ------------------------------------------------------------------------------------------
+
+
+def test_the_names_stand_behind_the_prefix() -> None:
+    assert joint_names() == list(JOINTS)
+    assert joint_names("left_")[0] == "left_palm_finger_1_joint"
+    assert len(set(joint_names("left_"))) == 11
+
+
+@given(byte, byte, byte, byte)
+def test_every_joint_is_inside_its_limits(a: int, b: int, c: int, scissor: int) -> None:
+    for name, angle in zip(JOINTS, positions(reading(a, b, c, scissor)), strict=True):
+        low, high = LIMITS[name]
+        assert low <= angle <= high, name
+
+
+@given(st.integers(6, 255), st.integers(15, 232))
+def test_what_is_inside_anyway_is_left_alone(finger: int, scissor: int) -> None:
+    status = reading(finger, finger, finger, scissor)
+    assert positions(status) == pytest.approx(joint_angles(status), abs=1e-4)
+
+
+def test_a_limit_says_where_it_bites() -> None:
+    base, palm = JOINTS.index("finger_1_joint_1"), JOINTS.index("palm_finger_1_joint")
+    assert joint_angles(reading(b=5))[base] < positions(reading(b=5))[base] == 0.0495
+    assert joint_angles(reading(scissor=240))[palm] < positions(reading(scissor=240))[palm] == -0.1784
+
+
+def test_velocities_are_taken_over_some_time() -> None:
+    velocities = Velocities()
+    assert velocities.of(reading(at=0.0)) == [0.0] * 11
+    base = JOINTS.index("finger_middle_joint_1")
+    for step in range(1, 20):
+        velocity = velocities.of(reading(a=6 + step, at=step * 0.01))[base]
+        assert velocity == pytest.approx(math.radians(0.5) / 0.01)
+    assert velocities.of(reading(a=25, at=0.19))[base] == pytest.approx(math.radians(0.5) / 0.01)
+
+
+def test_velocities_forget_what_was_before_a_lost_link() -> None:
+    velocities = Velocities()
+    velocities.of(reading(a=6, at=0.0))
+    velocities.forget()
+    assert velocities.of(reading(a=200, at=0.1)) == [0.0] * 11
+
+
+# -- goals -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("names", "angles", "counts"),
+    [
+        (["finger_1_joint_1"], [0.0], [(0, B)]),
+        (["finger_2_joint_1"], [math.radians(35)], [(70, C)]),
+        (["finger_middle_joint_1"], [1.2218], [(140, A)]),
+        (["finger_middle_joint_2"], [math.radians(45)], [(190, A)]),
+        (["finger_middle_joint_2"], [1.5708], [(240, A)]),
+        (["finger_middle_joint_2"], [0.0], [(140, A)]),
+        (["finger_1_joint_1", "finger_1_joint_2"], [1.2, 0.9], [(197, B)]),
+        (["finger_1_joint_1", "finger_1_joint_2"], [0.5, 0.0], [(57, B)]),
+        (["palm_finger_1_joint"], [0.192], [(15, S)]),
+        (["palm_finger_1_joint"], [0.0], [(128, S)]),
+        (["palm_finger_1_joint"], [-0.1784], [(232, S)]),
+        (["fingers"], [0.0], [(0, A | B | C)]),
+        (["fingers"], [2.8], [(240, A | B | C)]),
+        (["fingers"], [math.radians(70)], [(140, A | B | C)]),
+        ([], [math.radians(115)], [(190, A | B | C)]),
+        (["fingers", "palm_finger_1_joint"], [0.0, 0.0], [(0, A | B | C), (128, S)]),
+        (["finger_1_joint_1", "finger_2_joint_1"], [0.5, 0.7], [(57, B), (80, C)]),
+        (["finger_1_joint_1", "finger_2_joint_1"], [0.5, 0.5], [(57, B | C)]),
+        (["finger_1_joint_1"], [-0.0005], [(0, B)]),  # others round, too
+    ],
+)
+def test_what_a_goal_asks_of_the_axes(
+    names: Sequence[str], angles: Sequence[float], counts: list[tuple[int, Finger]]
+) -> None:
+    assert targets(names, angles).counts == tuple(counts)
+
+
+@given(st.integers(6, 240))
+def test_a_joint_state_sent_back_as_a_goal_leads_there(counts: int) -> None:
+    state = dict(zip(JOINTS, positions(reading(b=counts)), strict=True))
+    names = ["finger_1_joint_1", "finger_1_joint_2"]
+    assert targets(names, [state[name] for name in names]).counts == ((counts, B),)
+
+
+@given(st.integers(15, 232))
+def test_so_does_that_of_the_palm(counts: int) -> None:
+    palm = positions(reading(scissor=counts))[JOINTS.index("palm_finger_1_joint")]
+    assert targets(["palm_finger_1_joint"], [palm]).counts == ((counts, S),)
+
+
+def test_the_prefix_is_taken_off() -> None:
+    assert targets(["left_finger_1_joint_1"], [0.0], "left_").counts == ((0, B),)
+    assert targets([], [0.0], "left_").axes == Finger.ABC
+    with pytest.raises(GoalError, match="there is no joint 'finger_1_joint_1'; these take goals: left_"):
+        targets(["finger_1_joint_1"], [0.0], "left_")
+
+
+def test_the_addressed_axes() -> None:
+    assert Targets(((0, A | B), (9, S))).axes == A | B | S
+
+
+@pytest.mark.parametrize(
+    ("names", "angles", "reason"),
+    [
+        (["finger_1_joint_1"], [math.nan], "the position of 'finger_1_joint_1' is nan"),
+        (["fingers"], [math.inf], "is inf"),
+        (["left_finger_1_joint_1"], [0.1], "there is no joint 'left_finger_1_joint_1'"),
+        (["robotiq_85_left_knuckle_joint"], [0.1], "there is no joint"),
+        (["finger_1_joint_3"], [-0.5], "follows other joints and takes no goal"),
+        (["palm_finger_2_joint"], [0.0], "follows other joints"),
+        (["finger_1_joint_1", "finger_1_joint_1"], [0.1, 0.2], "two positions for one joint: 'finger_1_j"),
+        (["fingers", "finger_1_joint_1"], [0.1, 0.2], "two positions for one finger: 'fingers' and"),
+        (["finger_1_joint_1", "finger_1_joint_2"], [0.5, 0.5], "bends only once finger_1_joint_1 is at"),
+        (["finger_1_joint_1", "finger_1_joint_2"], [1.5, 0.5], "must be in 0.0..1.2218 rad"),
+        (["finger_1_joint_1"], [1.3], "'finger_1_joint_1' must be in 0.0..1.2218 rad, got 1.3000"),
+        (["finger_1_joint_1"], [-0.1], "must be in"),
+        (["finger_middle_joint_2"], [1.6], "must be in 0.0..1.5708 rad"),
+        (["palm_finger_1_joint"], [0.2], "must be in -0.1784..0.192 rad"),
+        (["fingers"], [2.9], "must be in 0..2.8 rad"),
+        (["fingers"], [-0.1], "must be in 0..2.8 rad"),
+        (["fingers"], [], "1 joints and 0 positions"),
+        (["fingers"], [1.0, 2.0], "1 joints and 2 positions"),
+        ([], [], "no joint is named"),
+        ([], [0.1, 0.2], "not one position but 2"),
+    ],
+)
+def test_what_a_goal_cannot_ask(names: Sequence[str], angles: Sequence[float], reason: str) -> None:
+    with pytest.raises(GoalError) as refused:
+        targets(names, angles)
+    assert reason in str(refused.value)
+
+
+@given(st.lists(st.tuples(st.sampled_from([*JOINTS, "fingers", "", "x"]), st.floats()), max_size=5))
+def test_any_goal_is_either_refused_or_within_the_range(pairs: list[tuple[str, float]]) -> None:
+    try:
+        goal = targets([name for name, _ in pairs], [angle for _, angle in pairs])
+    except GoalError:
+        return
+    assert all(0 <= position <= 255 and axes for position, axes in goal.counts)
+    assert sum(int(axes) for _, axes in goal.counts) == int(goal.axes) <= 15

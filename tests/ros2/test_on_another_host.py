@@ -1,0 +1,84 @@
+"""The node's side of a hand that an agent on another host serves: what is done with a hand is the same."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from robotiq_async import Finger, State
+from robotiq_async.ros2.connection import Connection, RefusedError
+from robotiq_async.ros2.diagnosis import Level, diagnose
+from robotiq_async.ros2.goals import Ending
+from robotiq_async.ros2.joints import Targets
+from robotiq_async.ros2.settings import PARAMETERS, check_settings
+from robotiq_async.session.clock import now
+from tests.fleet.lab import lab
+from tests.virtual import virtual
+
+SETTINGS = check_settings({name: parameter.default for name, parameter in PARAMETERS.items()})
+CLOSE = Targets(((240, Finger.ABC),))
+
+
+@virtual
+async def test_a_goal_and_its_cancellation() -> None:
+    async with lab() as here:
+        hand = here.client(control=None)
+        connection = Connection(hand, SETTINGS)
+        await connection.open()
+        assert not hand.is_in_control, "connecting only reads"
+        await connection.permit()
+        assert [each.level for each in diagnose(hand, now())] == [Level.OK, Level.OK]
+        outcome = await connection.run_goal(
+            b"1", Targets(((60, Finger.A), (80, Finger.B))), SETTINGS, lambda: None
+        )
+        assert outcome.ending is Ending.SUCCEEDED
+        assert [here.gripper.position(axis) for axis in (Finger.A, Finger.B)] == pytest.approx(
+            [60, 80], abs=2
+        )
+        goal = asyncio.create_task(connection.run_goal(b"2", CLOSE, SETTINGS, lambda: None))
+        async for status in hand.statuses():
+            if status.position(Finger.A) > 90:
+                break
+        connection.cancel_goal(b"2")
+        assert (await goal).ending is Ending.CANCELED
+        there = here.gripper.position(Finger.A)
+        assert there < 200
+        await asyncio.sleep(0.5)
+        assert abs(here.gripper.position(Finger.A) - there) <= 3
+        await connection.close("the end")
+        assert not hand.is_in_control
+
+
+@virtual
+async def test_a_new_goal_holds_the_other_axes() -> None:
+    async with lab() as here:
+        hand = here.client(control=None)
+        connection = Connection(hand, SETTINGS)
+        await connection.open()
+        await connection.permit()
+        first = asyncio.create_task(connection.run_goal(b"1", CLOSE, SETTINGS, lambda: None))
+        async for status in hand.statuses():
+            if status.position(Finger.A) > 40:
+                break
+        second = await connection.run_goal(b"2", Targets(((20, Finger.A),)), SETTINGS, lambda: None)
+        assert (await first).ending is Ending.ABORTED
+        assert second.ending is Ending.SUCCEEDED
+        assert here.gripper.position(Finger.B) < 200
+        assert not here.gripper.is_moving
+        await connection.close("the end")
+
+
+@virtual
+async def test_a_silent_agent_is_a_link_that_is_down() -> None:
+    async with lab() as here:
+        hand = here.client(control=None)
+        connection = Connection(hand, SETTINGS)
+        await connection.open()
+        await connection.permit()
+        await here.end_agent()
+        await hand.wait_for_state(State.DISCONNECTED, timeout=10)
+        assert diagnose(hand, now())[0].level is Level.ERROR
+        with pytest.raises(RefusedError, match="the link to the gripper is down"):
+            await connection.check_goal()
+        await connection.close("the end")

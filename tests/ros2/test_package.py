@@ -1,0 +1,60 @@
+"""What the wheel brings for ROS 2, and what the pages say of it."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import tomllib
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import robotiq_async
+from robotiq_async.ros2.connection import COMMANDS
+from robotiq_async.ros2.settings import PARAMETERS
+
+ROOT = Path(__file__).parents[2]
+SHARED: dict[str, str] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"][
+    "hatch"
+]["build"]["targets"]["wheel"]["shared-data"]
+PAGE = (ROOT / "docs" / "how-to" / "ros2.md").read_text(encoding="utf-8")
+
+
+def test_everything_that_ros_looks_for_is_there() -> None:
+    assert set(SHARED.values()) == {
+        "share/robotiq_async/package.xml",
+        "share/ament_index/resource_index/packages/robotiq_async",
+        "share/robotiq_async/launch/gripper.launch.py",
+        "lib/robotiq_async/gripper",
+    }
+    assert all((ROOT / source).is_file() for source in SHARED)
+    assert os.access(ROOT / "ros2" / "gripper", os.X_OK)
+
+
+def test_one_version() -> None:
+    package = ET.parse(ROOT / "ros2" / "package.xml").getroot()
+    assert package.findtext("name") == "robotiq_async"
+    assert package.findtext("version") == robotiq_async.__version__
+
+
+def test_every_package_of_ros_that_is_imported_is_a_dependency() -> None:
+    imported = set()
+    for file in (ROOT / "robotiq_async" / "ros2").glob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+                imported.add(node.module.partition(".")[0])
+    wanted = {each.text for each in ET.parse(ROOT / "ros2" / "package.xml").findall("exec_depend")}
+    of_ros = {each for each in imported if each.endswith(("_msgs", "_srvs", "_interfaces"))} | {"rclpy"}
+    assert of_ros <= wanted
+
+
+def test_arguments_of_the_launch_file_are_parameters() -> None:
+    text = (ROOT / "ros2" / "gripper.launch.py").read_text(encoding="utf-8")
+    (arguments,) = re.findall(r"^ARGUMENTS = ({.*?^})", text, re.MULTILINE | re.DOTALL)
+    assert set(ast.literal_eval(arguments)) <= set(PARAMETERS)
+
+
+def test_the_page_has_every_parameter_and_service() -> None:
+    rows = set(re.findall(r"`([^`]+)`", "".join(re.findall(r"^\| `[^|]*\|", PAGE, re.MULTILINE))))
+    assert set(PARAMETERS) <= rows
+    assert {f"~/{name}" for name in COMMANDS} <= rows

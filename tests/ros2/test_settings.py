@@ -1,0 +1,54 @@
+"""The parameters: what will do, and what is told of what will not. No ROS is needed here."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import pytest
+
+from robotiq_async.ros2.settings import PARAMETERS, check_parameter, check_settings
+
+USUAL = {name: parameter.default for name, parameter in PARAMETERS.items()}
+
+
+def test_the_defaults_will_do() -> None:
+    settings = check_settings(USUAL)
+    assert settings.address == "sim://"
+    assert settings.publish_rate == 50.0
+    assert {name: getattr(settings, name) for name in PARAMETERS} == USUAL
+
+
+def test_every_parameter_says_what_it_is_for() -> None:
+    for parameter in PARAMETERS.values():
+        assert parameter.description.endswith(".")
+        is_number = not isinstance(parameter.default, bool | str)
+        assert is_number == (parameter.high > parameter.low)
+
+
+def test_an_integer_will_do_for_a_float() -> None:
+    settings = check_settings(USUAL | {"publish_rate": 100})
+    assert settings.publish_rate == 100.0
+    assert isinstance(settings.publish_rate, float)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "reason"),
+    [
+        ("address", "tcp://", "malformed address 'tcp://'; accepted: tcp://HOST"),
+        ("address", "zenoh://lab", "malformed address 'zenoh://lab'"),
+        ("address", 7, "address must be a string, got 7"),
+        ("publish_rate", 0.0, "publish_rate must be a number in 1.0..200.0, got 0.0"),
+        ("publish_rate", math.nan, "publish_rate must be a number in 1.0..200.0, got nan"),
+        ("publish_rate", "fast", "publish_rate must be a number in 1.0..200.0, got 'fast'"),
+        ("publish_rate", True, "must be a number"),
+        ("poll_interval", 1, "poll_interval must be seconds in 0.001..0.1, got 1"),
+        ("speed", 256, "speed must be in 0..255, got 256"),
+        ("force", 64.0, "force must be an int in 0..255, got 64.0"),
+        ("allow_stalling", 1, "allow_stalling must be true or false, got 1"),
+        ("joint_prefix", None, "joint_prefix must be a string, got None"),
+    ],
+)
+def test_what_will_not_do_is_told(name: str, value: object, reason: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(reason)):
+        check_parameter(name, value)
