@@ -104,6 +104,11 @@ class Call:
             root = logging.getLogger()
             handlers, root.handlers = root.handlers, []
             stack.callback(setattr, root, "handlers", handlers)
+            # One that hangs is interrupted, and ends with 130.
+            impatience = threading.Timer(PATIENCE, os.kill, (os.getpid(), signal.SIGINT))
+            impatience.start()
+            stack.callback(impatience.join)
+            stack.callback(impatience.cancel)
             environs, filters, threads = _environs(), warnings.filters[:], set(threading.enumerate())
             code = main(arguments)
             _end_threads(threads)

@@ -162,10 +162,18 @@ def test_what_is_no_recording_is_one_line(
     ],
 )
 def test_a_missing_extra_is_named(
-    call: Call, without: Callable[[str], None], module: str, arguments: list[str], extra: str
+    call: Call,
+    without: Callable[[str], None],
+    module: str,
+    arguments: list[str],
+    extra: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.chdir(tmp_path)
     without(module)
     call(*arguments).assert_failed(1, f"pip install 'robotiq-async[{extra}]'")
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("seconds", ["0", "-1", "nan", "soon"])
