@@ -28,6 +28,9 @@ from .wire.names import ROOT, GripperName, check_name
 
 HALT_S: Final = 2.0
 LOOK_S: Final = 0.5
+LOOK_AGAIN_S: Final = 0.1
+SETTLE_S: Final = 2.0
+"""By then the links to all agents that can be reached are up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,12 +80,15 @@ class Fleet:
             bus: an open session to share; it stays open. None opens one.
 
         Raises:
-            TypeError, ValueError: not a name.
+            TypeError, ValueError: not a name, or a malformed or unprotected route.
         """
         self._site = "*" if site is None else check_name("site", site)
-        self._route = route
+        self._route = route or default_route()
+        if bus is None:
+            self._route.configuration()  # malformed or unprotected: said here
         self._shared = bus
         self._bus: Bus | None = None
+        self._entered_at = 0.0
         self._undo: list[Undo] = []
         self._members: dict[GripperName, Member] = {}
         self._tokens: dict[GripperName, set[str]] = {}
@@ -96,13 +102,18 @@ class Fleet:
             RobotiqError: no session could be opened.
         """
         self._changes.reopen(running_loop())
+        self._entered_at = now()
         self._bus = bus = self._shared or await self._open()
         base = f"{ROOT}/{self._site}/*/*"
         self._undo = [
             bus.subscribe(f"{base}/summary", self._hear),
             bus.watch(f"{base}/alive/*", self._see),
         ]
-        await self._look()
+        try:
+            await self._look()
+        except BaseException:
+            await self.__aexit__(None, None, None)
+            raise
         return self
 
     async def __aexit__(
@@ -139,14 +150,28 @@ class Fleet:
 
         It is no safety function: a network may be down when it is needed.
 
+        In the first seconds after the fleet was entered it looks on for agents whose links come up late.
+
         Raises:
             NotAllStoppedError: one was not seen to stop, or there is none at all.
             RuntimeError: the fleet is not entered.
         """
-        await self._look()
-        names = list(self._members)
-        outcomes = dict(zip(names, await asyncio.gather(*map(self._halt, names)), strict=True))
-        if not names:
+        halting: dict[GripperName, asyncio.Task[str]] = {}
+        try:
+            # Links come up one after the other: whoever is there is halted at once, and looking goes on.
+            while True:
+                await self._look()
+                for name in self._members:
+                    if name not in halting:
+                        halting[name] = asyncio.ensure_future(self._halt(name))
+                if now() - self._entered_at >= SETTLE_S:
+                    break
+                await asyncio.sleep(LOOK_AGAIN_S)
+            outcomes = {name: await task for name, task in halting.items()}
+        finally:
+            for task in halting.values():
+                task.cancel()
+        if not halting:
             raise NotAllStoppedError("no gripper is heard of: nothing was stopped", {})
         failed = {name: how for name, how in outcomes.items() if how != "stopped"}
         if failed:
@@ -181,7 +206,7 @@ class Fleet:
     async def _open(self) -> Bus:
         from .network.zenoh_bus import open_bus  # noqa: PLC0415  # needs the extra
 
-        return await open_bus((self._route or default_route()).configuration(), f"the fleet {self._site}")
+        return await open_bus(self._route.configuration(), f"the fleet {self._site}")
 
     def _entered(self) -> Bus:
         if self._bus is None:

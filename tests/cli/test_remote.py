@@ -148,3 +148,11 @@ def test_a_file_is_checked(call: Call, tmp_path: Path) -> None:
     assert outcome.out.split() == [ADDRESS, "tcp://192.168.1.11"]
     file.write_text('site = "lab"\n[grippers.left]\nadress = "tcp://192.168.1.11"\n')
     call("agent", "--check", str(file)).assert_failed(2, "adress", "address", "line 3")
+
+
+@pytest.mark.parametrize("command", [("fleet", "halt"), ("fleet",), ("status", ADDRESS)])
+async def test_a_route_that_cannot_be_meant_is_one_line(
+    shell: Shell, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
+) -> None:
+    monkeypatch.setitem(os.environ, "ROBOTIQ_ASYNC_CONNECT", "tcp/192.168.1.1:7447")
+    (await shell.run(*command)).assert_failed(2, "tcp/192.168.1.1:7447", "insecure")

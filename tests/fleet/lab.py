@@ -38,6 +38,10 @@ class Lab:
         """A remote hand that is not started."""
         return RemoteHand("zenoh://lab/cell/left", bus=self.network.bus(name), **options)
 
+    def client_over(self, bus: Any, **options: Any) -> RemoteHand:
+        """The same, over a bus of the test's own."""
+        return RemoteHand("zenoh://lab/cell/left", bus=bus, **options)
+
     async def end_agent(self) -> None:
         self.serving.cancel()
         await asyncio.gather(self.serving, return_exceptions=True)

@@ -19,6 +19,7 @@ from robotiq_async.fleet.network.configuration import (
     client_configuration,
     session_configuration,
 )
+from robotiq_async.fleet.network.mailbox import Kind
 from robotiq_async.fleet.network.zenoh_bus import ZenohBus, open_bus
 from robotiq_async.fleet.wire.names import GripperName
 
@@ -119,7 +120,7 @@ class Line:
 
         def tell(event: Any) -> None:
             is_there = event.kind == SampleKind.PUT
-            bus._mailbox.put((client.connected if is_there else client.disconnected).set)
+            bus._mailbox.put((client.connected if is_there else client.disconnected).set, Kind.ANSWER)
 
         listener = bus._session.info.declare_transport_events_listener(
             Callback(tell, indirect=False), history=True

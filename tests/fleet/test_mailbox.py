@@ -5,11 +5,12 @@ from __future__ import annotations
 import asyncio
 import json
 import threading
+import time
 from functools import partial
 
 import pytest
 
-from robotiq_async.fleet.network.zenoh_bus import GATHER_S, Mailbox
+from robotiq_async.fleet.network.mailbox import GATHER_S, MOST, TURN_S, Kind, Mailbox
 from tests.virtual import virtual
 
 
@@ -23,7 +24,10 @@ class Postman:
         self.opened: list[int] = []
 
     def bring(self, number: int, *, urgent: bool = False) -> None:
-        self.mailbox.put(partial(self._open, number, self.loop.time()), urgent=urgent)
+        self.put(number, Kind.REQUEST if urgent else Kind.NEWS)
+
+    def put(self, number: int, kind: Kind) -> None:
+        self.mailbox.put(partial(self._open, number, self.loop.time()), kind)
 
     def _open(self, number: int, brought_at: float) -> None:
         self.opened.append(number)
@@ -73,7 +77,7 @@ async def test_what_is_urgent_is_not_kept_waiting_nor_does_it_overtake() -> None
 @virtual
 async def test_a_letter_that_fails_keeps_no_other(caplog: pytest.LogCaptureFixture) -> None:
     postman = Postman()
-    postman.mailbox.put(partial(json.loads, "?"))
+    postman.mailbox.put(partial(json.loads, "?"), Kind.NEWS)
     postman.bring(1)
     await asyncio.sleep(0.01)
     assert postman.opened == [1]
@@ -86,7 +90,7 @@ async def test_letters_of_another_thread() -> None:
     def work() -> None:
         for number in range(1000):
             postman.bring(number)
-        postman.mailbox.put(there.set)
+        postman.mailbox.put(there.set, Kind.ANSWER)
 
     thread = threading.Thread(target=work)
     thread.start()
@@ -100,4 +104,52 @@ def test_a_loop_that_has_been_closed_is_told_nothing() -> None:
     async def make() -> Mailbox:
         return Mailbox()
 
-    asyncio.run(make()).put(lambda: None)
+    asyncio.run(make()).put(lambda: None, Kind.NEWS)
+
+
+@virtual
+async def test_a_halt_comes_before_a_flood() -> None:
+    """A reader that flooded the agent kept the halts of others waiting for seconds."""
+    postman = Postman()
+    for number in range(1000):
+        postman.put(number, Kind.REQUEST)
+    postman.put(-1, Kind.HALT)
+    await asyncio.sleep(0.1)
+    assert postman.opened == [-1, *range(1000)]
+
+
+@virtual
+async def test_what_is_too_much_is_dropped_but_no_answer(caplog: pytest.LogCaptureFixture) -> None:
+    postman = Postman()
+    for number in range(MOST + 10):
+        postman.put(number, Kind.REQUEST)
+    postman.put(-1, Kind.ANSWER)
+    await asyncio.sleep(0.1)
+    assert postman.opened == [*range(MOST), -1]
+    assert "10 messages of the fleet were dropped" in caplog.text
+
+
+async def test_a_flood_leaves_the_loop_its_turns() -> None:
+    mailbox, turns, left = Mailbox(), 0, 50
+    done = asyncio.Event()
+
+    def slow() -> None:
+        nonlocal left
+        until = time.perf_counter() + TURN_S
+        while time.perf_counter() < until:
+            pass
+        left -= 1
+        if not left:
+            done.set()
+
+    def count() -> None:
+        nonlocal turns
+        turns += 1
+        if not done.is_set():
+            asyncio.get_running_loop().call_soon(count)
+
+    for _ in range(left):
+        mailbox.put(slow, Kind.REQUEST)
+    count()
+    await done.wait()
+    assert turns >= 50

@@ -13,9 +13,10 @@ from ...log import log
 from ...telemetry.payloads import printable
 from ..arguments import need
 from ..failures import UsageError
-from ..log_capture import forwarded_warnings
+from ..log_capture import forget, forwarded_warnings
 
 if TYPE_CHECKING:
+    from ...fleet.agent.agent import Agent
     from ...fleet.agent.agent_file import AgentSettings
 
 
@@ -89,11 +90,19 @@ async def _serve(settings: AgentSettings) -> None:
     try:
         with forwarded_warnings(_tell):
             served = Agent(settings.site, settings.host, hands, bus, window=settings.window)
-            await served.run(lambda: [print(each.name, flush=True) for each in served.hands.values()])
+            await served.run(lambda: _announce(served))
     except asyncio.CancelledError:
         log.info("the agent was told to end")  # and that is how this command ends well
     finally:
         await bus.close()
+
+
+def _announce(served: Agent) -> None:
+    try:
+        for each in served.hands.values():
+            print(each.name, flush=True)
+    except BrokenPipeError:  # whoever wanted to know has heard enough; the grippers are served all the same
+        forget(sys.stdout)
 
 
 def _tell(words: str) -> None:

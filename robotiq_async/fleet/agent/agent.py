@@ -149,10 +149,7 @@ class Agent:
             question.reply(Answer("", 0, self.epoch, error=error_fields(refused)).pack())
             return
         served = self.hands.get(name.gripper)
-        if served is None:
-            error = AgentError(f"no gripper of this name here: {name}; there are: {', '.join(self.hands)}")
-            question.reply(Answer(name.base, 0, self.epoch, error=error_fields(error)).pack())
-        else:
+        if served is not None:  # else another agent of this host may serve it, and answers
             served.hear(question.key.removeprefix(f"{name.base}/"), question)
 
     async def _tell(self) -> None:

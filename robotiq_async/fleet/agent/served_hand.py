@@ -16,6 +16,7 @@ from ...hand import RobotiqHand
 from ...log import log
 from ...session.clock import now
 from ...version import __version__
+from ...wire.checks import check_byte, check_mask
 from ..control.admission import Admission
 from ..control.lease import Lease
 from ..network.bus import Bus, Question
@@ -83,6 +84,7 @@ class ServedHand:
         """The axes that are to be held as soon as the gripper is reached again."""
         self._tasks: set[asyncio.Task[Any]] = set()
         self._expiry: asyncio.TimerHandle | None = None
+        self._is_ending = False
 
     async def run(self) -> None:
         """Keep the hand running, with or without its gripper, until cancelled; then stop the fingers."""
@@ -91,6 +93,7 @@ class ServedHand:
             while True:
                 await self._run_once()
         finally:
+            self._is_ending = True
             self.end_lease("closed")
             await self._hand.stop()
             remove()
@@ -133,7 +136,7 @@ class ServedHand:
             question.reply(failure(call, self._epoch, error).pack())
             return
         try:
-            self._admission.check_meant(call)
+            self._admission.check_meant(call, in_any_run=verb in ("info", "halt"))
             self._expire()
             value = self._answer(verb, call, question)
         except (RobotiqError, TypeError, ValueError, OverflowError) as error:  # JSON may hold infinity
@@ -145,6 +148,8 @@ class ServedHand:
 
     def _answer(self, verb: str, call: Call, question: Question) -> Fields | None:
         """The answer, or None if it comes later."""
+        if self._is_ending and verb not in ("info", "halt"):
+            raise ControlLostError("the agent is ending; nothing was done", "closed")
         match verb.split("/"):
             case ["info"]:
                 return self._info(call)
@@ -164,12 +169,10 @@ class ServedHand:
 
     def _info(self, call: Call) -> Fields:
         since = call.arguments.get("since", -1)
-        holder = self._lease.holder
         return {
             **self.news.summary(),
             "version": __version__,
             "window": self._lease.window,
-            "client": None if holder is None else holder.client,
             "events": self.news.events_since(since) if type(since) is int and since >= 0 else [],
         }
 
@@ -216,7 +219,7 @@ class ServedHand:
             if not leaves:
                 await self._hand.halt()
 
-        self._start(_Request("release", call, question), release)
+        self._start(_Request("release", call, question), release())
 
     def end_lease(self, reason: str, by: str = "") -> None:
         """Take the lease from whoever holds it: what it commanded and still moves is held, grips stay."""
@@ -273,13 +276,13 @@ class ServedHand:
 
     def _halt(self, call: Call, question: Question) -> None:
         """From anyone, always, and as often as it is asked."""
+        self._lease.intervene(call.client, "halted")
         if self._admission.is_of_holder(call):
             self._admission.bar(call)
         else:
-            self._lease.intervene(call.client, "halted")
             # Or a control loop would undo it in ten milliseconds.
             self.end_lease("halted", str(call.arguments.get("label", "somebody"))[:200])
-        self._start(_Request("halt", call, question), self._hand.halt)
+        self._start(_Request("halt", call, question), self._hand.halt())
 
     def _command(self, name: str, call: Call, question: Question) -> None:
         known = self._requests.get(call.number)
@@ -292,12 +295,12 @@ class ServedHand:
         work = self._work(name, call)
         self._admission.admit(call, now())
         axes = _axes(name, call.arguments)
+        coroutine = work()  # arguments that do not fit end here, before anything is kept
         self._commanded |= axes
-        self._owed &= ~axes
         request = self._requests[call.number] = _Request(name, call, question)
         if len(self._requests) > _REMEMBERED:
             self._forget()
-        self._start(request, work)
+        self._start(request, coroutine)
 
     def _work(self, name: str, call: Call) -> _Work:
         if name == "command":
@@ -309,7 +312,10 @@ class ServedHand:
 
     async def _set(self, arguments: Fields) -> None:
         """What :meth:`RobotiqHand.command` does, for several axes at once."""
-        axes = {Finger(int(mask)): changes for mask, changes in arguments["axes"].items()}
+        axes = {check_mask(int(mask)): changes for mask, changes in arguments["axes"].items()}
+        for changes in axes.values():  # all of them before the first is asked for
+            for name, value in changes.items():
+                check_byte(name, value)
         for mask, changes in axes.items():
             self._hand.command(mask, **changes)
 
@@ -331,8 +337,8 @@ class ServedHand:
             self._admission.bar(Call(call.to, call.client, number=int(call.arguments.get("number", 0))))
         self._reply(question, Answer(call.to, call.number, self._epoch, {}))
 
-    def _start(self, request: _Request, work: _Work) -> None:
-        request.task = self._spawn(work())
+    def _start(self, request: _Request, work: Coroutine[Any, Any, MoveResult | None]) -> None:
+        request.task = self._spawn(work)
         # Not in the task itself: one that is cancelled before it has begun never runs.
         request.task.add_done_callback(lambda task: self._finish(request, task))
 
@@ -348,6 +354,8 @@ class ServedHand:
             answer = failure(call, self._epoch, error)
         else:
             answer = Answer(call.to, call.number, self._epoch, result_fields(task.result()) or {})
+            if request.name in ("move", "set_position", "command"):
+                self._owed &= ~_axes(request.name, call.arguments)
         request.answer = answer.pack()
         for question in request.questions:
             question.reply(request.answer, self.news.status_message())

@@ -33,15 +33,15 @@ class Admission:
         self._asked: dict[str, int] = {}
         """For each client, the number of the newest request for the lease."""
 
-    def check_meant(self, call: Call) -> None:
-        """Refuse what is meant for another gripper, or another run of the agent.
+    def check_meant(self, call: Call, *, in_any_run: bool = False) -> None:
+        """Refuse what is meant for another gripper, or another run of the agent if that matters.
 
         Raises:
             AgentError: it is.
         """
         if call.to != self._base:
             raise AgentError(f"a request for {call.to} was carried to {self._base}; nothing was done")
-        if call.epoch not in (0, self._epoch):
+        if not in_any_run and call.epoch not in (0, self._epoch):
             raise AgentError("the agent has been started anew since this was asked; nothing was done")
 
     def admit(self, call: Call, now: float) -> None:

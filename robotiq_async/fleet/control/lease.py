@@ -51,7 +51,8 @@ class Lease:
         self._awake_since = 0.0
         self._ends: dict[int, str] = {}
         self._last = ""
-        """The client that held it last."""
+        """The client that held it last, and the number of its first lease in a row."""
+        self._last_from = 0
         self._barred = -1, ""
         """Number of the newest lease whose holder may not come back by itself, and why."""
 
@@ -72,7 +73,8 @@ class Lease:
         """Give a lease that nobody holds to a client; returns its number."""
         self.number += 1
         self.holder = holder
-        self._last = holder.client
+        if holder.client != self._last:
+            self._last, self._last_from = holder.client, self.number
         self._proven = seen
         return self.number
 
@@ -96,10 +98,11 @@ class Lease:
     def intervene(self, client: str, reason: str) -> None:
         """A client has halted the gripper, or taken the lease: who held it before does not return by itself.
 
-        Call it before the lease is ended or granted. The last holder's own halt bars nobody.
+        Call it before the lease is ended or granted. The last holder's own halt bars all but itself.
         """
-        if client != self._last:
-            self._barred = self.number, reason
+        number = self.number if client != self._last else self._last_from - 1
+        if number >= self._barred[0]:
+            self._barred = number, reason
 
     def why_not_again(self, number: int) -> str:
         """Why who held the lease of a number may not come back by itself; empty if it may."""

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 import json
-from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
@@ -17,12 +17,13 @@ import zenoh
 from zenoh.handlers import Callback
 
 from ...errors import ConnectFailedError
-from ...log import log
 from .bus import Question, Reply, Undo, Urgency
+from .mailbox import Kind, Mailbox
+from .replier import Replier
 
 CLOSE_S: Final = 1.0
-GATHER_S: Final = 0.001
-"""For so long news are gathered where they come thick and fast."""
+LONGEST: Final = 4096
+"""Bytes of a request; what is longer is none, and is not looked at."""
 _PRIORITY: Final = {
     Urgency.STOP: zenoh.Priority.REAL_TIME,
     Urgency.COMMAND: zenoh.Priority.INTERACTIVE_HIGH,
@@ -62,62 +63,21 @@ def _close_opened(opening: asyncio.Future[zenoh.Session]) -> None:
         opening.result().close()  # type: ignore[no-untyped-call]
 
 
-class Mailbox:
-    """Carries what other threads bring into the event loop, in its order.
-
-    Waking the loop costs more than handling a status. Where news come thick and fast, from dozens of hands,
-    it wakes for those of a millisecond at once; what is urgent does not wait for that, nor do the news of one
-    hand.
-    """
-
-    def __init__(self) -> None:
-        """Belong to the running loop."""
-        self._loop = asyncio.get_running_loop()
-        self._letters: deque[Callable[[], None]] = deque()
-        self._is_due = False
-        self._gathering: asyncio.TimerHandle | None = None
-        self._opened_at = 0.0
-
-    def put(self, letter: Callable[[], None], *, urgent: bool = True) -> None:
-        """Have something called in the loop. From any thread."""
-        self._letters.append(letter)
-        if not self._is_due or (urgent and self._gathering is not None):
-            self._is_due = True
-            with contextlib.suppress(RuntimeError):  # the loop has been closed
-                self._loop.call_soon_threadsafe(self._open)
-
-    def _open(self) -> None:
-        if self._gathering is not None:
-            self._gathering.cancel()
-        self._is_due, self._gathering = False, None
-        before, self._opened_at = self._opened_at, self._loop.time()
-        # No more than lies there now: the rest of the loop has its turn.
-        count = len(self._letters)
-        for _ in range(count):
-            letter = self._letters.popleft()
-            try:
-                letter()
-            except Exception:  # noqa: BLE001  # the next letter is another's
-                log.exception("a message of the fleet could not be handled")
-        if self._letters and not self._is_due:
-            self._is_due = True
-            self._loop.call_soon(self._open)
-        elif count and not self._is_due and self._opened_at - before < 2 * GATHER_S:
-            self._is_due = True
-            self._gathering = self._loop.call_later(GATHER_S, self._open)
-
-
 class _Question:
     """A query that has arrived."""
 
-    def __init__(self, query: zenoh.Query) -> None:
+    def __init__(self, query: zenoh.Query, replier: Replier) -> None:
         self._query = query
+        self._replier = replier
         self.key = str(query.key_expr)
         self.payload = b"" if query.payload is None else query.payload.to_bytes()
 
     def reply(self, payload: bytes, attachment: bytes = b"") -> None:
-        with contextlib.suppress(zenoh.ZError), self._query as query:  # the asker is gone
-            query.reply(self.key, payload, attachment=attachment)
+        def send() -> None:
+            with contextlib.suppress(zenoh.ZError), self._query as query:  # the asker is gone
+                query.reply(self.key, payload, attachment=attachment)
+
+        self._replier.put(send)
 
 
 class _Reply:
@@ -135,6 +95,8 @@ class ZenohBus:
         """Use an open session from the running loop."""
         self._session = session
         self._mailbox = Mailbox()
+        # A halt is acknowledged also where others do not read their answers.
+        self._repliers = {True: Replier(), False: Replier()}
         self._closing: asyncio.Future[None] | None = None
 
     def publisher(self, key: str, urgency: Urgency) -> Callable[[bytes], None]:
@@ -161,15 +123,19 @@ class ZenohBus:
         """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
 
         def deliver(sample: zenoh.Sample) -> None:
-            self._mailbox.put(lambda: listener(str(sample.key_expr), sample.payload.to_bytes()), urgent=False)
+            letter = functools.partial(_deliver, listener, sample)
+            self._mailbox.put(letter, Kind.NEWS)
 
         return self._undo(self._session.declare_subscriber(expression, _direct(deliver)))
 
     def serve(self, expression: str, handler: Callable[[Question], None]) -> Undo:
         """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
+        is_halt = expression.endswith("/halt")
+        replier, kind = self._repliers[is_halt], Kind.HALT if is_halt else Kind.REQUEST
 
         def deliver(query: zenoh.Query) -> None:
-            self._mailbox.put(lambda: handler(_Question(query)))
+            if query.payload is None or len(query.payload) <= LONGEST:
+                self._mailbox.put(lambda: handler(_Question(query, replier)), kind)
 
         return self._undo(self._session.declare_queryable(expression, _direct(deliver)))
 
@@ -186,10 +152,10 @@ class ZenohBus:
         def arrive(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
                 sample = reply.ok
-                self._mailbox.put(lambda: take(_Reply(sample)))
+                self._mailbox.put(lambda: take(_Reply(sample)), Kind.ANSWER)
 
         def end() -> None:
-            self._mailbox.put(lambda: take(None))
+            self._mailbox.put(lambda: take(None), Kind.ANSWER)
 
         try:
             self._session.get(
@@ -221,7 +187,7 @@ class ZenohBus:
                 found.append(str(reply.ok.key_expr))
 
         # Not into a channel of zenoh's: it holds 256, get() itself fills it, and would wait there for ever.
-        handler = Callback(arrive, lambda: self._mailbox.put(ended.set), indirect=False)
+        handler = Callback(arrive, lambda: self._mailbox.put(ended.set, Kind.ANSWER), indirect=False)
         with contextlib.suppress(TimeoutError, zenoh.ZError):
             self._session.liveliness().get(expression, handler, timeout=timeout)
             async with asyncio.timeout(2 * timeout):
@@ -233,13 +199,15 @@ class ZenohBus:
 
         def deliver(sample: zenoh.Sample) -> None:
             key, is_there = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
-            self._mailbox.put(lambda: listener(key, is_there))
+            self._mailbox.put(lambda: listener(key, is_there), Kind.ANSWER)
 
         liveliness = self._session.liveliness()
         return self._undo(liveliness.declare_subscriber(expression, _direct(deliver), history=True))
 
     async def close(self) -> None:
         """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
+        for replier in self._repliers.values():
+            replier.close()
         if self._closing is None:
             self._closing = asyncio.ensure_future(asyncio.to_thread(self._session.close))
         with contextlib.suppress(TimeoutError, zenoh.ZError):
@@ -251,6 +219,10 @@ class ZenohBus:
                 declared.undeclare()
 
         return undo
+
+
+def _deliver(listener: Callable[[str, bytes], None], sample: zenoh.Sample) -> None:
+    listener(str(sample.key_expr), sample.payload.to_bytes())
 
 
 def _direct(deliver: Callable[[Any], None]) -> Any:  # noqa: ANN401

@@ -11,7 +11,7 @@ from ...control.motion import MoveResult
 from ...control.state_machine import RUNNING, refusal
 from ...control.triggers import Trigger
 from ...enums import CLOSED, OPEN, Finger
-from ...errors import ConnectionLostError, NotStartedError
+from ...errors import NotAllowedError, NotStartedError, RobotiqConnectionError
 from ...wire.checks import check_byte, check_mask, check_optional_byte, check_timeout
 from ..network.bus import Urgency
 from ..wire.values import Fields, read_result, reading
@@ -252,7 +252,7 @@ class RemoteCommands(RemoteObservation):
         assert outbox is not None
         if self._control is None and not session.is_in_control and session.lost is None:
             with plainly():
-                await session.acquire()
+                await session.keeper.acquire()
         session.check_control()
         outbox.flush()
         call = session.call(arguments)
@@ -261,7 +261,8 @@ class RemoteCommands(RemoteObservation):
                 value: Fields = await session.send(
                     call, f"cmd/{name}", timeout=timeout, urgency=Urgency.COMMAND
                 )
-        except (asyncio.CancelledError, ConnectionLostError):
+        except (asyncio.CancelledError, RobotiqConnectionError, NotAllowedError):
+            # Also when an answer came that tells nothing of what became of it.
             cancelling = session.call_off(call)
             if cancelling is not None and name in ("move", "set_position"):
                 outbox.count_motion(cancelling)

@@ -64,7 +64,7 @@ class LeaseKeeper:
         self._lease_run = 0
         """The run of the agent that the number is of."""
         self._acquiring = asyncio.Lock()
-        self._renewing: asyncio.Task[Any] | None = None
+        self._returning: asyncio.Task[Any] | None = None
         self._finding_out: asyncio.Task[Any] | None = None
 
     async def begin(self, deadline: float) -> None:
@@ -121,13 +121,15 @@ class LeaseKeeper:
             self.lose("released", "it was given back")
             await self._give_back(halt=halt)
 
-    async def look(self) -> None:
+    def look(self) -> None:
         """Renew the lease, or acquire it again when that is due; several times in a window."""
         if self.is_in_control:
-            if self._renewing is None or self._renewing.done():
-                self._renewing = self._run.spawn(self._renew())
-        elif self._wants_control and not self._run.mirror.is_silent:
-            await self._acquire_again()
+            # Also while others are under way: one that is lost is not to cost the lease.
+            self._run.spawn(self._renew())
+            return
+        is_returning = self._returning is not None and not self._returning.done()
+        if self._wants_control and not self._run.mirror.is_silent and not is_returning:
+            self._returning = self._run.spawn(self._acquire_again())
 
     def hear(self, lease: int) -> None:
         """The agent has told the number of the present lease."""

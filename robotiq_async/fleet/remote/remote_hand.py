@@ -58,6 +58,8 @@ class RemoteHand(RemoteCommands):
         self._name, self._route = parse_remote_address(address)
         self._connect_timeout = check_seconds("connect_timeout", connect_timeout, 0.1, 60.0)
         self._control = control
+        if bus is None:
+            self._route.configuration()  # malformed or unprotected: said here, and not when it starts
         self._shared = bus
         self._opening: object = None
         """Stands for the start that opens a session; None if there is none, or if it is to end."""
@@ -191,7 +193,7 @@ class RemoteHand(RemoteCommands):
             RobotiqError: not started, or the agent does not answer.
         """
         with plainly():
-            await self._asked().acquire()
+            await self._asked().keeper.acquire()
 
     async def take(self) -> None:
         """Get the lease, whoever has it: what that one commanded and still moves is held.
@@ -200,7 +202,7 @@ class RemoteHand(RemoteCommands):
             RobotiqError: not started, or the agent does not answer.
         """
         with plainly():
-            await self._asked().acquire(take=True)
+            await self._asked().keeper.acquire(take=True)
 
     async def release(self, *, halt: bool = True) -> None:
         """Give the lease back, and read on.
@@ -212,7 +214,7 @@ class RemoteHand(RemoteCommands):
             RobotiqError: not started, the agent does not answer, or the fingers were not seen to stop.
         """
         with plainly():
-            await self._asked().release(halt=halt)
+            await self._asked().keeper.release(halt=halt)
 
     def __repr__(self) -> str:
         """Address and state."""

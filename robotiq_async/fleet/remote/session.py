@@ -26,7 +26,8 @@ from ...session.event_loop import check_loop
 from ...session.state_waiters import StateWaiters
 from ...session.statistics import Counters, Statistics
 from ...session.streams import Channels
-from ..control.lease import WINDOW_S
+from ...wire.checks import check_seconds
+from ..control.lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
 from ..network.bus import Bus, Undo
 from ..wire.envelope import Call
 from ..wire.names import GripperName
@@ -39,6 +40,8 @@ from .requests import NoAnswerError, Posted, Requests
 
 CONNECT_S: Final = 5.0
 HALT_S: Final = 2.0
+TRIES: Final = 2
+"""So often a request is called off in a window."""
 
 
 class RemoteSession:
@@ -46,6 +49,7 @@ class RemoteSession:
 
     Attributes:
         mirror: what has been heard.
+        keeper: the lease.
         waiters: who waits for a state.
         is_over: whether the run has ended, or is about to.
         has_ended: whether nothing of it is left.
@@ -91,7 +95,7 @@ class RemoteSession:
         self._missed = MissedEvents(
             self.mirror, lambda since: self.ask("info", {"since": since}, timeout=ANSWER_S), self.spawn
         )
-        self._keeper = LeaseKeeper(self, wants_control=wants_control)
+        self.keeper = LeaseKeeper(self, wants_control=wants_control)
         self._looking: asyncio.Task[Any] | None = None
         channels.reopen(self.loop)
         self.mirror.begin(now())
@@ -104,17 +108,16 @@ class RemoteSession:
         """Wait until the agent is heard, and acquire the lease if that is wanted.
 
         Raises:
-            ConnectFailedError: nobody there.
+            ConnectFailedError: nobody there, or the agent does not reach the gripper.
             NotAllowedError: the agent is there, and does not answer.
             ControlLostError: another client commands the gripper.
-            ConnectFailedError: the agent does not reach the gripper.
         """
         deadline = now() + timeout
         while not await self._ask_info(deadline):
             if now() >= deadline:
                 await self._give_up()
             await asyncio.sleep(0.05)
-        await self._keeper.begin(deadline)
+        await self.keeper.begin(deadline)
         self.spawn(self._keep())
         await self._wait_for_gripper(deadline)
 
@@ -146,7 +149,7 @@ class RemoteSession:
         except (NoAnswerError, NotAllowedError):
             return False
         with reading("its figures"):
-            self.window = float(info["window"])
+            self.window = check_seconds("window", info["window"], WINDOW_MIN_S, WINDOW_MAX_S)
             self.statistics = read_statistics(info["statistics"])
         return True
 
@@ -155,10 +158,8 @@ class RemoteSession:
         keys = await self._bus.announced(self.name.key("alive", "*"), timeout=ANSWER_S)
         if keys:
             raise NotAllowedError(f"{self.name}: the agent is there, and does not answer: access denied")
-        raise ConnectFailedError(
-            str(self.name),
-            "no agent of it is heard: none runs, or the network or a certificate is in the way",
-        )
+        why = "no agent of it is heard: none runs, or the network or a certificate is in the way"
+        raise ConnectFailedError(str(self.name), why)
 
     async def close(self, *, halt: bool) -> None:
         """End the run; within two seconds, also when cancelled meanwhile, and whoever asks waits for it."""
@@ -171,11 +172,9 @@ class RemoteSession:
 
     async def _close(self, *, halt: bool) -> None:
         try:
-            await self._keeper.end(halt=halt)
+            await self.keeper.end(halt=halt)
         except RobotiqError as error:
-            log.warning(
-                "%s: the agent did not acknowledge the end (%s): it holds what moves", self.name, error
-            )
+            log.warning("%s: the end was not acknowledged (%s): the agent holds what moves", self.name, error)
         finally:
             self._undo()
             for task in self._tasks:
@@ -200,7 +199,7 @@ class RemoteSession:
     def abandon(self) -> None:
         """Count as over when the loop was closed under it; the agent holds what moves by itself."""
         log.warning("%s: the event loop was closed before stop()", self.name)
-        self._keeper.abandon()
+        self.keeper.abandon()
         self.waiters = StateWaiters()
         self._end()
 
@@ -245,7 +244,7 @@ class RemoteSession:
         if self.mirror.is_superseded(message, arrival, self.window):
             return False
         if self.mirror.epoch not in (0, message.epoch):
-            self._keeper.lose("closed", "the agent was started anew")
+            self.keeper.lose("closed", "the agent was started anew")
             self._requests.fall_silent()  # what the former one was asked it does not answer
         self._arrived_at = arrival
         if not self.mirror.hear(message, arrival, in_turn=in_turn, window=self.window, asked=asked):
@@ -253,7 +252,7 @@ class RemoteSession:
         self._heard_at = arrival
         self._requests.hear()
         if in_turn:
-            self._keeper.hear(message.lease)
+            self.keeper.hear(message.lease)
         return True
 
     def _hear_fields(self, fields: Mapping[str, Any]) -> None:
@@ -267,16 +266,18 @@ class RemoteSession:
 
     async def _keep(self) -> None:
         """Look for silence, renew the lease, and acquire it again when that is due."""
-        interval, woken = self.window / RENEWALS, now()
+        interval = self.window / RENEWALS
         while True:
+            due = now() + interval
             await asyncio.sleep(interval)
-            late, woken = now() - woken - interval, now()
+            woken = now()
+            late = woken - due
             # After a hold-up of this loop, what has arrived meanwhile is heard first.
             if late < interval and woken - self._heard_at > self.window:
                 self._fall_silent(woken)
             if self.mirror.is_silent and woken - self._arrived_at < interval:
                 self._look_again()
-            await self._keeper.look()
+            self.keeper.look()
 
     def _look_again(self) -> None:
         """What is heard seems to be old: it is, or the agent's clock stood still. An answer tells."""
@@ -288,7 +289,7 @@ class RemoteSession:
             return
         log.warning("%s: the agent is silent", self.name)
         self.mirror.fall_silent(at)
-        self._keeper.lose("expired", "the agent is silent")
+        self.keeper.lose("expired", "the agent is silent")
         self._requests.fall_silent()
 
     # -- control ---------------------------------------------------------------------------------------
@@ -296,25 +297,17 @@ class RemoteSession:
     @property
     def is_in_control(self) -> bool:
         """Whether this hand holds the lease, as far as it knows."""
-        return self._keeper.is_in_control
+        return self.keeper.is_in_control
 
     @property
     def lease(self) -> int:
         """Number of the lease it holds, or held last."""
-        return self._keeper.lease
+        return self.keeper.lease
 
     @property
     def lost(self) -> ControlLostError | None:
         """Why control was lost; None while it is held, or was never asked for."""
-        return self._keeper.lost
-
-    async def acquire(self, *, take: bool = False) -> None:
-        """Get the lease; see :meth:`LeaseKeeper.acquire`."""
-        await self._keeper.acquire(take=take)
-
-    async def release(self, *, halt: bool) -> None:
-        """Give the lease back; see :meth:`LeaseKeeper.release`."""
-        await self._keeper.release(halt=halt)
+        return self.keeper.lost
 
     def check_control(self) -> None:
         """Refuse commands of a hand that only reads, or has lost the lease.
@@ -325,7 +318,7 @@ class RemoteSession:
         """
         if self.mirror.is_silent:
             raise ConnectionLostError(f"{self.name}: the agent is silent: nothing was asked")
-        self._keeper.check()
+        self.keeper.check()
 
     # -- asking ----------------------------------------------------------------------------------------
 
@@ -367,7 +360,7 @@ class RemoteSession:
             if posted.verb != "lease":
                 self.check_running()  # the lease was given back at the end of the run
             if posted.verb != "halt" and error.reason != "late" and posted.call.lease == self.lease:
-                self._keeper.lose(error.reason, str(error))
+                self.keeper.lose(error.reason, str(error))
             raise
 
     async def ask_quietly(self, verb: str, arguments: Fields, timeout: float) -> None:
@@ -380,8 +373,19 @@ class RemoteSession:
         if not self.is_in_control or self.is_over:
             return None
 
-        # If it is not heard the lease ends, and the agent holds by itself.
-        return self.spawn(self.ask_quietly("cmd/cancel", {"number": call.number}, self.window))
+        return self.spawn(self._call_off(call))
+
+    async def _call_off(self, call: Call) -> None:
+        for _ in range(TRIES):
+            try:
+                await self.ask("cmd/cancel", {"number": call.number}, timeout=self.window / TRIES)
+            except (NoAnswerError, NotAllowedError):
+                continue
+            except RobotiqError:
+                pass  # the lease has ended, or the agent: nothing is left to call off
+            return
+        # Without renewals the lease ends, and the agent holds what moves by itself.
+        self.keeper.lose("expired", "a request could not be called off")
 
     def spawn(self, work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
         """Do something beside; it ends with the run."""

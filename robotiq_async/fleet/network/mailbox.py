@@ -1,0 +1,91 @@
+"""Mailbox: carries what zenoh's threads bring into the event loop."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections import deque
+from collections.abc import Callable
+from enum import Enum
+from typing import Final
+
+from ...log import log
+
+GATHER_S: Final = 0.001
+"""For so long news are gathered where they come thick and fast."""
+TURN_S: Final = 0.002
+"""So long letters are opened in one turn of the loop: the rest of it has its turn."""
+MOST: Final = 2000
+"""So many requests and news may lie there; the rest is dropped, as on a network that is full."""
+
+
+class Kind(Enum):
+    """What a letter is."""
+
+    HALT = "halt"
+    """Opened before all others."""
+    ANSWER = "answer"
+    """To something of ours: never dropped."""
+    REQUEST = "request"
+    NEWS = "news"
+    """May wait for a millisecond."""
+
+
+class Mailbox:
+    """Letters, in their order but for halts.
+
+    Waking the loop costs more than handling a status. Where news come thick and fast, from dozens of hands,
+    it wakes for those of a millisecond at once; nothing else waits for that, nor do the news of one hand.
+    """
+
+    def __init__(self) -> None:
+        """Belong to the running loop."""
+        self._loop = asyncio.get_running_loop()
+        self._halts: deque[Callable[[], None]] = deque()
+        self._letters: deque[Callable[[], None]] = deque()
+        self._is_due = False
+        self._gathering: asyncio.TimerHandle | None = None
+        self._opened_at = 0.0
+        self._dropped = 0
+
+    def put(self, letter: Callable[[], None], kind: Kind) -> None:
+        """Have something called in the loop. From any thread."""
+        letters = self._halts if kind is Kind.HALT else self._letters
+        if kind is Kind.ANSWER or len(letters) < MOST:
+            letters.append(letter)
+        else:
+            self._dropped += 1
+            return
+        if not self._is_due or (kind is not Kind.NEWS and self._gathering is not None):
+            self._is_due = True
+            with contextlib.suppress(RuntimeError):  # the loop has been closed
+                self._loop.call_soon_threadsafe(self._open)
+
+    def _open(self) -> None:
+        if self._gathering is not None:
+            self._gathering.cancel()
+        self._is_due, self._gathering = False, None
+        before, self._opened_at = self._opened_at, self._loop.time()
+        self._report_dropped()
+        count, until = 0, time.perf_counter() + TURN_S
+        while self._halts or self._letters:
+            letter = (self._halts or self._letters).popleft()
+            count += 1
+            try:
+                letter()
+            except Exception:  # noqa: BLE001  # the next letter is another's
+                log.exception("a message of the fleet could not be handled")
+            if time.perf_counter() > until:
+                break
+        if (self._halts or self._letters) and not self._is_due:
+            self._is_due = True
+            self._loop.call_soon(self._open)
+        elif count and not self._is_due and self._opened_at - before < 2 * GATHER_S:
+            self._is_due = True
+            self._gathering = self._loop.call_later(GATHER_S, self._open)
+
+    def _report_dropped(self) -> None:
+        dropped, self._dropped = self._dropped, 0
+        if dropped:
+            log.warning("%d messages of the fleet were dropped: more came than can be handled", dropped)

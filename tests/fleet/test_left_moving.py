@@ -1,0 +1,166 @@
+"""What must not be left moving, nor shown as if it were known: found by trying to break the promises."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import pytest
+
+from robotiq_async import Finger, RobotiqError, State
+from robotiq_async.errors import AgentError, ControlLostError
+from robotiq_async.fleet.network.bus import Reply, Urgency
+from robotiq_async.fleet.wire.envelope import Answer, Call
+from tests.fleet.lab import lab
+from tests.fleet.network import MemoryBus
+from tests.virtual import virtual
+
+
+class Spoiling:
+    """A bus whose answers to one kind of request are spoiled: lost once, or another's."""
+
+    def __init__(
+        self, bus: MemoryBus, verb: str, *, times: int = 1_000_000, answer: bytes | None = None
+    ) -> None:
+        self._bus, self._verb, self._answer, self._left = bus, verb, answer, times
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._bus, name)
+
+    def ask(
+        self, key: str, payload: bytes, *, timeout: float, urgency: Urgency
+    ) -> asyncio.Future[Reply | None]:
+        if not key.endswith(self._verb) or not self._left:
+            return self._bus.ask(key, payload, timeout=timeout, urgency=urgency)
+        self._left -= 1
+        if self._answer is None:  # never sent
+            return asyncio.ensure_future(_nothing(timeout))
+        return asyncio.ensure_future(self._another(key, payload, timeout, urgency))
+
+    async def _another(self, key: str, payload: bytes, timeout: float, urgency: Urgency) -> Reply | None:
+        asking = self._bus.ask(key, payload, timeout=timeout, urgency=urgency)
+        await asyncio.sleep(0.1)
+        asking.cancel()
+        assert self._answer is not None
+        return _Answered(self._answer)
+
+
+class _Answered:
+    attachment = b""
+
+    def __init__(self, payload: bytes) -> None:
+        self.payload = payload
+
+
+async def _nothing(timeout: float) -> None:
+    await asyncio.sleep(timeout)
+
+
+@virtual
+async def test_silence_is_noticed_while_the_lease_is_asked_for_again() -> None:
+    """The last status of an agent that had died was shown as the present one for ever."""
+    async with lab() as here, here.client() as hand:
+        here.network.cut(("client", "agent"))
+        while hand.is_in_control:  # noqa: ASYNC110  # what is waited for tells nobody
+            await asyncio.sleep(0.01)
+        here.network.cut(("agent", "client"))
+        await asyncio.sleep(3)
+        assert hand.state is State.DISCONNECTED
+
+
+@virtual
+@pytest.mark.parametrize("lost", [1, 1_000_000])
+async def test_a_cancelled_move_is_called_off_although_that_was_lost(lost: int) -> None:
+    """It was asked once, and the fingers ran on under a lease that was renewed."""
+    async with lab() as here:
+        bus = Spoiling(here.network.bus("client"), "cmd/cancel", times=lost)
+        async with here.client_over(bus) as hand:
+            with pytest.raises(TimeoutError):
+                async with asyncio.timeout(0.3):
+                    await hand.move(255, Finger.A, speed=0)
+            await asyncio.sleep(2.5)
+            assert not here.gripper.is_moving
+            assert here.gripper.position(Finger.A) < 220
+
+
+@virtual
+async def test_a_move_whose_answer_was_anothers_is_called_off() -> None:
+    async with lab() as here:
+        answer = Answer("robotiq/v1/lab/cell/right", 3, 1, {}).pack()
+        async with here.client_over(Spoiling(here.network.bus("client"), "cmd/move", answer=answer)) as hand:
+            with pytest.raises(AgentError, match="another answer"):
+                await hand.move(255, Finger.A, speed=0)
+            await asyncio.sleep(0.5)
+            assert not here.gripper.is_moving
+
+
+@virtual
+async def test_who_was_cut_off_does_not_come_back_after_a_halt_of_the_next_holder() -> None:
+    """Only a halt of somebody who had not held the lease barred the one before."""
+    async with lab() as here:
+        first = here.client("first")
+        await first.start()
+        here.network.cut(("first", "agent"), ("agent", "first"))
+        await asyncio.sleep(2)
+        async with here.client("next") as other:
+            await other.halt()
+        here.network.mend(*here.network.both("first", "agent"))
+        await asyncio.sleep(3)
+        assert not first.is_in_control
+        with pytest.raises(ControlLostError):
+            await first.move(30)
+        await first.stop()
+
+
+@virtual
+async def test_a_next_holder_that_halted_may_go_on_itself() -> None:
+    async with lab() as here, here.client("first") as hand:
+        await hand.halt()
+        await hand.move(30, Finger.A)
+
+
+@virtual
+async def test_the_holders_secret_is_told_to_nobody() -> None:
+    async with lab() as here, here.client("first"), here.client("reader", control=False) as reader:
+        bus = here.network.bus("stranger")
+        call = Call("robotiq/v1/lab/cell/left", "stranger")
+        reply = await bus.ask(f"{call.to}/info", call.pack(), timeout=1.0, urgency=Urgency.COMMAND)
+        assert reply is not None
+        assert b'"client"' not in reply.payload
+        assert reader.state is State.RUNNING_IDLE
+
+
+@virtual
+async def test_a_refused_command_does_not_forget_the_hold_that_is_owed() -> None:
+    """It was forgotten before the command was known to be carried out, and a dead holder's fingers ran on."""
+    async with lab() as here:
+        gone, other = here.client("gone"), here.client("other", control=False)
+        await gone.start()
+        await other.start()
+        moving = asyncio.create_task(gone.move(255, Finger.ABC, speed=0))
+        while not here.gripper.is_moving:  # noqa: ASYNC110  # what is waited for tells nobody
+            await asyncio.sleep(0.001)
+        await here.server.stop()
+        here.network.cut(("gone", "agent"), ("agent", "gone"))
+        await asyncio.sleep(1.2)
+        await other.acquire()
+        with pytest.raises(RobotiqError):
+            await other.set_speed(10)
+        await here.server.start()
+        await asyncio.sleep(1.0)
+        assert not here.gripper.is_moving
+        await asyncio.gather(moving, return_exceptions=True)
+        await other.stop()
+        await gone.stop()
+
+
+@virtual
+async def test_of_a_command_for_several_axes_all_is_carried_out_or_nothing() -> None:
+    async with lab() as here, here.client() as hand:
+        session = hand._session
+        assert session is not None
+        axes = {"1": {"position": 90}, "2": {"position": 999}}
+        with pytest.raises(ValueError, match="999"):
+            await session.ask("cmd/command", {"axes": axes}, timeout=1.0)
+        await asyncio.sleep(1)
+        assert here.gripper.position(Finger.A) < 10
