@@ -9,33 +9,36 @@ from __future__ import annotations
 import queue
 import threading
 from collections.abc import Callable
-from contextlib import suppress
 from typing import Final
 
 MOST: Final = 1000
-"""So many answers may wait; the rest is dropped: whoever asked asks again, or gives up."""
+"""So many answers may wait; of what comes then the question is dropped, in the thread as well: that, too, is
+said to whoever asked, and may take as long. Who asked asks again, or gives up."""
 
 
 class Replier:
-    """One thread, started with the first answer. Nobody has to wait for its end."""
+    """One thread, started with the first answer."""
 
     def __init__(self) -> None:
         """Nothing to send yet."""
-        self._waiting: queue.Queue[Callable[[], None] | None] = queue.Queue(MOST)
+        self._waiting: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
         self._thread: threading.Thread | None = None
 
-    def put(self, send: Callable[[], None]) -> None:
-        """Have an answer sent, after those before it."""
+    def put(self, send: Callable[[], None], drop: Callable[[], None]) -> None:
+        """Have an answer sent after those before it, or its question dropped where too many wait."""
         if self._thread is None:
             self._thread = threading.Thread(target=self._run, name="robotiq_async fleet", daemon=True)
             self._thread.start()
-        with suppress(queue.Full):
-            self._waiting.put_nowait(send)
+        self._waiting.put(send if self._waiting.qsize() < MOST else drop)
 
     def close(self) -> None:
-        """Send nothing more; what waits is given up if it cannot be sent at once."""
-        with suppress(queue.Full):
-            self._waiting.put_nowait(None)
+        """Send what waits, and nothing after it."""
+        self._waiting.put(None)
+
+    def join(self, timeout: float) -> None:
+        """Wait for the end of the thread; blocks."""
+        if self._thread is not None:
+            self._thread.join(timeout)
 
     def _run(self) -> None:
         while (send := self._waiting.get()) is not None:

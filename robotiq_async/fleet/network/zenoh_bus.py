@@ -22,6 +22,8 @@ from .mailbox import Kind, Mailbox
 from .replier import Replier
 
 CLOSE_S: Final = 1.0
+LAST_ANSWERS_S: Final = 0.2
+"""For the answers to what an end has called off."""
 LONGEST: Final = 4096
 """Bytes of a request; what is longer is none, and is not looked at."""
 _PRIORITY: Final = {
@@ -73,11 +75,17 @@ class _Question:
         self.payload = b"" if query.payload is None else query.payload.to_bytes()
 
     def reply(self, payload: bytes, attachment: bytes = b"") -> None:
-        def send() -> None:
-            with contextlib.suppress(zenoh.ZError), self._query as query:  # the asker is gone
-                query.reply(self.key, payload, attachment=attachment)
+        query, key = self._query, self.key
 
-        self._replier.put(send)
+        def send() -> None:
+            with contextlib.suppress(zenoh.ZError), query:  # the asker is gone
+                query.reply(key, payload, attachment=attachment)
+
+        def drop() -> None:
+            with contextlib.suppress(zenoh.ZError):
+                query.drop()  # type: ignore[no-untyped-call]
+
+        self._replier.put(send, drop)
 
 
 class _Reply:
@@ -206,12 +214,18 @@ class ZenohBus:
 
     async def close(self) -> None:
         """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
-        for replier in self._repliers.values():
-            replier.close()
         if self._closing is None:
-            self._closing = asyncio.ensure_future(asyncio.to_thread(self._session.close))
+            self._closing = asyncio.ensure_future(asyncio.to_thread(self._close))
         with contextlib.suppress(TimeoutError, zenoh.ZError):
             await asyncio.wait_for(asyncio.shield(self._closing), CLOSE_S)
+
+    def _close(self) -> None:
+        for replier in self._repliers.values():
+            replier.close()
+            replier.join(LAST_ANSWERS_S)
+        self._session.close()  # type: ignore[no-untyped-call]
+        for replier in self._repliers.values():
+            replier.join(CLOSE_S)
 
     def _undo(self, declared: Any) -> Undo:  # noqa: ANN401  # each kind has a class of its own
         def undo() -> None:
