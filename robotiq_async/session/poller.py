@@ -101,6 +101,11 @@ class Poller:
         if self._interruptible is not None:
             self._interruptible.cancel()
 
+    def hurry(self) -> None:
+        """Begin the next cycle at once if there is a stop to write; it does not wait for the tick."""
+        if self._controller.is_urgent:
+            self._tick.hurry()
+
     def abandon(self) -> None:
         """The loop was closed: give back what is not its own."""
         self._tick.close()
@@ -177,11 +182,13 @@ class Poller:
 
     async def _poll(self) -> None:
         while not self._stopping:
-            await self._wait_for_tick()
+            passed = await self._wait_for_tick()
             if self._stopping:
                 return
             try:
                 await self._cycle()
+                if not passed:
+                    self._last_poll = 0.0  # nor does the rest of a period that a hurried cycle came into
             except RobotiqConnectionError as error:
                 if not await self._reconnect(error):
                     return
@@ -239,14 +246,19 @@ class Poller:
         tick = self._tick
         return tick.late > HELD_S or tick.time() - tick.due > HELD_S
 
-    async def _wait_for_tick(self) -> None:
-        """Wait for the next tick; one that was missed is counted and skipped."""
-        missed = await self._tick.wait() - 1
+    async def _wait_for_tick(self) -> int:
+        """Wait for the next tick; one that was missed is counted and skipped. Returns how many have passed."""
+        passed = await self._tick.wait()
+        if not passed:
+            self._last_poll = 0.0  # a hurried cycle keeps to no period
+            return passed
+        missed = passed - 1
         self._counters.longest_stall = self._tick.longest_late
         if missed:
             self._counters.overruns += missed
             if missed * self._options.poll_interval >= LATE_S:
                 self._warn_late(missed * self._options.poll_interval)
+        return passed
 
     def _warn_late(self, late: float) -> None:
         now = self._loop.time()

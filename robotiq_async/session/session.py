@@ -198,6 +198,7 @@ class Session:
         """
         waiter = self.waiter()
         ask(waiter)
+        self._poller.hurry()
         await waiter
 
     async def reach(
@@ -226,6 +227,7 @@ class Session:
         with self._waiters.watching(states, ends) as reached:
             if ask is not None:
                 ask()
+                self._poller.hurry()
             with anyio.move_on_after(timeout):
                 return await reached
         raise StateTimeoutError(f"{what} within {timeout:g} s (now {self.machine.state.name})")

@@ -47,6 +47,7 @@ class Tick:
         self.longest_late = 0.0
         """The worst of all."""
         self._passed = 0
+        self._hurried = False
         self._waiter: asyncio.Future[None] | None = None
 
     def start(self) -> None:
@@ -55,7 +56,7 @@ class Tick:
         self._bell = bell = _Bell.of(self._loop)
         phase = self.interval * bell.next_phase()
         self.due = math.ceil((self.time() - phase) / self.interval) * self.interval + phase
-        self._passed, self.late = 0, 0.0
+        self._passed, self._hurried, self.late = 0, False, 0.0
         bell.add(self)
 
     def close(self) -> None:
@@ -69,12 +70,20 @@ class Tick:
         """What it beats by."""
         return "" if self._bell is None else self._bell.source
 
+    def hurry(self) -> None:
+        """Have the next wait end at once; the ticks come when they would have come."""
+        self._hurried = True
+        self._wake()
+
     async def wait(self) -> int:
-        """Wait for the next tick, and return how many have passed since the last wait: 1, or more if late."""
-        while not self._passed:
+        """Wait for the next tick, and return how many have passed since the last wait.
+
+        That is 1, more if late, and 0 when :meth:`hurry` ended the wait.
+        """
+        while not self._passed and not self._hurried:
             self._waiter = self._loop.create_future()
             await self._waiter
-        passed, self._passed = self._passed, 0
+        passed, self._passed, self._hurried = self._passed, 0, False
         return passed
 
     def strike(self, now: float) -> None:
@@ -86,6 +95,9 @@ class Tick:
         count = 1 + int(late / self.interval)
         self.due += count * self.interval
         self._passed += count
+        self._wake()
+
+    def _wake(self) -> None:
         if self._waiter is not None and not self._waiter.done():
             self._waiter.set_result(None)
 

@@ -262,3 +262,18 @@ async def test_a_loop_that_is_held_up_is_not_held_up_more_by_reading_again() -> 
         held, missed, after = [(await anext(stream)).timestamp for _ in range(3)]
     assert missed - held < 0.04, "the tick that was missed"
     assert after - missed > 0.04, "the tick after it"
+
+
+@pytest.mark.parametrize("emergency", ["halt", "reset"])
+async def test_a_stop_does_not_wait_for_the_next_poll(
+    server: SimulatorServer, gripper: SimulatedGripper, emergency: str
+) -> None:
+    async with RobotiqHand(server.address, poll_interval=0.1) as hand:
+        await hand.set_speed(0)
+        await hand.set_position(255)
+        while not gripper.is_moving:  # noqa: ASYNC110  # the gripper tells nobody
+            await asyncio.sleep(0.001)
+        await anext(hand.statuses())
+        asyncio.ensure_future(getattr(hand, emergency)())
+        await asyncio.sleep(0.01)
+        assert not gripper.is_moving, "a tenth of the interval later"

@@ -54,6 +54,41 @@ async def test_a_status_is_read_before_anything_is_written_and_the_write_follows
 
 
 @virtual
+async def test_a_halt_does_not_wait_for_the_tick_and_shifts_none() -> None:
+    async with polled() as here:
+        await here.polls(3)
+        here.controller.command(Command(Finger.A, 200))
+        await here.polls(3)
+        await asyncio.sleep(POLL_S / 4)
+        del here.wire.calls[:]
+        before, asked = here.statuses[-1].timestamp, here.loop.time()
+        here.controller.halt(asyncio.get_running_loop().create_future())
+        here.poller.hurry()
+        here.poller.hurry()
+        await here.polls()
+        assert here.wire.calls == ["write", "read"]
+        assert here.statuses[-1].timestamp - asked < POLL_S / 2
+        await here.polls(2)
+        later = [status.timestamp for status in here.statuses[-2:]]
+        assert later == [pytest.approx(before + POLL_S), pytest.approx(before + 2 * POLL_S)]
+        assert not here.counters.overruns
+        whole = list(here.counters.periods)[1:]  # the first is from the first contact to the first tick
+        assert len(whole) == 6, "those around a hurried cycle do not count"
+        assert all(period == pytest.approx(POLL_S) for period in whole)
+
+
+@virtual
+async def test_what_is_no_stop_waits_for_the_tick() -> None:
+    async with polled() as here:
+        await here.polls(3)
+        before = here.statuses[-1].timestamp
+        here.controller.command(Command(Finger.A, 200))
+        here.poller.hurry()
+        await here.polls()
+        assert here.statuses[-1].timestamp == pytest.approx(before + POLL_S)
+
+
+@virtual
 async def test_what_is_decided_is_decided_on_what_the_gripper_has_just_shown() -> None:
     """Another client resets it between two polls: a command that was waiting would activate it again."""
     async with polled() as here:
