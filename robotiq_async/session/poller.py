@@ -247,7 +247,7 @@ class Poller:
         return tick.late > HELD_S or tick.time() - tick.due > HELD_S
 
     async def _wait_for_tick(self) -> int:
-        """Wait for the next tick; one that was missed is counted and skipped. Returns how many have passed."""
+        """Wait for the next tick, and return how many have passed; a missed one is counted and skipped."""
         passed = await self._tick.wait()
         if not passed:
             self._last_poll = 0.0  # a hurried cycle keeps to no period

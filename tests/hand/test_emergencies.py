@@ -274,6 +274,7 @@ async def test_a_stop_does_not_wait_for_the_next_poll(
         while not gripper.is_moving:  # noqa: ASYNC110  # the gripper tells nobody
             await asyncio.sleep(0.001)
         await anext(hand.statuses())
-        asyncio.ensure_future(getattr(hand, emergency)())
-        await asyncio.sleep(0.01)
-        assert not gripper.is_moving, "a tenth of the interval later"
+        async with asyncio.TaskGroup() as group:
+            group.create_task(getattr(hand, emergency)())
+            await asyncio.sleep(0.01)
+            assert not gripper.is_moving, "a tenth of the interval later"
