@@ -108,7 +108,7 @@ class World:
         """Wait until something is true; half a minute at most, and in this loop that takes no time."""
         async with asyncio.timeout(30):
             while not condition():  # noqa: ASYNC110  # what is waited for tells nobody
-                await asyncio.sleep(0.0001)
+                await asyncio.sleep(0.001)
 
     async def until_moving(self) -> None:
         await self.until(lambda: self.gripper.is_moving)

@@ -6,6 +6,7 @@ import asyncio
 from bisect import bisect_right
 from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from operator import itemgetter
 from typing import Any, TypeVar
 
 from robotiq_async import Finger, RobotiqError, RobotiqHand, RobotiqStatus, State
@@ -225,9 +226,8 @@ class Client:
         """When the gripper gave this status out, by the number it wrote into it: the last time before now."""
         stamps, number = self.world.grippers[self.gripper].stamps, status.registers[7] & 0xFF
         # 256 numbers at 200 Hz are 1.3 s: start from when the client thinks it was.
-        index = bisect_right([at for at, _ in stamps[-4000:]], status.timestamp + 0.1) - 1
-        recent = stamps[-4000:][: index + 1]
-        for at, each in reversed(recent):
+        index = bisect_right(stamps, status.timestamp + 0.1, key=itemgetter(0))
+        for at, each in (stamps[before] for before in range(index - 1, -1, -1)):
             if each == number:
                 return at
         raise AssertionError("a status that this gripper never gave out")
