@@ -23,7 +23,7 @@
     +-- RecordingError                          a recording that cannot be written, or read
     +-- ViewerError                             a viewer that cannot be served
     +-- MeasuringError                          a measurement that went wrong
-    +-- NotAllStoppedError                      the halt of a fleet; .outcomes
+    +-- NotAllStoppedError                      the halt of a fleet; .outcomes, .unreached
 
 The three before the last concern neither gripper nor link: the hand goes on. They, and those about other
 hosts, stand here and not among the names of the package.
@@ -189,9 +189,11 @@ class NotAllStoppedError(RobotiqError):
 
     Attributes:
         outcomes: for each gripper how its halt ended; "stopped" is the good end.
+        unreached: endpoints to which there was no connection; nobody knows which grippers are behind them.
     """
 
-    def __init__(self, message: str, outcomes: Mapping[Any, str]) -> None:
+    def __init__(self, message: str, outcomes: Mapping[Any, str], unreached: Iterable[str] = ()) -> None:
         """Keep the outcomes."""
         self.outcomes = dict(outcomes)
+        self.unreached = tuple(unreached)
         super().__init__(message)

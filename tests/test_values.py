@@ -124,7 +124,7 @@ ERRORS: list[Exception] = [
     MoveTimeoutError("too slow", status_of(0x39, 0xC0)),
     ConnectFailedError("tcp://192.168.1.11:502", "refused"),
     ControlLostError("somebody commands the gripper", "held"),
-    NotAllStoppedError("not stopped", {LEFT: "no answer"}),
+    NotAllStoppedError("not stopped", {LEFT: "no answer"}, ["tls/cell-2:7447"]),
     TableError("table.csv", 3, "no number"),
     TableError("table.csv", None, "the file is empty"),
 ]

@@ -4,29 +4,24 @@ from __future__ import annotations
 
 import asyncio
 import json
-import secrets
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import count
 from types import TracebackType
 from typing import Any, Final, Self
 
 from ..enums import Fault, State
-from ..errors import AgentError, NotAllStoppedError, RobotiqError
+from ..errors import NotAllStoppedError
 from ..log import log
 from ..session.clock import now
 from ..session.event_loop import running_loop
 from ..session.listeners import Listeners
 from ..session.streams import Channel, Stream
-from .network.bus import Bus, Undo, Urgency
+from .halting import STOPPED, halt
+from .network.bus import Bus, Undo
 from .network.route import Route, default_route
-from .remote.persistence import until_answered
 from .remote.remote_hand import RemoteHand
-from .remote.requests import NoAnswerError, label
-from .wire.envelope import Call, unpack_answer
 from .wire.names import ROOT, GripperName, check_name
 
-HALT_S: Final = 2.0
 LOOK_S: Final = 0.5
 LOOK_AGAIN_S: Final = 0.1
 SETTLE_S: Final = 2.0
@@ -153,53 +148,31 @@ class Fleet:
         In the first seconds after the fleet was entered it looks on for agents whose links come up late.
 
         Raises:
-            NotAllStoppedError: one was not seen to stop, or there is none at all.
+            NotAllStoppedError: one was not seen to stop, or there is none at all, or an endpoint of the route
+                was not reached: nobody knows which grippers are behind it.
             RuntimeError: the fleet is not entered.
         """
+        bus = self._entered()
         halting: dict[GripperName, asyncio.Task[str]] = {}
         try:
             # Links come up one after the other: whoever is there is halted at once, and looking goes on.
             while True:
                 await self._look()
-                for name in self._members:
+                for name, member in self._members.items():
                     if name not in halting:
-                        halting[name] = asyncio.ensure_future(self._halt(name))
+                        halting[name] = asyncio.ensure_future(halt(bus, name, member.agents))
                 if now() - self._entered_at >= SETTLE_S:
                     break
                 await asyncio.sleep(LOOK_AGAIN_S)
-            outcomes = {name: await task for name, task in halting.items()}
+            outcomes = {name: await task for name, task in sorted(halting.items())}
         finally:
             for task in halting.values():
                 task.cancel()
-        if not halting:
-            raise NotAllStoppedError("no gripper is heard of: nothing was stopped", {})
-        failed = {name: how for name, how in outcomes.items() if how != "stopped"}
-        if failed:
-            words = "; ".join(f"{name}: {how}" for name, how in failed.items())
-            raise NotAllStoppedError(f"not stopped: {words}", outcomes)
+        unreached = await bus.unreached()
+        failed = {name: how for name, how in outcomes.items() if how != STOPPED}
+        if failed or unreached or not outcomes:
+            raise NotAllStoppedError(_account(outcomes, unreached), outcomes, unreached)
         return outcomes
-
-    async def _halt(self, name: GripperName) -> str:
-        """Ask until answered."""
-        bus, client, numbers = self._entered(), secrets.token_hex(8), count(1)
-
-        async def attempt(left: float) -> None:
-            call = Call(name.base, client, number=next(numbers), arguments={"label": label()})
-            reply = await bus.ask(name.key("halt"), call.pack(), timeout=left, urgency=Urgency.STOP)
-            if reply is None:
-                raise NoAnswerError("no answer")
-            answer = unpack_answer(reply.payload)
-            if answer.to != name.base or answer.number != call.number:
-                raise AgentError("another answer")
-            answer.outcome(lambda stamp: stamp)
-
-        try:
-            await until_answered(attempt, HALT_S)
-        except NoAnswerError:
-            return "no answer"
-        except (RobotiqError, TypeError, ValueError) as error:
-            return f"refused: {error}"
-        return "stopped"
 
     # -- inside ----------------------------------------------------------------------------------------
 
@@ -257,3 +230,14 @@ class Fleet:
     def __iter__(self) -> Iterator[Member]:
         """The members."""
         return iter(self.members.values())
+
+
+def _account(outcomes: Mapping[GripperName, str], unreached: Sequence[str]) -> str:
+    """What was halted and what was not, in words."""
+    stopped = sum(how == STOPPED for how in outcomes.values())
+    words = [
+        f"halted {stopped} of {len(outcomes)}" if outcomes else "no gripper is heard of: nothing was stopped"
+    ]
+    words += [f"{name}: {how}" for name, how in outcomes.items() if how != STOPPED]
+    words += [f"not reached: {', '.join(unreached)}"] if unreached else []
+    return "; ".join(words)

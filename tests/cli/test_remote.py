@@ -9,6 +9,7 @@ import signal
 import socket
 from asyncio.subprocess import Process
 from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,6 @@ import pytest
 from robotiq_async import Finger
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.conftest import Beside, Call, Shell
-from tests.conftest import Clock
 
 pytest.importorskip("zenoh")
 
@@ -36,10 +36,41 @@ def endpoint(monkeypatch: pytest.MonkeyPatch) -> str:
     return endpoint
 
 
+class Brake:
+    """A gripper's time: it can be slowed down, for commands take a while to start on a busy machine."""
+
+    def __init__(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._since, self._before, self._rate = self._loop.time(), 0.0, 1.0
+
+    def __call__(self) -> float:
+        return self._before + self._rate * (self._loop.time() - self._since)
+
+    def slow_down(self) -> None:
+        self._before, self._since, self._rate = self(), self._loop.time(), 0.01
+
+
+@dataclass
+class Served:
+    """A gripper, and where it is."""
+
+    gripper: SimulatedGripper
+    address: str
+    time: Brake
+
+    async def moves(self) -> None:
+        """Wait until finger A is on its way, and let it take long."""
+        async with asyncio.timeout(20):
+            while self.gripper.position(Finger.A) < 20:  # noqa: ASYNC110  # it tells nobody
+                await asyncio.sleep(0.01)
+        self.time.slow_down()
+
+
 @pytest.fixture
-async def gripper() -> AsyncIterator[tuple[SimulatedGripper, str]]:
-    async with SimulatorServer(SimulatedGripper(Clock(), speedup=20, spread=False)) as server:
-        yield server.gripper, server.address
+async def gripper() -> AsyncIterator[Served]:
+    time = Brake()
+    async with SimulatorServer(SimulatedGripper(time, speedup=20, spread=False)) as server:
+        yield Served(server.gripper, server.address, time)
 
 
 def fleet_file(folder: Path, endpoint: str, gripper: str) -> Path:
@@ -51,10 +82,8 @@ def fleet_file(folder: Path, endpoint: str, gripper: str) -> Path:
 
 
 @pytest.fixture
-async def agent(
-    shell: Shell, endpoint: str, gripper: tuple[SimulatedGripper, str], tmp_path: Path
-) -> Process:
-    process = await shell.start("agent", str(fleet_file(tmp_path, endpoint, gripper[1])))
+async def agent(shell: Shell, endpoint: str, gripper: Served, tmp_path: Path) -> Process:
+    process = await shell.start("agent", str(fleet_file(tmp_path, endpoint, gripper.address)))
     assert await shell.read_line(process) == ADDRESS
     return process
 
@@ -99,35 +128,31 @@ def test_nobody_there(call: Call, endpoint: str) -> None:
     call("status", ADDRESS).assert_failed(1, "cannot connect to zenoh://lab/cell/left")
 
 
-async def test_a_list_and_a_halt(shell: Shell, agent: Process, gripper: tuple[SimulatedGripper, str]) -> None:
+async def test_a_list_and_a_halt(shell: Shell, agent: Process, gripper: Served) -> None:
     listed = await shell.run("fleet", "--json")
     listed.assert_succeeded()
     assert json.loads(listed.out)["address"] == ADDRESS
     moving = await shell.start("move", "255", "--yes", "--speed", "0", ADDRESS)
-    async with asyncio.timeout(20):
-        while gripper[0].position(Finger.A) < 20:  # noqa: ASYNC110  # what is waited for tells nobody
-            await asyncio.sleep(0.01)
+    await gripper.moves()
     halted = await shell.run("fleet", "halt", "lab")
     halted.assert_succeeded()
     assert halted.out == f"{ADDRESS}  stopped\n"
     (await shell.finish(moving)).assert_failed(1, "halted")
-    assert not gripper[0].is_moving
+    assert not gripper.gripper.is_moving
 
 
 def test_a_halt_of_nobody_is_a_failure(call: Call, endpoint: str) -> None:
-    call("fleet", "halt").assert_failed(1, "nothing was stopped")
+    call("fleet", "halt").assert_failed(1, "nothing was stopped", f"not reached: {endpoint}")
 
 
 async def test_an_agent_that_is_told_to_end_stops_the_fingers(
-    shell: Shell, agent: Process, gripper: tuple[SimulatedGripper, str]
+    shell: Shell, agent: Process, gripper: Served
 ) -> None:
     moving = await shell.start("move", "255", "--yes", "--speed", "0", ADDRESS)
-    async with asyncio.timeout(20):
-        while gripper[0].position(Finger.A) < 20:  # noqa: ASYNC110  # what is waited for tells nobody
-            await asyncio.sleep(0.01)
+    await gripper.moves()
     agent.send_signal(signal.SIGTERM)
     (await shell.finish(agent)).assert_succeeded()
-    assert not gripper[0].is_moving
+    assert not gripper.gripper.is_moving
     assert (await shell.finish(moving)).code == 1
 
 

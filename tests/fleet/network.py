@@ -15,7 +15,8 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from robotiq_async.fleet.network.bus import Question, Reply, Undo, Urgency
+from robotiq_async.fleet.network.asking import Asking
+from robotiq_async.fleet.network.bus import Question, Reply, Undo, Urgency, is_any
 
 LATENCY_S = 0.0002
 LINK_LEASE_S = 1.0
@@ -72,7 +73,7 @@ class Network:
         self.wrong_key: Callable[[str], str] = lambda key: key
         """Under which key something arrives."""
         self.keeps_links = False
-        self.pending: set[_Ask] = set()
+        self.pending: set[_Query] = set()
         self._parted: set[frozenset[str]] = set()
 
     def stream(self, source: str, target: str) -> Stream:
@@ -112,9 +113,9 @@ class Network:
         self._parted.add(frozenset((one, other)))
         for stream in self.both(one, other):
             stream.kept.clear()
-        for ask in list(self.pending):
-            if {ask.source, ask.target} == {one, other}:
-                ask.end()
+        for query in list(self.pending):
+            if query.source.name in (one, other):
+                query.end(one, other)
         self._show_each_other(one, other, is_there=False)
 
     def join(self, one: str, other: str) -> None:
@@ -162,21 +163,42 @@ class Network:
         return bus
 
 
-@dataclass(eq=False)
-class _Ask:
-    """A request without an answer yet, and what ends it without one."""
+class _Query:
+    """A request on its way to all who serve its key, until each has answered or is out of reach."""
 
-    source: str
-    target: str
-    end: Callable[[], None]
+    def __init__(self, source: MemoryBus, targets: list[MemoryBus], decides: Callable[[Reply], bool]) -> None:
+        self.source = source
+        self.asking = Asking(decides)
+        self._left = [target.name for target in targets]
+
+    def take(self, target: str, reply: Reply | None) -> None:
+        """It is answered, or is not going to be."""
+        if target in self._left:
+            self._left.remove(target)
+            if reply is not None:
+                self.asking.take(reply)
+            if not self._left:
+                self.asking.end()
+
+    def end(self, *names: str) -> None:
+        """Some of those who were asked are gone."""
+        for name in names:
+            self.source.loop.call_soon(self.take, name, None)
 
 
 class _Question:
-    def __init__(self, key: str, payload: bytes, reply: Callable[[bytes, bytes], None]) -> None:
+    def __init__(self, key: str, payload: bytes, reply: Callable[[Reply | None], None]) -> None:
         self.key, self.payload, self._reply = key, payload, reply
+        self._is_answered = False
 
     def reply(self, payload: bytes, attachment: bytes = b"") -> None:
-        self._reply(payload, attachment)
+        self._is_answered = True
+        self._reply(_Reply(payload, attachment))
+
+    def __del__(self) -> None:
+        """Who drops a question says so to whoever asked."""
+        if not self._is_answered:
+            self._reply(None)
 
 
 @dataclass(frozen=True)
@@ -197,6 +219,8 @@ class MemoryBus:
         self.tokens: set[str] = set()
         self.watchers: list[tuple[str, Callable[[str, bool], None]]] = []
         self.is_closed = False
+        self.endpoints: list[str] = []
+        """Names of buses that it was told to connect to."""
 
     def _others(self) -> list[MemoryBus]:
         return [
@@ -232,41 +256,40 @@ class MemoryBus:
         return lambda: self.queryables.remove(entry) if entry in self.queryables else None
 
     def ask(
-        self, key: str, payload: bytes, *, timeout: float, urgency: Urgency
+        self,
+        key: str,
+        payload: bytes,
+        *,
+        timeout: float,
+        urgency: Urgency,
+        decides: Callable[[Reply], bool] = is_any,
     ) -> asyncio.Future[Reply | None]:
-        return asyncio.ensure_future(self._ask(key, payload, timeout=timeout, urgency=urgency))
+        return asyncio.ensure_future(self._ask(key, payload, timeout, urgency, decides))
 
-    async def _ask(self, key: str, payload: bytes, *, timeout: float, urgency: Urgency) -> Reply | None:
-        answered: asyncio.Future[Reply | None] = asyncio.get_running_loop().create_future()
+    async def _ask(
+        self, key: str, payload: bytes, timeout: float, urgency: Urgency, decides: Callable[[Reply], bool]
+    ) -> Reply | None:
         found = self._find(key)
-        if found is None or self.is_closed:
+        if not found or self.is_closed:
             return None
-        other, handler = found
-
-        def give_up() -> None:
-            if not answered.done():
-                answered.set_result(None)
-
-        def end() -> None:
-            self.loop.call_soon(give_up)
-
-        asked = _Ask(self.name, other.name, end)
-        self.network.pending.add(asked)
-        self._carry_question(other, handler, key, payload, answered, urgency)
+        query = _Query(self, [other for other, _ in found], decides)
+        self.network.pending.add(query)
+        for other, handler in found:
+            self._carry_question(other, handler, key, payload, query, urgency)
+        timer = self.loop.call_later(timeout, query.asking.end)
         try:
-            async with asyncio.timeout(timeout):
-                return await answered
-        except TimeoutError:
-            return None
+            return await query.asking.answered
         finally:
-            self.network.pending.discard(asked)
+            timer.cancel()
+            self.network.pending.discard(query)
 
-    def _find(self, key: str) -> tuple[MemoryBus, Callable[[Question], None]] | None:
-        for other in self._others():
-            for expression, handler in other.queryables:
-                if matches(expression, key):
-                    return other, handler
-        return None
+    def _find(self, key: str) -> list[tuple[MemoryBus, Callable[[Question], None]]]:
+        return [
+            (other, handler)
+            for other in self._others()
+            for expression, handler in other.queryables
+            if matches(expression, key)
+        ]
 
     def _carry_question(
         self,
@@ -274,18 +297,17 @@ class MemoryBus:
         handler: Callable[[Question], None],
         key: str,
         payload: bytes,
-        answered: asyncio.Future[Reply | None],
+        query: _Query,
         urgency: Urgency,
     ) -> None:
         network = self.network
 
-        def take(reply: Reply) -> None:
-            if not answered.done():
-                answered.set_result(reply)
-
-        def back(data: bytes, attachment: bytes) -> None:
-            deliver = functools.partial(take, _Reply(data, attachment))
-            network.carry(other.name, self, len(data) + len(attachment), deliver, urgency)
+        def back(reply: Reply | None) -> None:
+            size = 0 if reply is None else len(reply.payload) + len(reply.attachment)
+            if not network.loop.is_closed():
+                network.carry(
+                    other.name, self, size, functools.partial(query.take, other.name, reply), urgency
+                )
 
         def arrive() -> None:
             if not other.is_closed:
@@ -334,11 +356,14 @@ class MemoryBus:
                     self.loop.call_later(LATENCY_S, listener, key, True)
         return lambda: self.watchers.remove(entry) if entry in self.watchers else None
 
+    async def unreached(self) -> list[str]:
+        there = {bus.name for bus in self._others() if not self.network.stream(bus.name, self.name).is_cut}
+        return [each for each in self.endpoints if each not in there]
+
     async def close(self) -> None:
         self.is_closed = True
-        for ask in list(self.network.pending):
-            if self.name in (ask.source, ask.target):
-                ask.end()
+        for query in list(self.network.pending):
+            query.end(*([bus.name for bus in self.network.buses] if query.source is self else [self.name]))
         for key in list(self.tokens):
             self._show(key, False)
         self.tokens.clear()

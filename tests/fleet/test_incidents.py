@@ -95,6 +95,44 @@ async def test_halting_an_empty_fleet_is_an_error() -> None:
 
 
 @virtual
+async def test_a_halt_of_all_names_what_it_did_not_reach() -> None:
+    """An endpoint of its route was down, and "all" of the others stopped."""
+    async with world() as here:
+        bus = here.network.bus("console")
+        bus.endpoints = ["agent", "tls/cell-2:7447"]
+        async with Fleet("lab", bus=bus) as fleet:
+            with pytest.raises(NotAllStoppedError) as failed:
+                await fleet.halt_all()
+            assert str(failed.value) == "halted 2 of 2; not reached: tls/cell-2:7447"
+            assert failed.value.unreached == ("tls/cell-2:7447",)
+            assert set(failed.value.outcomes.values()) == {"stopped"}
+            here.kill(here.agent.host)
+            await asyncio.sleep(1)
+            with pytest.raises(NotAllStoppedError) as failed:
+                await fleet.halt_all()
+            left, right = "zenoh://lab/cell/left: no answer", "zenoh://lab/cell/right: no answer"
+            assert str(failed.value) == f"halted 0 of 2; {left}; {right}; not reached: agent, tls/cell-2:7447"
+            await here.start_agent("agent")
+
+
+@virtual
+async def test_a_halt_of_all_looks_on_for_links_that_come_up_late() -> None:
+    """It knew nothing of agents whose links came up after it had looked; somebody else looks on meanwhile."""
+    async with world() as here, Fleet(bus=here.network.bus("screen")) as screen:
+        changes = screen.changes()
+        call = await move_slowly(here)
+        here.network.part("agent", "console")
+        here.network.loop.call_later(1.0, here.network.join, "agent", "console")
+        async with Fleet("lab", bus=here.network.bus("console")) as fleet:
+            assert await fleet.halt_all() == {
+                GripperName("lab", "cell", name): "stopped" for name in ("left", "right")
+            }
+        assert not here.gripper.is_moving
+        assert await call == "ControlLost halted"
+        assert list(changes.drain())
+
+
+@virtual
 async def test_a_halt_is_acknowledged_however_slowly() -> None:
     """A round trip that is longer than the time between two attempts."""
     async with world() as here, Fleet("lab", bus=here.network.bus("console")) as fleet:

@@ -28,10 +28,10 @@ class Spoiling:
         return getattr(self._bus, name)
 
     def ask(
-        self, key: str, payload: bytes, *, timeout: float, urgency: Urgency
+        self, key: str, payload: bytes, *, timeout: float, urgency: Urgency, **how: Any
     ) -> asyncio.Future[Reply | None]:
         if not key.endswith(self._verb) or not self._left:
-            return self._bus.ask(key, payload, timeout=timeout, urgency=urgency)
+            return self._bus.ask(key, payload, timeout=timeout, urgency=urgency, **how)
         self._left -= 1
         if self._answer is None:  # never sent
             return asyncio.ensure_future(_nothing(timeout))

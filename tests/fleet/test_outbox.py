@@ -36,9 +36,9 @@ class CountingBus:
         return getattr(self._bus, name)
 
     def ask(
-        self, key: str, payload: bytes, *, timeout: float, urgency: Urgency
+        self, key: str, payload: bytes, *, timeout: float, urgency: Urgency, **how: Any
     ) -> asyncio.Future[Reply | None]:
-        asking = self._bus.ask(key, payload, timeout=timeout, urgency=urgency)
+        asking = self._bus.ask(key, payload, timeout=timeout, urgency=urgency, **how)
         if key.endswith("cmd/command"):
             self.commands.append(unpack_call(payload))
             self.under_way += 1

@@ -67,8 +67,8 @@ async def fleet(
 async def halt(site: Site = None, /) -> None:
     """Stop every gripper of a site now. Nobody is asked, and whoever commands loses the lease.
 
-    Prints how it ended for each, and exits with 1 unless all were seen to stop. It is no
-    safety function: a network may be down when it is needed.
+    Prints how it ended for each, and exits with 1 unless all were seen to stop and every
+    endpoint was reached. It is no safety function: a network may be down when it is needed.
 
     For example:
 

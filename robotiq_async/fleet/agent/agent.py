@@ -77,7 +77,7 @@ class Agent:
             ready: is called when requests are answered from now on.
 
         Raises:
-            AgentError: another agent serves one of the grippers.
+            AgentError: another agent serves one of the grippers, or has the same site and host.
         """
         undo: list[Undo] = []
         try:
@@ -105,7 +105,7 @@ class Agent:
     async def _refuse_if_served(self) -> None:
         await asyncio.sleep(LOOK_S)
         for _, name in await self._others():
-            raise AgentError(f"another agent serves {name} already: nothing was done")
+            raise AgentError(f"{self._said_of(name)}: nothing was done")
 
     async def _refuse_if_another_began(self) -> None:
         """Of agents that start at the same moment the one with the lowest epoch stays."""
@@ -115,30 +115,39 @@ class Agent:
             for epoch, name in others:
                 # One that does not go has been there for longer; it was only seen late.
                 if is_last or epoch < self.epoch:
-                    raise AgentError(f"another agent serves {name} too: nothing was done")
+                    raise AgentError(f"{self._said_of(name)}: nothing was done")
             if not others:
                 return
 
+    def _said_of(self, name: GripperName) -> str:
+        """What is wrong when another agent serves a gripper."""
+        if name.gripper in self.hands:
+            return f"another agent serves {name} already"
+        return (
+            f"another agent has this host name, and serves {name}: each needs a host of its own in its file"
+        )
+
     async def _others(self) -> list[tuple[int, GripperName]]:
-        """Which grippers of this agent are served by others, each with the other's epoch."""
+        """What other agents of this site and host serve, each with the other's epoch."""
         keys = await self._bus.announced(f"{self._prefix}/*/alive/*", timeout=LOOK_S)
         return [other for other in map(self._other, keys) if other is not None]
 
     def _other(self, key: str) -> tuple[int, GripperName] | None:
-        """Whose token this is, if it is another agent's for one of our grippers."""
+        """Whose token this is, if it is another agent's."""
         try:
             epoch, name = int(key.rpartition("/")[2]), GripperName.of_key(key)
         except ValueError:
             log.warning("a token that no agent makes: %r", key)
             return None
-        return (epoch, name) if epoch != self.epoch and name.gripper in self.hands else None
+        return (epoch, name) if epoch != self.epoch else None
 
     def _see_agent(self, key: str, is_there: bool) -> None:
         other = self._other(key)
         if is_there and other is not None:
             _, name = other
-            log.error("another agent serves %s too: one of them has to go", name)
-            self.hands[name.gripper].news.add({"kind": "conflict", "key": key})
+            log.error("%s: one of them has to go", self._said_of(name))
+            if name.gripper in self.hands:
+                self.hands[name.gripper].news.add({"kind": "conflict", "key": key})
 
     def _hear(self, question: Question) -> None:
         self._look_at_clocks()
@@ -149,7 +158,7 @@ class Agent:
             question.reply(Answer("", 0, self.epoch, error=error_fields(refused)).pack())
             return
         served = self.hands.get(name.gripper)
-        if served is not None:  # else another agent of this host may serve it, and answers
+        if served is not None:  # else it is another's, that came under a wrong key, or nobody's
             served.hear(question.key.removeprefix(f"{name.base}/"), question)
 
     async def _tell(self) -> None:

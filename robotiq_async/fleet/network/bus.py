@@ -49,6 +49,11 @@ class Reply(Protocol):
         """What was sent beside it; may be empty."""
 
 
+def is_any(_reply: Reply) -> bool:
+    """The first reply will do."""
+    return True
+
+
 class Bus(Protocol):
     """One open session. All calls and all callbacks belong to the event loop it was opened in."""
 
@@ -62,11 +67,28 @@ class Bus(Protocol):
         """Call a handler with each request under matching keys."""
 
     def ask(
-        self, key: str, payload: bytes, *, timeout: float, urgency: Urgency
+        self,
+        key: str,
+        payload: bytes,
+        *,
+        timeout: float,
+        urgency: Urgency,
+        decides: Callable[[Reply], bool] = is_any,
     ) -> asyncio.Future[Reply | None]:
-        """Ask, once. None: nobody serves the key, or may be asked, or answers in time.
+        """Ask everybody who serves the key, once: after a partition there may be two.
 
         What is asked first, of the same urgency, arrives first: the request goes out in this call.
+
+        Args:
+            key: of whoever is asked.
+            payload: what is asked.
+            timeout: seconds.
+            urgency: of the request and its answers.
+            decides: whether a reply is the one that is waited for. When all have answered, or the time is
+                over, it is the last one that came.
+
+        Returns:
+            The reply; None when nobody serves the key, or may be asked, or answers in time.
         """
 
     def announce(self, key: str) -> Undo:
@@ -77,6 +99,9 @@ class Bus(Protocol):
 
     def watch(self, expression: str, listener: Callable[[str, bool], None]) -> Undo:
         """Call a listener with each matching key that is announced, also before this, and that is gone."""
+
+    async def unreached(self) -> list[str]:
+        """The endpoints that it was told to connect to, and to which there is no connection now."""
 
     async def close(self) -> None:
         """Take back everything and close. Idempotent; takes a second at most."""

@@ -10,14 +10,16 @@ import asyncio
 import contextlib
 import functools
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 import zenoh
 from zenoh.handlers import Callback
 
 from ...errors import ConnectFailedError
-from .bus import Question, Reply, Undo, Urgency
+from .asking import Asking
+from .bus import Question, Reply, Undo, Urgency, is_any
+from .locators import locators
 from .mailbox import Kind, Mailbox
 from .replier import Replier
 
@@ -57,7 +59,13 @@ async def open_bus(configuration: Mapping[str, object], what: str) -> ZenohBus:
     except asyncio.CancelledError:
         opening.add_done_callback(_close_opened)
         raise
-    return ZenohBus(session)
+    return ZenohBus(session, _endpoints(configuration))
+
+
+def _endpoints(configuration: Mapping[str, Any]) -> Sequence[str]:
+    """Where a session is to connect to."""
+    endpoints: Sequence[str] = configuration["connect"]["endpoints"]
+    return endpoints
 
 
 def _close_opened(opening: asyncio.Future[zenoh.Session]) -> None:
@@ -99,9 +107,10 @@ class _Reply:
 class ZenohBus:
     """An open session."""
 
-    def __init__(self, session: zenoh.Session) -> None:
-        """Use an open session from the running loop."""
+    def __init__(self, session: zenoh.Session, endpoints: Sequence[str] = ()) -> None:
+        """Use an open session, which was told to connect to endpoints, from the running loop."""
         self._session = session
+        self._endpoints = endpoints
         self._mailbox = Mailbox()
         # A halt is acknowledged also where others do not read their answers.
         self._repliers = {True: Replier(), False: Replier()}
@@ -148,22 +157,24 @@ class ZenohBus:
         return self._undo(self._session.declare_queryable(expression, _direct(deliver)))
 
     def ask(
-        self, key: str, payload: bytes, *, timeout: float, urgency: Urgency
+        self,
+        key: str,
+        payload: bytes,
+        *,
+        timeout: float,
+        urgency: Urgency,
+        decides: Callable[[Reply], bool] = is_any,
     ) -> asyncio.Future[Reply | None]:
         """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
-        answered: asyncio.Future[Reply | None] = asyncio.get_running_loop().create_future()
-
-        def take(reply: Reply | None) -> None:
-            if not answered.done():
-                answered.set_result(reply)
+        asking = Asking(decides)
 
         def arrive(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
                 sample = reply.ok
-                self._mailbox.put(lambda: take(_Reply(sample)), Kind.ANSWER)
+                self._mailbox.put(lambda: asking.take(_Reply(sample)), Kind.ANSWER)
 
         def end() -> None:
-            self._mailbox.put(lambda: take(None), Kind.ANSWER)
+            self._mailbox.put(asking.end, Kind.ANSWER)
 
         try:
             self._session.get(
@@ -178,8 +189,8 @@ class ZenohBus:
                 congestion_control=zenoh.CongestionControl.DROP,
             )
         except zenoh.ZError:
-            answered.set_result(None)  # closed
-        return answered
+            asking.end()  # closed
+        return asking.answered
 
     def announce(self, key: str) -> Undo:
         """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
@@ -211,6 +222,11 @@ class ZenohBus:
 
         liveliness = self._session.liveliness()
         return self._undo(liveliness.declare_subscriber(expression, _direct(deliver), history=True))
+
+    async def unreached(self) -> list[str]:
+        """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
+        there = {str(link.dst) for link in self._session.info.links()}
+        return [each for each in self._endpoints if there.isdisjoint(await locators(each))]
 
     async def close(self) -> None:
         """See :class:`~robotiq_async.fleet.network.bus.Bus`."""

@@ -41,6 +41,9 @@ class Asking(Protocol):
     async def ask_quietly(self, verb: str, arguments: Fields, timeout: float) -> None:
         """Ask for what the answer does by itself."""
 
+    async def check_one_agent(self) -> None:
+        """Refuse to begin to command while two agents serve the gripper."""
+
     def spawn(self, work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
         """Do something beside; it ends with the run."""
 
@@ -61,6 +64,7 @@ class LeaseKeeper:
         self.lost: ControlLostError | None = None
         self._run = run
         self._wants_control = wants_control
+        self._may_return = True
         self._lease_run = 0
         """The run of the agent that the number is of."""
         self._acquiring = asyncio.Lock()
@@ -72,6 +76,7 @@ class LeaseKeeper:
 
         Raises:
             ControlLostError: another client commands the gripper.
+            AgentError: two agents serve it.
             RobotiqError: the agent did not answer.
         """
         while self._wants_control and not self.is_in_control:
@@ -96,11 +101,16 @@ class LeaseKeeper:
         """Nothing can be sent any more."""
         self.is_in_control = self._wants_control = False
 
+    def stay_away(self) -> None:
+        """If the lease is lost, it is not acquired again without that being asked for."""
+        self._may_return = False
+
     async def acquire(self, *, take: bool = False) -> None:
         """Get the lease.
 
         Raises:
             ControlLostError: another client holds it, and it is not to be taken away.
+            AgentError: two agents serve the gripper.
             RobotiqError: the agent did not answer.
         """
         async with self._acquiring:
@@ -128,7 +138,8 @@ class LeaseKeeper:
             self._run.spawn(self._renew())
             return
         is_returning = self._returning is not None and not self._returning.done()
-        if self._wants_control and not self._run.mirror.is_silent and not is_returning:
+        wants_back = self._wants_control and self._may_return
+        if wants_back and not self._run.mirror.is_silent and not is_returning:
             self._returning = self._run.spawn(self._acquire_again())
 
     def hear(self, lease: int) -> None:
@@ -163,11 +174,12 @@ class LeaseKeeper:
     # -- inside ----------------------------------------------------------------------------------------
 
     async def _acquire(self, what: Fields) -> None:
+        await self._run.check_one_agent()
         call = self._run.call({**what, "label": label()})
         value = await self._run.send(call, "lease", timeout=ANSWER_S)
         with reading("a lease"):
             self.lease, self._lease_run = int(value["lease"]), self._run.mirror.epoch
-        self.is_in_control, self._wants_control, self.lost = True, True, None
+        self.is_in_control, self._wants_control, self._may_return, self.lost = True, True, True, None
 
     async def _acquire_again(self) -> None:
         try:

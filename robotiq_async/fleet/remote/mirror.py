@@ -75,6 +75,7 @@ class Mirror:
         is_silent: whether nothing is heard of the agent.
         events: number of the newest event that was handed on.
         misrouted: messages that were about another gripper, and dropped.
+        heard_at: when the last one arrived that was current.
     """
 
     def __init__(
@@ -99,6 +100,7 @@ class Mirror:
         self.is_silent = True
         self.events = 0
         self.misrouted = 0
+        self.heard_at = 0.0
         self._mark = mark
         self._channels = channels
         self._entered = entered
@@ -139,15 +141,21 @@ class Mirror:
         log.warning("a message about another gripper was dropped (%d so far)", self.misrouted)
         return True
 
-    def is_superseded(self, message: StatusMessage, arrival: float, window: float = WINDOW_S) -> bool:
-        """Whether a message is of a run of the agent that another one has followed.
+    def is_of_another_run(self, message: StatusMessage, arrival: float, window: float = WINDOW_S) -> bool:
+        """Whether a message is of another run of the agent than the one that is followed.
 
-        Either it was late; or two agents serve the gripper, and that other one is heard.
+        Either it is late; or two agents serve the gripper, and whoever has begun with one stays with it while
+        it is heard: the other may serve another gripper under the same name. After one that has said that it
+        ends comes the next.
         """
-        clock = self._clocks.get(message.epoch)
-        if message.epoch == self.epoch or clock is None:
+        newest = self.newest
+        if newest is None or message.epoch == newest.epoch:
             return False
-        return not self.is_silent or arrival - clock(message.stamp) > window
+        is_heard = not self.is_silent and arrival - self.heard_at <= window
+        if is_heard and newest.state not in _OFF:
+            return True
+        clock = self._clocks.get(message.epoch)
+        return clock is not None and arrival - clock(message.stamp) > window
 
     def hear(
         self,
@@ -161,7 +169,7 @@ class Mirror:
         """A message has arrived. Returns whether it is current: one that was on its way for long is not.
 
         Args:
-            message: about this gripper, and not superseded.
+            message: about this gripper, and of the run that is followed, or is to be from now on.
             arrival: our time.
             in_turn: whether it came among the news, where every status has its turn. One that came with an
                 answer has overtaken others: readers get theirs first.
@@ -172,6 +180,8 @@ class Mirror:
             self._begin_anew(message, arrival)
         self.clock.hear(message.stamp, arrival, asked)
         is_current = arrival - self.clock(message.stamp) <= window
+        if is_current:
+            self.heard_at = arrival
         status = self._status(message)
         if message.stamp >= self.stamp:
             self.newest = message

@@ -7,12 +7,12 @@ import getpass
 import os
 import secrets
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Final
 
-from ...errors import AgentError, ConnectionLostError, NotAllowedError
+from ...errors import AgentError, ConnectionLostError, NotAllowedError, RobotiqError
 from ...session.clock import now
 from ..network.bus import Bus, Reply, Urgency
 from ..wire.envelope import Answer, Call, unpack_answer
@@ -63,6 +63,35 @@ class Posted:
     asked_at: float
     asking: asyncio.Future[Reply | None]
 
+    @property
+    def is_halt(self) -> bool:
+        """Whether it is for every run of the agent, and answered also when the agent falls silent."""
+        return self.urgency is Urgency.STOP
+
+
+def of_its_run(call: Call) -> Callable[[Reply], bool]:
+    """Whether a reply is that of the run of the agent that was asked; of any, if the request names none.
+
+    Where two agents serve a gripper, the one that refuses is the quicker one.
+    """
+
+    def decides(reply: Reply) -> bool:
+        try:
+            answer = unpack_answer(reply.payload)
+        except RobotiqError:
+            return False
+        return (answer.to, answer.number) == (call.to, call.number) and call.epoch in (0, answer.epoch)
+
+    return decides
+
+
+def is_refusal(reply: Reply) -> bool:
+    """Whether a reply to a halt says anything but that the fingers stand: of two agents both have to."""
+    try:
+        return unpack_answer(reply.payload).error is not None
+    except RobotiqError:
+        return True
+
 
 class Requests:
     """Numbers requests, sends each once, and ends the wait when the agent falls silent."""
@@ -112,7 +141,13 @@ class Requests:
             timeout: seconds for its answer.
             urgency: the answer to a halt is waited for also when the agent falls silent.
         """
-        asking = self._bus.ask(self._name.key(verb), call.pack(), timeout=timeout, urgency=urgency)
+        asking = self._bus.ask(
+            self._name.key(verb),
+            call.pack(),
+            timeout=timeout,
+            urgency=urgency,
+            decides=is_refusal if urgency is Urgency.STOP else of_its_run(call),
+        )
         self._asking.add(asking)
         asking.add_done_callback(self._asking.discard)
         return Posted(call, verb, timeout, urgency, now(), asking)
@@ -123,7 +158,7 @@ class Requests:
         Raises:
             NoAnswerError: no answer; it may have been carried out.
             NotAllowedError: nobody answers to that, and the agent is there.
-            AgentError: the answer was another's, or of another version.
+            AgentError: the answer was another gripper's, or of another version.
             ProtocolError: it is none.
         """
         reply, at_once = await self._wait(posted)
@@ -141,6 +176,11 @@ class Requests:
             raise AgentError(
                 f"{self._name}: another answer came to {posted.verb}; it may have been carried out"
             )
+        if answer.error is not None and posted.call.epoch not in (0, answer.epoch) and not posted.is_halt:
+            # That one has done nothing. What became of it where it was meant for nobody says.
+            raise NoAnswerError(
+                f"{self._name}: another run of its agent answered; {posted.verb} may have been carried out"
+            )
         return answer, reply.attachment
 
     async def _wait(self, posted: Posted) -> tuple[Reply | None, bool]:
@@ -151,7 +191,7 @@ class Requests:
         """
         asking = posted.asking
         awaited: set[asyncio.Future[Any]] = {asking, self._closed}
-        if posted.urgency is not Urgency.STOP:
+        if not posted.is_halt:
             awaited.add(self._silence)
         try:
             await asyncio.wait(awaited, return_when=asyncio.FIRST_COMPLETED)

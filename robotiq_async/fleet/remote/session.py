@@ -12,6 +12,7 @@ from ...concurrency import wait_shielded
 from ...control.triggers import Trigger
 from ...enums import State
 from ...errors import (
+    AgentError,
     ConnectFailedError,
     ConnectionLostError,
     ControlLostError,
@@ -40,6 +41,7 @@ from .requests import NoAnswerError, Posted, Requests
 
 CONNECT_S: Final = 5.0
 HALT_S: Final = 2.0
+TWO_AGENTS: Final = "two agents serve it, each perhaps another gripper under the same name: stop one of them"
 TRIES: Final = 2
 """So often a request is called off in a window."""
 
@@ -88,8 +90,8 @@ class RemoteSession:
         self._owns_bus = owns_bus
         self._closing: asyncio.Task[None] | None = None
         self.window = WINDOW_S
-        self._heard_at = 0.0  # something current
-        self._arrived_at = 0.0  # anything
+        self._arrived_at = 0.0
+        """When anything was heard, be it current or not."""
         self._requests = Requests(name, bus)
         self._tasks: set[asyncio.Task[Any]] = set()
         self._missed = MissedEvents(
@@ -99,8 +101,13 @@ class RemoteSession:
         self._looking: asyncio.Task[Any] | None = None
         channels.reopen(self.loop)
         self.mirror.begin(now())
-        # One wildcard, and every payload says what it is about: samples may come under the wrong key.
-        self._undo: Undo = bus.subscribe(name.key("*"), self._hear)
+        self._tokens: set[str] = set()
+        """Of the agents that say that they serve the gripper."""
+        self._undo: list[Undo] = [
+            # One wildcard, and every payload says what it is about: samples may come under the wrong key.
+            bus.subscribe(name.key("*"), self._hear),
+            bus.watch(name.key("alive", "*"), self._see_agent),
+        ]
 
     # -- start and end ---------------------------------------------------------------------------------
 
@@ -176,7 +183,8 @@ class RemoteSession:
         except RobotiqError as error:
             log.warning("%s: the end was not acknowledged (%s): the agent holds what moves", self.name, error)
         finally:
-            self._undo()
+            for undo in self._undo:
+                undo()
             for task in self._tasks:
                 task.cancel()
             await self._requests.close()
@@ -241,7 +249,7 @@ class RemoteSession:
         message, arrival = unpack(payload), now()
         if self.mirror.is_about_another(message.mark):
             return False
-        if self.mirror.is_superseded(message, arrival, self.window):
+        if self.mirror.is_of_another_run(message, arrival, self.window):
             return False
         if self.mirror.epoch not in (0, message.epoch):
             self.keeper.lose("closed", "the agent was started anew")
@@ -249,7 +257,6 @@ class RemoteSession:
         self._arrived_at = arrival
         if not self.mirror.hear(message, arrival, in_turn=in_turn, window=self.window, asked=asked):
             return True  # it has been on its way for so long that it says nothing about now
-        self._heard_at = arrival
         self._requests.hear()
         if in_turn:
             self.keeper.hear(message.lease)
@@ -264,6 +271,25 @@ class RemoteSession:
         if self._hear_status(bytes.fromhex(fields["status"]), in_turn=True):
             self.mirror.hear_events(fields["events"])
 
+    def _see_agent(self, token: str, is_there: bool) -> None:
+        """An agent has come or gone. Of two one is a mistake, and which one it is people know."""
+        before = len(self._tokens)
+        (self._tokens.add if is_there else self._tokens.discard)(token)
+        if before < 2 <= len(self._tokens):
+            log.error("%s: %s", self.name, TWO_AGENTS)
+            self.keeper.stay_away()
+
+    async def check_one_agent(self) -> None:
+        """Refuse to begin to command while two agents say that they serve the gripper.
+
+        Raises:
+            AgentError: they do.
+        """
+        if len(self._tokens) > 1:  # one may have gone without a word
+            self._tokens = set(await self._bus.announced(self.name.key("alive", "*"), timeout=ANSWER_S))
+        if len(self._tokens) > 1:
+            raise AgentError(f"{self.name}: {TWO_AGENTS}; nothing was done")
+
     async def _keep(self) -> None:
         """Look for silence, renew the lease, and acquire it again when that is due."""
         interval = self.window / RENEWALS
@@ -273,7 +299,7 @@ class RemoteSession:
             woken = now()
             late = woken - due
             # After a hold-up of this loop, what has arrived meanwhile is heard first.
-            if late < interval and woken - self._heard_at > self.window:
+            if late < interval and woken - self.mirror.heard_at > self.window:
                 self._fall_silent(woken)
             if self.mirror.is_silent and woken - self._arrived_at < interval:
                 self._look_again()

@@ -1,0 +1,60 @@
+"""Halting one gripper of a fleet, as somebody who holds no lease: asked until answered."""
+
+from __future__ import annotations
+
+import secrets
+from itertools import count
+from typing import Final
+
+from ..errors import AgentError, RobotiqError
+from .network.bus import Bus, Reply, Urgency
+from .remote.persistence import until_answered
+from .remote.requests import NoAnswerError, is_refusal, label
+from .wire.envelope import Call, unpack_answer
+from .wire.names import GripperName
+
+HALT_S: Final = 2.0
+STOPPED: Final = "stopped"
+
+
+async def halt(bus: Bus, name: GripperName, agents: int) -> str:
+    """Halt a gripper; returns how that ended: "stopped", or "no answer" or "refused" and why.
+
+    Args:
+        bus: an open session.
+        name: which one.
+        agents: how many serve it: all of them have to say that it stands.
+    """
+    client, numbers = secrets.token_hex(8), count(1)
+
+    async def attempt(left: float) -> None:
+        call = Call(name.base, client, number=next(numbers), arguments={"label": label()})
+        heard: set[int] = set()
+
+        def decides(reply: Reply) -> bool:
+            if is_refusal(reply):
+                return True
+            answer = unpack_answer(reply.payload)
+            if (answer.to, answer.number) == (call.to, call.number):
+                heard.add(answer.epoch)
+            return False
+
+        reply = await bus.ask(
+            name.key("halt"), call.pack(), timeout=left, urgency=Urgency.STOP, decides=decides
+        )
+        if reply is None:
+            raise NoAnswerError("no answer")
+        answer = unpack_answer(reply.payload)
+        if answer.to != name.base or answer.number != call.number:
+            raise AgentError("another answer")
+        answer.outcome(lambda stamp: stamp)
+        if len(heard) < agents:
+            raise NoAnswerError(f"no answer from {agents - len(heard)} of {agents} agents")
+
+    try:
+        await until_answered(attempt, HALT_S)
+    except NoAnswerError as error:
+        return str(error)
+    except (RobotiqError, TypeError, ValueError) as error:
+        return f"refused: {error}"
+    return STOPPED

@@ -1,0 +1,192 @@
+"""Two agents that do not see each other, two grippers under one name: whose answer counts, what moves."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+
+import pytest
+
+from robotiq_async import ConnectionLostError, Finger, RobotiqHand, State
+from robotiq_async.errors import AgentError, ControlLostError, NotAllStoppedError
+from robotiq_async.fleet.agent.agent import Agent
+from robotiq_async.fleet.fleet import Fleet
+from robotiq_async.fleet.network.asking import Asking
+from robotiq_async.fleet.network.bus import is_any
+from robotiq_async.fleet.remote.requests import is_refusal, of_its_run
+from robotiq_async.fleet.wire.envelope import Answer, Call, failure
+from robotiq_async.fleet.wire.names import GripperName
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from tests.fleet.lab import SPEEDUP, Lab, activate_beforehand, lab
+from tests.virtual import virtual
+
+LEFT = GripperName("lab", "cell", "left")
+WORDS = "two agents serve it"
+
+
+@dataclass
+class Other:
+    """A second agent, with a gripper of its own under the name of the first one's."""
+
+    gripper: SimulatedGripper
+    server: SimulatorServer
+    local: RobotiqHand
+    serving: asyncio.Task[None]
+
+    async def end(self) -> None:
+        self.serving.cancel()
+        await asyncio.gather(self.serving, return_exceptions=True)
+
+
+@asynccontextmanager
+async def another(here: Lab) -> AsyncIterator[Other]:
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, speedup=SPEEDUP, spread=False)
+    async with SimulatorServer(gripper) as server:
+        await activate_beforehand(gripper)
+        bus = here.network.bus("other agent")
+        here.network.part("agent", "other agent")
+        hand, ready = RobotiqHand(server.address), asyncio.Event()
+        serving = asyncio.create_task(Agent("lab", "cell", {"left": hand}, bus).run(ready.set))
+        other = Other(gripper, server, hand, serving)
+        try:
+            await ready.wait()
+            while hand.state is not State.RUNNING_IDLE:  # noqa: ASYNC110  # what is waited for tells nobody
+                await asyncio.sleep(0.01)
+            await asyncio.sleep(0.01)  # until clients have heard of it
+            yield other
+        finally:
+            await other.end()
+
+
+@virtual
+async def test_the_answer_of_the_one_that_commands_counts_and_not_the_quicker_refusal() -> None:
+    async with lab() as here, here.client() as hand, another(here) as other:
+        before = len(other.gripper.writes)
+        for stream in here.network.both("client", "agent"):
+            stream.delay = 0.05
+        await hand.set_speed(255)
+        result = await hand.move(60, Finger.A)
+        hand.command(Finger.B, position=60)
+        await asyncio.sleep(2)
+        assert abs(result.positions[Finger.A] - 60) <= 2
+        assert hand.status.position(Finger.B) == pytest.approx(60, abs=2)
+        assert len(other.gripper.writes) == before
+        assert hand.is_in_control
+
+
+@virtual
+async def test_whoever_is_told_by_two_says_so_and_begins_no_command(caplog: pytest.LogCaptureFixture) -> None:
+    async with lab() as here, here.client("reader", control=False) as reader, another(here) as other:
+        assert caplog.text.count(WORDS) == 1
+        for begin in (here.client("next").start, reader.acquire, reader.take):
+            with pytest.raises(AgentError, match=WORDS):
+                await begin()
+        await other.end()
+        await reader.acquire()
+        await reader.move(30, Finger.A)
+
+
+@virtual
+async def test_control_does_not_come_back_by_itself_from_the_one_to_the_other() -> None:
+    """It may be another gripper: a loop that tries again would move that one."""
+    async with lab() as here, here.client() as hand, another(here) as other:
+        before = len(other.gripper.writes)
+        here.network.cut(("client", "agent"), ("agent", "client"))
+        await asyncio.sleep(5)
+        assert hand.state is State.RUNNING_IDLE, "it reads on"
+        assert not hand.is_in_control
+        with pytest.raises(ControlLostError):
+            await hand.move(200)
+        assert len(other.gripper.writes) == before
+        here.network.mend(*here.network.both("client", "agent"))
+
+
+@virtual
+async def test_a_halt_stops_both_and_says_so_only_then() -> None:
+    async with lab() as here, here.client("reader", control=False) as reader, another(here) as other:
+        for hand in (here.local, other.local):
+            await hand.set_speed(0)
+            await hand.set_position(255, Finger.A)
+        while not (here.gripper.is_moving and other.gripper.is_moving):  # noqa: ASYNC110  # it tells nobody
+            await asyncio.sleep(0.001)
+        here.network.stream("other agent", "reader").delay = 0.3  # the answer that is longed for comes first
+        await reader.halt()
+        assert not here.gripper.is_moving
+        assert not other.gripper.is_moving
+        await other.server.stop()
+        await asyncio.sleep(0.5)
+        with pytest.raises(ConnectionLostError):
+            await reader.halt()
+        await other.server.start()
+
+
+@virtual
+async def test_the_halt_of_all_counts_agents_and_not_names() -> None:
+    async with lab() as here, another(here), Fleet("lab", bus=here.network.bus("console")) as fleet:
+        assert await fleet.halt_all() == {LEFT: "stopped"}
+        here.network.stream("console", "other agent").is_cut = True
+        with pytest.raises(NotAllStoppedError) as failed:
+            await fleet.halt_all()
+        assert failed.value.outcomes == {LEFT: "no answer from 1 of 2 agents"}
+
+
+@virtual
+async def test_a_second_agent_of_a_host_is_refused_whatever_it_serves() -> None:
+    async with lab() as here:
+        for name, words in (("left", "serves zenoh://lab/cell/left already"), ("right", "a host of its own")):
+            agent = Agent("lab", "cell", {name: RobotiqHand("sim://")}, here.network.bus(f"second {name}"))
+            with pytest.raises(AgentError, match=words):
+                await agent.run()
+        host = Agent("lab", "cell-2", {"left": RobotiqHand("sim://")}, here.network.bus("of another host"))
+        ready = asyncio.Event()
+        serving = asyncio.create_task(host.run(ready.set))
+        await ready.wait()
+        serving.cancel()
+        await asyncio.gather(serving, return_exceptions=True)
+
+
+class _Came:
+    attachment = b""
+
+    def __init__(self, answer: Answer | bytes) -> None:
+        self.payload = answer if isinstance(answer, bytes) else answer.pack()
+
+
+CALL = Call(LEFT.base, "somebody", epoch=7, number=3)
+RIGHT_ONE = Answer(LEFT.base, 3, 7, {})
+
+
+@pytest.mark.parametrize(
+    ("reply", "counts", "refuses"),
+    [
+        (RIGHT_ONE, True, False),
+        (failure(CALL, 7, AgentError("late")), True, True),
+        (failure(CALL, 8, AgentError("anew")), False, True),
+        (Answer(LEFT.base, 4, 7, {}), False, False),
+        (Answer("robotiq/v1/lab/cell/right", 3, 7, {}), False, False),
+        (b"?", False, True),
+    ],
+)
+def test_which_reply_decides(reply: Answer | bytes, counts: bool, refuses: bool) -> None:
+    assert of_its_run(CALL)(_Came(reply)) is counts
+    assert is_refusal(_Came(reply)) is refuses
+
+
+async def test_without_one_that_decides_it_is_the_last() -> None:
+    one, other = _Came(b"1"), _Came(b"2")
+    asking = Asking(lambda _: False)
+    for reply in (one, other):
+        asking.take(reply)
+    assert not asking.answered.done()
+    asking.end()
+    assert await asking.answered is other
+    first = Asking(is_any)
+    for reply in (one, other):
+        first.take(reply)
+    first.end()
+    assert await first.answered is one
+    nobody = Asking(is_any)
+    nobody.end()
+    assert await nobody.answered is None
