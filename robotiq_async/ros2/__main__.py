@@ -26,7 +26,7 @@ def main() -> int:
         import rclpy.exceptions  # noqa: PLC0415  # may be missing
         from control_msgs.action import ParallelGripperCommand  # noqa: F401, PLC0415  # may be missing
 
-        from .process import serve  # noqa: PLC0415  # imports the rest of ROS
+        from .node.process import serve  # noqa: PLC0415  # imports the rest of ROS
     except ImportError as error:
         _tell(_missing(error))
         return 1

@@ -12,12 +12,12 @@ from pathlib import Path
 import pytest
 
 from robotiq_async import Fault, Finger, RobotiqError, RobotiqHand, State
-from robotiq_async.ros2.connection import COMMANDS, MOST_CALLS, Connection, RefusedError
-from robotiq_async.ros2.description import prefixed, robot_description
-from robotiq_async.ros2.diagnosis import Level, diagnose, status_text
-from robotiq_async.ros2.goals import Ending
-from robotiq_async.ros2.joints import Targets
-from robotiq_async.ros2.settings import PARAMETERS, check_settings
+from robotiq_async.ros2.gripper.connection import COMMANDS, MOST_CALLS, Connection, RefusedError
+from robotiq_async.ros2.gripper.goals import Ending
+from robotiq_async.ros2.translation.description import prefixed, robot_description
+from robotiq_async.ros2.translation.diagnosis import Level, diagnose, status_text
+from robotiq_async.ros2.translation.joints import Targets
+from robotiq_async.ros2.translation.settings import PARAMETERS, check_settings
 from robotiq_async.session.clock import now
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.fake_hand import FakeHand

@@ -11,10 +11,11 @@ import pytest
 
 from robotiq_async import ConnectionLostError, Finger, MoveResult, RobotiqHand, State
 from robotiq_async.protocol import Hand
-from robotiq_async.ros2.goals import Ending, GoalRunner, Outcome
-from robotiq_async.ros2.hands import is_connected, make_hand, why_not
-from robotiq_async.ros2.joints import Targets
-from robotiq_async.ros2.settings import PARAMETERS, check_settings
+from robotiq_async.ros2.gripper.goals import Ending, GoalRunner, Outcome
+from robotiq_async.ros2.gripper.hands import make_hand
+from robotiq_async.ros2.translation.joints import Targets
+from robotiq_async.ros2.translation.readiness import is_connected, why_not
+from robotiq_async.ros2.translation.settings import PARAMETERS, check_settings
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.wire.request import Request
 from tests.fake_hand import FakeHand

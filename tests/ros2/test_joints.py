@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from robotiq_async import Finger, RobotiqStatus
 from robotiq_async.kinematics import JOINTS, joint_angles
-from robotiq_async.ros2.joints import (
+from robotiq_async.ros2.translation.joints import (
     LIMITS,
     GoalError,
     Targets,

@@ -7,11 +7,11 @@ import asyncio
 import pytest
 
 from robotiq_async import Finger, State
-from robotiq_async.ros2.connection import Connection, RefusedError
-from robotiq_async.ros2.diagnosis import Level, diagnose
-from robotiq_async.ros2.goals import Ending
-from robotiq_async.ros2.joints import Targets
-from robotiq_async.ros2.settings import PARAMETERS, check_settings
+from robotiq_async.ros2.gripper.connection import Connection, RefusedError
+from robotiq_async.ros2.gripper.goals import Ending
+from robotiq_async.ros2.translation.diagnosis import Level, diagnose
+from robotiq_async.ros2.translation.joints import Targets
+from robotiq_async.ros2.translation.settings import PARAMETERS, check_settings
 from robotiq_async.session.clock import now
 from tests.fleet.lab import lab
 from tests.virtual import virtual

@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from robotiq_async.ros2.settings import PARAMETERS, check_parameter, check_settings
+from robotiq_async.ros2.translation.settings import PARAMETERS, check_parameter, check_settings
 
 USUAL = {name: parameter.default for name, parameter in PARAMETERS.items()}
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import pytest
 
 from robotiq_async import Fault, Finger
-from robotiq_async.ros2.joints import joint_names
+from robotiq_async.ros2.translation.joints import joint_names
 from tests.ros2.live.bench import ABORTED, CANCELED, SUCCEEDED, Goal, Simulator
 from tests.ros2.live.fixtures import Cell
 from tests.ros2.live.processes import Process

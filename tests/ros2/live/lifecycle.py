@@ -6,7 +6,7 @@ import signal
 
 import pytest
 
-from robotiq_async.ros2.settings import PARAMETERS
+from robotiq_async.ros2.translation.settings import PARAMETERS
 from tests.ros2.live.bench import ABORTED, SUCCEEDED, Client, Simulator
 from tests.ros2.live.goals import begun, position
 from tests.ros2.live.processes import node

@@ -9,7 +9,7 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
-from .settings import PARAMETERS, Parameter, Settings, check_parameter, check_settings
+from ..translation.settings import PARAMETERS, Parameter, Settings, check_parameter, check_settings
 
 
 def declare(node: Node) -> None:

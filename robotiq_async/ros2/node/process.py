@@ -18,10 +18,10 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from ..log import log
+from ...log import log
 from .bridge import Bridge
+from .gripper_node import GripperNode
 from .logs import handed_to
-from .node import GripperNode
 
 ANSWERS_S: Final = 0.5
 """For the answers to what the end has ended; they take milliseconds."""

@@ -16,11 +16,11 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from ..errors import NotStartedError
-from ..session.clock import now
-from .connection import Connection
-from .diagnosis import diagnose, status_text
-from .hands import is_connected
+from ...errors import NotStartedError
+from ...session.clock import now
+from ..gripper.connection import Connection
+from ..translation.diagnosis import diagnose, status_text
+from ..translation.readiness import is_connected
 from .messages import JointStates, diagnostic_array
 
 STATUS_RATE_HZ: Final = 10.0

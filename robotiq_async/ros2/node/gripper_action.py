@@ -15,13 +15,13 @@ from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 
-from ..errors import NotStartedError
+from ...errors import NotStartedError
+from ..gripper.connection import Connection, RefusedError
+from ..gripper.goals import Ending, Outcome
+from ..translation.joints import GoalError, Targets, targets
+from ..translation.settings import Settings
 from .bridge import Bridge
-from .connection import Connection, RefusedError
-from .goals import Ending, Outcome
-from .joints import GoalError, Targets, targets
 from .messages import JointStates
-from .settings import Settings
 
 Configured = tuple[Connection, JointStates, Settings]
 

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from ..enums import DEFAULT_FORCE, DEFAULT_SPEED
-from ..fleet.network.route import is_remote, parse_remote_address
-from ..link.address import parse_address
-from ..session.options import POLL_INTERVAL_S
-from ..wire.checks import check_byte, check_number, check_seconds
+from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ...fleet.network.route import is_remote, parse_remote_address
+from ...link.address import parse_address
+from ...session.options import POLL_INTERVAL_S
+from ...wire.checks import check_byte, check_number, check_seconds
 
 Value = str | int | float | bool
 

@@ -17,13 +17,13 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
-from ..errors import RobotiqError
+from ...errors import RobotiqError
+from ..gripper.connection import COMMANDS, Connection, RefusedError
+from ..gripper.hands import make_hand
+from ..translation.description import robot_description
 from . import parameters
 from .bridge import Bridge, ClosedError
-from .connection import COMMANDS, Connection, RefusedError
-from .description import robot_description
 from .gripper_action import Configured, GripperAction
-from .hands import make_hand
 from .messages import JointStates
 from .publishing import Publishing
 

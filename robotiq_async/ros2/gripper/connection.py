@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from ..actions import ACTIONS, Operator
-from ..errors import RobotiqError
-from ..log import log
-from ..protocol import Hand
+from ...actions import ACTIONS, Operator
+from ...errors import RobotiqError
+from ...log import log
+from ...protocol import Hand
+from ..translation.joints import Targets
+from ..translation.readiness import why_not
+from ..translation.settings import Settings
 from .goals import GoalRunner, Outcome
-from .hands import why_not
-from .joints import Targets
-from .settings import Settings
 
 COMMANDS: Final = ("activate", "reset", "halt", "recover", "release")
 """What the services are called, and the actions behind them."""

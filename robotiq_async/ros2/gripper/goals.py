@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
-from ..control.motion import MoveResult
-from ..enums import Finger
-from ..errors import RobotiqError
-from ..log import log
-from ..protocol import Hand
-from .joints import Targets
+from ...control.motion import MoveResult
+from ...enums import Finger
+from ...errors import RobotiqError
+from ...log import log
+from ...protocol import Hand
+from ..translation.joints import Targets
 
 FEEDBACK_S: Final = 0.05
 """From one feedback to the next: 20 Hz."""

@@ -10,10 +10,10 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock
 from sensor_msgs.msg import JointState
 
-from ..session.clock import now
-from ..wire.status import RobotiqStatus
-from .diagnosis import Diagnosis
-from .joints import Velocities, joint_names, positions
+from ...session.clock import now
+from ...wire.status import RobotiqStatus
+from ..translation.diagnosis import Diagnosis
+from ..translation.joints import Velocities, joint_names, positions
 
 
 class JointStates:

@@ -14,9 +14,9 @@ from math import degrees, radians
 from types import MappingProxyType
 from typing import Final
 
-from ..enums import Finger
-from ..kinematics import BASE, JOINTS, MIDDLE, PALM, PREFIX, Points, joint_angles, joint_velocities
-from ..wire.status import RobotiqStatus
+from ...enums import Finger
+from ...kinematics import BASE, JOINTS, MIDDLE, PALM, PREFIX, Points, joint_angles, joint_velocities
+from ...wire.status import RobotiqStatus
 
 FINGERS: Final = "fingers"
 """The name of what stands for all three fingers in a goal: one angle, base and middle joint together."""
