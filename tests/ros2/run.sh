@@ -34,7 +34,7 @@ environment() { # make it unless it is there and fresh
     "$PYTHON" -m venv --clear "$venv"
     "$python" -m pip install --quiet --disable-pip-version-check uv
     "$python" -m uv pip install --quiet --python "$python" -c constraints.txt -r $HERE/"$1".txt \
-        hypothesis pytest pytest-asyncio pytest-xdist -e .
+        hypothesis pytest pytest-asyncio pytest-xdist -e '.[fleet]'
     "$python" $HERE/build_interface.py $HERE/control_msgs >/dev/null
     touch "$venv/.complete"
 }

@@ -27,7 +27,7 @@ CLOSE = Targets(((240, Finger.ABC),))
 
 
 def begin_goal(connection: Connection) -> asyncio.Task[object]:
-    return asyncio.create_task(connection.run_goal(b"1", CLOSE, SETTINGS, lambda: None))
+    return asyncio.create_task(connection.run_goal(b"1", CLOSE, SETTINGS, lambda: None, connection.stops))
 
 
 async def connected(server: SimulatorServer, *, active: bool = True) -> Connection:
@@ -116,7 +116,7 @@ async def test_any_hand_will_do() -> None:
     connection = Connection(FakeHand(), SETTINGS)
     await connection.open()
     await connection.permit()
-    outcome = await connection.run_goal(b"1", CLOSE, SETTINGS, lambda: None)
+    outcome = await connection.run_goal(b"1", CLOSE, SETTINGS, lambda: None, connection.stops)
     assert outcome.ending is Ending.SUCCEEDED
     await connection.close("the end")
 

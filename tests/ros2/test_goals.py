@@ -110,7 +110,9 @@ async def test_a_hold_that_is_not_acknowledged_is_told(caplog: pytest.LogCapture
         await anext(requests)
         runner.cancel(b"1")
         with caplog.at_level(logging.ERROR, "robotiq_async"):
-            assert (await goal).ending is Ending.CANCELED
+            outcome = await goal
+    assert outcome.ending is Ending.ABORTED, "canceled would say that the axes are to stay"
+    assert outcome.reason == "canceled by its client, but the hold was not acknowledged: the link went down"
     assert "the hold was not acknowledged: the link went down" in caplog.text
 
 

@@ -1,4 +1,4 @@
-"""What is told of a hand: diagnoses, and its state as JSON; nothing that is not known. Knows no ROS."""
+"""What is told of a hand: diagnoses, and its state as JSON; nothing that is not known."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Joints in radians, as ROS has them, from the axes in counts, and back. Knows no ROS and no clock.
+"""Joints in radians, as ROS has them, from the axes in counts, and back.
 
 A finger has one motor for three joints, so a goal for a finger is a goal for one of them: the base joint
 (``joint_1``) as far as it turns alone, the middle one (``joint_2``) beyond. The third joint and the second
