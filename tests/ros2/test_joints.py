@@ -14,8 +14,8 @@ from robotiq_async.kinematics import JOINTS, joint_angles
 from robotiq_async.ros2.translation.joints import (
     LIMITS,
     GoalError,
+    Motion,
     Targets,
-    Velocities,
     joint_names,
     positions,
     targets,
@@ -61,20 +61,28 @@ def test_a_limit_says_where_it_bites() -> None:
 
 
 def test_velocities_are_taken_over_some_time() -> None:
-    velocities = Velocities()
-    assert velocities.of(reading(at=0.0)) == [0.0] * 11
+    motion = Motion()
+    assert motion.of(reading(at=0.0)) == (positions(reading()), (0.0,) * 11)
     base = JOINTS.index("finger_middle_joint_1")
     for step in range(1, 20):
-        velocity = velocities.of(reading(a=6 + step, at=step * 0.01))[base]
-        assert velocity == pytest.approx(math.radians(0.5) / 0.01)
-    assert velocities.of(reading(a=25, at=0.19))[base] == pytest.approx(math.radians(0.5) / 0.01)
+        _, velocities = motion.of(reading(a=6 + step, at=step * 0.01))
+        assert velocities[base] == pytest.approx(math.radians(0.5) / 0.01)
+    assert motion.of(reading(a=25, at=0.19))[1][base] == pytest.approx(math.radians(0.5) / 0.01)
+
+
+def test_fingers_that_have_come_to_rest_have_no_velocity() -> None:
+    motion = Motion()
+    motion.of(reading(a=6, at=0.0))
+    for step in range(1, 10):
+        motion.of(reading(a=200, at=step * 0.01))
+    assert motion.of(reading(a=200, at=0.1)) == (positions(reading(a=200)), (0.0,) * 11)
 
 
 def test_velocities_forget_what_was_before_a_lost_link() -> None:
-    velocities = Velocities()
-    velocities.of(reading(a=6, at=0.0))
-    velocities.forget()
-    assert velocities.of(reading(a=200, at=0.1)) == [0.0] * 11
+    motion = Motion()
+    motion.of(reading(a=6, at=0.0))
+    motion.forget()
+    assert set(motion.of(reading(a=200, at=0.1))[1]) == {0.0}
 
 
 # -- goals -------------------------------------------------------------------------------------------------

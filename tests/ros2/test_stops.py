@@ -16,11 +16,13 @@ from robotiq_async.ros2.translation.joints import Targets
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_settings
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.fleet.lab import lab
+from tests.virtual import LATENCY_S
 
 pytestmark = pytest.mark.virtual_time
 
 SETTINGS = check_settings({name: parameter.default for name, parameter in PARAMETERS.items()})
 CLOSE = Targets(((240, Finger.ABC),))
+POLL_S = 0.02
 FAR = 200
 """Fingers that were stopped on their way are not there."""
 
@@ -34,7 +36,7 @@ async def gripper() -> SimulatedGripper:
 @pytest.fixture
 async def connection(server: SimulatorServer) -> AsyncIterator[Connection]:
     """An active node's, at an active gripper."""
-    connection = Connection(RobotiqHand(server.address, poll_interval=0.02), SETTINGS)
+    connection = Connection(RobotiqHand(server.address, poll_interval=POLL_S), SETTINGS)
     await connection.open()
     await connection.permit()
     await connection.command("activate")
@@ -144,6 +146,17 @@ async def test_a_closed_connection_does_not_open_or_take_commands(server: Simula
         with pytest.raises(RefusedError, match="the connection has been closed"):
             await again()
     assert not connection.takes_commands
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.006, 0.012, 0.018])
+async def test_a_cancel_is_acknowledged_with_the_next_poll(connection: Connection, offset: float) -> None:
+    goal = begin(connection)
+    await until_moving(connection)
+    await asyncio.sleep(offset)
+    asked = asyncio.get_running_loop().time()
+    await connection.cancel_goal(b"1")
+    assert (await goal).ending is Ending.CANCELED
+    assert asyncio.get_running_loop().time() - asked <= POLL_S + 5 * LATENCY_S
 
 
 # -- what a lost link keeps back -----------------------------------------------------------------------------

@@ -119,7 +119,7 @@ class GripperAction:
         asked = _targets(handle.request, settings)
 
         def feedback() -> None:
-            state = joints.fresh(connection.hand.status)
+            state = joints.message(connection.hand.status)
             handle.publish_feedback(ParallelGripperCommand.Feedback(state=state))
 
         async def work() -> Outcome:
@@ -127,7 +127,7 @@ class GripperAction:
                 return await connection.run_goal(_key(handle), asked, settings, feedback, stops)
             finally:
                 with suppress(NotStartedError):  # nothing has been read
-                    result.state = joints.fresh(connection.hand.status)
+                    result.state = joints.message(connection.hand.status)
 
         return await self._bridge.ask(work())
 

@@ -1,11 +1,13 @@
 """What the node publishes while it is configured: joint states, its status, diagnoses.
 
-Published from the event loop: waking ROS's executor for it would cost more than the messages do.
+Published from the event loop, and joint states in the turn of the poll that they are of: to wake the executor
+or the loop for it would cost more than the messages do.
 """
 
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
@@ -17,6 +19,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from ...errors import NotStartedError
+from ...protocol import Hand
 from ...session.clock import now
 from ..gripper.connection import Connection
 from ..translation.diagnosis import diagnose, status_text
@@ -26,6 +29,8 @@ from .messages import JointStates, diagnostic_array
 STATUS_RATE_HZ: Final = 10.0
 """Of the status; a change of state is published at once."""
 DIAGNOSTICS_RATE_HZ: Final = 1.0
+EARLY_S: Final = 0.001
+"""A status may come so much before its time: polls have their jitter."""
 _LATEST: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Whoever comes later gets the newest one."""
 
@@ -46,7 +51,8 @@ class Publishing:
         self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._status = node.create_publisher(String, "~/status", _LATEST)
         self._description = node.create_publisher(String, "robot_description", _LATEST)
-        self._tasks: list[asyncio.Task[None]] = []
+        self._timers: list[Timer] = []
+        self._readers: list[asyncio.Task[None]] = []
 
     def describe(self, urdf: str) -> None:
         """Publish the robot description."""
@@ -55,44 +61,44 @@ class Publishing:
     async def start(self, connection: Connection, joint_states: JointStates, rate: float) -> None:
         """Publish what the hand of a connection shows."""
         works = (
-            self._publish_joints(connection, joint_states, 1 / rate),
-            _every(1 / STATUS_RATE_HZ, lambda: self._publish_status(connection)),
-            self._publish_transitions(connection),
-            _every(1 / DIAGNOSTICS_RATE_HZ, lambda: self._publish_diagnoses(connection)),
+            (STATUS_RATE_HZ, lambda: self._publish_status(connection)),
+            (DIAGNOSTICS_RATE_HZ, lambda: self._publish_diagnoses(connection)),
         )
-        self._tasks = [asyncio.ensure_future(work) for work in works]
-        for task in self._tasks:
-            task.add_done_callback(self._look)
+        self._timers = [Timer(1 / frequency, work, self._failed) for frequency, work in works]
+        readers = (
+            self._publish_joints(connection.hand, joint_states, 1 / rate),
+            self._publish_transitions(connection, joint_states),
+        )
+        self._readers = [asyncio.ensure_future(reader) for reader in readers]
+        for reader in self._readers:
+            reader.add_done_callback(self._look)
 
     async def stop(self) -> None:
         """Publish nothing more. Idempotent."""
-        tasks, self._tasks = self._tasks, []
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        for timer in self._timers:
+            timer.cancel()
+        readers, self._readers = self._readers, []
+        for reader in readers:
+            reader.cancel()
+        await asyncio.gather(*readers, return_exceptions=True)
 
-    def _look(self, task: asyncio.Task[None]) -> None:
-        if not task.cancelled() and (error := task.exception()) is not None:
+    def _look(self, reader: asyncio.Task[None]) -> None:
+        if not reader.cancelled() and (error := reader.exception()) is not None:
             self._failed(error)
 
-    async def _publish_joints(self, connection: Connection, joints: JointStates, period: float) -> None:
-        hand, last = connection.hand, -1.0
+    async def _publish_joints(self, hand: Hand, joints: JointStates, period: float) -> None:
+        """Publish those statuses that are due as they come: to wake up for it would cost more than it does."""
+        due = -math.inf
+        async for status in hand.statuses():
+            if status.timestamp >= due - EARLY_S:
+                due = max(due + period, status.timestamp)
+                self._joint_states.publish(joints.encoded(status))
 
-        def publish() -> None:
-            nonlocal last
-            if not is_connected(hand):
-                joints.forget()
-                return
-            status = hand.status
-            if status.timestamp > last:  # of a hand on another host there may be no news yet
-                last = status.timestamp
-                self._joint_states.publish(joints.shared(status))
-
-        await _every(period, publish)
-
-    async def _publish_transitions(self, connection: Connection) -> None:
+    async def _publish_transitions(self, connection: Connection, joints: JointStates) -> None:
         async for _ in connection.hand.transitions():
             self._publish_status(connection)
+            if not is_connected(connection.hand):
+                joints.forget()
 
     def _publish_status(self, connection: Connection) -> None:
         text = status_text(connection.hand, takes_commands=connection.takes_commands)
@@ -110,11 +116,34 @@ class Publishing:
         )
 
 
-async def _every(period: float, work: Callable[[], object]) -> None:
-    """Do something at a rate; what is missed is missed."""
-    due = now()
-    while True:
-        with suppress(NotStartedError):  # the hand was stopped in this moment, and so will this be
-            work()
-        due = max(due + period, now())
-        await asyncio.sleep(due - now())
+class Timer:
+    """Does something at a rate, from now on; what is missed is missed."""
+
+    def __init__(
+        self, period: float, work: Callable[[], object], failed: Callable[[BaseException], object]
+    ) -> None:
+        """Begin at once, in the running loop.
+
+        Args:
+            period: seconds.
+            work: is done; a hand that was stopped in this moment does not matter.
+            failed: is called with what else it raises, and then it ends.
+        """
+        self._loop = asyncio.get_running_loop()
+        self._period, self._work, self._failed = period, work, failed
+        self._due = self._loop.time()
+        self._next = self._loop.call_soon(self._tick)
+
+    def cancel(self) -> None:
+        """End it."""
+        self._next.cancel()
+
+    def _tick(self) -> None:
+        try:
+            with suppress(NotStartedError):
+                self._work()
+        except Exception as error:  # noqa: BLE001  # whatever it is: nobody else would hear of it
+            self._failed(error)
+            return
+        self._due = max(self._due + self._period, self._loop.time())
+        self._next = self._loop.call_at(self._due, self._tick)
