@@ -7,7 +7,6 @@ or the loop for it would cost more than the messages do.
 from __future__ import annotations
 
 import asyncio
-import math
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
@@ -23,14 +22,13 @@ from ...protocol import Hand
 from ...session.clock import now
 from ..gripper.connection import Connection
 from ..translation.diagnosis import diagnose, status_text
+from ..translation.pace import Pace
 from ..translation.readiness import is_connected
 from .messages import JointStates, diagnostic_array
 
 STATUS_RATE_HZ: Final = 10.0
 """Of the status; a change of state is published at once."""
 DIAGNOSTICS_RATE_HZ: Final = 1.0
-EARLY_S: Final = 0.001
-"""A status may come so much before its time: polls have their jitter."""
 _LATEST: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Whoever comes later gets the newest one."""
 
@@ -66,7 +64,7 @@ class Publishing:
         )
         self._timers = [Timer(1 / frequency, work, self._failed) for frequency, work in works]
         readers = (
-            self._publish_joints(connection.hand, joint_states, 1 / rate),
+            self._publish_joints(connection.hand, joint_states, Pace(rate)),
             self._publish_transitions(connection, joint_states),
         )
         self._readers = [asyncio.ensure_future(reader) for reader in readers]
@@ -86,12 +84,9 @@ class Publishing:
         if not reader.cancelled() and (error := reader.exception()) is not None:
             self._failed(error)
 
-    async def _publish_joints(self, hand: Hand, joints: JointStates, period: float) -> None:
-        """Publish those statuses that are due as they come: to wake up for it would cost more than it does."""
-        due = -math.inf
+    async def _publish_joints(self, hand: Hand, joints: JointStates, pace: Pace) -> None:
         async for status in hand.statuses():
-            if status.timestamp >= due - EARLY_S:
-                due = max(due + period, status.timestamp)
+            if pace.takes(status.timestamp):
                 self._joint_states.publish(joints.encoded(status))
 
     async def _publish_transitions(self, connection: Connection, joints: JointStates) -> None:
