@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Final
-
-EARLY_S: Final = 0.001
-"""A status may come so much before its time: polls have their jitter."""
 
 
 class Pace:
@@ -23,7 +19,7 @@ class Pace:
 
     def takes(self, timestamp: float) -> bool:
         """Whether a status of this time is due, in monotonic seconds."""
-        if timestamp < self._due - EARLY_S:
+        if timestamp < self._due:
             return False
         self._due += self._period
         if self._due <= timestamp:
