@@ -23,17 +23,19 @@ from ...wire.status import RobotiqStatus
 FINGERS: Final = "fingers"
 """The name of what stands for all three fingers in a goal: one angle, base and middle joint together."""
 _PALM_JOINT: Final = "palm_finger_1_joint"
-_BASE_LIMITS: Final = (0.0495, 1.2218)
+_BASE_LIMITS: Final = (0.0495, 1.2217)
 _MIDDLE_LIMITS: Final = (0.0, 1.5708)
-_TIP_LIMITS: Final = (-1.2217, -0.0523)
+_TIP_LIMITS: Final = (-0.9599, -0.0523)
 
 LIMITS: Final = MappingProxyType(
     {name: _BASE_LIMITS for name in JOINTS if name.endswith("_joint_1")}
     | {name: _MIDDLE_LIMITS for name in JOINTS if name.endswith("_joint_2")}
     | {name: _TIP_LIMITS for name in JOINTS if name.endswith("_joint_3")}
-    | {_PALM_JOINT: (-0.1784, 0.1920), "palm_finger_2_joint": (-0.1920, 0.1784)}
+    | {_PALM_JOINT: (-0.1784, 0.1919), "palm_finger_2_joint": (-0.1919, 0.1784)}
 )
-"""Lower and upper end of each joint in radians, as the URDF of the hand (robotiq 3f description) has them.
+"""Lower and upper end of each joint in radians. Inside those of the packaged URDF, and of the one that users
+of ROS have (robotiq_3f_gripper_visualization of ros-industrial): that is narrower where a finger is open and
+where the scissor pinches.
 
 The angles leave them at the ends: a finger that reads less than 6 counts, a scissor that reads more than 232.
 Consumers refuse a joint outside its limits, so what is published stays inside.

@@ -237,8 +237,8 @@ class Client:
     def diagnostics(self) -> Topic:
         return self._listen(DiagnosticArray, "/diagnostics", 10)
 
-    def description(self) -> Topic:
-        return self._listen(String, "/robot_description", LATEST)
+    def description(self, name: str = "/robot_description") -> Topic:
+        return self._listen(String, name, LATEST)
 
     def _listen(self, kind: Any, name: str, qos: Any) -> Topic:
         topic = Topic()
