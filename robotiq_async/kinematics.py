@@ -11,7 +11,7 @@ Angles are what a mechanism without load and play would have; nothing here has b
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, lru_cache
 from math import radians
 from typing import Final
 
@@ -88,8 +88,14 @@ def palm_angle(scissor: int) -> float:
 
 def joint_angles(status: RobotiqStatus) -> tuple[float, ...]:
     """The eleven joints in radians, in the order of :data:`JOINTS`."""
-    palm = palm_angle(status.position(Finger.SCISSOR))
-    one, two, middle = (finger_angles(status.position(finger)) for finger in PREFIX)
+    return _joint_angles(*(status.position(axis) for axis in (Finger.SCISSOR, *PREFIX)))
+
+
+@lru_cache(maxsize=16)
+def _joint_angles(scissor: int, *fingers: int) -> tuple[float, ...]:
+    # Kept, for most of the time the fingers stand.
+    palm = palm_angle(scissor)
+    one, two, middle = map(_finger_angles, fingers)
     return (palm, *one, -palm, *two, *middle)
 
 

@@ -23,16 +23,23 @@ NEEDS = {
 def main() -> int:
     """Run the node; returns the exit code: 0 after a signal, 1 for a failure, which one line tells."""
     try:
+        return _run()
+    except KeyboardInterrupt:  # before the node could hear of it, or while the interpreter ends
+        return 130
+
+
+def _run() -> int:
+    try:
         import rclpy.exceptions  # noqa: PLC0415  # may be missing
         from control_msgs.action import ParallelGripperCommand  # noqa: F401, PLC0415  # may be missing
 
-        from .process import serve  # noqa: PLC0415  # imports the rest of ROS
+        from .node.process import serve  # noqa: PLC0415  # imports the rest of ROS
     except ImportError as error:
         _tell(_missing(error))
         return 1
     try:
         asyncio.run(serve(sys.argv))
-    except (rclpy.exceptions.ROSInterruptException, KeyboardInterrupt):
+    except rclpy.exceptions.ROSInterruptException:
         return 130
     except Exception as error:  # noqa: BLE001  # one line for whoever started it; the node's log has the rest
         _tell(" ".join(str(error).split()))

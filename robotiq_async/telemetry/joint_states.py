@@ -36,23 +36,29 @@ _STAMP: Final = Struct("<iI")
 class JointStateEncoder:
     """Encodes joint states of the eleven joints of the hand."""
 
-    def __init__(self, frame_id: str = "palm") -> None:
-        """Encode everything but the stamp and the numbers."""
+    def __init__(self, frame_id: str = "palm", names: Sequence[str] = JOINTS) -> None:
+        """Encode everything but the stamp and the numbers.
+
+        Args:
+            frame_id: of the header.
+            names: of the joints, in the order of their numbers.
+        """
         body = bytearray(_STAMP.size)
         _add_string(body, frame_id)
         _align(body, 4)
-        body += pack("<I", len(JOINTS))
-        for name in JOINTS:
+        body += pack("<I", len(names))
+        for name in names:
             _align(body, 4)
             _add_string(body, name)
+        self._count = len(names)
         self._constant = bytes(body[_STAMP.size :])
         # Three sequences of doubles: each count on a multiple of 4, its numbers on a multiple of 8.
         layout, at = "<", len(body)
         for _ in range(3):
             layout += f"{-at % 4}xI"
             at += -at % 4 + 4
-            layout += f"{-at % 8}x{len(JOINTS)}d"
-            at += -at % 8 + 8 * len(JOINTS)
+            layout += f"{-at % 8}x{len(names)}d"
+            at += -at % 8 + 8 * len(names)
         self._numbers = Struct(layout)
 
     def encode(
@@ -71,7 +77,7 @@ class JointStateEncoder:
             efforts: motor currents in ampere, one for each joint.
         """
         stamp = _STAMP.pack(*divmod(nanoseconds, 1_000_000_000))
-        count = len(JOINTS)
+        count = self._count
         numbers = self._numbers.pack(count, *positions, count, *velocities, count, *efforts)
         return _ENCAPSULATION + stamp + self._constant + numbers
 

@@ -34,7 +34,7 @@ environment() { # make it unless it is there and fresh
     "$PYTHON" -m venv --clear "$venv"
     "$python" -m pip install --quiet --disable-pip-version-check uv
     "$python" -m uv pip install --quiet --python "$python" -c constraints.txt -r $HERE/"$1".txt \
-        hypothesis pytest pytest-asyncio pytest-xdist -e .
+        hypothesis pytest pytest-asyncio pytest-xdist -e '.[fleet]'
     "$python" $HERE/build_interface.py $HERE/control_msgs >/dev/null
     touch "$venv/.complete"
 }
@@ -47,5 +47,5 @@ for distro in "$@"; do
     # shellcheck disable=SC2086
     .venv-ros2/"$distro"/bin/python -m pytest -p tests.ros2.live.fixtures --numprocesses 3 --dist loadfile \
         ${TESTS:-tests/ros2/live/goals.py tests/ros2/live/lifecycle.py tests/ros2/live/topics.py \
-        tests/ros2/live/failures.py}
+        tests/ros2/live/failures.py tests/ros2/live/bridge.py tests/ros2/live/messages.py}
 done

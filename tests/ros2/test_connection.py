@@ -7,17 +7,15 @@ import json
 import logging
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from robotiq_async import Fault, Finger, RobotiqError, RobotiqHand, State
-from robotiq_async.ros2.connection import COMMANDS, MOST_CALLS, Connection, RefusedError
-from robotiq_async.ros2.description import prefixed, robot_description
-from robotiq_async.ros2.diagnosis import Level, diagnose, status_text
-from robotiq_async.ros2.goals import Ending
-from robotiq_async.ros2.joints import Targets
-from robotiq_async.ros2.settings import PARAMETERS, check_settings
+from robotiq_async.ros2.gripper.connection import COMMANDS, MOST_CALLS, Connection, RefusedError
+from robotiq_async.ros2.gripper.goals import Ending
+from robotiq_async.ros2.translation.diagnosis import Level, diagnose, status_text
+from robotiq_async.ros2.translation.joints import Targets
+from robotiq_async.ros2.translation.settings import PARAMETERS, check_settings
 from robotiq_async.session.clock import now
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.fake_hand import FakeHand
@@ -27,7 +25,7 @@ CLOSE = Targets(((240, Finger.ABC),))
 
 
 def begin_goal(connection: Connection) -> asyncio.Task[object]:
-    return asyncio.create_task(connection.run_goal(b"1", CLOSE, SETTINGS, lambda: None))
+    return asyncio.create_task(connection.run_goal(b"1", CLOSE, SETTINGS, lambda: None, connection.stops))
 
 
 async def connected(server: SimulatorServer, *, active: bool = True) -> Connection:
@@ -116,7 +114,7 @@ async def test_any_hand_will_do() -> None:
     connection = Connection(FakeHand(), SETTINGS)
     await connection.open()
     await connection.permit()
-    outcome = await connection.run_goal(b"1", CLOSE, SETTINGS, lambda: None)
+    outcome = await connection.run_goal(b"1", CLOSE, SETTINGS, lambda: None, connection.stops)
     assert outcome.ending is Ending.SUCCEEDED
     await connection.close("the end")
 
@@ -163,38 +161,6 @@ def test_nothing_is_known_before_the_first_status() -> None:
     hand = RobotiqHand("tcp://192.0.2.1")
     assert diagnose(hand, 0.0)[1].level is Level.STALE
     assert "fault" not in json.loads(status_text(hand, takes_commands=False))
-
-
-# -- the robot description ----------------------------------------------------------------------------------
-
-URDF = (
-    "<robot name='hand'><link name='palm' /><link name='tip' /><joint name='j' type='revolute'>"
-    "<parent link='palm' /><child link='tip' /><mimic joint='i' /></joint></robot>"
-)
-
-
-def test_a_prefix_stands_before_links_and_joints() -> None:
-    text = prefixed(URDF, "left_").replace('"', "'")
-    for part in ("link name='left_palm'", "joint name='left_j'", "parent link='left_palm'"):
-        assert part in text
-    assert "child link='left_tip'" in text
-    assert "mimic joint='left_i'" in text
-    assert "robot name='hand'" in text
-    assert prefixed(URDF, "") == URDF
-
-
-def test_a_file_is_published_as_it_is(tmp_path: Path) -> None:
-    file = tmp_path / "hand.urdf"
-    file.write_text(URDF, encoding="utf-8")
-    assert robot_description(str(file), "left_") == URDF
-
-
-@pytest.mark.parametrize("text", ["", "<sdf/>", "no XML"])
-def test_what_is_no_urdf_is_refused(tmp_path: Path, text: str) -> None:
-    file = tmp_path / "hand.urdf"
-    file.write_text(text, encoding="utf-8")
-    with pytest.raises(ValueError, match=r"hand\.urdf is no URDF: "):
-        robot_description(str(file), "")
 
 
 # -- without ROS --------------------------------------------------------------------------------------------

@@ -11,10 +11,11 @@ import pytest
 
 from robotiq_async import ConnectionLostError, Finger, MoveResult, RobotiqHand, State
 from robotiq_async.protocol import Hand
-from robotiq_async.ros2.goals import Ending, GoalRunner, Outcome
-from robotiq_async.ros2.hands import is_connected, make_hand, why_not
-from robotiq_async.ros2.joints import Targets
-from robotiq_async.ros2.settings import PARAMETERS, check_settings
+from robotiq_async.ros2.gripper.goals import Ending, GoalRunner, Outcome
+from robotiq_async.ros2.gripper.hands import make_hand
+from robotiq_async.ros2.translation.joints import Targets
+from robotiq_async.ros2.translation.readiness import is_connected, why_not
+from robotiq_async.ros2.translation.settings import PARAMETERS, check_settings
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.wire.request import Request
 from tests.fake_hand import FakeHand
@@ -109,7 +110,9 @@ async def test_a_hold_that_is_not_acknowledged_is_told(caplog: pytest.LogCapture
         await anext(requests)
         runner.cancel(b"1")
         with caplog.at_level(logging.ERROR, "robotiq_async"):
-            assert (await goal).ending is Ending.CANCELED
+            outcome = await goal
+    assert outcome.ending is Ending.ABORTED, "canceled would say that the axes are to stay"
+    assert outcome.reason == "canceled by its client, but the hold was not acknowledged: the link went down"
     assert "the hold was not acknowledged: the link went down" in caplog.text
 
 

@@ -10,12 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async import Finger, RobotiqStatus
+from robotiq_async.description import hand_model
 from robotiq_async.kinematics import JOINTS, joint_angles
-from robotiq_async.ros2.joints import (
+from robotiq_async.ros2.translation.joints import (
     LIMITS,
     GoalError,
+    Motion,
     Targets,
-    Velocities,
     joint_names,
     positions,
     targets,
@@ -48,6 +49,22 @@ def test_every_joint_is_inside_its_limits(a: int, b: int, c: int, scissor: int) 
         assert low <= angle <= high, name
 
 
+OF_ROS = {"_joint_1": (0.0495, 1.2218), "_joint_2": (0.0, 1.5708), "_joint_3": (-1.2217, -0.0523)} | {
+    "palm_finger_1_joint": (-0.1784, 0.1920),
+    "palm_finger_2_joint": (-0.1920, 0.1784),
+}
+"""The limits of the URDF that ROS users have."""
+
+
+def test_the_limits_are_inside_those_of_both_urdfs() -> None:
+    packaged = {joint.name: (joint.lower, joint.upper) for joint in hand_model().moving}
+    assert packaged.keys() == LIMITS.keys()
+    for name, (low, high) in LIMITS.items():
+        (theirs,) = (limits for end, limits in OF_ROS.items() if name.endswith(end))
+        for least, most in (packaged[name], theirs):
+            assert least <= low < high <= most, name
+
+
 @given(st.integers(6, 255), st.integers(15, 232))
 def test_what_is_inside_anyway_is_left_alone(finger: int, scissor: int) -> None:
     status = reading(finger, finger, finger, scissor)
@@ -61,20 +78,28 @@ def test_a_limit_says_where_it_bites() -> None:
 
 
 def test_velocities_are_taken_over_some_time() -> None:
-    velocities = Velocities()
-    assert velocities.of(reading(at=0.0)) == [0.0] * 11
+    motion = Motion()
+    assert motion.of(reading(at=0.0)) == (positions(reading()), (0.0,) * 11)
     base = JOINTS.index("finger_middle_joint_1")
     for step in range(1, 20):
-        velocity = velocities.of(reading(a=6 + step, at=step * 0.01))[base]
-        assert velocity == pytest.approx(math.radians(0.5) / 0.01)
-    assert velocities.of(reading(a=25, at=0.19))[base] == pytest.approx(math.radians(0.5) / 0.01)
+        _, velocities = motion.of(reading(a=6 + step, at=step * 0.01))
+        assert velocities[base] == pytest.approx(math.radians(0.5) / 0.01)
+    assert motion.of(reading(a=25, at=0.19))[1][base] == pytest.approx(math.radians(0.5) / 0.01)
+
+
+def test_fingers_that_have_come_to_rest_have_no_velocity() -> None:
+    motion = Motion()
+    motion.of(reading(a=6, at=0.0))
+    for step in range(1, 10):
+        motion.of(reading(a=200, at=step * 0.01))
+    assert motion.of(reading(a=200, at=0.1)) == (positions(reading(a=200)), (0.0,) * 11)
 
 
 def test_velocities_forget_what_was_before_a_lost_link() -> None:
-    velocities = Velocities()
-    velocities.of(reading(a=6, at=0.0))
-    velocities.forget()
-    assert velocities.of(reading(a=200, at=0.1)) == [0.0] * 11
+    motion = Motion()
+    motion.of(reading(a=6, at=0.0))
+    motion.forget()
+    assert set(motion.of(reading(a=200, at=0.1))[1]) == {0.0}
 
 
 # -- goals -------------------------------------------------------------------------------------------------
@@ -146,11 +171,11 @@ def test_the_addressed_axes() -> None:
         (["finger_1_joint_1", "finger_1_joint_1"], [0.1, 0.2], "two positions for one joint: 'finger_1_j"),
         (["fingers", "finger_1_joint_1"], [0.1, 0.2], "two positions for one finger: 'fingers' and"),
         (["finger_1_joint_1", "finger_1_joint_2"], [0.5, 0.5], "bends only once finger_1_joint_1 is at"),
-        (["finger_1_joint_1", "finger_1_joint_2"], [1.5, 0.5], "must be in 0.0..1.2218 rad"),
-        (["finger_1_joint_1"], [1.3], "'finger_1_joint_1' must be in 0.0..1.2218 rad, got 1.3000"),
+        (["finger_1_joint_1", "finger_1_joint_2"], [1.5, 0.5], "must be in 0.0..1.2217 rad"),
+        (["finger_1_joint_1"], [1.3], "'finger_1_joint_1' must be in 0.0..1.2217 rad, got 1.3000"),
         (["finger_1_joint_1"], [-0.1], "must be in"),
         (["finger_middle_joint_2"], [1.6], "must be in 0.0..1.5708 rad"),
-        (["palm_finger_1_joint"], [0.2], "must be in -0.1784..0.192 rad"),
+        (["palm_finger_1_joint"], [0.2], "must be in -0.1784..0.1919 rad"),
         (["fingers"], [2.9], "must be in 0..2.8 rad"),
         (["fingers"], [-0.1], "must be in 0..2.8 rad"),
         (["fingers"], [], "1 joints and 0 positions"),

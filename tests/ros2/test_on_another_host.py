@@ -7,11 +7,11 @@ import asyncio
 import pytest
 
 from robotiq_async import Finger, State
-from robotiq_async.ros2.connection import Connection, RefusedError
-from robotiq_async.ros2.diagnosis import Level, diagnose
-from robotiq_async.ros2.goals import Ending
-from robotiq_async.ros2.joints import Targets
-from robotiq_async.ros2.settings import PARAMETERS, check_settings
+from robotiq_async.ros2.gripper.connection import Connection, RefusedError
+from robotiq_async.ros2.gripper.goals import Ending
+from robotiq_async.ros2.translation.diagnosis import Level, diagnose
+from robotiq_async.ros2.translation.joints import Targets
+from robotiq_async.ros2.translation.settings import PARAMETERS, check_settings
 from robotiq_async.session.clock import now
 from tests.fleet.lab import lab
 from tests.virtual import virtual
@@ -30,17 +30,17 @@ async def test_a_goal_and_its_cancellation() -> None:
         await connection.permit()
         assert [each.level for each in diagnose(hand, now())] == [Level.OK, Level.OK]
         outcome = await connection.run_goal(
-            b"1", Targets(((60, Finger.A), (80, Finger.B))), SETTINGS, lambda: None
+            b"1", Targets(((60, Finger.A), (80, Finger.B))), SETTINGS, lambda: None, 0
         )
         assert outcome.ending is Ending.SUCCEEDED
         assert [here.gripper.position(axis) for axis in (Finger.A, Finger.B)] == pytest.approx(
             [60, 80], abs=2
         )
-        goal = asyncio.create_task(connection.run_goal(b"2", CLOSE, SETTINGS, lambda: None))
+        goal = asyncio.create_task(connection.run_goal(b"2", CLOSE, SETTINGS, lambda: None, 0))
         async for status in hand.statuses():
             if status.position(Finger.A) > 90:
                 break
-        connection.cancel_goal(b"2")
+        await connection.cancel_goal(b"2")
         assert (await goal).ending is Ending.CANCELED
         there = here.gripper.position(Finger.A)
         assert there < 200
@@ -57,11 +57,11 @@ async def test_a_new_goal_holds_the_other_axes() -> None:
         connection = Connection(hand, SETTINGS)
         await connection.open()
         await connection.permit()
-        first = asyncio.create_task(connection.run_goal(b"1", CLOSE, SETTINGS, lambda: None))
+        first = asyncio.create_task(connection.run_goal(b"1", CLOSE, SETTINGS, lambda: None, 0))
         async for status in hand.statuses():
             if status.position(Finger.A) > 40:
                 break
-        second = await connection.run_goal(b"2", Targets(((20, Finger.A),)), SETTINGS, lambda: None)
+        second = await connection.run_goal(b"2", Targets(((20, Finger.A),)), SETTINGS, lambda: None, 0)
         assert (await first).ending is Ending.ABORTED
         assert second.ending is Ending.SUCCEEDED
         assert here.gripper.position(Finger.B) < 200

@@ -10,8 +10,8 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import robotiq_async
-from robotiq_async.ros2.connection import COMMANDS
-from robotiq_async.ros2.settings import PARAMETERS
+from robotiq_async.ros2.gripper.connection import COMMANDS
+from robotiq_async.ros2.translation.settings import PARAMETERS
 
 ROOT = Path(__file__).parents[2]
 SHARED: dict[str, str] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"][
@@ -39,7 +39,7 @@ def test_one_version() -> None:
 
 def test_every_package_of_ros_that_is_imported_is_a_dependency() -> None:
     imported = set()
-    for file in (ROOT / "robotiq_async" / "ros2").glob("*.py"):
+    for file in (ROOT / "robotiq_async" / "ros2").rglob("*.py"):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
                 imported.add(node.module.partition(".")[0])

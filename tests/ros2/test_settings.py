@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from robotiq_async.ros2.settings import PARAMETERS, check_parameter, check_settings
+from robotiq_async.ros2.translation.settings import PARAMETERS, check_parameter, check_settings
 
 USUAL = {name: parameter.default for name, parameter in PARAMETERS.items()}
 
@@ -46,6 +46,7 @@ def test_an_integer_will_do_for_a_float() -> None:
         ("speed", 256, "speed must be in 0..255, got 256"),
         ("force", 64.0, "force must be an int in 0..255, got 64.0"),
         ("allow_stalling", 1, "allow_stalling must be true or false, got 1"),
+        ("joint_prefix", "left <&", "joint_prefix may have letters, digits, _ . / and -, got 'left <&'"),
         ("joint_prefix", None, "joint_prefix must be a string, got None"),
     ],
 )

@@ -13,11 +13,12 @@ from typing import Any, Final, Self, TypeVar
 
 import rclpy
 from action_msgs.msg import GoalStatus
+from action_msgs.srv import CancelGoal
 from control_msgs.action import ParallelGripperCommand
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
-from rcl_interfaces.srv import DescribeParameters, SetParameters
+from rcl_interfaces.srv import DescribeParameters, SetParameters, SetParametersAtomically
 from rclpy.action import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -188,22 +189,39 @@ class Client:
         request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
         return self.call("set_parameters", SetParameters, request).results[0]
 
+    def set_together(self, **values: object) -> Any:
+        """Set parameters, all or none; the result has a reason."""
+        messages = [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
+        request = SetParametersAtomically.Request(parameters=messages)
+        return self.call("set_parameters_atomically", SetParametersAtomically, request).result
+
     def describe(self, *names: str) -> Sequence[Any]:
         request = DescribeParameters.Request(names=list(names))
         return list(self.call("describe_parameters", DescribeParameters, request).descriptors)
 
     # -- goals and topics ----------------------------------------------------------------------------------
 
-    def send(
+    def begin_goal(
         self, names: Sequence[str], positions: Sequence[float], **limits: Sequence[float]
-    ) -> Goal | None:
-        """Send a goal; None if it is rejected."""
+    ) -> tuple[Any, Topic]:
+        """Send a goal, without waiting for the answer; what is fed back goes to the topic."""
         feedback = Topic()
         command = JointState(name=list(names), position=[*map(float, positions)], **limits)
         goal = ParallelGripperCommand.Goal(command=command)
         took = lambda it: feedback.take(it.feedback)  # noqa: E731
-        handle = waited(self.inside(lambda: self._action.send_goal_async(goal, feedback_callback=took)))
+        return self.inside(lambda: self._action.send_goal_async(goal, feedback_callback=took)), feedback
+
+    def send(
+        self, names: Sequence[str], positions: Sequence[float], **limits: Sequence[float]
+    ) -> Goal | None:
+        """Send a goal; None if it is rejected."""
+        answer, feedback = self.begin_goal(names, positions, **limits)
+        handle = waited(answer)
         return Goal(self, handle, feedback) if handle.accepted else None
+
+    def cancel_all(self) -> Any:
+        """Cancel whatever goals there are; a future of the answer."""
+        return self.begin("gripper_cmd/_action/cancel_goal", CancelGoal)
 
     def move(self, *positions: float, names: Sequence[str] = ("fingers",)) -> Goal:
         goal = self.send(names, positions)
@@ -219,8 +237,8 @@ class Client:
     def diagnostics(self) -> Topic:
         return self._listen(DiagnosticArray, "/diagnostics", 10)
 
-    def description(self) -> Topic:
-        return self._listen(String, "/robot_description", LATEST)
+    def description(self, name: str = "/robot_description") -> Topic:
+        return self._listen(String, name, LATEST)
 
     def _listen(self, kind: Any, name: str, qos: Any) -> Topic:
         topic = Topic()

@@ -45,6 +45,7 @@ def test_a_lost_link(simulator: Simulator) -> None:
         simulator.find_link()
         status.wait(lambda it: json.loads(it.data)["connected"])
         states.wait()
+        process.prints("the link is back, and what still moved has been stopped")
         assert client.move(0.0).ends()[0] == SUCCEEDED
 
 

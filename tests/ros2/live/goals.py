@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import pytest
 
 from robotiq_async import Fault, Finger
-from robotiq_async.ros2.joints import joint_names
-from tests.ros2.live.bench import ABORTED, CANCELED, SUCCEEDED, Goal, Simulator
+from robotiq_async.ros2.translation.joints import joint_names
+from tests.ros2.live.bench import ABORTED, CANCELED, SUCCEEDED, Goal, Simulator, waited
 from tests.ros2.live.fixtures import Cell
 from tests.ros2.live.processes import Process
 
@@ -91,6 +91,19 @@ def test_cancel_stops_the_fingers(cell: Cell) -> None:
     for _ in range(10):
         states.wait()
     assert abs(position(cell.simulator) - there) <= 3, "a held axis may come back by a count or two"
+
+
+def test_a_cancel_that_comes_while_a_goal_is_being_accepted(cell: Cell) -> None:
+    """Goals and cancels as fast as they can be sent: whoever was told "canceling" has not arrived."""
+    waited(cell.client.cancel_all())  # the service is known from here on
+    for _ in range(5):
+        accepting, feedback = cell.client.begin_goal(["fingers"], [2.8])
+        canceling = cell.client.cancel_all()
+        goal = Goal(cell.client, waited(accepting), feedback)
+        if not waited(canceling).goals_canceling:  # it came before the goal
+            goal.cancel()
+        assert goal.ends()[0] == CANCELED
+    assert position(cell.simulator) < 200
 
 
 def test_a_new_goal_takes_over(cell: Cell) -> None:

@@ -6,7 +6,8 @@ import signal
 
 import pytest
 
-from robotiq_async.ros2.settings import PARAMETERS
+from robotiq_async.ros2.translation.settings import PARAMETERS
+from robotiq_async.wire.request import Request
 from tests.ros2.live.bench import ABORTED, SUCCEEDED, Client, Simulator
 from tests.ros2.live.goals import begun, position
 from tests.ros2.live.processes import node
@@ -91,6 +92,27 @@ def test_parameters(simulator: Simulator) -> None:
         (rate,) = client.describe("publish_rate")
         assert (rate.floating_point_range[0].from_value, rate.floating_point_range[0].to_value) == (1, 200)
         assert process.is_running
+
+
+def test_of_parameters_that_are_set_together_none_counts_if_one_is_refused(simulator: Simulator) -> None:
+    with (
+        node(address=simulator.address, autostart=True, adress="tcp://192.0.2.1") as process,
+        Client() as client,
+    ):
+        process.prints("commands are taken")
+        assert "this node has no parameter adress" in process.text
+        assert client.call("activate").success
+        assert not client.set_together(speed=7, force=999).successful
+        assert client.move(0.3).ends()[0] == SUCCEEDED
+        assert speed(simulator) == 128
+        assert client.set_together(speed=9, force=11).successful
+        assert client.move(0.4).ends()[0] == SUCCEEDED
+        assert speed(simulator) == 9
+
+
+def speed(simulator: Simulator) -> int:
+    """That finger A was last given."""
+    return simulator.do(lambda gripper: Request.from_registers(gripper.request_registers).axes[0].speed)
 
 
 def test_a_gripper_that_is_not_there(simulator: Simulator) -> None:

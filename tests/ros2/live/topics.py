@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 
 from robotiq_async import Finger
+from robotiq_async.description import HandModel
+from robotiq_async.ros2.translation.joints import joint_names
 from tests.ros2.live.bench import SUCCEEDED, Client, Simulator
 from tests.ros2.live.goals import position
 from tests.ros2.live.processes import node
@@ -29,6 +31,8 @@ def test_a_prefix_is_before_every_joint(simulator: Simulator) -> None:
         assert [goal.ends()[0] for goal in moving] == [SUCCEEDED, SUCCEEDED]
         assert position(simulator) >= 238
         assert position(other) == 70
+        described = one.description("/left/robot_description").wait(new=False).data
+        assert {joint.name for joint in HandModel.parse(described).moving} == set(joint_names("left_"))
         assert one.joint_states("/left/joint_states").wait().name[0] == "left_palm_finger_1_joint"
         assert two.joint_states("/right/joint_states").wait().name[0] == "right_palm_finger_1_joint"
         assert one.send(["right_fingers"], [0.0]) is None

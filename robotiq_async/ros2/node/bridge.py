@@ -18,7 +18,10 @@ class ClosedError(Exception):
 
 
 class Bridge:
-    """Two ways across. Neither blocks the loop; only :meth:`wait` blocks the executor."""
+    """Three ways across. None blocks the loop, and only :meth:`wait` blocks the executor.
+
+    What is asked of the loop begins in the order in which it was asked.
+    """
 
     def __init__(self, loop: asyncio.AbstractEventLoop, executor: Executor) -> None:
         """Connect a running loop with an executor of another thread."""
@@ -55,6 +58,14 @@ class Bridge:
         self._begin(work).add_done_callback(lambda done: _hand_over(done, answer))
         result: T = await answer
         return result
+
+    def tell(self, work: Coroutine[Any, Any, object]) -> None:
+        """Have the loop do something that nobody waits for, and that does not fail.
+
+        Raises:
+            ClosedError: the node ends.
+        """
+        self._begin(work)
 
     def wait(self, work: Coroutine[Any, Any, T]) -> T:
         """The same, blocking the executor: for transitions, whose callbacks must be synchronous.

@@ -18,10 +18,10 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from ..log import log
+from ...log import log
 from .bridge import Bridge
+from .gripper_node import GripperNode
 from .logs import handed_to
-from .node import GripperNode
 
 ANSWERS_S: Final = 0.5
 """For the answers to what the end has ended; they take milliseconds."""
@@ -53,12 +53,13 @@ class Spinner(threading.Thread):
         while not self._is_ending.is_set():
             try:
                 self._executor.spin_once()
-            except Exception as error:  # noqa: BLE001  # whatever ROS raises
+            except BaseException as error:  # noqa: BLE001  # nobody could halt any more if it ended unheard
                 if self._is_ending.is_set():
                     return
                 moment = time.monotonic()
                 failures = [*(each for each in failures if moment - each < 1.0), moment]
-                if len(failures) > MOST_FAILURES or not self._executor.context.ok():
+                is_broken = len(failures) > MOST_FAILURES or not self._executor.context.ok()
+                if is_broken or not isinstance(error, Exception):
                     self._died(error)
                     return
                 log.error("a callback of ROS failed: %r", error)
@@ -110,10 +111,12 @@ async def serve(arguments: Sequence[str]) -> None:
 
 async def _end(node: GripperNode, bridge: Bridge, spinner: Spinner) -> None:
     bridge.close()
-    await node.close()
-    await bridge.drained(ANSWERS_S)
-    await asyncio.sleep(LINGER_S)
-    await spinner.end()
+    try:
+        await node.close()
+        await bridge.drained(ANSWERS_S)
+        await asyncio.sleep(LINGER_S)
+    finally:
+        await spinner.end()
 
 
 @contextmanager

@@ -15,13 +15,13 @@ from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 
-from ..errors import NotStartedError
+from ...errors import NotStartedError
+from ..gripper.connection import Connection, RefusedError
+from ..gripper.goals import Ending, Outcome
+from ..translation.joints import GoalError, Targets, targets
+from ..translation.settings import Settings
 from .bridge import Bridge
-from .connection import Connection, RefusedError
-from .goals import Ending, Outcome
-from .joints import GoalError, Targets, targets
 from .messages import JointStates
-from .settings import Settings
 
 Configured = tuple[Connection, JointStates, Settings]
 
@@ -44,12 +44,15 @@ class GripperAction:
         self._bridge = bridge
         self._configured = configured
         self._warned = False
+        self._accepted: dict[bytes, tuple[Configured, int]] = {}
+        """By the key of the goal: what it was accepted for, and how many stops there had been."""
         self._server = ActionServer(
             node,
             ParallelGripperCommand,
             "~/gripper_cmd",
             execute_callback=self._execute,
             goal_callback=self._check,
+            handle_accepted_callback=self._begin,
             cancel_callback=self._cancel,
             callback_group=group,
         )
@@ -73,14 +76,25 @@ class GripperAction:
         self._warn_of_limits(request)
         return GoalResponse.ACCEPT
 
+    def _begin(self, handle: ServerGoalHandle) -> None:
+        """A goal was accepted: for what the node is connected to now, and no stop may come between."""
+        try:
+            configured = self._configured()
+            self._accepted[_key(handle)] = configured, configured[0].stops
+        except Exception as error:  # noqa: BLE001  # would end the executor
+            self._log.error(f"a goal that was accepted cannot begin: {error}")
+        handle.execute()
+
     def _cancel(self, handle: ServerGoalHandle) -> CancelResponse:
-        """Accept. The goal hears of it afterwards: this thread has to mark it as canceling first."""
+        """Accept. The goal hears of it afterwards: this thread has to mark it as canceling first.
+
+        Whatever the node's state: of a cancel for several goals rclpy skips the one after one that refuses.
+        """
         try:
             connection, _, _ = self._configured()
-            key = bytes(handle.goal_id.uuid)
-            self._bridge.loop.call_soon_threadsafe(connection.cancel_goal, key)
+            self._bridge.tell(connection.cancel_goal(_key(handle)))
         except Exception as error:  # noqa: BLE001  # would end the executor
-            self._log.warning(f"cancel of a goal that is over: {error}")
+            self._log.warning(f"cancel of a goal that ends anyway: {error}")
         return CancelResponse.ACCEPT
 
     async def _execute(self, handle: ServerGoalHandle) -> ParallelGripperCommand.Result:
@@ -93,25 +107,27 @@ class GripperAction:
                 outcome = await self._run(handle, result)
         except Exception as error:  # noqa: BLE001  # would leave the client without a result
             outcome = Outcome(Ending.ABORTED, stalled=False, reached=False, reason=str(error) or repr(error))
+        self._accepted.pop(_key(handle), None)
         result.stalled, result.reached_goal = outcome.stalled, outcome.reached
         self._finish(handle, outcome)
         return result
 
     async def _run(self, handle: ServerGoalHandle, result: ParallelGripperCommand.Result) -> Outcome:
-        connection, joints, settings = self._configured()
+        if _key(handle) not in self._accepted:
+            raise RefusedError("the node is not configured")
+        (connection, joints, settings), stops = self._accepted[_key(handle)]
         asked = _targets(handle.request, settings)
 
         def feedback() -> None:
-            state = joints.fresh(connection.hand.status)
+            state = joints.message(connection.hand.status)
             handle.publish_feedback(ParallelGripperCommand.Feedback(state=state))
 
         async def work() -> Outcome:
-            key = bytes(handle.goal_id.uuid)
             try:
-                return await connection.run_goal(key, asked, settings, feedback)
+                return await connection.run_goal(_key(handle), asked, settings, feedback, stops)
             finally:
                 with suppress(NotStartedError):  # nothing has been read
-                    result.state = joints.fresh(connection.hand.status)
+                    result.state = joints.message(connection.hand.status)
 
         return await self._bridge.ask(work())
 
@@ -133,6 +149,10 @@ class GripperAction:
             self._log.warning(
                 "velocity and effort of goals are not heeded: the parameters speed and force are (said once)"
             )
+
+
+def _key(handle: ServerGoalHandle) -> bytes:
+    return bytes(handle.goal_id.uuid)
 
 
 def _targets(request: ParallelGripperCommand.Goal, settings: Settings) -> Targets:

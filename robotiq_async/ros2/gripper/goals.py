@@ -1,4 +1,4 @@
-"""Goals of the gripper's action, one at a time, on any hand. Runs in the event loop; knows no ROS."""
+"""Goals of the gripper's action, one at a time, on any hand."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
-from ..control.motion import MoveResult
-from ..enums import Finger
-from ..errors import RobotiqError
-from ..log import log
-from ..protocol import Hand
-from .joints import Targets
+from ...control.motion import MoveResult
+from ...enums import Finger
+from ...errors import RobotiqConnectionError, RobotiqError
+from ...log import log
+from ...protocol import Hand
+from ..translation.joints import Targets
 
 FEEDBACK_S: Final = 0.05
 """From one feedback to the next: 20 Hz."""
@@ -52,8 +52,8 @@ class _Goal:
         self.work: asyncio.Task[Sequence[MoveResult]] | None = None
         self.ended: tuple[Ending, str] | None = None
         """How somebody else has ended it."""
-        self.hold: asyncio.Future[None] | None = None
-        """Done when its axes have been told to stay."""
+        self.hold: asyncio.Future[str] | None = None
+        """Done when its axes have been told to stay: empty, or why they have not been."""
         self.is_over = asyncio.Event()
         """Its axes belong to whoever comes next."""
 
@@ -68,13 +68,15 @@ class _Goal:
 class GoalRunner:
     """Carries out goals on a hand; a new one takes the place of the one before, all of its axes."""
 
-    def __init__(self, hand: Hand) -> None:
+    def __init__(self, hand: Hand, lost: Callable[[Finger], object] = lambda _: None) -> None:
         """Begin with none.
 
         Args:
             hand: the hand; it moves only while a goal is run.
+            lost: is called with the axes of a goal that a lost link has ended: they may still move.
         """
         self._hand = hand
+        self._lost = lost
         self._newest: _Goal | None = None
 
     async def run(
@@ -108,12 +110,15 @@ class GoalRunner:
         try:
             results = await self._moved(goal, targets, speed, force, feedback)
         except RobotiqError as error:
+            if isinstance(error, RobotiqConnectionError):
+                self._lost(targets.axes)
             return Outcome(Ending.ABORTED, stalled=False, reached=False, reason=str(error))
         if results is None:
             assert goal.ended is not None
             ending, reason = goal.ended
-            if goal.hold is not None:
-                await goal.hold
+            if goal.hold is not None and (problem := await goal.hold):
+                # Canceled would say that its axes are to stay.
+                ending, reason = Ending.ABORTED, f"{reason}, but {problem}"
             return Outcome(ending, stalled=False, reached=False, reason=reason)
         return _judged(results, allow_stalling=allow_stalling)
 
@@ -157,13 +162,16 @@ class GoalRunner:
         finally:
             goal.is_over.set()
 
-    async def _held(self, goal: _Goal, axes: Finger) -> None:
-        """Wait until the gripper has acknowledged that axes are to stay; the log tells if it has not."""
+    async def _held(self, goal: _Goal, axes: Finger) -> str:
+        """Wait until the gripper has acknowledged that axes are to stay; returns why it has not."""
         try:
             await self._hand.hold(axes)
         except RobotiqError as error:
             if self._newest is goal:  # or else the next goal has them
-                log.error("a goal was canceled, and the hold was not acknowledged: %s", error)
+                problem = f"the hold was not acknowledged: {error}"
+                log.error("a goal was canceled, and %s", problem)
+                return problem
+        return ""
 
 
 async def _move(hand: Hand, targets: Targets, speed: int, force: int) -> Sequence[MoveResult]:

@@ -1,4 +1,4 @@
-"""Joints in radians, as ROS has them, from the axes in counts, and back. Knows no ROS and no clock.
+"""Joints in radians, as ROS has them, from the axes in counts, and back.
 
 A finger has one motor for three joints, so a goal for a finger is a goal for one of them: the base joint
 (``joint_1``) as far as it turns alone, the middle one (``joint_2``) beyond. The third joint and the second
@@ -8,35 +8,40 @@ palm joint only follow. See :mod:`robotiq_async.kinematics` for where the angles
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import degrees, radians
 from types import MappingProxyType
 from typing import Final
 
-from ..enums import Finger
-from ..kinematics import BASE, JOINTS, MIDDLE, PALM, PREFIX, Points, joint_angles, joint_velocities
-from ..wire.status import RobotiqStatus
+from ...enums import Finger
+from ...kinematics import BASE, JOINTS, MIDDLE, PALM, PREFIX, Points, joint_angles
+from ...wire.status import RobotiqStatus
 
 FINGERS: Final = "fingers"
 """The name of what stands for all three fingers in a goal: one angle, base and middle joint together."""
 _PALM_JOINT: Final = "palm_finger_1_joint"
-_BASE_LIMITS: Final = (0.0495, 1.2218)
+_BASE_LIMITS: Final = (0.0495, 1.2217)
 _MIDDLE_LIMITS: Final = (0.0, 1.5708)
-_TIP_LIMITS: Final = (-1.2217, -0.0523)
+_TIP_LIMITS: Final = (-0.9599, -0.0523)
 
 LIMITS: Final = MappingProxyType(
     {name: _BASE_LIMITS for name in JOINTS if name.endswith("_joint_1")}
     | {name: _MIDDLE_LIMITS for name in JOINTS if name.endswith("_joint_2")}
     | {name: _TIP_LIMITS for name in JOINTS if name.endswith("_joint_3")}
-    | {_PALM_JOINT: (-0.1784, 0.1920), "palm_finger_2_joint": (-0.1920, 0.1784)}
+    | {_PALM_JOINT: (-0.1784, 0.1919), "palm_finger_2_joint": (-0.1919, 0.1784)}
 )
-"""Lower and upper end of each joint in radians, as the URDF of the hand (robotiq 3f description) has them.
+"""Lower and upper end of each joint in radians. Inside those of the packaged URDF, and of the one that users
+of ROS have (robotiq_3f_gripper_visualization of ros-industrial): that is narrower where a finger is open and
+where the scissor pinches.
 
 The angles leave them at the ends: a finger that reads less than 6 counts, a scissor that reads more than 232.
 Consumers refuse a joint outside its limits, so what is published stays inside.
 """
 _LIMITS: Final = tuple(LIMITS[name] for name in JOINTS)
+_STILL: Final = (0.0,) * len(JOINTS)
 
 CLOSING_END: Final = 2.8
 """End of the closing angle of all fingers: 70 degrees of the base and 90 of the middle joint, rounded up."""
@@ -74,34 +79,39 @@ def joint_names(prefix: str = "") -> list[str]:
     return [prefix + name for name in JOINTS]
 
 
-def positions(status: RobotiqStatus) -> list[float]:
+def positions(status: RobotiqStatus) -> tuple[float, ...]:
     """The eleven joints in radians, inside their limits."""
-    return [
-        min(max(angle, low), high) for angle, (low, high) in zip(joint_angles(status), _LIMITS, strict=True)
-    ]
+    return _inside(joint_angles(status))
 
 
-class Velocities:
-    """Joint velocities from one status to the next."""
+@lru_cache(maxsize=16)
+def _inside(angles: tuple[float, ...]) -> tuple[float, ...]:
+    # Kept, for most of the time the fingers stand.
+    return tuple(min(max(angle, low), high) for angle, (low, high) in zip(angles, _LIMITS, strict=True))
+
+
+class Motion:
+    """Positions and velocities of the joints from one status to the next."""
 
     def __init__(self) -> None:
         """Begin with nothing to compare with."""
-        self._statuses: list[RobotiqStatus] = []
+        self._seen: deque[tuple[float, Sequence[float]]] = deque()
 
-    def of(self, status: RobotiqStatus) -> list[float]:
-        """Radians a second of the eleven joints, over the last hundredths of a second; 0 at first."""
-        kept = self._statuses
-        if not kept or status.timestamp > kept[-1].timestamp:
-            kept.append(status)
-        while len(kept) > 2 and status.timestamp - kept[1].timestamp >= VELOCITY_S:
-            del kept[0]
-        if kept[0].timestamp >= status.timestamp:
-            return [0.0] * len(JOINTS)
-        return list(joint_velocities(kept[0], status))
+    def of(self, status: RobotiqStatus) -> tuple[Sequence[float], Sequence[float]]:
+        """Radians, and radians a second over the last hundredths of a second; those are 0 at first."""
+        seen, at, there = self._seen, status.timestamp, positions(status)
+        if not seen or at > seen[-1][0]:
+            seen.append((at, there))
+        while len(seen) > 2 and at - seen[1][0] >= VELOCITY_S:
+            seen.popleft()
+        before, past = seen[0]
+        if past is there or before >= at:
+            return there, _STILL
+        return there, [(new - old) / (at - before) for old, new in zip(past, there, strict=True)]
 
     def forget(self) -> None:
         """What comes next has nothing to do with what was: the link was down."""
-        self._statuses.clear()
+        self._seen.clear()
 
 
 def targets(names: Sequence[str], angles: Sequence[float], prefix: str = "") -> Targets:

@@ -17,13 +17,13 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
-from ..errors import RobotiqError
+from ...errors import RobotiqError
+from ..gripper.connection import COMMANDS, Connection, RefusedError
+from ..gripper.hands import make_hand
+from ..translation.description import robot_description
 from . import parameters
 from .bridge import Bridge, ClosedError
-from .connection import COMMANDS, Connection, RefusedError
-from .description import robot_description
 from .gripper_action import Configured, GripperAction
-from .hands import make_hand
 from .messages import JointStates
 from .publishing import Publishing
 
@@ -50,6 +50,7 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
         """What the node has while it is configured; the loop reads it too."""
         parameters.declare(self)
         parameters.guard(self, lambda: self._now is not None, self._change)
+        parameters.warn_of_unknown(self)
         # In the default group a halt would wait for the activation before it.
         group = ReentrantCallbackGroup()
         self._publishing = Publishing(self, failed)
@@ -96,9 +97,8 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
 
     async def close(self) -> None:
         """Disconnect, in the loop: the process ends. Goals under way are aborted, fingers stop."""
-        await self._publishing.stop()
         if self._now is not None:
-            await self._now[0].close("the node is shutting down")
+            await self._disconnect(self._now[0], "the node is shutting down")
 
     def _transition(self, what: str, work: Callable[[], str]) -> TransitionCallbackReturn:
         """Do the work of a transition. ROS would swallow what it raises."""
@@ -119,13 +119,11 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
         joints = JointStates(self.get_clock(), settings.joint_prefix, settings.frame_id)
         self._now = connection, joints, settings
         try:
-            self._bridge.wait(connection.open())
+            self._bridge.wait(self._connect(connection, joints, settings.publish_rate))
         except BaseException:
             self._now = None
             raise
-        self._bridge.wait(self._publishing.start(connection, joints, settings.publish_rate))
-        if urdf is not None:
-            self._publishing.describe(urdf)
+        self._publishing.describe(urdf)
         return f"connected to {connection.hand.address}: {connection.hand.state.name}"
 
     def _activate(self) -> str:
@@ -141,10 +139,22 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
     def _clean_up(self) -> str:
         if self._now is None:
             return "not connected"
-        connection, self._now = self._now[0], None
-        self._bridge.wait(self._publishing.stop())
-        self._bridge.wait(connection.close("the node was cleaned up"))
+        self._bridge.wait(self._disconnect(self._now[0], "the node was cleaned up"))
+        # Not before: if the process is told to end meanwhile, it has to know what to stop.
+        self._now = None
         return "disconnected"
+
+    async def _connect(self, connection: Connection, joints: JointStates, rate: float) -> None:
+        try:
+            await connection.open()
+            await self._publishing.start(connection, joints, rate)
+        except BaseException:
+            await self._disconnect(connection, "the configuration failed")
+            raise
+
+    async def _disconnect(self, connection: Connection, reason: str) -> None:
+        await self._publishing.stop()
+        await connection.close(reason)
 
     # -- services --------------------------------------------------------------------------------------
 
@@ -167,11 +177,11 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
             raise RefusedError("the node is not configured")
         return self._now
 
-    def _change(self, name: str, value: object) -> None:
-        """A parameter that counts at once."""
+    def _change(self, values: dict[str, object]) -> None:
+        """Parameters that count at once."""
         if self._now is not None:
             connection, joints, settings = self._now
-            self._now = connection, joints, replace(settings, **{name: value})  # type: ignore[arg-type]
+            self._now = connection, joints, replace(settings, **values)  # type: ignore[arg-type]
 
     def _answer_illegal_transitions(self) -> None:
         """Answer a transition that is not possible now with a no.

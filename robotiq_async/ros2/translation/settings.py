@@ -1,16 +1,17 @@
-"""The parameters of the node: names, meaning, ranges, and what is made of their values. Knows no ROS."""
+"""The parameters of the node: names, meaning, ranges, and what is made of their values."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from ..enums import DEFAULT_FORCE, DEFAULT_SPEED
-from ..fleet.network.route import is_remote, parse_remote_address
-from ..link.address import parse_address
-from ..session.options import POLL_INTERVAL_S
-from ..wire.checks import check_byte, check_number, check_seconds
+from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ...fleet.network.route import is_remote, parse_remote_address
+from ...link.address import parse_address
+from ...session.options import POLL_INTERVAL_S
+from ...wire.checks import check_byte, check_number, check_seconds
 
 Value = str | int | float | bool
 
@@ -49,7 +50,7 @@ PARAMETERS: Final[Mapping[str, Parameter]] = {
     "frame_id": Parameter("", "Of the headers of joint states; joint states need none."),
     "urdf": Parameter(
         "",
-        "File to publish as robot_description, as it is; empty for the one that the package brings, if any.",
+        "File to publish as robot_description, as it is; empty for the one that the package brings.",
     ),
     "allow_stalling": Parameter(
         True,
@@ -106,7 +107,8 @@ def check_parameter(name: str, value: object) -> Value:
             return _check_kind(name, value, bool, "true or false")
         if isinstance(parameter.default, str):
             text = _check_kind(name, value, str, "a string")
-            return _check_address(text) if name == "address" else text
+            check = _CHECKS.get(name)
+            return text if check is None else check(str(text))
         if isinstance(parameter.default, int):
             return check_byte(name, value)
         if name.endswith("interval"):
@@ -122,8 +124,19 @@ def _check_kind(name: str, value: object, kind: type[Value], what: str) -> Value
     return value
 
 
-def _check_address(address: Value) -> Value:
+def _check_address(address: str) -> str:
     """Refuse what is none before anything is opened."""
     parse = parse_remote_address if is_remote(address) else parse_address
-    parse(str(address))
+    parse(address)
     return address
+
+
+def _check_prefix(prefix: str) -> str:
+    """Refuse what is no part of a name: it gets into a URDF and into the names of frames."""
+    if not re.fullmatch(r"[A-Za-z0-9_./-]*", prefix):
+        raise ValueError(f"joint_prefix may have letters, digits, _ . / and -, got {prefix!r}")
+    return prefix
+
+
+_CHECKS: Final = {"address": _check_address, "joint_prefix": _check_prefix}
+"""Of strings that are not free."""

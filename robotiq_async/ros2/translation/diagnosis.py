@@ -1,4 +1,4 @@
-"""What is told of a hand: diagnoses, and its state as JSON; nothing that is not known. Knows no ROS."""
+"""What is told of a hand: diagnoses, and its state as JSON; nothing that is not known."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-from ..enums import AXES, Severity
-from ..errors import NotStartedError
-from ..protocol import Hand
-from ..telemetry.payloads import status_fields
-from ..wire.status import RobotiqStatus
-from .hands import is_connected
+from ...enums import AXES, Severity
+from ...errors import NotStartedError
+from ...protocol import Hand
+from ...telemetry.payloads import status_fields
+from ...wire.status import RobotiqStatus
+from .readiness import is_connected
 
 
 class Level(IntEnum):

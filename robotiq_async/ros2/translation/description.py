@@ -1,38 +1,33 @@
-"""The robot description: a URDF as text. Knows no ROS."""
+"""The robot description: a URDF as text."""
 
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
-PACKAGED: Final = "robotiq_3f.urdf"
-"""In the package's data, if anywhere."""
+from ...description import urdf
+
 _REFERENCES: Final = {"parent": "link", "child": "link", "mimic": "joint"}
 """Elements of a joint that name another part, and how."""
 
 
-def robot_description(path: str, prefix: str) -> str | None:
+def robot_description(path: str, prefix: str) -> str:
     """The URDF of a file as it is, or the packaged one with the prefix before its links and joints.
 
     Args:
         path: of a file; empty for the packaged one.
         prefix: of the joints.
 
-    Returns:
-        The text; None if the package brings none.
-
     Raises:
         OSError: the file cannot be read.
         ValueError: the file is no URDF.
     """
-    if path:
-        text = Path(path).read_text(encoding="utf-8")
-        _parse(text, path)
-        return text
-    packaged = files("robotiq_async") / "data" / PACKAGED
-    return prefixed(packaged.read_text(encoding="utf-8"), prefix) if packaged.is_file() else None
+    if not path:
+        return prefixed(urdf(), prefix)
+    text = Path(path).read_text(encoding="utf-8")
+    _parse(text, path)
+    return text
 
 
 def prefixed(text: str, prefix: str) -> str:
@@ -43,7 +38,7 @@ def prefixed(text: str, prefix: str) -> str:
     """
     if not prefix:
         return text
-    robot = _parse(text, PACKAGED)
+    robot = _parse(text, "the description")
     for part in (*robot.findall("link"), *robot.findall("joint")):
         part.set("name", prefix + part.get("name", ""))
         for element, attribute in _REFERENCES.items():

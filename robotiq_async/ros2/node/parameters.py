@@ -9,7 +9,7 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
-from .settings import PARAMETERS, Parameter, Settings, check_parameter, check_settings
+from ..translation.settings import PARAMETERS, Parameter, Settings, check_parameter, check_settings
 
 
 def declare(node: Node) -> None:
@@ -34,30 +34,44 @@ def read(node: Node) -> Settings:
     return check_settings({name: node.get_parameter(name).value for name in PARAMETERS})
 
 
-def guard(node: Node, is_configured: Callable[[], bool], changed: Callable[[str, object], object]) -> None:
+def guard(
+    node: Node, is_configured: Callable[[], bool], changed: Callable[[dict[str, object]], object]
+) -> None:
     """Refuse values that will not do, and changes that would come too late; the log says why.
 
     Args:
         node: of which.
         is_configured: whether the node has been configured with what is there.
-        changed: is called with what may be changed then.
+        changed: is called with those that may be changed then, once all that came with them were accepted.
     """
 
-    def check(parameters: Sequence[RosParameter]) -> SetParametersResult:
-        for each in parameters:
-            known = PARAMETERS.get(each.name)
-            if known is None:
-                continue  # one of ROS's own
+    def check(given: Sequence[RosParameter]) -> SetParametersResult:
+        for each in _ours(given):
             try:
-                value = check_parameter(each.name, each.value)
+                check_parameter(each.name, each.value)
             except ValueError as error:
                 return _refused(node, str(error))
-            if is_configured() and not known.live:
+            if is_configured() and not PARAMETERS[each.name].live:
                 return _refused(node, f"{each.name} counts when the node is configured: clean it up first")
-            changed(each.name, value)
         return SetParametersResult(successful=True)
 
+    def take(given: Sequence[RosParameter]) -> None:
+        changed({each.name: check_parameter(each.name, each.value) for each in _ours(given)})
+
     node.add_on_set_parameters_callback(check)
+    node.add_post_set_parameters_callback(take)
+
+
+def warn_of_unknown(node: Node) -> None:
+    """Tell of parameters that the node was started with and does not have: a slip may leave the default."""
+    unknown = [name for name in getattr(node, "_parameter_overrides", ()) if not node.has_parameter(name)]
+    if unknown:
+        node.get_logger().warning(f"this node has no parameter {', '.join(sorted(unknown))}")
+
+
+def _ours(given: Sequence[RosParameter]) -> list[RosParameter]:
+    """Without those of ROS's own."""
+    return [each for each in given if each.name in PARAMETERS]
 
 
 def _refused(node: Node, reason: str) -> SetParametersResult:

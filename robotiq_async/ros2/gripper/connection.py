@@ -1,0 +1,211 @@
+"""What a configured node has: a hand, its goals and its commands."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Final
+
+from ...actions import ACTIONS, Operator
+from ...errors import NotStartedError, RobotiqConnectionError, RobotiqError
+from ...log import log
+from ...protocol import Hand
+from ..translation.joints import Targets
+from ..translation.readiness import why_not
+from ..translation.settings import Settings
+from .goals import GoalRunner, Outcome
+from .owed_stop import OwedStop
+
+COMMANDS: Final = ("activate", "reset", "halt", "recover", "release")
+"""What the services are called, and the actions behind them."""
+MOST_CALLS: Final = 16
+"""Commands that may be under way at once; halts are no part of them, and never one too many."""
+
+
+class RefusedError(RobotiqError):
+    """The node does not carry out what it is asked now."""
+
+
+class Connection:
+    """A hand, from the configuration of the node to its cleanup.
+
+    What was asked before a stop neither begins nor goes on after it, and a stop is answered before anything
+    else is taken.
+
+    Attributes:
+        hand: the hand.
+        takes_commands: whether the node is active. A halt is taken whether or not it is.
+        stops: how many stops there were; a goal that was accepted before the last one is not begun.
+    """
+
+    def __init__(self, hand: Hand, settings: Settings) -> None:
+        """Prepare; opens nothing. Belongs to the loop of the hand; others may read its attributes.
+
+        Args:
+            hand: not started.
+            settings: what the hand was made with.
+        """
+        self.hand = hand
+        self.takes_commands = False
+        self.stops = 0
+        self._operator = Operator(hand, speed=settings.speed, force=settings.force)
+        self._owed = OwedStop(hand)
+        self._goals = GoalRunner(hand, lost=lambda axes: self._owed.owe(lambda: hand.hold(axes)))
+        self._calls: set[asyncio.Task[str]] = set()
+        self._stopping = 0
+        self._took_commands = False
+        self._is_closed = False
+
+    # -- its life --------------------------------------------------------------------------------------
+
+    async def open(self) -> None:
+        """Connect and read; nothing is written to the gripper.
+
+        Raises:
+            RefusedError: it has been closed already.
+            RobotiqError: no gripper there, or a link that failed.
+        """
+        self._check_open()
+        await self.hand.start(activate=False)
+
+    async def permit(self) -> None:
+        """Take commands from now on. Moves nothing.
+
+        Raises:
+            RefusedError: it has been closed.
+        """
+        self._check_open()
+        self.takes_commands = self._took_commands = True
+
+    async def forbid(self, reason: str) -> None:
+        """Take no commands any more, and halt.
+
+        A halt that does not reach the gripper is an error in the log and no failure: what matters is that
+        nothing else is commanded. If the link comes back soon, the gripper is halted then.
+        """
+        self.takes_commands = False
+        try:
+            await self._stop(reason)
+        except NotStartedError:
+            pass  # stopped by the end of the hand
+        except RobotiqError as error:
+            log.error("no halt, the fingers MAY STILL MOVE: %s", error)
+            if isinstance(error, RobotiqConnectionError):
+                self._owed.owe(self.hand.halt)
+
+    async def close(self, reason: str) -> None:
+        """Disconnect; the fingers are stopped if commands were ever taken. Idempotent."""
+        self.takes_commands, self._is_closed = False, True
+        self._end_all(reason)
+        try:
+            await self.hand.stop(halt=self._took_commands)
+        finally:
+            await self._owed.end()
+
+    # -- commands --------------------------------------------------------------------------------------
+
+    async def command(self, name: str) -> str:
+        """Carry out one of :data:`COMMANDS`; returns how it ended, in words.
+
+        Raises:
+            RefusedError: the node is not active, too much is under way, or a stop took over.
+            RobotiqError: it could not be carried out.
+        """
+        if name == "halt":
+            return await self._stop("a halt took over")
+        self._check_active()
+        self._check_standing()
+        if len(self._calls) >= MOST_CALLS:
+            raise RefusedError(f"{MOST_CALLS} commands are under way")
+        call = asyncio.ensure_future(self._operator.act(ACTIONS[name]))
+        self._calls.add(call)
+        try:
+            await asyncio.wait({call})
+        finally:
+            call.cancel()
+            self._calls.discard(call)
+        if call.cancelled():
+            raise RefusedError(f"a stop took over: {name} does not go on")
+        return call.result()
+
+    async def check_goal(self) -> None:
+        """Refuse a goal that cannot be begun now.
+
+        Raises:
+            RefusedError: the node is not active, the link is down, the gripper is in no state to move, or it
+                is being stopped.
+        """
+        self._check_active()
+        reason = why_not(self.hand)
+        if reason is not None:
+            raise RefusedError(reason)
+        self._check_standing()
+
+    async def run_goal(
+        self, key: bytes, targets: Targets, settings: Settings, feedback: Callable[[], object], stops: int
+    ) -> Outcome:
+        """Carry out a goal; see :meth:`GoalRunner.run`.
+
+        Args:
+            key: which goal, for :meth:`cancel_goal`.
+            targets: where its axes go.
+            settings: as they are now.
+            feedback: is called while it is under way.
+            stops: how many there were when the goal was accepted.
+
+        Raises:
+            RefusedError: as :meth:`check_goal`, for things may have changed since; or a stop came between.
+        """
+        if stops != self.stops:
+            raise RefusedError("a stop took over before it began")
+        await self.check_goal()
+        return await self._goals.run(
+            key,
+            targets,
+            speed=settings.speed,
+            force=settings.force,
+            allow_stalling=settings.allow_stalling,
+            feedback=feedback,
+        )
+
+    async def cancel_goal(self, key: bytes) -> None:
+        """End a goal for its client."""
+        self._goals.cancel(key)
+
+    # -- stops -----------------------------------------------------------------------------------------
+
+    async def _stop(self, reason: str) -> str:
+        """Halt; returns how that ended, in words.
+
+        Raises:
+            RobotiqError: it did not reach the gripper.
+        """
+        self._end_all(reason)
+        self._stopping += 1
+        try:
+            return await self._operator.act(ACTIONS["halt"])
+        finally:
+            self._stopping -= 1
+
+    def _end_all(self, reason: str) -> None:
+        """Whatever was asked before ends, also what has not reached the hand yet."""
+        self.stops += 1
+        self._goals.abort(reason)
+        for call in self._calls:
+            call.cancel()
+
+    # -- what is refused -------------------------------------------------------------------------------
+
+    def _check_open(self) -> None:
+        if self._is_closed:
+            raise RefusedError("the connection has been closed")
+
+    def _check_active(self) -> None:
+        if not self.takes_commands:
+            raise RefusedError("the node is not active: activate it first (that moves nothing)")
+
+    def _check_standing(self) -> None:
+        if self._stopping:
+            raise RefusedError("a halt is under way")
+        if self._owed.is_owed:
+            raise RefusedError("the fingers are not stopped yet: the link was down when they were to be")

@@ -1,0 +1,83 @@
+"""Messages of ROS from what a hand shows."""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Sequence
+from typing import Final
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock
+from sensor_msgs.msg import JointState
+
+from ...kinematics import JOINTS
+from ...session.clock import now
+from ...telemetry.joint_states import JointStateEncoder
+from ...wire.status import RobotiqStatus
+from ..translation.diagnosis import Diagnosis
+from ..translation.joints import Motion, joint_names, positions
+
+
+class JointStates:
+    """Joint states of one hand. Belongs to the event loop."""
+
+    def __init__(self, clock: Clock, prefix: str, frame_id: str) -> None:
+        """Keep what is the same in every message."""
+        self._clock = clock
+        self._names = joint_names(prefix)
+        self._frame_id = frame_id
+        self._encoder = JointStateEncoder(frame_id, self._names)
+        self._motion = Motion()
+        self._velocities: Sequence[float] = (0.0,) * len(self._names)
+
+    def encoded(self, status: RobotiqStatus) -> bytes:
+        """A message as it goes out, to be published: building one costs four times as much."""
+        positions, self._velocities = self._motion.of(status)
+        nanoseconds = stamp(self._clock, status.timestamp)
+        return self._encoder.encode(nanoseconds, positions, self._velocities, _UNKNOWN)
+
+    def message(self, status: RobotiqStatus) -> JointState:
+        """A message, for feedback and results. Its velocities are those last published."""
+        message = JointState()
+        seconds, nanoseconds = divmod(stamp(self._clock, status.timestamp), 1_000_000_000)
+        message.header.stamp = Time(sec=seconds, nanosec=nanoseconds)
+        message.header.frame_id = self._frame_id
+        message.name = self._names
+        message.position = array("d", positions(status))
+        message.velocity = array("d", self._velocities)
+        message.effort = array("d", _UNKNOWN)
+        return message
+
+    def forget(self) -> None:
+        """The link was down: what comes next is no motion since."""
+        self._motion.forget()
+
+
+_UNKNOWN: Final = (math.nan,) * len(JOINTS)
+"""Efforts. Currents are known, torques are not: no number is better than a wrong one."""
+
+
+def stamp(clock: Clock, timestamp: float) -> int:
+    """The time of ROS in nanoseconds for a timestamp in monotonic seconds: now, less its age."""
+    return max(0, int(clock.now().nanoseconds) - round((now() - timestamp) * 1e9))
+
+
+def diagnostic_array(
+    clock: Clock, node_name: str, hardware_id: str, diagnoses: tuple[Diagnosis, ...]
+) -> DiagnosticArray:
+    """Diagnoses for ``/diagnostics``."""
+    message = DiagnosticArray()
+    message.header.stamp = clock.now().to_msg()
+    message.status = [
+        DiagnosticStatus(
+            level=bytes([each.level]),  # a byte, and no int
+            name=f"{node_name}: {each.what}",
+            message=each.message,
+            hardware_id=hardware_id,
+            values=[KeyValue(key=key, value=value) for key, value in each.values.items()],
+        )
+        for each in diagnoses
+    ]
+    return message

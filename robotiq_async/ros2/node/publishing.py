@@ -1,0 +1,144 @@
+"""What the node publishes while it is configured: joint states, its status, diagnoses.
+
+Published from the event loop, and joint states in the turn of the poll that they are of: to wake the executor
+or the loop for it would cost more than the messages do.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Final
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from ...errors import NotStartedError
+from ...protocol import Hand
+from ...session.clock import now
+from ..gripper.connection import Connection
+from ..translation.diagnosis import diagnose, status_text
+from ..translation.pace import Pace
+from ..translation.readiness import is_connected
+from .messages import JointStates, diagnostic_array
+
+STATUS_RATE_HZ: Final = 10.0
+"""Of the status; a change of state is published at once."""
+DIAGNOSTICS_RATE_HZ: Final = 1.0
+_LATEST: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""Whoever comes later gets the newest one."""
+
+
+class Publishing:
+    """The publishers of a node. They stay; what they publish begins and ends with a connection."""
+
+    def __init__(self, node: Node, failed: Callable[[BaseException], object]) -> None:
+        """Advertise the topics.
+
+        Args:
+            node: of which.
+            failed: is called, in the loop, if publishing ends for a reason that nobody has thought of.
+        """
+        self._node = node
+        self._failed = failed
+        self._joint_states = node.create_publisher(JointState, "joint_states", 10)
+        self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._status = node.create_publisher(String, "~/status", _LATEST)
+        self._description = node.create_publisher(String, "robot_description", _LATEST)
+        self._timers: list[Timer] = []
+        self._readers: list[asyncio.Task[None]] = []
+
+    def describe(self, urdf: str) -> None:
+        """Publish the robot description."""
+        self._description.publish(String(data=urdf))
+
+    async def start(self, connection: Connection, joint_states: JointStates, rate: float) -> None:
+        """Publish what the hand of a connection shows."""
+        works = (
+            (STATUS_RATE_HZ, lambda: self._publish_status(connection)),
+            (DIAGNOSTICS_RATE_HZ, lambda: self._publish_diagnoses(connection)),
+        )
+        self._timers = [Timer(1 / frequency, work, self._failed) for frequency, work in works]
+        readers = (
+            self._publish_joints(connection.hand, joint_states, Pace(rate)),
+            self._publish_transitions(connection, joint_states),
+        )
+        self._readers = [asyncio.ensure_future(reader) for reader in readers]
+        for reader in self._readers:
+            reader.add_done_callback(self._look)
+
+    async def stop(self) -> None:
+        """Publish nothing more. Idempotent."""
+        for timer in self._timers:
+            timer.cancel()
+        readers, self._readers = self._readers, []
+        for reader in readers:
+            reader.cancel()
+        await asyncio.gather(*readers, return_exceptions=True)
+
+    def _look(self, reader: asyncio.Task[None]) -> None:
+        if not reader.cancelled() and (error := reader.exception()) is not None:
+            self._failed(error)
+
+    async def _publish_joints(self, hand: Hand, joints: JointStates, pace: Pace) -> None:
+        async for status in hand.statuses():
+            if pace.takes(status.timestamp):
+                self._joint_states.publish(joints.encoded(status))
+
+    async def _publish_transitions(self, connection: Connection, joints: JointStates) -> None:
+        async for _ in connection.hand.transitions():
+            self._publish_status(connection)
+            if not is_connected(connection.hand):
+                joints.forget()
+
+    def _publish_status(self, connection: Connection) -> None:
+        text = status_text(connection.hand, takes_commands=connection.takes_commands)
+        self._status.publish(String(data=text))
+
+    def _publish_diagnoses(self, connection: Connection) -> None:
+        hand = connection.hand
+        self._diagnostics.publish(
+            diagnostic_array(
+                self._node.get_clock(),
+                self._node.get_fully_qualified_name(),
+                hand.address,
+                diagnose(hand, now()),
+            )
+        )
+
+
+class Timer:
+    """Does something at a rate, from now on; what is missed is missed."""
+
+    def __init__(
+        self, period: float, work: Callable[[], object], failed: Callable[[BaseException], object]
+    ) -> None:
+        """Begin at once, in the running loop.
+
+        Args:
+            period: seconds.
+            work: is done; a hand that was stopped in this moment does not matter.
+            failed: is called with what else it raises, and then it ends.
+        """
+        self._loop = asyncio.get_running_loop()
+        self._period, self._work, self._failed = period, work, failed
+        self._due = self._loop.time()
+        self._next = self._loop.call_soon(self._tick)
+
+    def cancel(self) -> None:
+        """End it."""
+        self._next.cancel()
+
+    def _tick(self) -> None:
+        try:
+            with suppress(NotStartedError):
+                self._work()
+        except Exception as error:  # noqa: BLE001  # whatever it is: nobody else would hear of it
+            self._failed(error)
+            return
+        self._due = max(self._due + self._period, self._loop.time())
+        self._next = self._loop.call_at(self._due, self._tick)

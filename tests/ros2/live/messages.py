@@ -1,0 +1,33 @@
+"""Messages that are encoded here are those of ROS."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from rclpy.clock import Clock
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+
+from robotiq_async.ros2.node.messages import JointStates
+from robotiq_async.session.clock import now
+from tests.register_words import status_of
+
+
+@pytest.mark.parametrize(("prefix", "frame_id"), [("", ""), ("left_", "palm"), ("cell/3.", "a")])
+async def test_joint_states(prefix: str, frame_id: str) -> None:
+    joints, began = JointStates(Clock(), prefix, frame_id), now()
+    joints.encoded(status_of(0x31, position=(20, 30, 40, 137), at=began - 0.04))
+    status = status_of(0x31, position=(21, 30, 240, 140), at=began)
+    read = deserialize_message(joints.encoded(status), JointState)
+    made = joints.message(status)
+    assert read.header.frame_id == made.header.frame_id == frame_id
+    assert read.name == made.name
+    assert read.name[0] == f"{prefix}palm_finger_1_joint"
+    assert read.position == made.position
+    assert read.velocity == made.velocity
+    assert any(read.velocity)
+    assert len(read.effort) == 11
+    assert all(math.isnan(effort) for effort in (*read.effort, *made.effort))
+    apart = made.header.stamp.nanosec - read.header.stamp.nanosec
+    assert abs(apart) < 50_000_000 or abs(apart) > 950_000_000

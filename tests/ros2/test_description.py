@@ -1,0 +1,55 @@
+"""The robot description that the node publishes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from robotiq_async.description import HandModel, hand_model, urdf
+from robotiq_async.ros2.translation.description import prefixed, robot_description
+from robotiq_async.ros2.translation.joints import joint_names
+
+URDF = (
+    "<robot name='hand'><link name='palm' /><link name='tip' /><joint name='j' type='revolute'>"
+    "<parent link='palm' /><child link='tip' /><mimic joint='i' /></joint></robot>"
+)
+
+
+@pytest.mark.parametrize("prefix", ["", "left_", "cell/3."])
+def test_without_a_file_it_is_the_packaged_one_behind_the_prefix(prefix: str) -> None:
+    """The same hand: every link where it was, and the joints are those of the joint states."""
+    model, plain = HandModel.parse(robot_description("", prefix)), hand_model()
+    assert {joint.name for joint in model.moving} == set(joint_names(prefix))
+    assert model.root == f"{prefix}{plain.root}"
+    angles = {joint.name: (joint.lower + joint.upper) / 3 for joint in plain.moving}
+    there = model.link_poses({prefix + name: angle for name, angle in angles.items()})
+    assert there == {prefix + name: pose for name, pose in plain.link_poses(angles).items()}
+
+
+def test_without_a_prefix_nothing_is_touched() -> None:
+    assert robot_description("", "") == urdf()
+    assert prefixed(URDF, "") == URDF
+
+
+def test_a_prefix_stands_before_links_and_joints() -> None:
+    text = prefixed(URDF, "left_").replace('"', "'")
+    for part in ("link name='left_palm'", "joint name='left_j'", "parent link='left_palm'"):
+        assert part in text
+    assert "child link='left_tip'" in text
+    assert "mimic joint='left_i'" in text
+    assert "robot name='hand'" in text
+
+
+def test_a_file_is_published_as_it_is(tmp_path: Path) -> None:
+    file = tmp_path / "hand.urdf"
+    file.write_text(URDF, encoding="utf-8")
+    assert robot_description(str(file), "left_") == URDF
+
+
+@pytest.mark.parametrize("text", ["", "<sdf/>", "no XML"])
+def test_what_is_no_urdf_is_refused(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "hand.urdf"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError, match=r"hand\.urdf is no URDF: "):
+        robot_description(str(file), "")
