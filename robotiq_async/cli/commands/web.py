@@ -15,8 +15,8 @@ from ...actions import Operator
 from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...errors import RobotiqError
 from ...telemetry.payloads import printable
-from ..arguments import USUAL, Address, Byte, Link, Port, is_loopback, need
-from ..browser import open_page
+from ..arguments import USUAL, Address, Byte, Link, Port, need
+from ..browser import opened
 from ..failures import CommandError, UsageError, usage
 
 if TYPE_CHECKING:
@@ -80,7 +80,6 @@ async def web(
             host=host,
             port=port,
             control=control,
-            loopback=is_loopback(host),
             addresses=tuple(operator.hand.address for operator in operators),
             speed=speed,
             force=force,
@@ -112,8 +111,8 @@ async def _show(
         if not settings.loopback and not settings.certificate:
             _tell("without a certificate the password goes through the network for everybody to read")
         print(page.url, flush=True)
-        if open_browser:
-            await open_page(page.url)
+        if open_browser and not await stack.enter_async_context(opened(page.url)):
+            _tell("no browser could be opened here: open the address above yourself")
         await page.ended()
         raise CommandError("the process of the page has ended; what it says is above")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from datetime import datetime
+from time import monotonic
 from typing import Final
 
 from nicegui import Client, ui
@@ -49,8 +50,8 @@ class Visits:
         """A page is being made."""
         touch = Touch()
         client.on_connect(lambda: self._arrive(client.id, touch))
-        client.on_disconnect(lambda: self._leave(client.id))
-        client.on_delete(lambda: self._leave(client.id))
+        client.on_disconnect(lambda: self._leave(client))
+        client.on_delete(lambda: self._leave(client))
         ui.on("beat", lambda event: touch.heard(event.args))
 
         def look() -> None:
@@ -66,9 +67,11 @@ class Visits:
         self._present.add(page)
         self._mirror.count(len(self._present))
 
-    def _leave(self, page: str) -> None:
-        self._mirror.gone(page)
-        self._present.discard(page)
+    def _leave(self, client: Client) -> None:
+        self._mirror.gone(client.id)
+        # A browser that came back may be heard of before its old connection is found to have ended.
+        if not client.has_socket_connection:
+            self._present.discard(client.id)
         self._mirror.count(len(self._present))
 
 
@@ -111,7 +114,7 @@ def _frame(title: str, *, home: bool) -> None:
 
 def _hand_page(mirror: Mirror, hand: HandMirror, client: Client, visits: Visits) -> None:
     _frame(hand.address, home=len(mirror.hands) > 1)
-    visits.begin(client)
+    touch = visits.begin(client)
     shown: list[Callable[[], None]] = []
     with ui.element("div").classes("grid w-full gap-3 grid-cols-1 lg:grid-cols-2"):
         with ui.column().classes("w-full gap-2"):
@@ -134,7 +137,7 @@ def _hand_page(mirror: Mirror, hand: HandMirror, client: Client, visits: Visits)
     ]
     if mirror.control:
         with place:
-            controls = Controls(mirror, hand, client.id, lambda words: events.add(_timed(words)))
+            controls = Controls(mirror, hand, client.id, touch, lambda words: events.add(_timed(words)))
         _halt_button("halt", "stops every axis", controls.halt)
     else:
         with place:
@@ -167,7 +170,7 @@ def _tiles(mirror: Mirror, client: Client, visits: Visits) -> None:
 
 def _halt_all(mirror: Mirror, page: str) -> None:
     for hand in mirror.hands:
-        mirror.ask(page, hand.index, "halt", {}, lambda *_: None)
+        mirror.ask(page, hand.index, "halt", {}, lambda *_: None, at=monotonic())
 
 
 def _tile(mirror: Mirror, hand: HandMirror) -> Callable[[], None]:
