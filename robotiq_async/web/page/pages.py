@@ -55,7 +55,8 @@ STYLE: Final = """
 </style>
 """
 CUT: Final = """
-<div class="rq-cut-words" role="alert" data-testid="cut">No connection to robotiq-async: what is shown is old{}.</div>
+<div class="rq-cut-words" role="alert" data-testid="cut">
+No connection to robotiq-async: what is shown is old{}.</div>
 """
 PRESSED: Final = ", and nothing that is pressed here arrives, HALT neither"
 
