@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import MutableMapping
+
 import pytest
 
 from robotiq_async.web.page.access import Access, Head, Verdict
+from robotiq_async.web.page.guard import Guard
 from robotiq_async.web.settings import PageSettings
 
 PORT = 8766
@@ -139,3 +143,63 @@ def test_settings_travel_as_a_line_and_show_no_secret() -> None:
     assert "horse" not in repr(settings)
     assert settings.url(80) == "http://127.0.0.1:80/"
     assert PageSettings(host="::1").url(80).startswith("http://[::1]:80/?token=")
+
+
+# -- the guard, without a server -------------------------------------------------------------------------
+
+
+@pytest.mark.virtual_time
+async def test_whoever_tries_passwords_holds_up_nobody_who_sits_elsewhere() -> None:
+    """A wrong one takes a second, and the next from there waits for it: others do not."""
+    tries = [asyncio.create_task(entered("198.51.100.7", f"guess {n}")) for n in range(50)]
+    await asyncio.sleep(0.5)
+    began = asyncio.get_running_loop().time()
+    assert (await entered("192.0.2.1", WORD))["status"] == 303
+    assert asyncio.get_running_loop().time() == began
+    answers = await asyncio.gather(*tries)
+    assert {answer["status"] for answer in answers} == {403}
+    assert asyncio.get_running_loop().time() - began >= 49
+
+
+WORD = "correct horse"
+RULES = Access(PageSettings(password=WORD), 80)
+GUARD = Guard(None, RULES)  # type: ignore[arg-type]
+
+
+async def entered(client: str, password: str, *, ends: bool = True) -> dict[str, object]:
+    """What is answered to somebody who enters a password."""
+    answers: list[dict[str, object]] = []
+    parts = [{"type": "http.request", "body": f"password={password}".encode(), "more_body": not ends}]
+
+    async def receive() -> dict[str, object]:
+        return parts.pop(0) if parts else await asyncio.Future()
+
+    async def send(message: MutableMapping[str, object]) -> None:
+        answers.append(dict(message))
+
+    headers = [(b"host", b"127.0.0.1"), (b"origin", b"http://127.0.0.1")]
+    scope = {"type": "http", "method": "POST", "path": "/", "query_string": b"", "headers": headers}
+    await GUARD({**scope, "client": (client, 1)}, receive, send)
+    return answers[0]
+
+
+@pytest.mark.virtual_time
+async def test_a_form_that_never_ends_is_not_waited_for() -> None:
+    assert (await entered("192.0.2.1", "guess", ends=False))["status"] == 403
+
+
+@pytest.mark.virtual_time
+async def test_two_origins_are_none() -> None:
+    answers: list[MutableMapping[str, object]] = []
+
+    async def send(message: MutableMapping[str, object]) -> None:
+        answers.append(message)
+
+    cookie = RULES.cookie.partition(";")[0].encode()
+    for origins in ([b"http://evil.example", b"http://127.0.0.1"], [b"http://127.0.0.1", b"null"]):
+        headers = [(b"host", b"127.0.0.1"), (b"cookie", cookie), *((b"origin", each) for each in origins)]
+        path = f"{RULES.settings.folder}/"
+        scope = {"type": "http", "method": "GET", "path": path, "query_string": b"", "headers": headers}
+        await GUARD(scope, entered, send)  # type: ignore[arg-type]
+        assert answers[0]["status"] == 403
+        answers.clear()

@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import http.client
-from collections.abc import AsyncIterator, MutableMapping
+from collections.abc import AsyncIterator
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
+import pytest_asyncio
 
 pytest.importorskip("nicegui", reason="the page needs the extra web")
 from websockets.asyncio.client import connect
 from websockets.exceptions import InvalidStatus
 from websockets.typing import Origin
 
+from robotiq_async.actions import ACTIONS
 from robotiq_async.errors import ViewerError
-from robotiq_async.web.page.access import Access
-from robotiq_async.web.page.guard import Guard
 from robotiq_async.web.server import PageServer
 from robotiq_async.web.settings import PageSettings
+from tests.conftest import watched
 from tests.fake_hand import FakeHand
+
+pytestmark = pytest.mark.asyncio(loop_scope="module")
 
 WORD = "correct horse"
 
@@ -29,10 +33,17 @@ def settings(**options: object) -> PageSettings:
     return PageSettings(port=0, addresses=("fake://hand",), **options)  # type: ignore[arg-type]
 
 
-@pytest.fixture
+@pytest_asyncio.fixture(loop_scope="module", scope="module")
 async def page() -> AsyncIterator[PageServer]:
+    """One for all who try."""
     async with PageServer([FakeHand()], settings()) as page:
         yield page
+
+
+@pytest_asyncio.fixture(loop_scope="module")
+async def nothing_left_running(page: PageServer, caplog: pytest.LogCaptureFixture) -> AsyncIterator[None]:
+    with watched(caplog):
+        yield
 
 
 class Answer:
@@ -93,6 +104,32 @@ async def test_a_websocket_of_another_site_is_refused(page: PageServer) -> None:
         await connect(url, origin=Origin(ours))
 
 
+async def test_a_page_that_only_looks_has_nothing_to_press(page: PageServer) -> None:
+    folder, cookie = await let_in(page)
+    text = (await ask(page.url, folder, Cookie=cookie)).text
+    assert "read-only" in text
+    for name in (*ACTIONS, "speed", "force"):
+        assert f'"data-testid":"{name}"' not in text
+    assert '"data-testid":"state"' in text
+
+
+async def test_headers_without_end_are_not_kept(page: PageServer) -> None:
+    """Anybody who reaches the port can send them."""
+    parts = urlsplit(page.url)
+    _, writer = await asyncio.open_connection(parts.hostname, parts.port)
+    writer.write(b"GET / HTTP/1.1\r\n")
+    with contextlib.suppress(ConnectionError):
+        async with asyncio.timeout(20):
+            for _ in range(1000):
+                writer.write(b"X: " + b"x" * 10_000 + b"\r\n")
+                await writer.drain()
+                await asyncio.sleep(0)
+            pytest.fail("it takes them all")
+    writer.close()
+    with contextlib.suppress(ConnectionError):
+        await writer.wait_closed()
+
+
 async def test_a_password_is_asked_for_and_a_wrong_one_takes_its_time() -> None:
     async with PageServer([FakeHand()], settings(password=WORD)) as page:
         assert "token" not in page.url
@@ -121,62 +158,3 @@ async def test_a_certificate_that_is_none(tmp_path: Path) -> None:
     with pytest.raises(ViewerError, match=r"cert\.pem"):
         async with PageServer([FakeHand()], settings(certificate=str(file), key=str(file))):
             pass
-
-
-# -- without a server --------------------------------------------------------------------------------------
-
-
-@pytest.mark.virtual_time
-async def test_whoever_tries_passwords_holds_up_nobody_who_sits_elsewhere() -> None:
-    """A wrong one takes a second, and the next from there waits for it: others do not."""
-    tries = [asyncio.create_task(entered("198.51.100.7", f"guess {n}")) for n in range(50)]
-    await asyncio.sleep(0.5)
-    began = asyncio.get_running_loop().time()
-    assert (await entered("192.0.2.1", WORD))["status"] == 303
-    assert asyncio.get_running_loop().time() == began
-    answers = await asyncio.gather(*tries)
-    assert {answer["status"] for answer in answers} == {403}
-    assert asyncio.get_running_loop().time() - began >= 49
-
-
-RULES = Access(settings(password=WORD), 80)
-GUARD = Guard(None, RULES)  # type: ignore[arg-type]
-
-
-async def entered(client: str, password: str, *, ends: bool = True) -> dict[str, object]:
-    """What is answered to somebody who enters a password."""
-    answers: list[dict[str, object]] = []
-    parts = [{"type": "http.request", "body": f"password={password}".encode(), "more_body": not ends}]
-
-    async def receive() -> dict[str, object]:
-        return parts.pop(0) if parts else await asyncio.Future()
-
-    async def send(message: MutableMapping[str, object]) -> None:
-        answers.append(dict(message))
-
-    headers = [(b"host", b"127.0.0.1"), (b"origin", b"http://127.0.0.1")]
-    scope = {"type": "http", "method": "POST", "path": "/", "query_string": b"", "headers": headers}
-    await GUARD({**scope, "client": (client, 1)}, receive, send)
-    return answers[0]
-
-
-@pytest.mark.virtual_time
-async def test_a_form_that_never_ends_is_not_waited_for() -> None:
-    assert (await entered("192.0.2.1", "guess", ends=False))["status"] == 403
-
-
-@pytest.mark.virtual_time
-async def test_two_origins_are_none() -> None:
-    answers: list[MutableMapping[str, object]] = []
-
-    async def send(message: MutableMapping[str, object]) -> None:
-        answers.append(message)
-
-    cookie = RULES.cookie.partition(";")[0].encode()
-    for origins in ([b"http://evil.example", b"http://127.0.0.1"], [b"http://127.0.0.1", b"null"]):
-        headers = [(b"host", b"127.0.0.1"), (b"cookie", cookie), *((b"origin", each) for each in origins)]
-        path = f"{RULES.settings.folder}/"
-        scope = {"type": "http", "method": "GET", "path": path, "query_string": b"", "headers": headers}
-        await GUARD(scope, entered, send)  # type: ignore[arg-type]
-        assert answers[0]["status"] == 403
-        answers.clear()
