@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from robotiq_async.actions import ACTIONS
+from robotiq_async.description import hand_model
 from robotiq_async.enums import AXES, Fault, Severity, State
 
 FILE: Final = Path(__file__).parents[1] / "robotiq_async" / "data" / "foxglove_layout.json"
@@ -34,6 +35,7 @@ Panel = dict[str, Any]
 
 def draw() -> str:
     """The file's text."""
+    curves = _stacked("Plot!positions", _stacked("Plot!currents", "StateTransitions!states", 60), 40)
     layout = {
         "configById": panels(),
         "globalVariables": {},
@@ -42,7 +44,7 @@ def draw() -> str:
         "layout": _side_by_side(
             _stacked(
                 _side_by_side("Indicator!state", "Indicator!fault"),
-                _stacked("Plot!positions", _stacked("Plot!currents", "StateTransitions!states", 60), 40),
+                _stacked("3D!hand", curves, 40),
                 12,
             ),
             _stacked(
@@ -69,6 +71,7 @@ def panels() -> dict[str, Panel]:
     return {
         "Indicator!state": _indicator("state", states),
         "Indicator!fault": _indicator("fault", faults),
+        "3D!hand": _hand(),
         "Plot!positions": _plot("Positions", [(name, f"{name}.position") for name in names]),
         "Plot!currents": _plot("Currents in mA", [(name, f"{name}.current_ma") for name in names]),
         "StateTransitions!states": {
@@ -96,6 +99,31 @@ def _indicator(field: str, rules: list[tuple[str, str, str]]) -> Panel:
             {"operator": "=", "rawValue": value, "color": colour, "label": label}
             for value, colour, label in rules
         ],
+    }
+
+
+def _hand() -> Panel:
+    """The hand with its fingers up: out of the palm is y, and the camera looks down at x and y."""
+    model = hand_model()
+    return {
+        "foxglovePanelTitle": "Hand",
+        "lichtblickPanelTitle": "Hand",
+        "followMode": "follow-pose",
+        "followTf": model.root,
+        "cameraState": {
+            "perspective": True,
+            "distance": 0.5,
+            "phi": 35,
+            "thetaOffset": 25,
+            "targetOffset": [0, 0.06, 0],
+            "fovy": 45,
+            "near": 0.01,
+            "far": 100,
+        },
+        "topics": {"/robot_description": {"visible": True}},
+        # Their axes would be metres long, and the hand is not.
+        "scene": {"transforms": {"showLabel": False, "axisScale": 0.03}},
+        "transforms": {f"frame:{link}": {"visible": False} for link in model.links},
     }
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import inspect
 import logging
 import os
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterator
 
 import pytest
 import pytest_asyncio
@@ -44,6 +45,12 @@ def pytest_asyncio_loop_factories(item: pytest.Item) -> dict[str, Callable[[], a
 
 @pytest_asyncio.fixture
 async def nothing_left_running(caplog: pytest.LogCaptureFixture) -> AsyncIterator[None]:
+    with watched(caplog):
+        yield
+
+
+@contextlib.contextmanager
+def watched(caplog: pytest.LogCaptureFixture) -> Iterator[None]:
     """Fail a test that leaves a task behind or that the event loop had to complain about."""
     caplog.set_level(logging.ERROR, logger="asyncio")
     before = asyncio.all_tasks()

@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
-from ipaddress import ip_address
 from typing import Annotated, Final
 
 from cyclopts import Parameter, Token
@@ -24,14 +23,6 @@ def need(module: str, extra: str, instead: str = "") -> None:
     """
     if find_spec(module) is None:
         raise CommandError(f"this needs {module}: pip install 'robotiq-async[{extra}]'{instead}")
-
-
-def is_loopback(host: str) -> bool:
-    """Whether only programs on this machine reach what listens there."""
-    try:
-        return ip_address(host).is_loopback
-    except ValueError:
-        return host.lower() == "localhost"
 
 
 def _integer(name: str, low: int, high: int) -> Callable[[object, Sequence[Token]], int]:

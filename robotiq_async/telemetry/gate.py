@@ -16,14 +16,26 @@ import sys
 import threading
 from collections.abc import Callable, Collection
 from contextlib import suppress
+from ipaddress import ip_address
+from time import monotonic
 from typing import Final
 
 HEAD_S: Final = 10.0
-"""How long a client may take to say what it wants."""
+"""How long a client may take to say what it wants, all in all."""
 HEAD_MAX: Final = 16_384
 CONNECTIONS: Final = 64
 CHUNK: Final = 65_536
+TOLD: Final = 32
+"""Origins that are told of: a page may try again and again, and others as many names as it likes."""
 REFUSED: Final = b"HTTP/1.1 403 Forbidden\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only programs on this machine reach what listens there."""
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return host.lower() == "localhost"
 
 
 def hidden_address() -> str:
@@ -50,6 +62,7 @@ class Gate:
         origins: Collection[str],
         refused: Callable[[str], object],
         left: Callable[[], object],
+        head_s: float = HEAD_S,
     ) -> None:
         """Listen, and let through from now on.
 
@@ -58,8 +71,9 @@ class Gate:
             port: 0 takes a free one.
             behind: address of the server.
             origins: pages of these sites may connect.
-            refused: is called, in a thread, with an origin that was refused.
+            refused: is called, in a thread, with an origin that was refused; once for each.
             left: is called, in a thread, when somebody who was let through has left.
+            head_s: how long a client may take to say what it wants.
 
         Raises:
             OSError: the port is taken, or there is no such interface.
@@ -68,8 +82,10 @@ class Gate:
         self._origins = {origin.lower().rstrip("/") for origin in origins}
         self._refused = refused
         self._left = left
+        self._head_s = head_s
         self._lock = threading.Lock()
         self._sockets: set[socket.socket] = set()
+        self._told: set[str] = set()
         self._slots = threading.BoundedSemaphore(CONNECTIONS)
         self._listening = listen(host, port)
         self.port = int(self._listening.getsockname()[1])
@@ -102,8 +118,7 @@ class Gate:
     def _serve(self, client: socket.socket) -> None:
         try:
             with suppress(OSError):
-                client.settimeout(HEAD_S)
-                head = _head(client)
+                head = _head(client, self._head_s)
                 if head is not None and self._may_pass(head):
                     client.settimeout(None)
                     self._pass_on(client, head)
@@ -122,8 +137,15 @@ class Gate:
             return True
         if len(origins) == 1 and origins[0].lower() in self._origins:
             return True
-        self._refused(", ".join(origins))
+        self._tell(", ".join(origins))
         return False
+
+    def _tell(self, origin: str) -> None:
+        with self._lock:
+            is_new = origin not in self._told and len(self._told) < TOLD
+            self._told |= {origin} if is_new else set()
+        if is_new:
+            self._refused(origin)
 
     def _pass_on(self, client: socket.socket, head: bytes) -> None:
         server = socket.create_connection(self._behind, HEAD_S)
@@ -172,10 +194,11 @@ def listen(host: str, port: int) -> socket.socket:
     return listening
 
 
-def _head(client: socket.socket) -> bytes | None:
+def _head(client: socket.socket, within: float) -> bytes | None:
     """What comes up to the empty line, and what has come after it; None if it never comes."""
-    received = b""
+    received, until = b"", monotonic() + within
     while b"\r\n\r\n" not in received:
+        client.settimeout(max(until - monotonic(), 0.001))
         chunk = client.recv(4096)
         if not chunk or len(received) > HEAD_MAX:
             return None

@@ -19,6 +19,7 @@ import concurrent.futures
 import json
 import threading
 from collections.abc import Callable, Collection
+from contextlib import suppress
 from types import TracebackType
 from typing import Any, Final, Self
 
@@ -209,7 +210,7 @@ class Viewer:
                 (host, server.port),
                 origins=self._origins,
                 refused=_report,
-                left=lambda: self._loop.call_soon_threadsafe(self._hold_calls),
+                left=self._viewer_left,
             )
         except OSError as error:
             server.stop()
@@ -289,6 +290,10 @@ class Viewer:
             return compact({"outcome": await service.call(self._operator, payload)})
         finally:
             del self._calls[task]
+
+    def _viewer_left(self) -> None:
+        with suppress(RuntimeError):  # the loop has been closed meanwhile
+            self._loop.call_soon_threadsafe(self._hold_calls)
 
     def _hold_calls(self) -> None:
         """A viewer has left, and the server does not tell whose call is whose: what moves is held."""

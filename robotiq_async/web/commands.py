@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Callable, Sequence
+from time import monotonic
 from typing import Final
 
 from ..actions import Operator
@@ -15,6 +16,8 @@ from ..telemetry.services import SERVICES
 MAX_COMMANDS: Final = 16
 """Of one page at a time; a halt is never refused."""
 HALT: Final = "halt"
+FRESH_S: Final = 1.5
+"""A command that was asked for longer ago moves nothing; a halt is never too old."""
 
 
 class PageCommands:
@@ -45,7 +48,8 @@ class PageCommands:
         """Begin to carry out a request; its answer comes later.
 
         Args:
-            request: ``page``, ``number``, ``hand``, ``name`` and ``arguments`` of a service.
+            request: ``page``, ``number``, ``hand``, ``name`` and ``arguments`` of a service, and ``at``, when
+                it was asked for: ``time.monotonic()`` of this machine, which is the same in every process.
         """
         page, name = str(request["page"]), str(request["name"])
         task = asyncio.get_running_loop().create_task(self._carry_out(request, page, name))
@@ -85,6 +89,8 @@ class PageCommands:
     async def _call(self, request: Fields, page: str, name: str) -> str:
         if not self._operators:
             raise ValueError("this page only looks: start it with --control")
+        if name != HALT and not 0 <= monotonic() - request["at"] <= FRESH_S:
+            raise ValueError("this came too late to be carried out: the connection was held up")
         if name != HALT and len(self._tasks.get(page, ())) > MAX_COMMANDS:
             raise ValueError(f"{MAX_COMMANDS} commands of this page are under way already")
         service = SERVICES.get(f"/gripper/{name}")

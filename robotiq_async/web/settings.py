@@ -7,6 +7,8 @@ import secrets
 from dataclasses import asdict, dataclass, field
 from typing import Final, Self
 
+from ..telemetry.gate import is_loopback
+
 LOOPBACK: Final = "127.0.0.1"
 PORT: Final = 8766
 """Beside that of the viewers."""
@@ -20,7 +22,6 @@ class PageSettings:
         host: the interface to listen on.
         port: the TCP port; 0 takes a free one.
         control: whether the page may command.
-        loopback: whether only programs of this machine reach the interface.
         addresses: of the hands, in their order.
         speed: where the slider of the speed begins.
         force: where the slider of the force begins.
@@ -35,7 +36,6 @@ class PageSettings:
     host: str = LOOPBACK
     port: int = PORT
     control: bool = False
-    loopback: bool = True
     addresses: tuple[str, ...] = ()
     speed: int = 0
     force: int = 0
@@ -57,6 +57,11 @@ class PageSettings:
             raise ValueError(
                 f"{self.host} lets others in: that needs a password or a certificate of your own"
             )
+
+    @property
+    def loopback(self) -> bool:
+        """Whether only programs of this machine reach the interface."""
+        return is_loopback(self.host)
 
     @property
     def scheme(self) -> str:

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import asyncio
 import http.client
+import os
 import signal
+import sys
+import threading
+import webbrowser
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 import pytest
 
 from robotiq_async import RobotiqHand
+from robotiq_async.cli.browser import opened
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
 pytest.importorskip("nicegui", reason="the page needs the extra web")
@@ -85,8 +91,7 @@ def test_bad_input_is_one_clear_line(
     assert outcome.code == code
     assert words in outcome.err
     assert "Traceback" not in outcome.err
-    # What became of the fingers of a hand that was started may be said as well.
-    assert len([line for line in outcome.err.splitlines() if "left as they are" not in line]) == 1
+    assert outcome.err.count("\n") == 1
 
 
 def test_without_nicegui_one_line_names_the_extra(call: Call, without: Callable[[str], None]) -> None:
@@ -104,3 +109,57 @@ async def test_the_demo_waits_until_somebody_looks(shell: Shell) -> None:
     outcome = await shell.finish(process)
     assert outcome.code == 130
     assert "Traceback" not in outcome.err
+
+
+@pytest.fixture
+def screen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """A screen, and somebody's home folder."""
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    return tmp_path
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a file's mode says who may read it")
+async def test_the_token_is_not_among_the_arguments_of_a_browser(screen: Path) -> None:
+    """Every user of a machine can read those."""
+    asked: list[tuple[str, int, str]] = []
+
+    def opener(address: str) -> bool:
+        file = Path(url2pathname(urlsplit(address).path))
+        asked.append((address, file.stat().st_mode & 0o777, file.read_text()))
+        return True
+
+    async with opened("http://127.0.0.1:1/?token=secret&x=1", opener) as is_opened:
+        assert is_opened
+    [(address, mode, text)] = asked
+    assert "secret" not in address
+    assert (mode, "url=http://127.0.0.1:1/?token=secret&amp;x=1" in text) == (0o600, True)
+    assert os.listdir(screen) == [], "it is removed in the end"
+
+
+@pytest.mark.virtual_time
+async def test_a_browser_that_is_busy_until_it_is_closed_holds_up_nothing(screen: Path) -> None:
+    closed = threading.Event()
+    async with opened("http://127.0.0.1:1/", lambda _: closed.wait(20)) as is_opened:
+        assert is_opened
+        closed.set()
+
+
+async def test_where_no_browser_can_be_opened_it_says_so(
+    screen: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(_: str) -> bool:
+        raise webbrowser.Error("could not locate runnable browser")
+
+    for opener in (lambda _: False, broken):
+        async with opened("http://127.0.0.1:1/", opener) as is_opened:
+            assert not is_opened
+    monkeypatch.setenv("HOME", str(screen / "nowhere"))
+    async with opened("http://127.0.0.1:1/", pytest.fail) as is_opened:
+        assert not is_opened
+    if sys.platform.startswith("linux"):
+        monkeypatch.setenv("HOME", str(screen))
+        monkeypatch.delenv("DISPLAY")
+        monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+        async with opened("http://127.0.0.1:1/", pytest.fail) as is_opened:
+            assert not is_opened

@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-from collections.abc import AsyncIterator
+import socket
+import xml.etree.ElementTree as ET
+from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +20,15 @@ from websockets.typing import Origin, Subprotocol
 from docs import make_layout
 from robotiq_async import Fault, Finger, RobotiqHand, RobotiqStatus, State
 from robotiq_async.actions import Operator
-from robotiq_async.description import HandModel
+from robotiq_async.description import HandModel, urdf
 from robotiq_async.errors import ViewerError
 from robotiq_async.kinematics import JOINTS, joint_angles
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.telemetry.gate import Gate
 from robotiq_async.telemetry.payloads import SCHEMAS
+from robotiq_async.telemetry.robot_description import transforms
 from robotiq_async.telemetry.services import SERVICES
-from robotiq_async.telemetry.viewer import Viewer
+from robotiq_async.telemetry.viewer import SHOWN, Viewer
 from tests.foxglove_client import Client, client
 
 PROTOCOLS = [Subprotocol("foxglove.sdk.v1")]
@@ -214,6 +218,43 @@ async def test_who_says_no_end_of_things_is_sent_away(operator: Operator) -> Non
         writer.close()
         with contextlib.suppress(ConnectionError):
             await writer.wait_closed()
+
+
+@contextlib.contextmanager
+def gate(told: list[str], *, head_s: float = 10.0) -> Iterator[tuple[str, int]]:
+    """Where a gate listens, with nothing behind it."""
+    one = Gate(
+        "127.0.0.1", 0, ("127.0.0.1", 1), origins=(), refused=told.append, left=lambda: None, head_s=head_s
+    )
+    try:
+        yield "127.0.0.1", one.port
+    finally:
+        one.stop()
+
+
+def test_who_says_what_he_wants_in_drops_is_sent_away() -> None:
+    """Each drop in time: 64 of them kept everybody else out for as long as they liked."""
+    with gate([], head_s=0.2) as where, socket.create_connection(where, 5) as client:
+        client.settimeout(0.02)
+        with contextlib.suppress(ConnectionError):
+            for _ in range(500):
+                client.sendall(b"x")
+                with contextlib.suppress(TimeoutError):
+                    assert client.recv(1) == b""
+                    return
+            pytest.fail("he still drips")
+
+
+def test_an_origin_is_told_of_once() -> None:
+    """A page may try again as often as it likes: it fills nobody's terminal."""
+    told: list[str] = []
+    with gate(told) as where:
+        for number in (0, 0, 0, *range(100)):
+            with socket.create_connection(where, 5) as client:
+                head = f"GET / HTTP/1.1\r\nUpgrade: websocket\r\nOrigin: http://evil{number}\r\n\r\n"
+                client.sendall(head.encode())
+                assert client.recv(12) == b"HTTP/1.1 403"
+    assert told == [f"http://evil{number}" for number in range(32)]
 
 
 async def test_a_viewer_that_leaves_holds_what_moves() -> None:
@@ -478,6 +519,25 @@ async def test_a_port_that_cannot_be(operator: Operator, port: int) -> None:
 # -- the layout --------------------------------------------------------------------------------------------
 
 
+def test_the_layout_the_transforms_and_the_description_mean_the_same_hand() -> None:
+    """A viewer finds the parts by the names of frames and joints, and by nothing else."""
+    panel = make_layout.panels()["3D!hand"]
+    robot = ET.fromstring(urdf())
+    links = {each.attrib["name"] for each in robot.findall("link")}
+    joints = {
+        each.attrib["name"]: (each[0].attrib["link"], each[1].attrib["link"])  # parent and child
+        for each in robot.findall("joint")
+    }
+    status = RobotiqStatus.from_registers([0] * 8, timestamp=0.0, sequence=0)
+    told = transforms(status, 0)["transforms"]
+    assert {(each["parent_frame_id"], each["child_frame_id"]) for each in told} == set(joints.values())
+    assert {panel["followTf"]} == links - {child for _, child in joints.values()}
+    assert set(panel["transforms"]) == {f"frame:{link}" for link in links}
+    assert set(panel["topics"]) == {"/robot_description"}
+    moving = {each.attrib["name"] for each in robot.findall("joint") if each.attrib["type"] == "revolute"}
+    assert moving == set(JOINTS)
+
+
 def test_the_layout_shows_what_there_is() -> None:
     """Every path is a field of a topic, every button a service, every panel has its place."""
     layout = json.loads(make_layout.FILE.read_text(encoding="utf-8"))
@@ -499,5 +559,7 @@ def test_the_layout_shows_what_there_is() -> None:
         return [node] if isinstance(node, str) else placed(node["first"]) + placed(node["second"])
 
     assert sorted(placed(layout["layout"])) == sorted(panels)
+    topics = {topic for config in panels.values() for topic in config.get("topics", ())}
+    assert topics <= {topic.name for topic in SHOWN}
     buttons = {config["serviceName"] for config in panels.values() if "serviceName" in config}
     assert buttons == set(SERVICES) - {"/gripper/set_speed", "/gripper/set_force"}

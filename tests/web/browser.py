@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
 import shutil
 import tempfile
 from collections.abc import Callable
@@ -22,6 +21,8 @@ BROWSER: Final = shutil.which("chromium") or shutil.which("google-chrome")
 DRIVER: Final = shutil.which("chromedriver")
 MISSING: Final = "needs a browser and its driver: apt-get install chromium chromium-driver"
 PATIENCE: Final = 20
+SMALL: Final = (460, 420)
+"""Of a window, in pixels: what is drawn without a graphics card takes the processor's time."""
 FLAGS: Final = (
     "--headless",
     "--no-sandbox",
@@ -47,9 +48,9 @@ VISIBLE: Final = """
 const scene = window[Object.keys(window).find((key) => key.startsWith('scene_'))];
 return scene.getObjectByName(arguments[0]).visible;
 """
-COLOR: Final = """
+COLORS: Final = """
 const scene = window[Object.keys(window).find((key) => key.startsWith('scene_'))];
-return scene.getObjectByName(arguments[0]).children[0].material.color.getHexString();
+return scene.getObjectByName(arguments[0]).children.map((each) => each.material?.color.getHexString());
 """
 
 
@@ -62,12 +63,10 @@ class Browser:
         self._profile = tempfile.mkdtemp(prefix="robotiq_async-")
         options = webdriver.ChromeOptions()
         options.binary_location = BROWSER
-        for flag in (*FLAGS, "--window-size=700,650", f"--user-data-dir={self._profile}"):
+        for flag in (*FLAGS, f"--window-size={SMALL[0]},{SMALL[1]}", f"--user-data-dir={self._profile}"):
             options.add_argument(flag)
         options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-        # On other machines the page is drawn by another computer: here the drawing must not starve the hand.
-        service = Service(DRIVER, popen_kw={"preexec_fn": lambda: os.nice(10)})
-        self.driver = webdriver.Chrome(options=options, service=service)
+        self.driver = webdriver.Chrome(options=options, service=Service(DRIVER))
 
     def quit(self) -> None:
         self.driver.quit()

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import MutableMapping
+
 import pytest
 
 from robotiq_async.web.page.access import Access, Head, Verdict
+from robotiq_async.web.page.guard import Guard
 from robotiq_async.web.settings import PageSettings
 
 PORT = 8766
@@ -39,6 +43,7 @@ def test_the_cookie_serves_what_lies_in_the_folder() -> None:
     assert rules.judge(head(rules, inside, cookie=cookie(rules))) is Verdict.SERVE
     for wrong in ("", "robotiq_async=", "robotiq_async=x", cookie(access()), "a=b; robotiq_async", "\x00"):
         assert rules.judge(head(rules, inside, cookie=wrong)) is Verdict.NO_TOKEN
+    assert rules.judge(head(rules, inside, cookie=f"x{cookie(rules)}")) is Verdict.NO_TOKEN
     assert rules.judge(head(rules, "/elsewhere", cookie=cookie(rules))) is Verdict.NO_TOKEN
     assert rules.judge(head(rules, inside)) is Verdict.NO_TOKEN
 
@@ -48,9 +53,21 @@ def test_the_cookie_is_for_browsers_only_and_for_this_server_only() -> None:
     rules = access()
     assert f"Path={rules.settings.folder};" in rules.cookie
     assert "HttpOnly" in rules.cookie
-    assert "SameSite=Strict" in rules.cookie
+    assert "SameSite=Lax" in rules.cookie
     assert "Secure" not in rules.cookie
     assert "Secure" in access(certificate="cert.pem", key="key.pem").cookie
+
+
+@pytest.mark.parametrize(
+    "others",
+    ["robotiq_async=x", 'state={"open": [1, 2]}', "plain; a=b", 'quoted="x; y"', "", "\x00=\xff"],
+)
+def test_cookies_of_other_servers_of_this_machine_do_no_harm(others: str) -> None:
+    """Cookies know no ports: one that no parser reads, or one of the same name, locked people out."""
+    rules = access()
+    for together in (f"{others}; {cookie(rules)}", f"{cookie(rules)}; {others}"):
+        asked = head(rules, f"{rules.settings.folder}/x", cookie=together)
+        assert rules.judge(asked) is Verdict.SERVE
 
 
 @pytest.mark.parametrize(
@@ -95,7 +112,7 @@ def test_what_changes_something_or_stays_open_has_an_origin(method: str) -> None
 
 
 def test_a_password_takes_the_place_of_the_token() -> None:
-    rules = access(host="192.0.2.1", loopback=False, password="correct horse")
+    rules = access(host="192.0.2.1", password="correct horse")
     here = "gripper.lab:8766"
     assert rules.judge(head(rules, host=here)) is Verdict.ASK
     assert rules.judge(head(rules, host=here, query=f"token={rules.settings.token}")) is Verdict.ASK
@@ -108,9 +125,13 @@ def test_a_password_takes_the_place_of_the_token() -> None:
 
 
 def test_another_interface_needs_a_password_or_a_certificate() -> None:
-    with pytest.raises(ValueError, match=r"192\.0\.2\.1 lets others in"):
-        access(host="192.0.2.1", loopback=False)
-    access(host="192.0.2.1", loopback=False, certificate="cert.pem", key="key.pem")
+    for host in ("192.0.2.1", "0.0.0.0", "::", "", "gripper.lab"):
+        with pytest.raises(ValueError, match="lets others in"):
+            access(host=host)
+        access(host=host, certificate="cert.pem", key="key.pem")
+        access(host=host, password="correct horse")
+    for host in ("127.0.0.1", "127.0.0.2", "::1", "localhost"):
+        assert access(host=host).settings.loopback
     with pytest.raises(ValueError, match="needs its key"):
         access(certificate="cert.pem")
 
@@ -122,3 +143,63 @@ def test_settings_travel_as_a_line_and_show_no_secret() -> None:
     assert "horse" not in repr(settings)
     assert settings.url(80) == "http://127.0.0.1:80/"
     assert PageSettings(host="::1").url(80).startswith("http://[::1]:80/?token=")
+
+
+# -- the guard, without a server -------------------------------------------------------------------------
+
+
+@pytest.mark.virtual_time
+async def test_whoever_tries_passwords_holds_up_nobody_who_sits_elsewhere() -> None:
+    """A wrong one takes a second, and the next from there waits for it: others do not."""
+    tries = [asyncio.create_task(entered("198.51.100.7", f"guess {n}")) for n in range(50)]
+    await asyncio.sleep(0.5)
+    began = asyncio.get_running_loop().time()
+    assert (await entered("192.0.2.1", WORD))["status"] == 303
+    assert asyncio.get_running_loop().time() == began
+    answers = await asyncio.gather(*tries)
+    assert {answer["status"] for answer in answers} == {403}
+    assert asyncio.get_running_loop().time() - began >= 49
+
+
+WORD = "correct horse"
+RULES = Access(PageSettings(password=WORD), 80)
+GUARD = Guard(None, RULES)  # type: ignore[arg-type]
+
+
+async def entered(client: str, password: str, *, ends: bool = True) -> dict[str, object]:
+    """What is answered to somebody who enters a password."""
+    answers: list[dict[str, object]] = []
+    parts = [{"type": "http.request", "body": f"password={password}".encode(), "more_body": not ends}]
+
+    async def receive() -> dict[str, object]:
+        return parts.pop(0) if parts else await asyncio.Future()
+
+    async def send(message: MutableMapping[str, object]) -> None:
+        answers.append(dict(message))
+
+    headers = [(b"host", b"127.0.0.1"), (b"origin", b"http://127.0.0.1")]
+    scope = {"type": "http", "method": "POST", "path": "/", "query_string": b"", "headers": headers}
+    await GUARD({**scope, "client": (client, 1)}, receive, send)
+    return answers[0]
+
+
+@pytest.mark.virtual_time
+async def test_a_form_that_never_ends_is_not_waited_for() -> None:
+    assert (await entered("192.0.2.1", "guess", ends=False))["status"] == 403
+
+
+@pytest.mark.virtual_time
+async def test_two_origins_are_none() -> None:
+    answers: list[MutableMapping[str, object]] = []
+
+    async def send(message: MutableMapping[str, object]) -> None:
+        answers.append(message)
+
+    cookie = RULES.cookie.partition(";")[0].encode()
+    for origins in ([b"http://evil.example", b"http://127.0.0.1"], [b"http://127.0.0.1", b"null"]):
+        headers = [(b"host", b"127.0.0.1"), (b"cookie", cookie), *((b"origin", each) for each in origins)]
+        path = f"{RULES.settings.folder}/"
+        scope = {"type": "http", "method": "GET", "path": path, "query_string": b"", "headers": headers}
+        await GUARD(scope, entered, send)  # type: ignore[arg-type]
+        assert answers[0]["status"] == 403
+        answers.clear()

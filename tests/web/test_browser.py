@@ -1,48 +1,120 @@
-"""The page as a person sees it: in a real browser."""
+"""The page as a person sees it: in a real browser. One of it, one hand and one page serve all tests."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
+import signal
 from collections.abc import AsyncIterator, Iterator
+from dataclasses import dataclass
 from functools import partial
 from time import monotonic
 
 import pytest
+import pytest_asyncio
 
 pytest.importorskip("nicegui", reason="the page needs the extra web")
 pytest.importorskip("selenium", reason="a browser is driven with the extra dev")
 
 from selenium.common.exceptions import WebDriverException
 from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.keys import Keys
 
-from robotiq_async import Fault, Finger, RobotiqHand, RobotiqStatus, State
+from robotiq_async import WIDTH_NORMAL, Fault, Finger, RobotiqHand, RobotiqStatus, State
 from robotiq_async.description import hand_model
+from robotiq_async.enums import DEFAULT_SPEED
 from robotiq_async.kinematics import JOINTS, joint_angles
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.web.server import PageServer
-from tests.web.browser import BROWSER, COLOR, DRIVER, MISSING, VISIBLE, Browser
+from tests.conftest import watched
+from tests.fake_hand import FakeHand
+from tests.virtual import HoldWatch
+from tests.web.browser import BROWSER, COLORS, DRIVER, MISSING, SMALL, VISIBLE, Browser
 from tests.web.showing import shown
 
+pytestmark = pytest.mark.asyncio(loop_scope="module")
 
-async def press(browser: Browser, name: str) -> None:
-    """Press a button until that is heard in time: a busy machine may be late."""
-    await browser.in_touch()
-    for _ in range(10):
-        await browser.click(name)
-        if "too late" not in await browser.says("outcome", name):
-            return
+FAST, REAL = 20.0, 1.0
+
+
+class Pace:
+    """The clock of a gripper, which may run faster than ours."""
+
+    def __init__(self) -> None:
+        self._rate = FAST
+        self._at = self._now = monotonic()
+
+    def __call__(self) -> float:
+        at = monotonic()
+        self._now += self._rate * (at - self._at)
+        self._at = at
+        return self._now
+
+    def set(self, rate: float) -> None:
+        self()
+        self._rate = rate
+
+
+@dataclass
+class Stage:
+    """What is shown, and where."""
+
+    pace: Pace
+    gripper: SimulatedGripper
+    server: SimulatorServer
+    hand: RobotiqHand
+    page: PageServer
+
+    async def clear(self) -> None:
+        """As it was before the first test."""
+        self.pace.set(FAST)
+        self.gripper.remove_object()
+        if self.hand.state is State.FAULT:
+            await self.hand.recover()
+        if self.hand.state is State.RESET:
+            await self.hand.activate()
+        await self.hand.set_speed(DEFAULT_SPEED)
+        await self.hand.open()
+        await self.hand.move(WIDTH_NORMAL, Finger.SCISSOR)
+
+    async def slow(self) -> None:
+        """From now on a stroke takes ten seconds, so that there is something to stop."""
+        await self.hand.set_speed(0)
+        self.pace.set(REAL)
+
+
+@pytest_asyncio.fixture(loop_scope="module", scope="module")
+async def whole_stage() -> AsyncIterator[Stage]:
+    pace = Pace()
+    gripper = SimulatedGripper(pace, spread=False)
+    async with (
+        SimulatorServer(gripper) as server,
+        RobotiqHand(server.address) as hand,
+        shown(hand) as page,
+    ):
+        yield Stage(pace, gripper, server, hand, page)
+
+
+@pytest_asyncio.fixture(loop_scope="module")
+async def stage(whole_stage: Stage) -> Stage:
+    await whole_stage.clear()
+    return whole_stage
 
 
 @pytest.fixture
-async def page(hand: RobotiqHand) -> AsyncIterator[PageServer]:
-    async with shown(hand) as page:
-        yield page
+def hand(stage: Stage) -> RobotiqHand:
+    return stage.hand
+
+
+@pytest_asyncio.fixture(loop_scope="module")
+async def nothing_left_running(whole_stage: Stage, caplog: pytest.LogCaptureFixture) -> AsyncIterator[None]:
+    with watched(caplog):
+        yield
 
 
 @pytest.fixture(scope="module")
 def shared_browser() -> Iterator[Browser]:
-    """One for all tests: it takes a second to start."""
     if BROWSER is None or DRIVER is None:
         pytest.skip(MISSING)
     browser = Browser()
@@ -51,10 +123,10 @@ def shared_browser() -> Iterator[Browser]:
 
 
 @pytest.fixture
-def browser(shared_browser: Browser) -> Iterator[Browser]:
-    """It, with one window, and nothing in its logs."""
+def window(shared_browser: Browser) -> Iterator[Browser]:
+    """The browser, with one window, and nothing in its logs."""
     driver = shared_browser.driver
-    driver.set_window_size(700, 650)
+    driver.set_window_size(*SMALL)
     shared_browser.requested()
     shared_browser.complaints()
     yield shared_browser
@@ -63,48 +135,44 @@ def browser(shared_browser: Browser) -> Iterator[Browser]:
         driver.switch_to.window(other)
         driver.close()
     driver.switch_to.window(first)
-    driver.get("about:blank")
 
 
-class Pace:
-    """The clock of a gripper: fast until it is active."""
-
-    def __init__(self) -> None:
-        self.rate = 20.0
-        self._at = self._now = monotonic()
-
-    def __call__(self) -> float:
-        at = monotonic()
-        self._now += self.rate * (at - self._at)
-        self._at = at
-        return self._now
+@pytest_asyncio.fixture(loop_scope="module")
+async def browser(window: Browser, stage: Stage) -> Browser:
+    """It, with the page of the hand, in touch."""
+    await window.open(stage.page.url)
+    await window.in_touch()
+    return window
 
 
-@contextlib.asynccontextmanager
-async def slow_hand() -> AsyncIterator[RobotiqHand]:
-    """One that takes ten seconds for a stroke, so that there is something to stop."""
-    pace = Pace()
-    gripper = SimulatedGripper(pace, spread=False)
-    async with SimulatorServer(gripper) as server, RobotiqHand(server.address, speed=0) as hand:
-        pace.rate = 1.0
-        yield hand
+async def press(browser: Browser, hand: RobotiqHand, name: str) -> None:
+    """Press a button until the fingers move: on a busy machine that may come too late."""
+    for _ in range(10):
+        await browser.click(name)
+        with contextlib.suppress(TimeoutError):
+            await seen(hand, moving=True, within=2)
+            return
+    pytest.fail(f"{name} moves nothing: {browser.find('outcome').text}")
 
 
-async def seen(hand: RobotiqHand, *, moving: bool) -> RobotiqStatus:
-    async with asyncio.timeout(20):
+async def seen(hand: RobotiqHand, *, moving: bool, go: bool = True, within: float = 20) -> RobotiqStatus:
+    """Wait until the fingers move or stand still, and are asked to go anywhere or not any more."""
+    async with asyncio.timeout(within):
         async for status in hand.statuses():
-            if status.is_moving is moving:
+            if status.is_moving is moving and (go or not status.go_echo):
                 return status
     raise AssertionError("the hand has ended")
 
 
-async def test_it_loads_and_asks_nobody_else(browser: Browser, page: PageServer) -> None:
-    await browser.open(page.url)
+# -- what it shows -----------------------------------------------------------------------------------------
+
+
+async def test_it_loads_and_asks_nobody_else(browser: Browser, stage: Stage) -> None:
     await browser.says("state", "ready")
     assert await browser.says("fault", "no fault")
     await browser.says("statistics", "polls")
     await browser.until(lambda: browser.link("finger_1_link_3"))
-    base = page.url.partition("?")[0].removeprefix("http://")
+    base = stage.page.url.partition("?")[0].removeprefix("http://")
     for url in browser.requested():
         scheme, _, rest = url.partition("://")
         assert (scheme in ("http", "ws") and rest.startswith(base)) or url.startswith(("data:", "blob:")), url
@@ -113,11 +181,15 @@ async def test_it_loads_and_asks_nobody_else(browser: Browser, page: PageServer)
     assert "token" not in await browser.run("return location.href")
 
 
-async def test_the_joints_move_when_the_gripper_moves(
-    browser: Browser, page: PageServer, hand: RobotiqHand, gripper: SimulatedGripper
-) -> None:
+async def test_whoever_follows_a_link_gets_in(window: Browser, stage: Stage) -> None:
+    """In a terminal in the browser, or from the file that --open writes: cookies may stay at home then."""
+    await window.open(f"data:text/html,<a id=link href='{stage.page.url}'>here</a>")
+    await window.do(lambda: window.driver.find_element("id", "link").click())
+    await window.says("state", "ready")
+
+
+async def test_the_joints_move_when_the_gripper_moves(browser: Browser, hand: RobotiqHand) -> None:
     """Three.js puts every link where the library says that it is."""
-    await browser.open(page.url)
     for position, scissor in ((120, 60), (200, 219)):
         await hand.move(0)
         await hand.move(scissor, Finger.SCISSOR)
@@ -132,60 +204,82 @@ def is_at(browser: Browser, link: str, position: tuple[float, float, float]) -> 
     return bool(browser.link(link) == pytest.approx(position, abs=1e-4))
 
 
-async def test_what_it_holds_is_drawn_and_what_touches_glows(
-    browser: Browser, page: PageServer, hand: RobotiqHand, gripper: SimulatedGripper
-) -> None:
-    await browser.open(page.url)
+async def test_what_it_holds_is_drawn_and_what_touches_glows(browser: Browser, stage: Stage) -> None:
     await browser.until(lambda: browser.link("finger_1_link_3"))
     assert not await browser.run(VISIBLE, "object")
-    gripper.place_object(Finger.ABC, position=90)
-    await hand.close()
+    stage.gripper.place_object(Finger.ABC, position=90)
+    await stage.hand.close()
     await browser.until(lambda: browser.driver.execute_script(VISIBLE, "object"))
-    await browser.until(lambda: browser.driver.execute_script(COLOR, "finger_middle_link_3") == "ff5a1f")
+    await browser.until(lambda: "ff5a1f" in browser.driver.execute_script(COLORS, "finger_middle_link_3"))
     assert await browser.says("axes", "contact while closing")
-    await hand.open()
+    await stage.hand.open()
     await browser.until(lambda: not browser.driver.execute_script(VISIBLE, "object"))
 
 
-async def test_halt_stops_it_and_so_does_the_space_bar(browser: Browser) -> None:
-    async with slow_hand() as hand, shown(hand) as page:
-        await browser.open(page.url)
-        await press(browser, "close")
-        await seen(hand, moving=True)
-        await browser.click("halt")
-        status = await seen(hand, moving=False)
-        assert status.position(Finger.A) < 200
-        assert not status.go_echo
-        await browser.says("events", "halt: every axis stands still")
-        # While the button that was clicked has the focus: the space bar would press it again.
-        await press(browser, "open")
-        await seen(hand, moving=True)
-        await browser.do(lambda: ActionChains(browser.driver).send_keys(" ").perform())
-        await seen(hand, moving=False)
-        assert not hand.status.go_echo
-
-
-async def test_what_it_shows_of_a_gripper_that_dies_and_comes_back(
-    browser: Browser, page: PageServer, server: SimulatorServer, hand: RobotiqHand, gripper: SimulatedGripper
-) -> None:
-    await browser.open(page.url)
+async def test_what_it_shows_of_a_gripper_that_dies_and_comes_back(browser: Browser, stage: Stage) -> None:
     await browser.says("state", "ready")
-    server.refuse()
-    server.cut()
+    stage.server.refuse()
+    stage.server.cut()
     await browser.says("state", "lost")
     await browser.says("fault", "what is shown is old")
-    await server.accept()
+    await stage.server.accept()
     await browser.says("state", "ready")
-    gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    stage.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
     await browser.says("fault", Fault.SCISSOR_BLOCKED.description)
     await browser.says("events", "0x0E")
 
 
-async def test_what_is_dangerous_is_asked_about(
-    browser: Browser, page: PageServer, hand: RobotiqHand
-) -> None:
-    await browser.open(page.url)
-    await browser.in_touch()
+async def test_many_hands_have_a_tile_each_and_it_fits_on_a_phone(window: Browser, hand: RobotiqHand) -> None:
+    async with FakeHand() as other, shown(other, hand) as page:
+        await window.do(lambda: window.driver.set_window_size(500, 900))
+        await window.open(page.url)
+        for tile in ("tile-0", "tile-1"):
+            await window.says(tile, "ready")
+        await window.click("tile-1")
+        await window.says("address", hand.address)
+        await window.says("state", "ready")
+        await window.until(lambda: window.find("halt").is_displayed())
+        # In the window without scrolling, and nothing stands out to the side.
+        for place in (0, 10_000):
+            await window.run("window.scrollTo(0, arguments[0])", place)
+            assert await window.run(
+                "const box = document.querySelector('[data-testid=halt]').getBoundingClientRect();"
+                "return box.bottom <= innerHeight && box.height > 50 && box.width > innerWidth * 0.9"
+                " && document.documentElement.scrollWidth <= document.documentElement.clientWidth"
+            )
+
+
+# -- what it makes the hand do -----------------------------------------------------------------------------
+
+
+async def test_halt_stops_it_and_so_does_the_space_bar(browser: Browser, stage: Stage) -> None:
+    hand = stage.hand
+    await stage.slow()
+    await press(browser, hand, "close")
+    await browser.click("halt")
+    status = await seen(hand, moving=False, go=False)
+    assert status.position(Finger.A) < 200
+    await browser.says("events", "halt: every axis stands still")
+    # While the button that was clicked has the focus: the space bar would press it again.
+    await press(browser, hand, "open")
+    await browser.do(lambda: ActionChains(browser.driver).send_keys(" ").perform())
+    await seen(hand, moving=False, go=False)
+
+
+async def test_a_halt_is_not_under_a_question_that_is_open(browser: Browser, stage: Stage) -> None:
+    """On a phone there is no space bar; the first tap closed the question, and the fingers went on."""
+    await stage.slow()
+    await press(browser, stage.hand, "close")
+    await browser.click("reset")
+    await browser.until(lambda: browser.find("yes-reset").is_displayed())
+    await browser.do(lambda: browser.find("halt").click())
+    status = await seen(stage.hand, moving=False, go=False)
+    assert status.position(Finger.A) < 200
+    assert stage.hand.state is State.RUNNING_IDLE
+    await browser.until(lambda: not browser.has("yes-reset"))
+
+
+async def test_what_is_dangerous_is_asked_about(browser: Browser, hand: RobotiqHand) -> None:
     await browser.click("reset")
     await browser.until(lambda: browser.find("yes-reset").is_displayed())
     assert hand.state is State.RUNNING_IDLE
@@ -199,108 +293,95 @@ async def test_what_is_dangerous_is_asked_about(
     await browser.says("state", "reset")
 
 
-async def test_closing_a_page_holds_what_it_has_set_in_motion_and_the_other_page_goes_on(
-    browser: Browser,
-) -> None:
-    async with slow_hand() as hand, shown(hand) as page:
-        await browser.open(page.url)
-        await browser.in_touch()
-        await browser.run("window.open(location.href)")
-        await browser.until(lambda: len(browser.driver.window_handles) == 2)
-        first, second = browser.driver.window_handles
-        await browser.do(lambda: browser.driver.switch_to.window(second))
-        await press(browser, "close")
-        await seen(hand, moving=True)
-        await browser.do(browser.driver.close)
-        status = await seen(hand, moving=False)
-        assert status.position(Finger.A) < 200
-        await browser.do(lambda: browser.driver.switch_to.window(first))
-        await browser.says("axes", str(status.position(Finger.A)))
-        await hand.set_speed(255)
-        await browser.click("open")
-        await browser.says("outcome", "open: A at")
-
-
-async def test_a_page_that_cannot_be_heard_holds_its_motion(browser: Browser) -> None:
-    async with slow_hand() as hand, shown(hand) as page:
-        await browser.open(page.url)
-        await press(browser, "close")
-        await seen(hand, moving=True)
-        await browser.run("window.emitEvent = () => {}; window.socket.emit = () => {};")
-        status = await seen(hand, moving=False)
-        assert status.position(Finger.A) < 200
-
-
-async def test_a_press_that_comes_too_late_moves_nothing(
-    browser: Browser, page: PageServer, hand: RobotiqHand
-) -> None:
-    await browser.open(page.url)
-    await browser.in_touch()
-    await browser.run(
-        "const then = window.robotiqTime - 5;"
-        "Object.defineProperty(window, 'robotiqTime', { get: () => then, set: () => {} });"
-    )
+async def test_a_slider_sends_where_it_was_let_go(browser: Browser, hand: RobotiqHand) -> None:
+    """And not where it was some milliseconds before, which is what the server knows of it then."""
     requests = hand.requests()
-    await browser.click("close")
+    await browser.run("document.querySelector('[data-testid=speed] [tabindex]').focus()")
+    await browser.do(lambda: ActionChains(browser.driver).send_keys(Keys.RIGHT * 4).perform())
+    async with asyncio.timeout(20):
+        while not any(sent.request.axes[0].speed == 4 for sent in requests.drain()):
+            await hand.move(20, Finger.A)
+            await hand.move(10, Finger.A)
+
+
+# -- what happens when it is gone --------------------------------------------------------------------------
+
+
+async def test_closing_a_page_holds_what_it_has_set_in_motion_and_the_other_page_goes_on(
+    browser: Browser, stage: Stage
+) -> None:
+    hand = stage.hand
+    await stage.slow()
+    await browser.run("window.open(location.href)")
+    await browser.until(lambda: len(browser.driver.window_handles) == 2)
+    first, second = browser.driver.window_handles
+    await browser.do(lambda: browser.driver.switch_to.window(second))
+    await browser.in_touch()
+    await press(browser, hand, "close")
+    await browser.do(browser.driver.close)
+    status = await seen(hand, moving=False)
+    assert status.position(Finger.A) < 200
+    await browser.do(lambda: browser.driver.switch_to.window(first))
+    await browser.says("axes", str(status.position(Finger.A)))
+    stage.pace.set(FAST)
+    for _ in range(10):
+        await browser.click("open")
+        if "A at" in await browser.says("outcome", "open: "):
+            return
+    pytest.fail("the other page opens nothing")
+
+
+async def test_a_page_that_cannot_be_heard_holds_its_motion(browser: Browser, stage: Stage) -> None:
+    """As a phone that leaves the wireless network: no connection is closed."""
+    await stage.slow()
+    await press(browser, stage.hand, "close")
+    await browser.run("window.emitEvent = () => {}; window.socket.emit = () => {};")
+    status = await seen(stage.hand, moving=False)
+    assert status.position(Finger.A) < 200
+
+
+@pytest.mark.skipif(os.name != "posix", reason="stops a process")
+async def test_a_page_whose_process_stands_still_holds_its_motion_and_takes_no_press(
+    browser: Browser, stage: Stage
+) -> None:
+    """What is pressed meanwhile arrives when it runs again, and moves nothing."""
+    await stage.slow()
+    await press(browser, stage.hand, "close")
+    process = stage.page._process.pid
+    os.kill(process, signal.SIGSTOP)
+    try:
+        status = await seen(stage.hand, moving=False)
+        assert status.position(Finger.A) < 200
+        await browser.says("cut", "what is shown is old")
+        requests = stage.hand.requests()
+        await browser.do(lambda: browser.find("open").click())
+    finally:
+        os.kill(process, signal.SIGCONT)
     await browser.says("outcome", "too late")
     assert requests.take_nowait() is None
+    await browser.until(lambda: not browser.find("cut").is_displayed())
 
 
-async def test_without_control_there_is_nothing_to_press(browser: Browser, hand: RobotiqHand) -> None:
-    async with shown(hand, control=False) as page:
-        await browser.open(page.url)
-        await browser.says("read-only", "--control")
-        assert not browser.has("halt")
-        assert not browser.has("close")
+# -- what it costs -----------------------------------------------------------------------------------------
 
 
-async def test_many_hands_have_a_tile_each_and_it_fits_on_a_phone(
-    browser: Browser, server: SimulatorServer, hand: RobotiqHand
-) -> None:
-    async with (
-        SimulatorServer(SimulatedGripper(speedup=20)) as other,
-        RobotiqHand(other.address) as second,
-        shown(hand, second) as page,
-    ):
-        await browser.do(lambda: browser.driver.set_window_size(500, 900))
-        await browser.open(page.url)
-        for tile in ("tile-0", "tile-1"):
-            await browser.says(tile, "ready")
-        await browser.click("tile-1")
-        await browser.says("address", second.address)
-        await browser.says("state", "ready")
-        await browser.until(lambda: browser.find("halt").is_displayed())
-        # In the window without scrolling, and nothing stands out to the side.
-        assert await browser.run(
-            "const box = document.querySelector('[data-testid=halt]').getBoundingClientRect();"
-            "return box.bottom <= innerHeight && box.height > 50"
-            " && document.documentElement.scrollWidth <= document.documentElement.clientWidth"
-        )
-
-
-async def share_of_polls(hand: RobotiqHand) -> float:
-    """The best half second: other programs of a busy machine spoil many, what a page costs spoils all."""
-    best = 0.0
-    for _ in range(40):
-        before = hand.statistics
-        for _ in range(100):
-            await anext(hand.statuses())
-        after = hand.statistics
-        polls, missed = after.polls - before.polls, after.overruns - before.overruns
-        best = max(best, polls / (polls + missed))
-        if best > 0.99:
-            break
-    return best
-
-
-async def test_the_hand_keeps_its_polls_with_two_pages_open(browser: Browser) -> None:
-    """99 % of 200 a second, while it moves."""
-    async with slow_hand() as hand, shown(hand) as page:
-        await browser.open(page.url)
-        await browser.run("window.open(location.href)")
-        await browser.until(lambda: page.pages == 2)
-        closing = asyncio.create_task(hand.close())
-        share = await share_of_polls(hand)
-        closing.cancel()
-        await asyncio.gather(closing, return_exceptions=True)
-    assert share >= 0.99, f"{share:.2%} of the polls"
+async def test_the_hand_keeps_its_polls_with_two_pages_open(browser: Browser, stage: Stage) -> None:
+    """99 % of 200 a second while it moves, without those that others on the machine have made it miss."""
+    await browser.run("window.open(location.href)")
+    await browser.until(lambda: stage.page.pages == 2)
+    await stage.slow()
+    closing = asyncio.create_task(stage.hand.close())
+    watch, before = HoldWatch(), stage.hand.statistics
+    statuses = stage.hand.statuses()
+    others = -watch.waiting()
+    for _ in range(400):
+        await anext(statuses)
+    others += watch.waiting()
+    watch.close()
+    after = stage.hand.statistics
+    closing.cancel()
+    await asyncio.gather(closing, return_exceptions=True)
+    polls, missed = after.polls - before.polls, after.overruns - before.overruns
+    missed_by_us = max(missed - others / 0.005, 0)
+    share = polls / (polls + missed_by_us)
+    assert share >= 0.99, f"{share:.2%}: {missed} missed in {polls}, others took {others:.3f} s"

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import http.client
 from collections.abc import AsyncIterator
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
+import pytest_asyncio
 
 pytest.importorskip("nicegui", reason="the page needs the extra web")
 from websockets.asyncio.client import connect
 from websockets.exceptions import InvalidStatus
 from websockets.typing import Origin
 
+from robotiq_async.actions import ACTIONS
 from robotiq_async.errors import ViewerError
 from robotiq_async.web.server import PageServer
 from robotiq_async.web.settings import PageSettings
+from tests.conftest import watched
 from tests.fake_hand import FakeHand
+
+pytestmark = pytest.mark.asyncio(loop_scope="module")
 
 WORD = "correct horse"
 
@@ -27,10 +33,17 @@ def settings(**options: object) -> PageSettings:
     return PageSettings(port=0, addresses=("fake://hand",), **options)  # type: ignore[arg-type]
 
 
-@pytest.fixture
+@pytest_asyncio.fixture(loop_scope="module", scope="module")
 async def page() -> AsyncIterator[PageServer]:
+    """One for all who try."""
     async with PageServer([FakeHand()], settings()) as page:
         yield page
+
+
+@pytest_asyncio.fixture(loop_scope="module")
+async def nothing_left_running(page: PageServer, caplog: pytest.LogCaptureFixture) -> AsyncIterator[None]:
+    with watched(caplog):
+        yield
 
 
 class Answer:
@@ -89,6 +102,32 @@ async def test_a_websocket_of_another_site_is_refused(page: PageServer) -> None:
             await connect(url, origin=None if origin is None else Origin(origin), additional_headers=headers)
     with pytest.raises(InvalidStatus, match="403"):
         await connect(url, origin=Origin(ours))
+
+
+async def test_a_page_that_only_looks_has_nothing_to_press(page: PageServer) -> None:
+    folder, cookie = await let_in(page)
+    text = (await ask(page.url, folder, Cookie=cookie)).text
+    assert "read-only" in text
+    for name in (*ACTIONS, "speed", "force"):
+        assert f'"data-testid":"{name}"' not in text
+    assert '"data-testid":"state"' in text
+
+
+async def test_headers_without_end_are_not_kept(page: PageServer) -> None:
+    """Anybody who reaches the port can send them."""
+    parts = urlsplit(page.url)
+    _, writer = await asyncio.open_connection(parts.hostname, parts.port)
+    writer.write(b"GET / HTTP/1.1\r\n")
+    with contextlib.suppress(ConnectionError):
+        async with asyncio.timeout(20):
+            for _ in range(1000):
+                writer.write(b"X: " + b"x" * 10_000 + b"\r\n")
+                await writer.drain()
+                await asyncio.sleep(0)
+            pytest.fail("it takes them all")
+    writer.close()
+    with contextlib.suppress(ConnectionError):
+        await writer.wait_closed()
 
 
 async def test_a_password_is_asked_for_and_a_wrong_one_takes_its_time() -> None:

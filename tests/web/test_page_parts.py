@@ -17,11 +17,11 @@ from robotiq_async.actions import Operator
 from robotiq_async.description import hand_model
 from robotiq_async.kinematics import JOINTS, joint_angles
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.web.commands import MAX_COMMANDS, PageCommands
+from robotiq_async.web.commands import FRESH_S, MAX_COMMANDS, PageCommands
 from robotiq_async.web.news import HandNews
 from robotiq_async.web.page.held import held, pads
 from robotiq_async.web.page.mirror import HISTORY_S, Mirror
-from robotiq_async.web.page.touch import FRESH_S, LOST_S, Touch
+from robotiq_async.web.page.touch import LOST_S, Touch
 from robotiq_async.web.page.words import event_words, fault_words, state_words
 from robotiq_async.web.server import PageServer
 from robotiq_async.web.settings import PageSettings
@@ -37,8 +37,9 @@ class Desk:
         self.answers: list[dict[str, Any]] = []
         self.commands = PageCommands([Operator(hand) for hand in hands], self.answers.append)
 
-    def do(self, name: str, page: str = "one", hand: int = 0, **arguments: object) -> None:
-        self.commands.do({"page": page, "number": 1, "hand": hand, "name": name, "arguments": arguments})
+    def do(self, name: str, page: str = "one", hand: int = 0, ago: float = 0.0, **arguments: object) -> None:
+        asked = {"page": page, "number": 1, "at": monotonic() - ago, "hand": hand, "name": name}
+        self.commands.do({**asked, "arguments": arguments})
 
     async def answer(self) -> dict[str, Any]:
         async with asyncio.timeout(20):
@@ -73,6 +74,21 @@ async def test_without_operators_nothing_is_carried_out() -> None:
     for name in ("close", "halt"):
         desk.do(name)
         assert "only looks" in (await desk.answer())["words"]
+
+
+async def test_what_was_asked_for_too_long_ago_moves_nothing_but_a_halt_is_never_too_old(
+    hand: RobotiqHand,
+) -> None:
+    """Whether it waited in the browser, on the network, or for this loop, which something had held up."""
+    desk, requests = Desk(hand), hand.requests()
+    for ago in (FRESH_S + 0.1, 1e9, -1.0):
+        for name, arguments in (("close", {}), ("set_speed", {"value": 9}), ("reset", {"confirm": True})):
+            desk.do(name, ago=ago, **arguments)
+            assert "came too late" in (await desk.answer())["words"]
+    assert requests.take_nowait() is None
+    assert hand.state is State.RUNNING_IDLE
+    desk.do("halt", ago=1e9)
+    assert (await desk.answer())["ok"]
 
 
 async def test_a_page_that_is_gone_has_its_motion_held_and_no_other() -> None:
@@ -176,7 +192,7 @@ def test_an_answer_goes_to_whoever_asked() -> None:
     said: list[dict[str, Any]] = []
     told: list[tuple[bool, str]] = []
     mirror = Mirror(("here",), control=True, say=said.append)
-    mirror.ask("page", 0, "close", {}, lambda ok, words: told.append((ok, words)))
+    mirror.ask("page", 0, "close", {}, lambda ok, words: told.append((ok, words)), at=1.0)
     number = said[0]["do"]["number"]
     answer = {"number": number, "ok": True, "words": "A"}
     for _ in range(2):
@@ -202,7 +218,8 @@ async def test_a_process_that_dies_is_noticed_and_its_motions_are_held() -> None
     async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
         settings = PageSettings(port=0, control=True, addresses=(hand.address,))
         async with PageServer([hand], settings, operators=[Operator(hand)]) as page:
-            page._hear({"do": {"page": "p", "number": 1, "hand": 0, "name": "close", "arguments": {}}})
+            asked = {"page": "p", "number": 1, "at": monotonic(), "hand": 0, "name": "close"}
+            page._hear({"do": {**asked, "arguments": {}}})
             async for status in hand.statuses():
                 if status.is_moving:
                     break
@@ -218,12 +235,11 @@ async def test_a_process_that_dies_is_noticed_and_its_motions_are_held() -> None
 # -- in touch ----------------------------------------------------------------------------------------------
 
 
-def test_a_press_is_fresh_for_a_moment() -> None:
-    now = monotonic()
-    assert Touch.is_fresh(now)
-    assert not Touch.is_fresh(now - FRESH_S - 0.1)
-    nothing: tuple[object, ...] = (None, "now", [now], True, {}, now + 60, float("nan"))
-    assert not any(Touch.is_fresh(each) for each in nothing)
+def test_what_a_browser_sends_back_may_be_anything() -> None:
+    touch, now = Touch(), monotonic()
+    assert touch.heard(now) == now
+    nothing: tuple[object, ...] = (None, "now", [now], True, {}, now + 60, -1, float("nan"), float("-inf"))
+    assert [touch.heard(each) for each in nothing] == [0.0] * len(nothing), "which is too long ago"
 
 
 def test_a_browser_is_lost_once_and_found_again() -> None:
@@ -236,6 +252,8 @@ def test_a_browser_is_lost_once_and_found_again() -> None:
     assert touch.is_lost, "what it sent was long under way"
     touch.heard(monotonic())
     assert not touch.is_lost
+    touch._newest -= LOST_S + 1
+    assert touch.check(), "and lost once more, with whatever it has set in motion since"
 
 
 # -- what is held ------------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from cyclopts import Parameter
 
 from ...protocol import Hand
 from ..arguments import Address, Yes, need
-from ..browser import open_page
+from ..browser import opened
 from ..consent import consent
 
 PATIENCE_S: Final = 60.0
@@ -56,10 +56,13 @@ async def _shown(hand: Hand) -> AsyncIterator[None]:
     from ...web.server import PageServer
     from ...web.settings import PageSettings
 
-    async with PageServer([hand], PageSettings(port=0, addresses=(hand.address,))) as page:
-        print(f"Watch it move: {page.url}", flush=True)
-        if not await open_page(page.url):
-            print(f"No screen here: open it yourself. It begins then, or in {PATIENCE_S:g} s.", flush=True)
+    async with (
+        PageServer([hand], PageSettings(port=0, addresses=(hand.address,))) as page,
+        opened(page.url) as is_opened,
+    ):
+        print(f"Watch it move: {page.url}")
+        where = "Your browser opens it; if none does" if is_opened else "No browser could be opened here"
+        print(f"{where}: open it yourself. The demo begins then, or in {PATIENCE_S:g} s.", flush=True)
         try:
             async with asyncio.timeout(PATIENCE_S):
                 await page.seen()

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ...errors import RobotiqError
+from ...telemetry.gate import is_loopback
 from ...wire.registers import RTU_REGISTERS
-from ..arguments import Port, Unit, is_loopback
+from ..arguments import Port, Unit
 from ..failures import usage
 
 if TYPE_CHECKING:

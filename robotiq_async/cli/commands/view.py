@@ -11,8 +11,9 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ...telemetry.gate import is_loopback
 from ...telemetry.payloads import printable
-from ..arguments import USUAL, Address, Byte, Link, Port, is_loopback, need
+from ..arguments import USUAL, Address, Byte, Link, Port, need
 from ..failures import CommandError, UsageError
 
 

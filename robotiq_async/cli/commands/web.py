@@ -15,11 +15,12 @@ from ...actions import Operator
 from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...errors import RobotiqError
 from ...telemetry.payloads import printable
-from ..arguments import USUAL, Address, Byte, Link, Port, is_loopback, need
-from ..browser import open_page
+from ..arguments import USUAL, Address, Byte, Link, Port, need
+from ..browser import opened
 from ..failures import CommandError, UsageError, usage
 
 if TYPE_CHECKING:
+    from ...web.news import HandNews
     from ...web.server import PageServer
     from ...web.settings import PageSettings
 
@@ -80,7 +81,6 @@ async def web(
             host=host,
             port=port,
             control=control,
-            loopback=is_loopback(host),
             addresses=tuple(operator.hand.address for operator in operators),
             speed=speed,
             force=force,
@@ -105,15 +105,15 @@ async def _show(
     # In this order nothing that concerns the page delays the stop of the fingers.
     async with page, AsyncExitStack() as stack:
         for index, operator in enumerate(operators):
-            stack.push_async_callback(_leave, operator)
+            stack.push_async_callback(_leave, operator, page.news[index])
             await _start(page, index, operator, alone=len(operators) == 1, stack=stack)
         if all(news.problem for news in page.news):
             raise CommandError("; ".join(news.problem for news in page.news))
         if not settings.loopback and not settings.certificate:
             _tell("without a certificate the password goes through the network for everybody to read")
         print(page.url, flush=True)
-        if open_browser:
-            await open_page(page.url)
+        if open_browser and not await stack.enter_async_context(opened(page.url)):
+            _tell("no browser could be opened here: open the address above yourself")
         await page.ended()
         raise CommandError("the process of the page has ended; what it says is above")
 
@@ -126,9 +126,9 @@ async def _start(
     try:
         await operator.hand.start(activate=False)
     except RobotiqError as error:
+        news.problem = str(error)
         if alone:
             raise
-        news.problem = str(error)
         trying = asyncio.get_running_loop().create_task(_try_again(page, index, operator))
         stack.push_async_callback(_cancelled, trying)
     news.open()
@@ -152,8 +152,10 @@ async def _cancelled(task: asyncio.Task[None]) -> None:
     await asyncio.gather(task, return_exceptions=True)
 
 
-async def _leave(operator: Operator) -> None:
-    _tell(f"{operator.hand.address}: {await operator.leave()}")
+async def _leave(operator: Operator, news: HandNews) -> None:
+    words = await operator.leave()
+    if not news.problem:  # of one that was never reached there is nothing to say
+        _tell(f"{operator.hand.address}: {words}")
 
 
 def _password(file: Path | None) -> str:

@@ -11,7 +11,7 @@ from nicegui import events, ui
 from ...actions import ACTIONS, Action
 from ...enums import FORCE_MAX, SPEED_MAX
 from .mirror import HandMirror, Mirror
-from .touch import PRESS, Touch
+from .touch import PRESS, PRESS_WITH_VALUE, Touch
 
 ARMED_S: Final = 0.3
 """A question takes no yes before: nobody has read it."""
@@ -22,16 +22,19 @@ ASKED: Final = tuple(name for name, action in ACTIONS.items() if action.warning)
 class Controls:
     """The part of the page that commands; only there when the page may."""
 
-    def __init__(self, mirror: Mirror, hand: HandMirror, page: str, told: Callable[[str], None]) -> None:
+    def __init__(
+        self, mirror: Mirror, hand: HandMirror, page: str, touch: Touch, told: Callable[[str], None]
+    ) -> None:
         """Build it where the page is being built.
 
         Args:
             mirror: the way to the hand.
             hand: which one.
             page: who asks.
+            touch: with its browser.
             told: is called with how each command ended.
         """
-        self._mirror, self._hand, self._page, self._told = mirror, hand, page, told
+        self._mirror, self._hand, self._page, self._touch, self._told = mirror, hand, page, touch, told
         self._dialogs: list[ui.dialog] = []
         with ui.row().classes("w-full gap-2"):
             for name in DIRECT:
@@ -48,12 +51,12 @@ class Controls:
         """Stop every axis; it is never too old and never asked about. Closes what is open."""
         for dialog in self._dialogs:
             dialog.close()
-        self._ask("halt", {})
+        self._ask("halt", {}, at=monotonic())
 
     def _button(self, action: Action) -> None:
         button = ui.button(action.name).props(f"data-testid={action.name} no-caps").classes("grow")
         button.tooltip(action.what)
-        button.on("click", lambda e: self._pressed(e, action.name, {}), js_handler=PRESS)
+        button.on("click", lambda e: self._pressed(action.name, {}, e.args), js_handler=PRESS)
 
     def _question(self, action: Action) -> None:
         asked_at = 0.0
@@ -66,7 +69,7 @@ class Controls:
         def yes(event: events.GenericEventArguments) -> None:
             if monotonic() - asked_at >= ARMED_S:
                 dialog.close()
-                self._pressed(event, action.name, {"confirm": True})
+                self._pressed(action.name, {"confirm": True}, event.args)
 
         with ui.dialog() as dialog, ui.card():
             ui.label(f"{action.name.capitalize()}: {action.what}").classes("text-lg")
@@ -80,35 +83,25 @@ class Controls:
 
     def _slider(self, what: str, highest: int, value: int) -> None:
         def change(event: events.GenericEventArguments) -> None:
-            self._pressed(event, f"set_{what}", {"value": int(slider.value)}, quiet=True)
+            sent_back, value = event.args
+            self._pressed(f"set_{what}", {"value": value}, sent_back)
 
         ui.label(what)
         slider = ui.slider(min=0, max=highest, value=value).props(f"data-testid={what}")
         # Sent when it is let go, and not for every value on the way.
-        slider.on("change", change, js_handler=PRESS)
+        slider.on("change", change, js_handler=PRESS_WITH_VALUE)
         ui.label().bind_text_from(slider, "value", lambda each: f"{each:.0f}").classes("w-8 text-right")
 
-    def _pressed(
-        self,
-        event: events.GenericEventArguments,
-        name: str,
-        arguments: dict[str, Any],
-        *,
-        quiet: bool = False,
-    ) -> None:
-        if Touch.is_fresh(event.args):
-            self._ask(name, arguments, quiet=quiet)
-        else:
-            self._show(name, False, "this came too late to be carried out: the connection was held up")
+    def _pressed(self, name: str, arguments: dict[str, Any], sent_back: object) -> None:
+        self._ask(name, arguments, at=self._touch.heard(sent_back))
 
-    def _ask(self, name: str, arguments: dict[str, Any], *, quiet: bool = False) -> None:
-        if not quiet:
-            self._outcome.set_text(f"{name} ...")
+    def _ask(self, name: str, arguments: dict[str, Any], *, at: float) -> None:
+        self._outcome.set_text(f"{name} ...")
 
         def answered(ok: bool, words: str) -> None:
             self._show(name, ok, words)
 
-        self._mirror.ask(self._page, self._hand.index, name, arguments, answered)
+        self._mirror.ask(self._page, self._hand.index, name, arguments, answered, at=at)
 
     def _show(self, name: str, ok: bool, words: str) -> None:
         if self._outcome.is_deleted:

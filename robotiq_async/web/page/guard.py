@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, MutableMapping
+from contextlib import suppress
 from html import escape
 from typing import Any, Final
 from urllib.parse import parse_qs
+from weakref import WeakValueDictionary
 
 from .access import Access, Head, Verdict
 
@@ -16,7 +18,8 @@ Send = Callable[[Message], Awaitable[None]]
 App = Callable[[Message, Receive, Send], Awaitable[None]]
 
 TRY_S: Final = 1.0
-"""A wrong password takes this long, and the next one waits for it."""
+"""A wrong password takes this long, and the next one from there waits for it."""
+FORM_S: Final = 10.0
 MAX_FORM: Final = 4096
 
 HEADERS: Final = {
@@ -50,7 +53,8 @@ class Guard:
         """
         self.app = app
         self._access = access
-        self._trying = asyncio.Lock()
+        self._trying: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
+        """By address: whoever tries many holds up nobody who sits elsewhere."""
 
     async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
         """Pass on, or answer."""
@@ -66,16 +70,16 @@ class Guard:
         elif verdict is Verdict.LET_IN:
             await self._let_in(send)
         elif verdict is Verdict.ASK:
-            await self._ask(scope["method"], receive, send)
+            await self._ask(scope, receive, send)
         else:
             await _answer(send, 403, f"<p>{escape(verdict.value)}.</p>")
 
-    async def _ask(self, method: str, receive: Receive, send: Send) -> None:
-        if method != "POST":
+    async def _ask(self, scope: Message, receive: Receive, send: Send) -> None:
+        if scope["method"] != "POST":
             await _answer(send, 200, _FORM)
             return
         password = parse_qs((await _body(receive)).decode("utf-8", "replace")).get("password", [""])[0]
-        async with self._trying:
+        async with self._trying.setdefault(scope["client"][0], asyncio.Lock()):
             right = self._access.knows(password)
             if not right:
                 await asyncio.sleep(TRY_S)
@@ -90,18 +94,23 @@ class Guard:
 
 
 def _head(scope: Message) -> Head:
-    headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
+    headers: dict[str, str] = {}
+    for name, value in scope["headers"]:
+        key, text = name.decode("latin-1"), value.decode("latin-1")
+        headers[key] = f"{headers[key]}, {text}" if key in headers else text  # two origins are none
     method = scope.get("method", "")
     return Head(method, scope["path"], scope["query_string"].decode("latin-1"), headers)
 
 
 async def _body(receive: Receive) -> bytes:
-    """A short one; of a long one the beginning."""
+    """A short one; of a long or a slow one the beginning."""
     body, more = b"", True
-    while more and len(body) < MAX_FORM:
-        message = await receive()
-        body += message.get("body", b"")
-        more = message.get("more_body", False)
+    with suppress(TimeoutError):
+        async with asyncio.timeout(FORM_S):
+            while more and len(body) < MAX_FORM:
+                message = await receive()
+                body += message.get("body", b"")
+                more = message.get("more_body", False)
     return body[:MAX_FORM]
 
 

@@ -162,11 +162,22 @@ class Mirror:
         name: str,
         arguments: dict[str, Any],
         answered: Callable[[bool, str], None],
+        *,
+        at: float,
     ) -> None:
-        """Ask for a command; ``answered`` is called with whether and how it ended."""
+        """Ask for a command; ``answered`` is called with whether and how it ended.
+
+        Args:
+            page: who asks.
+            hand: which one is to do it.
+            name: of the command.
+            arguments: of the command.
+            answered: is called later.
+            at: the time of this process that the browser knew when it asked.
+        """
         number = next(self._numbers)
         self._answers[number] = answered
-        asked = {"page": page, "number": number, "hand": hand, "name": name, "arguments": arguments}
+        asked = {"page": page, "number": number, "at": at, "hand": hand, "name": name, "arguments": arguments}
         self._say({"do": asked})
 
     def gone(self, page: str) -> None:

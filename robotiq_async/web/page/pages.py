@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from datetime import datetime
+from time import monotonic
 from typing import Final
 
 from nicegui import Client, ui
@@ -13,28 +13,52 @@ from .mirror import HandMirror, Mirror
 from .panels import AxesPanel, Curves, Events, StatePanel, StatisticsPanel
 from .scene import HandScene
 from .touch import BEAT_MS, SCRIPT, Touch
+from .words import timed
 
 REFRESH_S: Final = 0.05
-STAGE: Final = "h-[42vh] lg:h-[calc(100vh-13rem)] lg:sticky lg:top-16 min-h-[280px]"
+STAGE: Final = "h-[36vh] lg:h-[calc(100vh-13rem)] lg:sticky lg:top-16 min-h-[250px]"
 """How large the scene is: a part of a phone, and all that is left of a wide window."""
+SCENES_MAX: Final = 12
+"""Tiles with a scene: a browser takes the first ones away when there are more than some sixteen."""
 STYLE: Final = """
 <style>
 .rq-axes { display: grid; gap: .35rem; width: 100%; }
 .rq-axis { display: grid; grid-template-columns: 4.2rem 1fr 2.2rem 3.6rem 4.2rem; gap: .1rem .6rem;
   align-items: center;
   border-left: 4px solid transparent; padding-left: .4rem; font-variant-numeric: tabular-nums; }
-.rq-bar { position: relative; height: .8rem; border-radius: .4rem; background: #8883; overflow: hidden; }
-.rq-bar i { position: absolute; inset: 0 auto 0 0; }
-.rq-bar u { position: absolute; top: 0; bottom: 0; width: 3px; margin-left: -1px; background: currentColor; }
+.rq-bar { position: relative; height: .8rem; border-radius: .4rem; background: #8883; }
+.rq-bar i { position: absolute; inset: 0 auto 0 0; border-radius: .4rem; }
+.rq-bar u { position: absolute; top: -3px; bottom: -3px; width: 3px; background: currentColor; }
 .rq-number { text-align: right; }
 .rq-does { grid-column: 2 / -1; font-size: .75rem; opacity: .75; min-height: 1rem; }
 .rq-contact { border-color: #ff5a1f; }
 .rq-contact .rq-does { color: #ff5a1f; opacity: 1; font-weight: 600; }
 .rq-stale { opacity: .45; }
+@media (min-width: 1200px) {
+  .rq-line .rq-axis { grid-template-columns: 4.2rem 1fr 2.2rem 3.6rem 4.2rem 8.5rem; min-height: 1.7rem; }
+  .rq-line .rq-does { grid-column: auto; min-height: 0; }
+}
+.rq-foot { z-index: 7000; pointer-events: none; }
+.rq-foot > * { pointer-events: auto; }
 .rq-halt { min-height: 4rem; font-size: 1.5rem !important; font-weight: 700; letter-spacing: .1em; }
+.rq-stage { border-radius: 4px; overflow: hidden; }
+.body--dark .rq-stage { filter: brightness(.8); }
+.body--dark .text-negative { color: #ff7b72 !important; }
+.rq-cut-words { display: none; position: fixed; top: 3.5rem; left: 50%; translate: -50%; z-index: 7000;
+  width: max-content; max-width: calc(100vw - 1.5rem); padding: .6rem 1rem; border-radius: 4px;
+  background: #b00020; color: #fff; font-weight: 600; box-shadow: 0 2px 8px #0008; }
+.rq-cut .rq-cut-words { display: block; }
+.rq-cut .nicegui-content { opacity: .4; filter: grayscale(1); }
+.rq-cut .rq-halt { opacity: .4; }
+#popup { display: none; }
 .nicegui-content { padding: .75rem; padding-bottom: 6rem; }
 </style>
 """
+CUT: Final = """
+<div class="rq-cut-words" role="alert" data-testid="cut">
+No connection to robotiq-async: what is shown is old{}.</div>
+"""
+PRESSED: Final = ", and nothing that is pressed here arrives, HALT neither"
 
 
 class Visits:
@@ -49,8 +73,8 @@ class Visits:
         """A page is being made."""
         touch = Touch()
         client.on_connect(lambda: self._arrive(client.id, touch))
-        client.on_disconnect(lambda: self._leave(client.id))
-        client.on_delete(lambda: self._leave(client.id))
+        client.on_disconnect(lambda: self._leave(client))
+        client.on_delete(lambda: self._leave(client))
         ui.on("beat", lambda event: touch.heard(event.args))
 
         def look() -> None:
@@ -66,9 +90,11 @@ class Visits:
         self._present.add(page)
         self._mirror.count(len(self._present))
 
-    def _leave(self, page: str) -> None:
-        self._mirror.gone(page)
-        self._present.discard(page)
+    def _leave(self, client: Client) -> None:
+        self._mirror.gone(client.id)
+        # A browser that came back may be heard of before its old connection is found to have ended.
+        if not client.has_socket_connection:
+            self._present.discard(client.id)
         self._mirror.count(len(self._present))
 
 
@@ -91,16 +117,16 @@ def register(mirror: Mirror) -> None:
             ui.label(f"There is no hand {index}: there are {len(mirror.hands)}.")
 
 
-def _frame(title: str, *, home: bool) -> None:
+def _frame(title: str, mirror: Mirror, *, home: bool) -> None:
     ui.add_head_html(STYLE)
-    ui.add_body_html(SCRIPT)
+    ui.add_body_html(CUT.format(PRESSED if mirror.control else "") + SCRIPT)
     dark = ui.dark_mode(None)
     with ui.header().classes("items-center no-wrap gap-3 py-2 px-4 bg-slate-800"):
         if home:
             ui.button(icon="arrow_back", on_click=lambda: ui.navigate.to("/")).props(
                 "flat round dense color=white"
             )
-        ui.label("Robotiq 3-Finger").classes("text-base font-bold whitespace-nowrap")
+        ui.label("Robotiq 3-Finger").classes("text-base font-bold whitespace-nowrap max-sm:hidden")
         ui.label(title).classes("text-sm opacity-80 truncate").props("data-testid=address")
         ui.space()
         with ui.button_group().props("flat"):
@@ -110,17 +136,17 @@ def _frame(title: str, *, home: bool) -> None:
 
 
 def _hand_page(mirror: Mirror, hand: HandMirror, client: Client, visits: Visits) -> None:
-    _frame(hand.address, home=len(mirror.hands) > 1)
-    visits.begin(client)
+    _frame(hand.address, mirror, home=len(mirror.hands) > 1)
+    touch = visits.begin(client)
     shown: list[Callable[[], None]] = []
     with ui.element("div").classes("grid w-full gap-3 grid-cols-1 lg:grid-cols-2"):
         with ui.column().classes("w-full gap-2"):
             with ui.row().classes("w-full items-center gap-3"):
                 state = StatePanel()
-            with ui.element("div").classes(f"{STAGE} w-full rounded overflow-hidden"):
+            with ui.element("div").classes(f"{STAGE} w-full rq-stage"):
                 scene = HandScene()
         with ui.column().classes("w-full gap-3"):
-            axes = AxesPanel()
+            axes = AxesPanel(wide=True)
             place = ui.column().classes("w-full gap-3")
             curves = Curves()
             events, statistics = Events(), StatisticsPanel()
@@ -134,7 +160,7 @@ def _hand_page(mirror: Mirror, hand: HandMirror, client: Client, visits: Visits)
     ]
     if mirror.control:
         with place:
-            controls = Controls(mirror, hand, client.id, lambda words: events.add(_timed(words)))
+            controls = Controls(mirror, hand, client.id, touch, lambda words: events.add(timed(words)))
         _halt_button("halt", "stops every axis", controls.halt)
     else:
         with place:
@@ -144,19 +170,15 @@ def _hand_page(mirror: Mirror, hand: HandMirror, client: Client, visits: Visits)
 
 
 def _halt_button(name: str, what: str, halt: Callable[[], None]) -> None:
-    """At the foot of the window, wherever the page is scrolled to."""
+    """At the foot of the window, wherever the page is scrolled to, and above a question that is open."""
     ui.on("space", halt)
-    with ui.footer().classes("p-2 bg-transparent"):
+    with ui.footer().classes("p-2 bg-transparent rq-foot"):
         button = ui.button(name, on_click=halt, color="red-8").classes("w-full rq-halt")
         button.props("data-testid=halt").tooltip(f"{what}; the space bar does it too")
 
 
-def _timed(words: str) -> str:
-    return f"{datetime.now().astimezone():%H:%M:%S.%f}"[:-4] + f"  {words}"
-
-
 def _tiles(mirror: Mirror, client: Client, visits: Visits) -> None:
-    _frame(f"{len(mirror.hands)} hands", home=False)
+    _frame(f"{len(mirror.hands)} hands", mirror, home=False)
     visits.begin(client)
     with ui.element("div").classes("grid w-full gap-3 grid-cols-1 sm:grid-cols-2 xl:grid-cols-3"):
         shown = [_tile(mirror, hand) for hand in mirror.hands]
@@ -167,7 +189,7 @@ def _tiles(mirror: Mirror, client: Client, visits: Visits) -> None:
 
 def _halt_all(mirror: Mirror, page: str) -> None:
     for hand in mirror.hands:
-        mirror.ask(page, hand.index, "halt", {}, lambda *_: None)
+        mirror.ask(page, hand.index, "halt", {}, lambda *_: None, at=monotonic())
 
 
 def _tile(mirror: Mirror, hand: HandMirror) -> Callable[[], None]:
@@ -176,13 +198,16 @@ def _tile(mirror: Mirror, hand: HandMirror) -> Callable[[], None]:
         ui.label(hand.address).classes("font-bold")
         with ui.row().classes("w-full items-center gap-3"):
             state = StatePanel()
-        with ui.element("div").classes("w-full h-56 pointer-events-none"):
-            scene = HandScene(compact=True)
+        scene = None
+        if len(mirror.hands) <= SCENES_MAX:
+            with ui.element("div").classes("w-full h-56 pointer-events-none rq-stage"):
+                scene = HandScene(compact=True)
         axes = AxesPanel()
 
     def show() -> None:
         state.show(hand, is_quiet=mirror.is_quiet)
-        scene.show(hand)
+        if scene is not None:
+            scene.show(hand)
         axes.show(hand)
 
     return show

@@ -10,9 +10,11 @@ from nicegui import ui
 
 from ...enums import AXES
 from .mirror import HISTORY_S, HandMirror
-from .words import COLORS, NAMES, axis_words, event_words, fault_words, state_words
+from .words import COLORS, NAMES, axis_words, event_words, fault_words, state_words, timed
 
 CURVES_S: Final = 0.5
+WIDTHS: Final = (6, 4, 2, 2)
+"""Of the curves: fingers that move together are drawn on each other, and all of them are seen."""
 CURRENT_MAX: Final = 600
 """The axis of the currents reaches at least so far, in mA."""
 
@@ -40,9 +42,14 @@ class StatePanel:
 class AxesPanel:
     """For each axis where it is, where it is asked to go, what it does, and its current."""
 
-    def __init__(self) -> None:
-        """Build it where the page is being built."""
+    def __init__(self, *, wide: bool = False) -> None:
+        """Build it where the page is being built.
+
+        Args:
+            wide: a line for each axis where there is room, in place of two.
+        """
         self._html = ui.html("", sanitize=False).classes("w-full").props("data-testid=axes")
+        self._classes = "rq-axes rq-line" if wide else "rq-axes"
         self._shown = ""
 
     def show(self, hand: HandMirror) -> None:
@@ -50,7 +57,7 @@ class AxesPanel:
         rows = "".join(_axis_row(hand, index) for index in range(len(AXES)))
         if rows != self._shown:
             self._shown = rows
-            self._html.set_content(f'<div class="rq-axes">{rows}</div>')
+            self._html.set_content(f'<div class="{self._classes}">{rows}</div>')
 
 
 def _axis_row(hand: HandMirror, index: int) -> str:
@@ -65,7 +72,7 @@ def _axis_row(hand: HandMirror, index: int) -> str:
         f'<div class="rq-axis{contact}{stale}" data-axis="{NAMES[index]}" data-position="{position}">'
         f'<b style="color:{color}">{NAMES[index]}</b>'
         f'<span class="rq-bar"><i style="width:{position / 2.55:.1f}%;background:{color}"></i>'
-        f'<u style="left:{wanted / 2.57:.1f}%"></u></span>'
+        f'<u style="left:calc((100% - 3px) * {wanted / 255:.3f})"></u></span>'
         f'<span class="rq-number">{position}</span><span class="rq-wanted">&rarr; {wanted}</span>'
         f'<span class="rq-number">{status.current_ma(axis)} mA</span>'
         f'<span class="rq-does">{escape(axis_words(hand, axis))}</span></div>'
@@ -78,8 +85,8 @@ class Curves:
     def __init__(self) -> None:
         """Build it where the page is being built."""
         self._drawn_at = 0.0
-        self._positions = ui.echart(_options("position", 255)).classes("w-full h-44")
-        self._currents = ui.echart(_options("current / mA", CURRENT_MAX)).classes("w-full h-44")
+        self._positions = ui.echart(_options("position / counts", 255, 51)).classes("w-full h-40")
+        self._currents = ui.echart(_options("current / mA", CURRENT_MAX, 200)).classes("w-full h-40")
 
     def show(self, hand: HandMirror) -> None:
         """Draw what is newest, twice a second."""
@@ -102,24 +109,31 @@ class Curves:
         self._currents.update()
 
 
-def _options(title: str, highest: int) -> dict[str, Any]:
+def _options(title: str, highest: int, step: int) -> dict[str, Any]:
     series = [
         {
             "type": "line",
             "name": name,
             "data": [],
             "showSymbol": False,
-            "lineStyle": {"width": 2},
+            "lineStyle": {"width": width},
             "color": color,
             "animation": False,
         }
-        for name, color in zip(NAMES, COLORS, strict=True)
+        for name, color, width in zip(NAMES, COLORS, WIDTHS, strict=True)
     ]
     quiet = {"color": "#8a8f98"}
     return {
         "animation": False,
         "title": {"text": title, "textStyle": {"fontSize": 12, **quiet}, "left": 8, "top": 2},
-        "legend": {"right": 8, "top": 2, "textStyle": quiet, "itemWidth": 14},
+        "legend": {
+            "right": 8,
+            "top": 2,
+            "textStyle": quiet,
+            "icon": "roundRect",
+            "itemWidth": 16,
+            "itemHeight": 5,
+        },
         "grid": {"left": 44, "right": 12, "top": 28, "bottom": 22},
         "xAxis": {
             "type": "value",
@@ -132,6 +146,9 @@ def _options(title: str, highest: int) -> dict[str, Any]:
             "type": "value",
             "min": 0,
             "max": highest,
+            "interval": step,
+            "axisLine": {"onZero": False, "show": False},
+            "axisTick": {"show": False},
             "axisLabel": quiet,
             "splitLine": {"lineStyle": {"color": "#8883"}},
         },
@@ -144,15 +161,19 @@ class Events:
 
     def __init__(self) -> None:
         """Build it where the page is being built."""
-        self._log = ui.log(max_lines=100).classes("w-full h-40 text-xs").props("data-testid=events")
-        self._shown = 0
+        ui.label("events").classes("text-xs font-bold opacity-60 -mb-2")
+        self._log = ui.log(max_lines=100).classes("w-full h-32 text-xs").props("data-testid=events")
+        self._shown = -1
 
     def show(self, hand: HandMirror) -> None:
-        """Add what is new."""
+        """Add what is new; at first what happened before the page was opened."""
+        is_first, self._shown = self._shown < 0, max(self._shown, 0)
         for number, event in hand.events:
             if number > self._shown:
                 self._shown = number
                 self._log.push(event_words(event))
+        if is_first:
+            self._log.push(timed("this page was opened"))
 
     def add(self, words: str) -> None:
         """Add what this page has to say."""

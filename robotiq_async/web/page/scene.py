@@ -26,6 +26,8 @@ GLOW: Final = "#ff5a1f"
 GHOST: Final = "#0ea5e9"
 STAGE: Final = "#b9c3cf"
 """Behind the hand, which is grey and black; on a light page and on a dark one."""
+HALO: Final = "text-shadow:0 0 2px #fff,0 0 2px #fff,0 0 4px #fff"
+"""Around a letter, wherever it is before."""
 STALE: Final = 0.25
 APART: Final = 3
 """Counts between request and position from which on the request of an axis that is not there yet is drawn."""
@@ -92,7 +94,9 @@ class Figure:
             return
         self._looks[link] = (color or "", opacity)
         for shape, drawn in self._shapes[link]:
-            drawn.material(color or _hex(shape), opacity)
+            # The joints of a link that glows stay as they are: otherwise nobody sees its shape.
+            kept = color is None or (color == GLOW and shape.kind == "cylinder")
+            drawn.material(_hex(shape) if kept else color, opacity)
 
     def look_all(self, color: str | None, opacity: float) -> None:
         """Colour every link."""
@@ -126,7 +130,7 @@ class HandScene:
             if not compact:
                 self._letters()
         self._model = model
-        scene.move_camera(0.75, -2.5, 1.9, 0, 0, 0.8, duration=0)
+        scene.move_camera(0.8, -2.2, 2.1, 0, 0, 1.05, duration=0)
 
     def show(self, hand: HandMirror) -> None:
         """Draw what is newest; costs nothing where nothing has changed."""
@@ -172,9 +176,9 @@ class HandScene:
     def _letters(self) -> None:
         for axis, color in zip(AXES, COLORS, strict=True):
             if axis in PREFIX:
-                with self._figure.group(f"{PREFIX[axis]}_link_0"):
-                    style = f"color:{color};font:bold 15px sans-serif;text-shadow:0 0 3px #0008"
-                    ui.scene.text(str(axis.name), style).move(0.0, -0.035, 0.0)
+                with self._figure.group(f"{PREFIX[axis]}_link_3"):
+                    style = f"color:{color};font:bold 17px sans-serif;{HALO}"
+                    ui.scene.text(str(axis.name), style).move(0.052, 0.032, 0.0)
 
 
 def _away(status: RobotiqStatus) -> Finger:

@@ -66,6 +66,8 @@ def run(settings: PageSettings, listening: socket.socket, pipes: Pipes) -> None:
     port = listening.getsockname()[1]
     config = uvicorn.Config(
         Guard(_application(settings, mirror), Access(settings, port)),
+        http="h11",  # the other one keeps as many headers as come
+        proxy_headers=False,
         log_level="critical",
         access_log=False,
         server_header=False,

@@ -2,8 +2,8 @@
 
 The server sends the time by its own clock four times a second, and the browser sends back what it got last:
 with its heartbeat, and with every press of a button. So a press that was held up on its way, or made on a
-page that shows what was long ago, is told apart from a fresh one, although the two clocks know nothing of
-each other.
+page that shows what was long ago, is told apart from a fresh one (where the hand is, and the whole way behind
+it), although the two clocks know nothing of each other.
 """
 
 from __future__ import annotations
@@ -12,15 +12,17 @@ from time import monotonic
 from typing import Final
 
 BEAT_MS: Final = 250
+CUT_MS: Final = 1500
+"""After this a page says that it hears nothing: what it shows is old."""
 LOST_S: Final = 2.0
 """After this a page cannot be heard. A browser wakes up a tab in the background once a second."""
-FRESH_S: Final = 1.5
-"""A press that is older than this moves nothing."""
-
 SCRIPT: Final = f"""
 <script>
 window.robotiqTime = 0;
+window.robotiqHeard = performance.now();
+window.robotiqHear = (time) => {{ robotiqTime = time; robotiqHeard = performance.now(); }};
 setInterval(() => {{
+  document.body.classList.toggle('rq-cut', performance.now() - robotiqHeard > {CUT_MS});
   if (window.socket && window.socket.connected) emitEvent('beat', window.robotiqTime);
 }}, {BEAT_MS});
 for (const kind of ['keydown', 'keyup']) {{
@@ -36,6 +38,8 @@ for (const kind of ['keydown', 'keyup']) {{
 """
 PRESS: Final = "() => emit(window.robotiqTime)"
 """What a button sends."""
+PRESS_WITH_VALUE: Final = "(value) => emit(window.robotiqTime, value)"
+"""What a slider sends: the value that it was let go at, which is not always known here yet."""
 
 
 class Touch:
@@ -59,27 +63,24 @@ class Touch:
     @staticmethod
     def now() -> str:
         """The script that tells the browser the time."""
-        return f"window.robotiqTime = {monotonic():.3f}"
+        return f"robotiqHear({monotonic():.6f})"
 
-    def heard(self, sent_back: object) -> None:
-        """A heartbeat."""
-        self._newest = max(self._newest, _time(sent_back))
+    def heard(self, sent_back: object) -> float:
+        """A heartbeat, or a press, after which it can be lost again. Returns the time that was sent back."""
+        at = _time(sent_back)
+        self._newest = max(self._newest, at)
         if self.is_lost and monotonic() - self._newest < LOST_S:
             self.is_lost = False
+        return at
 
     def check(self) -> bool:
         """Whether the browser has just been lost."""
         was_lost, self.is_lost = self.is_lost, self.is_lost or monotonic() - self._newest > LOST_S
         return self.is_lost and not was_lost
 
-    @staticmethod
-    def is_fresh(sent_back: object) -> bool:
-        """Whether a press is."""
-        return 0 <= monotonic() - _time(sent_back) <= FRESH_S
-
 
 def _time(sent_back: object) -> float:
     """What a browser may have sent is anything."""
-    if isinstance(sent_back, bool) or not isinstance(sent_back, int | float) or sent_back > monotonic():
+    if isinstance(sent_back, bool) or not isinstance(sent_back, int | float):
         return 0.0
-    return float(sent_back)
+    return float(sent_back) if 0 <= sent_back <= monotonic() else 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
+from time import time
 from typing import Any, Final
 
 from ...enums import AXES, Fault, Finger, ObjectStatus, Severity, State
@@ -79,8 +80,18 @@ def axis_words(hand: HandMirror, axis: Finger) -> str:
 
 def event_words(event: dict[str, Any]) -> str:
     """An event as a line."""
-    clock = f"{datetime.fromtimestamp(event['time']).astimezone():%H:%M:%S.%f}"[:-4]
     if event["kind"] == "fault":
-        return f"{clock}  fault 0x{event['code']:02X}: {event['description']}"
+        return timed(f"fault 0x{event['code']:02X}: {event['description']}", event["time"])
     words = _STATES[State[event["target"]]]
-    return f"{clock}  {words}  ({event['source']} to {event['target']})"
+    return timed(f"{words}  ({event['source']} to {event['target']})", event["time"])
+
+
+def timed(words: str, at: float | None = None) -> str:
+    """Words with the time of day before them.
+
+    Args:
+        words: what has happened.
+        at: seconds since 1970; None for now.
+    """
+    clock = datetime.fromtimestamp(time() if at is None else at).astimezone()
+    return f"{clock:%H:%M:%S.%f}"[:-4] + f"  {words}"
