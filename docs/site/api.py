@@ -74,7 +74,9 @@ def parts() -> dict[str, Part]:
             "The hand", "One gripper, for the program that moves it.", (*hand, f"{PACKAGE}.protocol.Hand")
         ),
         "values.md": Part(
-            "What a hand hands out and takes", "Readings, results, streams, options.", tuple(values)
+            "Readings, results, options",
+            "What a hand hands out, and what it takes beside numbers.",
+            tuple(values),
         ),
         "enums.md": Part(
             "Names and numbers",
