@@ -8,16 +8,20 @@ ADDRESS ?= sim://
 MINUTES ?= 30
 LINK ?= tcp
 DISTROS ?= jazzy kilted
+PYTHONS ?= 3.12 3.13 3.14
 VENV := .venv
 BIN := $(VENV)/bin
 # Touched last, so it stands for a complete environment.
 STAMP := $(VENV)/.complete
+# The site and the releases have environments of their own: nothing of theirs is needed to work on the library.
+SITE := $(VENV)-site
+RELEASE := $(VENV)-release
 
 # The caller's environment must not leak into ours: an active venv or a PYTHONPATH would shadow it.
 unexport VIRTUAL_ENV CONDA_PREFIX PYTHONHOME PYTHONPATH PYTHONSTARTUP PIP_USER PIP_TARGET PIP_PREFIX UV_PYTHON
 
 .DEFAULT_GOAL := help
-.PHONY: help demo show test test-ros2 pages soak fuzz explore bench lint check format constraints clean
+.PHONY: help demo show test test-ros2 pages docs dist pythons canary soak fuzz explore bench lint check format constraints clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -38,6 +42,18 @@ test-ros2:  ## Test the ROS 2 node with real clients, each ROS in an environment
 pages: $(STAMP)  ## Run the code of every page in the environment that the page names (needs the package index)
 	@$(BIN)/python -m pytest --numprocesses auto tests/docs/environments.py
 
+docs: $(SITE)/.complete  ## Make the documentation site in site/, strictly: no dead links, nothing from other hosts
+	@$(SITE)/bin/python -m docs.site
+
+dist: $(RELEASE)/.complete  ## Build sdist and wheel in dist/, and try each in a bare environment (needs the package index)
+	@$(RELEASE)/bin/python -m tests.release.dist
+
+pythons: $(RELEASE)/.complete  ## Test the library on other Pythons (PYTHONS="3.12 3.13 3.14"); one that cannot be had is named
+	@$(RELEASE)/bin/python -m tests.release.pythons $(PYTHONS)
+
+canary: $(RELEASE)/.complete  ## Test with the newest of all dependencies, in an environment that is thrown away
+	@$(RELEASE)/bin/python -m tests.release.canary
+
 soak: $(STAMP)  ## Move under random faults for MINUTES=30 over LINK=tcp (or rtu), and print figures
 	@$(BIN)/python -m tests.adversity.soak --minutes $(MINUTES) --link $(LINK)
 
@@ -57,7 +73,7 @@ lint: $(STAMP)  ## Check style, types and the directions of the imports
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo --no-cache
 
-check: lint test test-ros2 pages  ## Everything CI runs, and more of ROS 2
+check: lint test test-ros2 pages docs dist pythons  ## Everything CI runs, and more of ROS 2
 
 format: $(STAMP)  ## Put the sources into shape
 	$(BIN)/ruff check --fix
@@ -66,9 +82,11 @@ format: $(STAMP)  ## Put the sources into shape
 constraints: $(STAMP)  ## Take the newest versions of all dependencies into constraints.txt
 	$(BIN)/python -m uv pip compile --quiet --universal --upgrade --all-extras --no-header --no-annotate \
 		pyproject.toml --output-file constraints.txt
+	$(BIN)/python -m uv pip compile --quiet --universal --upgrade --python-version 3.11 --no-header --no-annotate \
+		docs/site/requirements.in --output-file docs/site/requirements.txt
 
 clean:  ## Remove what the other commands made
-	rm -rf $(VENV) .venv-ros2 build dist site .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
+	rm -rf $(VENV) $(SITE) $(RELEASE) .venv-ros2 build dist site .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
 	find robotiq_async tests demo -type d -name __pycache__ -prune -exec rm -rf {} +
 
 # uv is several times quicker than pip, but nothing depends on it. When it fails, whatever the reason, pip does
@@ -89,4 +107,15 @@ $(STAMP): pyproject.toml constraints.txt
 		|| { echo "uv did not work here; installing with pip, which takes a little longer"; \
 			$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[all,dev]'; } \
 		|| { echo "Installing the dependencies failed (see above). The package index must be reachable, once." >&2; exit 1; }
+	@touch $@
+
+$(SITE)/.complete: docs/site/requirements.txt
+	@echo "Setting up $(SITE), once"
+	@$(PYTHON) -m venv --clear $(SITE)
+	@$(SITE)/bin/python -m pip install --quiet --disable-pip-version-check --requirement docs/site/requirements.txt
+	@touch $@
+
+$(RELEASE)/.complete: Makefile
+	@$(PYTHON) -m venv --clear $(RELEASE)
+	@$(RELEASE)/bin/python -m pip install --quiet --disable-pip-version-check uv
 	@touch $@

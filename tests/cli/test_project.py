@@ -17,12 +17,21 @@ if TYPE_CHECKING:
     from tests.cli.conftest import Shell
 
 ROOT = Path(__file__).parents[2]
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text())
+PROJECT, HATCH = SETTINGS["project"], SETTINGS["tool"]["hatch"]
 
 
 def test_one_version() -> None:
-    assert PROJECT["version"] == robotiq_async.__version__
-    assert f"## [{robotiq_async.__version__}]" in (ROOT / "CHANGELOG.md").read_text()
+    """In version.py; what cannot take it from there is compared."""
+    version, settings = robotiq_async.__version__, HATCH["version"]
+    found = re.search(settings["pattern"], (ROOT / settings["path"]).read_text())
+    assert found is not None
+    assert found["version"] == version
+    assert "version" not in PROJECT
+    assert f"<version>{version}</version>" in (ROOT / "ros2" / "package.xml").read_text()
+    assert f"## [{version}]" in (ROOT / "CHANGELOG.md").read_text()
+    # As long as nothing is released there is none to cite.
+    assert "\nversion:" not in (ROOT / "CITATION.cff").read_text()
 
 
 def test_the_script_is_the_command_line() -> None:
@@ -49,7 +58,7 @@ def test_every_dependency_is_pinned() -> None:
 
 
 def test_no_package_index_is_named() -> None:
-    for name in ("pyproject.toml", "Makefile", ".ci/run"):
+    for name in ("pyproject.toml", "Makefile", "mkdocs.yml", ".ci/run"):
         assert not re.search(r"index-url|find-links|simple/|://[^\s]*pypi", (ROOT / name).read_text()), name
 
 

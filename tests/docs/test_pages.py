@@ -20,7 +20,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.docs.agents import ROOM, agent_of_the_pages
 from tests.docs.pages import DOCS, PAGES, ROOT, Block, blocks, prose, requirements
 
-FRONT = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]
+FRONT = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")]
 TUTORIAL = DOCS / "tutorial.md"
 """Has a test of its own: its blocks belong together."""
 

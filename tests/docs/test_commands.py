@@ -1,0 +1,80 @@
+"""What the pages have typed into a shell exists: commands with their options, make's targets, extras, files.
+
+It is parsed and not run: most of it is for a gripper, a second machine or a ROS. What runs are the commands
+themselves (tests/cli), the targets (CI) and the Python code (test_pages, environments).
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from robotiq_async.cli.app import build
+from tests.docs.pages import PAGES, ROOT, blocks
+
+LINES = [
+    pytest.param(line.strip(), id=f"{page.name}:{block.line + number}")
+    for page in [*PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
+    for block in blocks(page.read_text(encoding="utf-8"))
+    if block.language == "sh"
+    for number, line in enumerate(block.text.replace("\\\n", " ").splitlines())
+    if line.strip() and not line.startswith("#")
+]
+OTHERS = {"cp", "export", "python3", "ros2", "source", "sudo"}
+"""Programs that are not ours: ``python3 -m venv``, and what ROS and the shell have."""
+TARGETS = set(re.findall(r"^([a-z0-9-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"][
+    "optional-dependencies"
+]
+
+
+def words_of(line: str) -> list[str]:
+    """The words of the first command on a line, without variables before it and what it is piped into."""
+    words = shlex.split(line, comments=True)
+    while words and re.match(r"[A-Z_]+=", words[0]):
+        del words[0]
+    ends = [number for number, word in enumerate(words) if word in ("|", ">", "&", "&&", ";", "2>")]
+    return words[: min(ends, default=len(words))]
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_it_can_be_typed(line: str) -> None:
+    words = words_of(line)
+    program = Path(words[0]).name
+    if program == "robotiq-async":
+        build().parse_args(words[1:], print_error=False, exit_on_error=False)
+    elif program == "make":
+        assert {word for word in words[1:] if "=" not in word} <= TARGETS
+    elif program == "pip" and words[1] == "install":
+        wanted = re.findall(r"\.\[(.*)\]", " ".join(words))
+        assert {extra for each in wanted for extra in each.split(",")} <= set(EXTRAS)
+    elif program == "python":
+        named = [
+            word for word in words[1:] if word.endswith(".py") and "/" in word and not word.startswith("..")
+        ]
+        modules = [words[number + 1] for number, word in enumerate(words) if word == "-m"]
+        assert all((ROOT / each).is_file() for each in named)
+        assert all(has(each) for each in modules)
+    else:
+        assert program in OTHERS, f"what is {program}?"
+
+
+def has(module: str) -> bool:
+    """Whether ``python -m`` finds it: with Python, with what the page installs, or in the clone."""
+    place = ROOT.joinpath(*module.split("."))
+    return (
+        module in ("asyncio", "pytest", "venv", "http.server")
+        or place.is_dir()
+        or place.with_suffix(".py").is_file()
+    )
+
+
+def test_a_command_that_is_not_there_is_found() -> None:
+    with pytest.raises(Exception, match="turbo"):
+        test_it_can_be_typed("robotiq-async move 255 --turbo")
+    with pytest.raises(AssertionError):
+        test_it_can_be_typed("make coffee")

@@ -1,0 +1,59 @@
+"""``make canary``: does the library live with the newest of everything it depends on?
+
+The constraints are left out, so the environment has what somebody gets who installs today, the tools of the
+tests included. It is thrown away; what is newer than in constraints.txt is named, whatever the tests say.
+
+    make canary TESTS="tests/cli tests/telemetry"
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+
+from tests.release.environments import ROOT, FailedError, installed, make
+from tests.release.suites import run_suite
+
+
+def pinned() -> dict[str, set[str]]:
+    """The versions in constraints.txt; several where Python versions differ."""
+    found: dict[str, set[str]] = {}
+    for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines():
+        name, _, version = line.partition(" ;")[0].partition("==")
+        found.setdefault(name, set()).add(version)
+    return found
+
+
+def news(packages: Iterable[str]) -> list[str]:
+    """Which of the packages are not those of the constraints: ``name old -> new`` each.
+
+    Args:
+        packages: ``name==version`` each.
+    """
+    known, found = pinned(), []
+    for package in packages:
+        name, _, version = package.partition("==")
+        before = known.get(name.lower(), {"nothing"})
+        if version not in before:
+            found.append(f"{name} {' or '.join(sorted(before))} -> {version}")
+    return found
+
+
+def main() -> int:
+    """Install, and test; gives the exit code."""
+    try:
+        with tempfile.TemporaryDirectory(prefix="robotiq_async_canary") as folder:
+            python = make(Path(folder) / "venv", "--upgrade", "--editable", f"{ROOT}[all,dev]")
+            print("not as in constraints.txt:", "; ".join(news(installed(python))) or "nothing", flush=True)
+            outcome = run_suite(python)
+    except FailedError as error:
+        print(error, file=sys.stderr)
+        return 1
+    print(outcome or "The library does not live with these.")
+    return 0 if outcome else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

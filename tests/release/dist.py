@@ -1,0 +1,133 @@
+"""``make dist``: the sdist and the wheel, each tried by somebody who has nothing else.
+
+    dist/robotiq_async-VERSION.tar.gz
+    dist/robotiq_async-VERSION-py3-none-any.whl
+
+Each goes into two new environments, outside the clone: the base install runs the demo as a module and says
+what the command line needs; with the extra ``cli`` the command runs it.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import tarfile
+import tempfile
+import zipfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Final
+
+from docs.site.versions import version
+from tests.release.environments import CONSTRAINTS, ROOT, FailedError, installed, make, run, uv
+
+DIST: Final = ROOT / "dist"
+IN_THE_SDIST: Final = (
+    *("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md", "SECURITY.md"),
+    *("constraints.txt", "mkdocs.yml", "demo/demo.py", "docs/index.md", "ros2/package.xml"),
+    *("robotiq_async/__init__.py", "tests/conftest.py"),
+)
+IN_THE_WHEEL: Final = (
+    "robotiq_async/py.typed",
+    "robotiq_async/_demo.py",
+    "robotiq_async/data/robotiq_3f.urdf",
+)
+LAST_PART: Final = "What the hand went through"
+"""The demo's heading of its last part."""
+
+
+def build() -> list[Path]:
+    """Both, in a folder that is emptied before.
+
+    Raises:
+        FailedError: they cannot be built, or hold what they should not.
+    """
+    shutil.rmtree(DIST, ignore_errors=True)
+    uv("build", "--quiet", "--out-dir", str(DIST), str(ROOT))
+    name = f"robotiq_async-{version()}"
+    sdist, wheel = DIST / f"{name}.tar.gz", DIST / f"{name}-py3-none-any.whl"
+    found = {path.name for path in DIST.iterdir() if path.suffix in (".gz", ".whl")}
+    if found != {sdist.name, wheel.name}:
+        raise FailedError(f"built {sorted(found)}, and not {sdist.name} and {wheel.name}")
+    with tarfile.open(sdist) as archive:
+        files = {member.name.removeprefix(f"{name}/") for member in archive}
+    _need(sdist, files, IN_THE_SDIST)
+    with zipfile.ZipFile(wheel) as archive:
+        files = {*archive.namelist()}
+    _need(wheel, files, (*IN_THE_WHEEL, f"{name}.dist-info/licenses/LICENSE"))
+    strange = [each for each in files if not each.startswith(("robotiq_async/", f"{name}."))]
+    if strange:
+        raise FailedError(f"{wheel.name} installs {strange}")
+    return [sdist, wheel]
+
+
+def _need(archive: Path, files: set[str], wanted: tuple[str, ...]) -> None:
+    if gone := [each for each in wanted if each not in files]:
+        raise FailedError(f"{archive.name} has no {gone}")
+
+
+def try_base(artifact: Path, folder: Path) -> list[str]:
+    """The base install: the library, and the demo as a module. Gives what it has installed.
+
+    Raises:
+        FailedError: it does not work.
+    """
+    python = make(folder / "base", *CONSTRAINTS, str(artifact))
+    said = run(
+        str(python), "-c", "import robotiq_async as it; print(it.__version__, it.__file__)", folder=folder
+    )
+    if not said.startswith(f"{version()} {folder}"):
+        raise FailedError(f"{artifact.name} installed {said}")
+    _demo(str(python), "-m", "robotiq_async._demo", folder=folder)
+    said = run(str(python), "-m", "robotiq_async", "demo", folder=folder, code=1)
+    if "pip install 'robotiq-async[cli]'" not in said or said.count("\n") != 1:
+        raise FailedError(f"{artifact.name} without cli says {said}")
+    return installed(python)
+
+
+def try_command(artifact: Path, folder: Path) -> None:
+    """With the extra ``cli``: the command.
+
+    Raises:
+        FailedError: it does not work.
+    """
+    python = make(folder / "cli", *CONSTRAINTS, f"robotiq-async[cli] @ {artifact.as_uri()}")
+    command = str(python.parent / "robotiq-async")
+    if run(command, "--version", folder=folder).strip() != version():
+        raise FailedError(f"{artifact.name}: {command} is of another version")
+    _demo(command, "demo", folder=folder)
+
+
+def _demo(*command: str, folder: Path) -> None:
+    printed = run(*command, folder=folder)
+    if LAST_PART not in printed or "Traceback" in printed:
+        raise FailedError(f"{' '.join(command)} did not end well:\n{printed}")
+
+
+def main() -> int:
+    """Build, and try; gives the exit code."""
+    try:
+        with tempfile.TemporaryDirectory(prefix="robotiq_async_dist") as place, ThreadPoolExecutor(4) as pool:
+            tried = []
+            for artifact in build():
+                folder = Path(place).resolve() / artifact.name
+                folder.mkdir()
+                tried.append(
+                    (
+                        artifact,
+                        pool.submit(try_base, artifact, folder),
+                        pool.submit(try_command, artifact, folder),
+                    )
+                )
+            for artifact, base, command in tried:
+                holds = ", ".join(base.result())
+                command.result()
+                print(f"dist/{artifact.name}: {artifact.stat().st_size >> 10} KiB; installs {holds}")
+    except FailedError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,82 @@
+"""New environments with nothing in them but what is asked for, and programs that run there."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+ROOT: Final = Path(__file__).parents[2]
+CONSTRAINTS: Final = ("--constraints", str(ROOT / "constraints.txt"))
+BARE: Final = {"PATH": "/usr/local/bin:/usr/bin:/bin"}
+"""Variables that lend a program no modules."""
+PATIENCE: Final = 600.0
+"""Seconds after which a program counts as hanging."""
+
+
+class FailedError(Exception):
+    """Something did not do what a release needs."""
+
+
+def make(folder: Path, *requirements: str, python: str = sys.executable) -> Path:
+    """A new environment; gives its interpreter.
+
+    Args:
+        folder: where it will be.
+        requirements: what is installed, and options of ``pip install``.
+        python: the interpreter that it is made of.
+
+    Raises:
+        FailedError: it cannot be made.
+    """
+    uv("venv", "--quiet", "--python", python, str(folder))
+    interpreter = folder / "bin" / "python"
+    uv("pip", "install", "--quiet", "--python", str(interpreter), *requirements)
+    return interpreter
+
+
+def installed(interpreter: Path) -> list[str]:
+    """What an environment holds: ``name==version`` each.
+
+    Raises:
+        FailedError: it is none.
+    """
+    printed = uv("pip", "list", "--python", str(interpreter), "--format", "freeze", "--exclude-editable")
+    return [line for line in printed.splitlines() if "==" in line]
+
+
+def uv(*arguments: str) -> str:
+    """What uv prints; how it reaches the package index may be in the variables.
+
+    Raises:
+        FailedError: it fails.
+    """
+    return run(sys.executable, "-m", "uv", *arguments, variables=os.environ)
+
+
+def run(*command: str, folder: Path = ROOT, code: int = 0, variables: Mapping[str, str] = BARE) -> str:
+    """What a program prints that ends as it should.
+
+    Raises:
+        FailedError: it ends otherwise, or not at all.
+    """
+    try:
+        done = subprocess.run(
+            command,
+            cwd=folder,
+            env=variables,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            check=False,
+            timeout=PATIENCE,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise FailedError(f"{' '.join(command)} still ran after {PATIENCE:g} s") from error
+    if done.returncode != code:
+        raise FailedError(f"{' '.join(command)} ended with {done.returncode}:\n{done.stdout}")
+    return done.stdout

@@ -1,0 +1,80 @@
+"""``make pythons``: the tests of the library on other Pythons.
+
+One that is not here is asked of uv, which downloads it; one that cannot be had is named and left out: nothing
+fails then, and nothing is claimed.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Final
+
+from tests.release.environments import CONSTRAINTS, ROOT, FailedError, make, uv
+from tests.release.suites import run_suite
+
+TOOLS: Final = ("hypothesis", "pyModbusTCP", "pyserial", "pytest", "pytest-asyncio", "pytest-xdist", "uvloop")
+"""What the tests of the library need beside it."""
+
+
+def interpreter(version: str) -> str | None:
+    """A Python of this version, or None.
+
+    Args:
+        version: as in ``3.12``.
+    """
+    command = shutil.which(f"python{version}")
+    if command is not None and (found := _asked(command, version)):
+        return found
+    for arguments in (("find", "--no-python-downloads"), ("install",), ("find", "--no-python-downloads")):
+        try:
+            found = uv("python", *arguments, version).strip().rpartition("\n")[2]
+        except FailedError:
+            continue
+        if arguments[0] == "find":
+            return found
+    return None
+
+
+def _asked(command: str, version: str) -> str:
+    """Where a command's interpreter is; empty if it does not run."""
+    # pyenv's commands do nothing unless they are told which version is meant.
+    variables = {**os.environ, "PYENV_VERSION": version}
+    asked = [command, "-c", "import sys; print(sys.executable)"]
+    done = subprocess.run(asked, env=variables, capture_output=True, text=True, check=False)
+    return "" if done.returncode else done.stdout.strip()
+
+
+def tried(version: str) -> str:
+    """How the tests end on a Python; empty if something failed.
+
+    Raises:
+        FailedError: the library cannot be installed there.
+    """
+    python = interpreter(version)
+    if python is None:
+        return "left out: it is not here, and uv cannot get it"
+    with tempfile.TemporaryDirectory(prefix="robotiq_async_python") as folder:
+        return run_suite(make(Path(folder) / "venv", *CONSTRAINTS, *TOOLS, "-e", str(ROOT), python=python))
+
+
+def main() -> int:
+    """Try each version of the command line; gives the exit code."""
+    failed = False
+    for version in sys.argv[1:]:
+        try:
+            outcome = tried(version)
+        except FailedError as error:
+            print(error, file=sys.stderr)
+            outcome = ""
+        failed = failed or not outcome
+        print(f"Python {version}: {outcome or 'FAILED'}", flush=True)
+    return failed
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,62 @@
+"""What the releases' programs decide; the rest they try themselves: make dist, pythons, canary."""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+from fnmatch import fnmatch
+from pathlib import Path
+
+import pytest
+
+from tests.release import dist, pythons
+from tests.release.canary import news, pinned
+from tests.release.environments import ROOT, FailedError, run
+
+HERE = f"{sys.version_info[0]}.{sys.version_info[1]}"
+
+
+def test_what_the_sdist_has_to_hold_is_there_and_included() -> None:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    included = settings["tool"]["hatch"]["build"]["targets"]["sdist"]["include"]
+    for name in dist.IN_THE_SDIST:
+        assert (ROOT / name).is_file()
+        # The license is taken in as such.
+        assert name == "LICENSE" or any(
+            fnmatch(f"/{name}", each) or f"/{name}".startswith(f"{each}/") for each in included
+        )
+
+
+def test_a_file_that_is_missing_is_named() -> None:
+    with pytest.raises(FailedError, match=r"a.whl has no \['b'\]"):
+        dist._need(Path("a.whl"), {"a"}, ("a", "b"))
+
+
+def test_a_program_that_fails_is_told_with_what_it_printed() -> None:
+    with pytest.raises(FailedError, match=r"ended with 3:\nwords"):
+        run(sys.executable, "-c", "print('words'); raise SystemExit(3)")
+    assert run(sys.executable, "-c", "raise SystemExit(3)", code=3) == ""
+
+
+def test_a_program_is_lent_no_modules(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", "/nowhere")
+    assert "/nowhere" not in run(sys.executable, "-c", "import sys; print(sys.path)")
+
+
+def test_what_is_newer_than_the_constraints_is_named() -> None:
+    (version,) = pinned()["pymodbus"]
+    assert news([f"pymodbus=={version}", "anyio==99.0", "stranger==1.0"]) == [
+        f"anyio {next(iter(pinned()['anyio']))} -> 99.0",
+        "stranger nothing -> 1.0",
+    ]
+
+
+def test_a_package_that_is_pinned_twice_may_be_either() -> None:
+    versions = pinned()["numpy"]
+    assert len(versions) == 2
+    assert news(f"numpy=={each}" for each in versions) == []
+
+
+def test_a_python_is_found_by_its_version() -> None:
+    found = pythons._asked(sys.executable, HERE)
+    assert Path(found).samefile(sys.executable)
