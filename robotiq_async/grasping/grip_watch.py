@@ -15,6 +15,9 @@ SLIP_COUNTS: Final = 3
 """Counts that an axis in contact may move without being told: more than the 2 by which readings and requests
 differ (manual). What a slip is on real hardware has not been seen."""
 
+LATE_S: Final = 1.0
+"""No status of a hand comes later than that after a newer one."""
+
 
 @dataclass(slots=True)
 class _Grip:
@@ -69,9 +72,13 @@ class GripWatch:
         return Finger(sum(axis for axis, grip in self._grips.items() if not grip.is_slipping))
 
     def see(self, status: RobotiqStatus) -> list[GripEvent]:
-        """Take in a status; returns what it tells. One that is older than the last is passed over."""
+        """Take in a status; returns what it tells.
+
+        One that is older than the last is late, and passed over. One that is older by a second or more is of
+        another clock, and believed: a watch that waits for the time to come back hears nothing.
+        """
         last = self._last
-        if last is not None and status.timestamp < last.timestamp:
+        if last is not None and 0 < last.timestamp - status.timestamp < LATE_S:
             return []
         self._last = status
         changes = [(axis, *change) for axis in self._axes for change in self._changes(axis, status)]

@@ -128,9 +128,19 @@ def test_the_other_contact_is_another_grip() -> None:
         seen(CLOSING, 150, byte_0=0x09),  # an automatic release
         seen(MOVING, 150, byte_0=0x31),  # a halt after which no contact is reported
         seen(MOVING, 150, fault=FAULT),
+        seen(MOVING, 150, 0, byte_0=0x09),
+        seen(MOVING, 150, 0, byte_0=0x31),
         seen(MOVING, 150, 0, fault=FAULT),
     ],
-    ids=["reset", "release", "halt", "fault", "fault under another request"],
+    ids=[
+        "reset",
+        "release",
+        "halt",
+        "fault",
+        "release under another request",
+        "halt under another request",
+        "fault under another request",
+    ],
 )
 def test_what_is_not_known_to_be_held_is_lost(then: RobotiqStatus) -> None:
     assert told(seen(CLOSING, 150), then) == [(LOST, 0)]
@@ -146,9 +156,18 @@ def test_without_an_echo_to_go_by_nothing_counts_as_asked_for() -> None:
     assert told(seen(CLOSING, 150, 0), seen(MOVING, 150, 0)) == [(LOST, 0)]
 
 
-def test_an_older_status_is_passed_over() -> None:
-    late = seen(REACHED, 100, 100, at=1.0)
+def test_from_the_first_echo_on_that_presses_letting_go_can_be_told() -> None:
+    assert told(seen(CLOSING, 150, 0), seen(CLOSING, 150), seen(MOVING, 149, 0)) == [(RELEASED, -1)]
+
+
+def test_a_status_that_is_late_is_passed_over() -> None:
+    late = seen(REACHED, 100, 100, at=1.5)
     assert told(seen(CLOSING, 150, at=2.0), late, seen(CLOSING, 150, at=3.0)) == []
+
+
+def test_a_status_of_another_clock_is_believed() -> None:
+    """Else whoever begins with one that was kept from before a restart of the computer hears nothing."""
+    assert told(seen(CLOSING, 150, at=5000.0), seen(REACHED, 241, at=7.0)) == [(LOST, 91)]
 
 
 def test_only_the_axes_that_are_watched_tell() -> None:
