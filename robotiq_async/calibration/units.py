@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import overload
 
 from .scales import (
@@ -79,11 +80,9 @@ class Units:
         """
         if (mm_per_s is None) == (closing_s is None):
             raise TypeError("speed() takes one of mm_per_s and closing_s")
-        values = covered(self.speeds.points)
         if closing_s is not None:
-            times = {value: self.speeds.closing_time(value) for value in values}
-            return _closest("closing_s", closing_s, times, "s")
-        return _closest("mm_per_s", mm_per_s, self._mm_per_s(), "mm/s")
+            return _closest("closing_s", closing_s, _closing_times(self.speeds), "s")
+        return _closest("mm_per_s", mm_per_s, _mm_per_s(self.speeds), "mm/s")
 
     def force(self, *, label_n: float) -> int:
         """The force value, 0..255, whose label comes closest; the lowest of several.
@@ -95,7 +94,7 @@ class Units:
             TypeError: not a number.
             ValueError: no value has such a label; told in newton.
         """
-        return _closest("label_n", label_n, self._labels(), "N (a label, not a measured force)")
+        return _closest("label_n", label_n, _labels(self.forces), "N (a label, not a measured force)")
 
     # -- from counts -----------------------------------------------------------------------------------
 
@@ -140,20 +139,30 @@ class Units:
 
     def __repr__(self) -> str:
         """Ranges and sources."""
-        speeds, labels = self._mm_per_s().values(), self._labels().values()
+        speeds, labels = _mm_per_s(self.speeds).values(), _labels(self.forces).values()
         return (
             f"<Units {_words(0, STROKE_MM)} mm (nominal), "
             f"{_words(min(speeds), max(speeds))} mm/s ({self.speeds.source}), "
             f"labels {_words(min(labels), max(labels))} N ({self.forces.source})>"
         )
 
-    # -- inside ----------------------------------------------------------------------------------------
 
-    def _mm_per_s(self) -> dict[int, float]:
-        return {value: self.speeds.mm_per_s(value) for value in covered(self.speeds.points)}
+# Kept, for control loops ask at every turn, and a table takes a millisecond.
 
-    def _labels(self) -> dict[int, float]:
-        return {value: self.forces.newton(value) for value in covered(self.forces.points)}
+
+@lru_cache(maxsize=8)
+def _closing_times(speeds: SpeedCalibration) -> Mapping[int, float]:
+    return {value: speeds.closing_time(value) for value in covered(speeds.points)}
+
+
+@lru_cache(maxsize=8)
+def _mm_per_s(speeds: SpeedCalibration) -> Mapping[int, float]:
+    return {value: speeds.mm_per_s(value) for value in covered(speeds.points)}
+
+
+@lru_cache(maxsize=8)
+def _labels(forces: ForceCalibration) -> Mapping[int, float]:
+    return {value: forces.newton(value) for value in covered(forces.points)}
 
 
 def _closest(name: str, wanted: object, figures: Mapping[int, float], unit: str) -> int:

@@ -9,7 +9,7 @@ from ..control.contact import agrees
 from ..enums import Finger, ObjectStatus
 from ..wire.checks import check_int, check_mask
 from ..wire.status import RobotiqStatus
-from .grip_events import GripChange, GripEvent
+from .grip_event import GripChange, GripEvent
 
 SLIP_COUNTS: Final = 3
 """Counts that an axis in contact may move without being told: more than the 2 by which readings and requests
