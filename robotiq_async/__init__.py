@@ -4,6 +4,7 @@ What a program needs is imported from here. Where it comes from, and what stands
 
     hand, protocol           RobotiqHand, and what every hand can do
     session                  the task that polls, from start() to stop()
+    grasping                 who holds a part, and what becomes of the grip
     control                  what to write next: state machine, moves, adoption
     link                     addresses, transports, Modbus: the bytes
     wire                     status and request, decoded and encoded
@@ -19,6 +20,7 @@ What a program needs is imported from here. Where it comes from, and what stands
 Nothing of this has run on real hardware yet.
 """
 
+from .calibration import Units
 from .control.motion import MoveResult
 from .control.triggers import Trigger
 from .enums import (
@@ -56,7 +58,9 @@ from .errors import (
     RobotiqStateError,
     StateTimeoutError,
 )
+from .grasping import GraspResult, GripChange, GripEvent
 from .hand import RobotiqHand
+from .hand.grasping import GripEvents
 from .link.transport import Transport
 from .session.reconnecting import ReconnectPolicy
 from .session.statistics import Statistics
@@ -79,6 +83,10 @@ __all__ = [
     "ConnectionLostError",
     "Fault",
     "Finger",
+    "GraspResult",
+    "GripChange",
+    "GripEvent",
+    "GripEvents",
     "GripperFaultError",
     "Initialization",
     "InvalidStateError",
@@ -106,6 +114,7 @@ __all__ = [
     "Transition",
     "Transport",
     "Trigger",
+    "Units",
 ]
 
 

@@ -11,8 +11,10 @@ from collections.abc import Iterator
 from types import TracebackType
 from typing import Protocol, Self, TypeVar
 
+from .calibration import Units
 from .control.motion import MoveResult
 from .enums import Finger, State
+from .grasping import SLIP_COUNTS, GraspResult, GripEvent
 from .session.statistics import Statistics
 from .session.streams import SentRequest, Transition
 from .wire.status import RobotiqStatus
@@ -176,6 +178,36 @@ class Hand(Protocol):
     ) -> MoveResult:
         """Close the fingers, not the connection: :meth:`move` to 255."""
 
+    async def grasp(
+        self,
+        fingers: Finger | int = Finger.ABC,
+        *,
+        at_least: int | None = None,
+        speed: int | None = None,
+        force: int | None = None,
+        timeout: float | None = None,
+    ) -> GraspResult:
+        """Close fingers until each of them has met something or is closed, and say which of them hold it.
+
+        Too few contacts are a result and not an error: the result is false, and the fingers stay as they are.
+        When cancelled or timed out, as :meth:`move`.
+
+        What holds is what the gripper calls a contact while closing. A thin object between fingertips may
+        never be called one; and a contact latches: a finger that stood in one before still counts, also when
+        the part has been taken out meanwhile. Open first, or ask for more force.
+
+        Args:
+            fingers: the axes that close.
+            at_least: contacts that make a grasp, 1..as many as there are axes; None for all of them.
+            speed: new speed of these axes; None leaves it.
+            force: new force of these axes; None leaves it.
+            timeout: seconds; None for twice the expected time plus 2 s.
+
+        Raises:
+            TypeError, ValueError: an argument of the wrong type or outside its range; nothing is sent.
+            RobotiqError: as :meth:`move`.
+        """
+
     async def hold(self, fingers: Finger | int = Finger.ALL) -> None:
         """Ask axes that move to stay where they are; returns when the gripper has acknowledged it.
 
@@ -234,6 +266,13 @@ class Hand(Protocol):
         """Which gripper, for people and labels: no two hands of a process have the same one."""
 
     @property
+    def units(self) -> Units:
+        """Converts mm, mm/s, seconds and newton labels to what commands take, and back.
+
+        There before the start, and the same as long as the hand lives.
+        """
+
+    @property
     def state(self) -> State:
         """Where the hand is."""
 
@@ -285,6 +324,31 @@ class Hand(Protocol):
 
     def requests(self, buffer: int | None = None) -> HandStream[SentRequest]:
         """Every request written from now on, by whomever it was asked for; None loses none."""
+
+    def grip_events(
+        self,
+        fingers: Finger | int = Finger.ABC,
+        *,
+        since: RobotiqStatus | None = None,
+        slip: int = SLIP_COUNTS,
+    ) -> HandStream[GripEvent]:
+        """What becomes of the grips from now on: contacts gained and lost, parts that slip.
+
+        For one reader, made of :meth:`statuses`, and ends as these do. Nothing is told while the link is
+        down; what has become of a grip meanwhile is told when it is back.
+
+        It tells what the gripper reports. A contact latches: a part that is pulled out is noticed when its
+        finger closes on, which it does when more force is asked for, and by the manual not before.
+
+        Args:
+            fingers: the axes that are watched.
+            since: the status to begin with, ``result.status`` of a grasp or a move: what changes between that
+                and the first status that is read is told, too. None for the newest one.
+            slip: counts that an axis in contact may move without being told, 1..255.
+
+        Raises:
+            TypeError, ValueError: an argument of the wrong type or outside its range.
+        """
 
     async def wait_for_state(self, *states: State, timeout: float | None = None) -> State:
         """Wait until the hand is, if only for a moment, in one of these states, and return it.

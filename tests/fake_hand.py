@@ -27,7 +27,9 @@ from robotiq_async import (
     Transition,
     Trigger,
 )
+from robotiq_async.calibration import Units
 from robotiq_async.enums import AXES, ObjectStatus
+from robotiq_async.hand.grasping import Grasping
 from robotiq_async.wire import registers as reg
 from robotiq_async.wire.request import AxisRequest, Request
 
@@ -73,7 +75,7 @@ class FakeStream(Generic[T]):
         self.end()
 
 
-class FakeHand:
+class FakeHand(Grasping):
     """An active gripper whose axes are where they are sent as soon as they are sent there.
 
     Attributes:
@@ -82,6 +84,7 @@ class FakeHand:
 
     address = "fake://hand"
     is_moving = False
+    units = Units()
 
     def __init__(self) -> None:
         self.state = State.DISCONNECTED

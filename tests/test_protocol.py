@@ -13,7 +13,16 @@ import pytest
 from textual.widgets import RichLog, Static
 
 import robotiq_async
-from robotiq_async import Fault, Finger, InvalidStateError, RobotiqHand, RobotiqStatus, State, Stream
+from robotiq_async import (
+    Fault,
+    Finger,
+    GripChange,
+    InvalidStateError,
+    RobotiqHand,
+    RobotiqStatus,
+    State,
+    Stream,
+)
 from robotiq_async.actions import ACTIONS, Operator
 from robotiq_async.cli.commands.status import as_dict
 from robotiq_async.cli.stream_output import print_objects
@@ -196,6 +205,17 @@ async def test_what_is_printed(hand: FakeHand, capfd: pytest.CaptureFixture[str]
     assert any(each["kind"] == "status" and each["A"]["position"] == 100 for each in told)
     assert told[-1]["state"] == "SHUTDOWN"
     assert "RUNNING_IDLE: active, not moving" in lines
+
+
+async def test_a_grasp_and_what_becomes_of_it(hand: FakeHand) -> None:
+    hand.obstacle = 150
+    grasp = await hand.grasp()
+    assert grasp.holds == Finger.ABC
+    assert hand.units.mm(grasp.positions[Finger.A]) == pytest.approx(60, abs=1)
+    events = hand.grip_events(since=grasp.status)
+    await hand.open(Finger.A)
+    event = await anext(events)
+    assert (event.change, event.finger, event.holds) == (GripChange.RELEASED, Finger.A, Finger.B | Finger.C)
 
 
 async def test_measurements(hand: FakeHand) -> None:

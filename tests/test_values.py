@@ -22,6 +22,9 @@ from robotiq_async import (
     ConnectFailedError,
     Fault,
     Finger,
+    GraspResult,
+    GripChange,
+    GripEvent,
     GripperFaultError,
     InvalidStateError,
     Mode,
@@ -35,6 +38,7 @@ from robotiq_async import (
     Statistics,
     Transition,
     Trigger,
+    Units,
 )
 from robotiq_async.calibration import ForceCalibration, SpeedCalibration
 from robotiq_async.calibration.csv_tables import SPEED, TableError
@@ -96,6 +100,9 @@ VALUES: list[object] = [
     SpeedCalibration.thesis(),
     SpeedCalibration("mine", [[0, 9.0], [255, 2.0]]),  # type: ignore[arg-type]
     ForceCalibration.nominal(),
+    Units(),
+    GraspResult(result(), 2),
+    GripEvent(GripChange.SLIPPED, A, 5, A | B, status_of(0xB9, 0xEA, at=12.5, sequence=7)),
     Request(activate=True, mode=Mode.PINCH),
     parse_address("tcp://gripper"),
     TCP_REGISTERS,

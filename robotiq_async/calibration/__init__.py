@@ -9,6 +9,7 @@ from .scales import (
     opening_mm,
     position_of_opening,
 )
+from .units import Units
 
 __all__ = [
     "NOMINAL_FORCES_N",
@@ -16,6 +17,7 @@ __all__ = [
     "STROKE_MM",
     "ForceCalibration",
     "SpeedCalibration",
+    "Units",
     "opening_mm",
     "position_of_opening",
 ]

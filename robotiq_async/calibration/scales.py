@@ -308,4 +308,9 @@ def closest(name: str, wanted: float, figures: Mapping[int, float]) -> int:
         ValueError: wanted is below or above all figures.
     """
     check_number(name, wanted, min(figures.values()), max(figures.values()))
+    return nearest(wanted, figures)
+
+
+def nearest(wanted: float, figures: Mapping[int, float]) -> int:
+    """The value whose figure comes closest, the lowest of several."""
     return min(figures, key=lambda value: abs(figures[value] - wanted))

@@ -1,6 +1,7 @@
 """RobotiqHand: one gripper, for the program that moves it.
 
-What it shows, how it recovers, what it is told and how it lives are a file each, in this order.
+What it shows, how it recovers, what it is told and how it lives are a file each, in this order. How it grasps
+is for any hand.
 """
 
 from .robotiq_hand import RobotiqHand

@@ -6,6 +6,7 @@ import inspect
 from collections.abc import Callable
 from typing import TypeVar
 
+from ..calibration import Units
 from ..control.state_machine import StateMachine
 from ..enums import State
 from ..errors import ConnectionLostError, NotStartedError
@@ -32,6 +33,14 @@ class Observation:
     def address(self) -> str:
         """The gripper's address in its full form; for a transport object, what messages call it."""
         return self._options.address
+
+    @property
+    def units(self) -> Units:
+        """Converts mm, mm/s, seconds and newton labels to what commands take, and back.
+
+        By the calibrations that the hand was made with; there before the start.
+        """
+        return self._options.units
 
     @property
     def state(self) -> State:

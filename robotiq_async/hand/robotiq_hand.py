@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import TracebackType
 from typing import Self
 
-from ..calibration import SpeedCalibration
+from ..calibration import ForceCalibration, SpeedCalibration
 from ..control.state_machine import StateMachine
 from ..enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..link.transport import Transport
@@ -21,9 +21,10 @@ from ..session.reconnecting import ReconnectPolicy
 from ..session.session import Session
 from ..session.streams import Channels
 from .commands import Commands
+from .grasping import Grasping
 
 
-class RobotiqHand(Commands):
+class RobotiqHand(Commands, Grasping):
     """A Robotiq 3-Finger gripper behind Modbus TCP, a serial line, or simulated.
 
     Use it as ``async with RobotiqHand(address) as hand:``, or call :meth:`start` and :meth:`stop`. One
@@ -49,6 +50,7 @@ class RobotiqHand(Commands):
         request_address: int | None = None,
         status_address: int | None = None,
         calibration: SpeedCalibration | None = None,
+        force_calibration: ForceCalibration | None = None,
     ) -> None:
         """Check every option. Opens nothing and needs no running loop.
 
@@ -70,8 +72,9 @@ class RobotiqHand(Commands):
             force: what the axes get until set otherwise, 0..255.
             request_address: first request register; by default 0 over TCP and 0x03E8 over RTU.
             status_address: first status register; by default 0 over TCP and 0x07D0 over RTU.
-            calibration: how fast this gripper is: default timeouts of moves come from it. None for the
-                thesis's gripper.
+            calibration: how fast this gripper is: default timeouts of moves come from it, and the speeds of
+                :attr:`units`. None for the thesis's gripper.
+            force_calibration: what :attr:`units` labels force values with. None for the manual's figures.
 
         Raises:
             TypeError: an option of the wrong type.
@@ -90,6 +93,7 @@ class RobotiqHand(Commands):
             request_address=request_address,
             status_address=status_address,
             calibration=calibration,
+            force_calibration=force_calibration,
         )
         self._machine = StateMachine()
         self._channels = Channels()

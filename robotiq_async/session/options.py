@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
-from ..calibration.scales import SpeedCalibration
+from ..calibration import ForceCalibration, SpeedCalibration, Units
 from ..link.address import parse_address
 from ..link.guard import GuardedTransport
 from ..link.modbus import ModbusTransport
@@ -35,6 +35,7 @@ number, and whoever has it open gets part of what arrives."""
 
 # Read when this is imported: a hand may be made in a running loop, and that waits for no disk.
 _THESIS: Final = SpeedCalibration.thesis()
+_NOMINAL: Final = ForceCalibration.nominal()
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +52,8 @@ class Options:
     policy: ReconnectPolicy | None
     speed: int
     force: int
-    closing_time: Callable[[int], float]
-    """Seconds of a full closing at a speed."""
+    units: Units
+    """What positions, speeds and forces mean to people; default timeouts of moves come from its speeds."""
 
 
 def check_options(
@@ -69,6 +70,7 @@ def check_options(
     request_address: object,
     status_address: object,
     calibration: object,
+    force_calibration: object,
 ) -> Options:
     """Check every option and make the transport; opens nothing and needs no running loop.
 
@@ -115,19 +117,27 @@ def check_options(
         policy=_check_reconnect(reconnect),
         speed=check_byte("speed", speed),
         force=check_byte("force", force),
-        closing_time=_check_calibration(calibration),
+        units=check_units(calibration, force_calibration),
     )
 
 
-def _check_calibration(calibration: object) -> Callable[[int], float]:
-    if calibration is None:
-        return _THESIS.closing_time
-    if not isinstance(calibration, SpeedCalibration):
+def check_units(calibration: object, force_calibration: object) -> Units:
+    """What the values of a hand mean; None for the thesis's speeds, and for the manual's forces.
+
+    Raises:
+        TypeError: not a calibration of its kind.
+        ValueError: speeds that do not reach over 0..255.
+    """
+    speeds = _THESIS if calibration is None else calibration
+    forces = _NOMINAL if force_calibration is None else force_calibration
+    if not isinstance(speeds, SpeedCalibration):
         raise TypeError(f"calibration must be None or a SpeedCalibration, got {calibration!r}")
-    first, last = calibration.points[0][0], calibration.points[-1][0]
+    if not isinstance(forces, ForceCalibration):
+        raise TypeError(f"force_calibration must be None or a ForceCalibration, got {force_calibration!r}")
+    first, last = speeds.points[0][0], speeds.points[-1][0]
     if (first, last) != (0, 255):
         raise ValueError(f"calibration must reach over the speed values 0..255, got {first}..{last}")
-    return calibration.closing_time
+    return Units(speeds, forces)
 
 
 def _check_reconnect(reconnect: object) -> ReconnectPolicy | None:

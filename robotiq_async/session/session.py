@@ -67,7 +67,7 @@ class Session:
         self._loop = asyncio.get_running_loop()
         self.machine = machine
         self._claim()
-        self.controller = Controller(machine, options.speed, options.force, options.closing_time)
+        self.controller = Controller(machine, options.speed, options.force, options.units.closing_s)
         self.controller.activates = activate
         self.counters = Counters()
         self._channels = channels

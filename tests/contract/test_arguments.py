@@ -20,6 +20,12 @@ CALLS: dict[str, tuple[Call, str]] = {
     "move force": (lambda bad: lambda hand: hand.move(3, force=bad), "force"),
     "open fingers": (lambda bad: lambda hand: hand.open(bad), "fingers"),
     "close speed": (lambda bad: lambda hand: hand.close(speed=bad), "speed"),
+    "grasp fingers": (lambda bad: lambda hand: hand.grasp(bad), "fingers"),
+    "grasp at_least": (lambda bad: lambda hand: hand.grasp(at_least=bad), "at_least"),
+    "grasp speed": (lambda bad: lambda hand: hand.grasp(speed=bad), "speed"),
+    "grasp force": (lambda bad: lambda hand: hand.grasp(force=bad), "force"),
+    "grip_events fingers": (lambda bad: lambda hand: hand.grip_events(bad), "fingers"),
+    "grip_events slip": (lambda bad: lambda hand: hand.grip_events(slip=bad), "slip"),
     "set_position value": (lambda bad: lambda hand: hand.set_position(bad), "value"),
     "set_position fingers": (lambda bad: lambda hand: hand.set_position(3, bad), "fingers"),
     "set_speed value": (lambda bad: lambda hand: hand.set_speed(bad), "value"),
@@ -34,6 +40,7 @@ CALLS: dict[str, tuple[Call, str]] = {
 }
 TIMEOUTS: dict[str, Call] = {
     "move": lambda bad: lambda hand: hand.move(3, timeout=bad),
+    "grasp": lambda bad: lambda hand: hand.grasp(timeout=bad),
     "recover": lambda bad: lambda hand: hand.recover(timeout=bad),
     "wait_for_state": lambda bad: lambda hand: hand.wait_for_state(hand.state, timeout=bad),
 }
@@ -101,6 +108,25 @@ async def test_states(where: str) -> None:
             await hand.wait_for_state()
         with pytest.raises(TypeError, match="states must be State members, got 'FAULT'"):
             await hand.wait_for_state("FAULT")  # type: ignore[arg-type]
+
+
+@contract
+async def test_more_contacts_than_axes(where: str) -> None:
+    for fingers, at_least in ((Finger.ABC, 4), (Finger.ABC, 0), (Finger.A, 2), (Finger.ALL, 5)):
+        among = f"at_least must be in 1..{fingers.bit_count()}, got {at_least}"
+        async with bench(where) as here, here.make() as hand:
+            writes = here.writes
+            with pytest.raises(ValueError, match=re.escape(among)):
+                await hand.grasp(fingers, at_least=at_least)
+            await asyncio.sleep(0.1)
+            assert here.writes == writes
+
+
+@contract
+async def test_where_grip_events_begin(where: str) -> None:
+    async with bench(where) as here, here.make() as hand:
+        with pytest.raises(TypeError, match="since must be None or a RobotiqStatus, got 'now'"):
+            hand.grip_events(since="now")  # type: ignore[arg-type]
 
 
 @contract

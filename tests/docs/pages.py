@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -32,6 +33,16 @@ def blocks(text: str) -> list[Block]:
         Block(found[1], found[2], text[: found.start(2)].count("\n") + 1)
         for found in re.finditer(r"^```(\w*)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
     ]
+
+
+def outputs(text: str) -> dict[Block, Block]:
+    """What a page shows as printed by some of its blocks: a block of text right after one of Python."""
+    return {
+        block: following
+        for block, following in pairwise(blocks(text))
+        if (block.language, following.language) == ("python", "text")
+        and following.line == block.line + block.text.count("\n") + 3
+    }
 
 
 def prose(text: str) -> str:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import ast
 import inspect
 import re
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, redirect_stdout
+from io import StringIO
 from pathlib import Path
 from types import CodeType, FunctionType
 from typing import Any
@@ -18,7 +19,8 @@ from robotiq_async.control.triggers import Trigger
 from robotiq_async.enums import State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.docs.agents import ROOM, agent_of_the_pages
-from tests.docs.pages import DOCS, PAGES, ROOT, Block, blocks, prose, requirements
+from tests.docs.pages import DOCS, PAGES, ROOT, Block, blocks, outputs, prose, requirements
+from tests.docs.test_tutorial import agree
 
 FRONT = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")]
 TUTORIAL = DOCS / "tutorial.md"
@@ -109,6 +111,10 @@ CODE = [
     for block in blocks(read(page))
     if block.language == "python"
 ]
+OUTPUTS = {
+    (page, block): shown for page in PAGES if page != TUTORIAL for block, shown in outputs(read(page)).items()
+}
+"""What the page shows behind a block."""
 
 
 def compiled(page: Path, block: Block, address: str) -> CodeType:
@@ -128,9 +134,12 @@ async def test_code_runs(
             for variable, value in (await stack.enter_async_context(agent_of_the_pages())).items():
                 monkeypatch.setenv(variable, value)
         names: dict[str, Any] = {}
-        outcome = FunctionType(compiled(page, block, server.address), names)()
-        if inspect.iscoroutine(outcome):
-            await outcome
+        with redirect_stdout(StringIO()) as printed:
+            outcome = FunctionType(compiled(page, block, server.address), names)()
+            if inspect.iscoroutine(outcome):
+                await outcome
+        shown = OUTPUTS.get((page, block))
+        assert shown is None or agree(shown.text, printed.getvalue()), printed.getvalue()
         for function in [value for key, value in names.items() if key.startswith("test_")]:
             await function()
 

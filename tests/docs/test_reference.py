@@ -12,6 +12,10 @@ import robotiq_async
 from robotiq_async import (
     Fault,
     Finger,
+    GraspResult,
+    GripChange,
+    GripEvent,
+    GripEvents,
     Initialization,
     Mode,
     MoveResult,
@@ -24,6 +28,7 @@ from robotiq_async import (
     Statistics,
     Stream,
     Transition,
+    Units,
     fleet,
     simulator,
 )
@@ -52,6 +57,10 @@ def test_every_public_name_is_there(name: str) -> None:
         RobotiqHand,
         RobotiqStatus,
         MoveResult,
+        GraspResult,
+        GripEvent,
+        GripEvents,
+        Units,
         Statistics,
         ReconnectPolicy,
         Transition,
@@ -71,7 +80,7 @@ def test_what_a_stream_is_for_is_there() -> None:
 
 
 @pytest.mark.parametrize(
-    "kind", [Finger, ObjectStatus, Initialization, Mode, Severity], ids=lambda k: k.__name__
+    "kind", [Finger, GripChange, ObjectStatus, Initialization, Mode, Severity], ids=lambda k: k.__name__
 )
 def test_every_member_is_there(kind: type[Finger]) -> None:
     assert {*kind.__members__} <= WORDS

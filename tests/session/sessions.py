@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from robotiq_async.calibration.closing_time import closing_time
+from robotiq_async.calibration import Units
 from robotiq_async.control.state_machine import StateMachine
 from robotiq_async.errors import ConnectionLostError
 from robotiq_async.session.claims import Gripper
@@ -29,7 +29,7 @@ def options(wire: Wire, policy: ReconnectPolicy | None, key: str = "wire") -> Op
         policy=policy,
         speed=128,
         force=64,
-        closing_time=closing_time,
+        units=Units(),
     )
 
 

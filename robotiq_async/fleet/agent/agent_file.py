@@ -244,7 +244,8 @@ def _check_gripper(address: object, given: Mapping[str, object]) -> Options:
     if not isinstance(address, str):
         raise TypeError(f"address must be a string, got {address!r}")
     options = {key: value for key, value in given.items() if key != "address"}
-    return check_options(address, **{**_DEFAULTS, "reconnect": True, "calibration": None, **options})
+    fixed = {"reconnect": True, "calibration": None, "force_calibration": None}
+    return check_options(address, **{**_DEFAULTS, **fixed, **options})
 
 
 def _check_bool(name: str, value: object) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import TypeVar
 
+from ...calibration import Units
 from ...enums import State
 from ...errors import ConnectionLostError, NotStartedError, StateTimeoutError
 from ...session.event_loop import check_loop
@@ -23,6 +24,7 @@ class RemoteObservation:
     """A hand on another host that is looked at."""
 
     _name: GripperName
+    _units: Units
     _channels: Channels
     _session: RemoteSession | None
     """The run under way, or the last one."""
@@ -32,6 +34,14 @@ class RemoteObservation:
     def address(self) -> str:
         """The gripper's address, without how to get there."""
         return str(self._name)
+
+    @property
+    def units(self) -> Units:
+        """Converts mm, mm/s, seconds and newton labels to what commands take, and back.
+
+        By the calibrations that this hand was made with: the agent tells of none.
+        """
+        return self._units
 
     @property
     def state(self) -> State:

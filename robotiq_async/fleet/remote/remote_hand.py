@@ -5,9 +5,12 @@ from __future__ import annotations
 from types import TracebackType
 from typing import Self
 
+from ...calibration import ForceCalibration, SpeedCalibration
 from ...enums import State
 from ...errors import InvalidStateError, NotStartedError
+from ...hand.grasping import Grasping
 from ...session.event_loop import running_loop
+from ...session.options import check_units
 from ...session.streams import Channels
 from ...wire.checks import check_seconds
 from ..network.bus import Bus
@@ -18,7 +21,7 @@ from .requests import plainly
 from .session import CONNECT_S, RemoteSession
 
 
-class RemoteHand(RemoteCommands):
+class RemoteHand(RemoteCommands, Grasping):
     """A Robotiq 3-Finger gripper on another host, served by ``robotiq-async agent`` there.
 
     A :class:`~robotiq_async.protocol.Hand`: the names, errors and promises are those of
@@ -37,6 +40,8 @@ class RemoteHand(RemoteCommands):
         control: bool | None = True,
         connect_timeout: float = CONNECT_S,
         bus: Bus | None = None,
+        calibration: SpeedCalibration | None = None,
+        force_calibration: ForceCalibration | None = None,
     ) -> None:
         """Check every option. Opens nothing and needs no running loop.
 
@@ -48,6 +53,9 @@ class RemoteHand(RemoteCommands):
                 awaited, False not at all: it only reads (and halts) unless :meth:`acquire` is called.
             connect_timeout: seconds for finding the agent, 0.1..60.
             bus: an open session to share; it stays open. None opens one.
+            calibration: the speeds of :attr:`units`; default timeouts are the agent's. None for the thesis's
+                gripper.
+            force_calibration: what :attr:`units` labels force values with. None for the manual's figures.
 
         Raises:
             TypeError: an option of the wrong type.
@@ -58,6 +66,7 @@ class RemoteHand(RemoteCommands):
         self._name, self._route = parse_remote_address(address)
         self._connect_timeout = check_seconds("connect_timeout", connect_timeout, 0.1, 60.0)
         self._control = control
+        self._units = check_units(calibration, force_calibration)
         if bus is None:
             self._route.configuration()  # malformed or unprotected: said here, and not when it starts
         self._shared = bus

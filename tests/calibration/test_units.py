@@ -1,0 +1,173 @@
+"""Millimetres, mm/s, seconds and newton labels, to and from what the gripper takes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robotiq_async import RobotiqHand, Units
+from robotiq_async.calibration import ForceCalibration, SpeedCalibration
+from robotiq_async.calibration.csv_tables import FORCE, SPEED, write_table
+from robotiq_async.fleet import RemoteHand
+from robotiq_async.protocol import Hand
+
+THESIS = Units()
+NOMINAL = Units(SpeedCalibration.nominal())
+VALUES = st.integers(0, 255)
+
+
+@given(st.integers(6, 241))
+def test_positions_and_openings_go_both_ways(position: int) -> None:
+    assert THESIS.position(mm=THESIS.mm(position)) == position
+
+
+@given(VALUES)
+def test_speeds_go_both_ways(speed: int) -> None:
+    for units in (THESIS, NOMINAL):
+        assert units.speed(mm_per_s=units.mm_per_s(speed)) == speed
+        assert units.speed(closing_s=units.closing_s(speed)) == speed
+
+
+@given(VALUES)
+def test_force_labels_go_both_ways(force: int) -> None:
+    assert THESIS.force(label_n=THESIS.label_n(force)) == force
+
+
+@given(st.floats(0, 155), st.floats(15.47, 73.1), st.floats(15, 60))
+def test_the_value_is_the_closest_one(mm: float, mm_per_s: float, label_n: float) -> None:
+    assert THESIS.mm(THESIS.position(mm=mm)) == pytest.approx(mm, abs=155 / 235 / 2 + 1e-9)
+    speed, force = THESIS.speed(mm_per_s=mm_per_s), THESIS.force(label_n=label_n)
+    assert all(
+        abs(THESIS.mm_per_s(speed) - mm_per_s) <= abs(THESIS.mm_per_s(other) - mm_per_s)
+        for other in range(max(speed - 1, 0), min(speed + 2, 256))
+    )
+    assert THESIS.label_n(force) == pytest.approx(label_n, abs=45 / 255 / 2 + 1e-9)
+
+
+def test_the_figures() -> None:
+    assert (THESIS.mm(0), THESIS.mm(6), THESIS.mm(241), THESIS.mm(255)) == (155, 155, 0, 0)
+    assert (THESIS.closing_s(0), THESIS.closing_s(255)) == pytest.approx((10.021, 2.119), abs=0.001)
+    assert (NOMINAL.mm_per_s(0), NOMINAL.mm_per_s(255)) == pytest.approx((22, 110))
+    assert (THESIS.label_n(0), THESIS.label_n(255)) == (15, 60)
+
+
+REFUSED: dict[str, tuple[str, Callable[[Units, Any], int], tuple[float, ...]]] = {
+    "mm": ("0..155 mm", lambda units, value: units.position(mm=value), (-0.01, 155.01)),
+    "mm_per_s": (
+        "15.47..73.16 mm/s",
+        lambda units, value: units.speed(mm_per_s=value),
+        (0, 15.46, 73.17),
+    ),
+    "closing_s": ("2.12..10.02 s", lambda units, value: units.speed(closing_s=value), (0, 2.11, 10.03)),
+    "label_n": (
+        "15..60 N (a label, not a measured force)",
+        lambda units, value: units.force(label_n=value),
+        (14.99, 60.01),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_out_of_range_is_told_in_the_unit(name: str) -> None:
+    words, call, outside = REFUSED[name]
+    for value in (*outside, float("nan"), float("inf"), -1):
+        with pytest.raises(ValueError) as caught:  # noqa: PT011  # the whole message is compared
+            call(THESIS, value)
+        assert str(caught.value) == f"{name} must be in {words}, got {value!r}"
+    for bad in ("3", True, [1]):
+        with pytest.raises(TypeError) as error:
+            call(THESIS, bad)
+        assert str(error.value) == f"{name} must be a number in {words}, got {bad!r}"
+
+
+@pytest.mark.parametrize("units", [THESIS, NOMINAL])
+def test_the_limits_that_are_told_are_accepted(units: Units) -> None:
+    for name, (_, call, _) in REFUSED.items():
+        with pytest.raises(ValueError, match=f"{name} must be in") as caught:
+            call(units, 1e6)
+        low, _, high = str(caught.value).split()[4].partition("..")
+        ends = {6, 241} if name == "mm" else {0, 255}
+        assert {call(units, float(low)), call(units, float(high))} == ends
+
+
+def test_a_speed_takes_one_of_two() -> None:
+    speed: Any = THESIS.speed
+    for both_or_none in ({}, {"mm_per_s": 40, "closing_s": 3}):
+        with pytest.raises(TypeError, match="one of mm_per_s and closing_s"):
+            speed(**both_or_none)
+
+
+@pytest.mark.parametrize("call", [THESIS.mm, THESIS.mm_per_s, THESIS.closing_s, THESIS.label_n])
+def test_counts_are_refused_as_counts(call: Any) -> None:
+    with pytest.raises(ValueError, match=r"must be in 0\.\.255, got 256"):
+        call(256)
+    with pytest.raises(TypeError, match=r"must be an int in 0\.\.255, got 3\.0"):
+        call(3.0)
+
+
+def test_what_is_no_calibration_is_refused() -> None:
+    with pytest.raises(TypeError, match="speeds must be a SpeedCalibration, got None"):
+        Units(None)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="forces must be a ForceCalibration, got 30"):
+        Units(forces=30)  # type: ignore[arg-type]
+
+
+def test_where_the_figures_come_from_is_told() -> None:
+    assert repr(THESIS) == (
+        "<Units 0..155 mm (nominal), 15.47..73.16 mm/s (thesis, table A1.1), "
+        "labels 15..60 N (nominal (manual))>"
+    )
+
+
+def test_the_table_of_the_page() -> None:
+    """Each row: a call to counts, the call back from these counts, and the range."""
+    page = (Path(__file__).parents[2] / "docs" / "how-to" / "grasp.md").read_text(encoding="utf-8")
+    rows = re.findall(
+        r"^\| `units\.(\w+)\((\w+)=(\d+)\)` \| `units\.(\w+)\((\d+)\)` \| ([^|]+) \|", page, re.MULTILINE
+    )
+    assert len(rows) == 4
+    for there, unit, figure, back, counts, limits in rows:
+        assert getattr(THESIS, there)(**{unit: int(figure)}) == int(counts)
+        assert back == unit
+        assert REFUSED[unit][0].startswith(limits)
+
+
+# -- of a hand ---------------------------------------------------------------------------------------------
+
+
+def hands(**options: Any) -> list[Hand]:
+    return [RobotiqHand(**options), RemoteHand("zenoh://lab/cell/left", **options)]
+
+
+def test_a_hand_has_them_before_it_is_started() -> None:
+    assert [hand.units for hand in hands()] == [THESIS, THESIS]
+
+
+def test_they_are_by_the_owners_calibrations(tmp_path: Path) -> None:
+    write_table(tmp_path / "speed.csv", SPEED, {0: (20_000,), 255: (5_000,)})
+    write_table(tmp_path / "force.csv", FORCE, {50: (1000,), 100: (3000,)})
+    speeds = SpeedCalibration.from_csv(tmp_path / "speed.csv")
+    forces = ForceCalibration.from_csv(tmp_path / "force.csv")
+    for hand in hands(calibration=speeds, force_calibration=forces):
+        assert hand.units == Units(speeds, forces)
+        assert hand.units.closing_s(255) == 5
+        assert hand.units.force(label_n=19.62) == 75
+        with pytest.raises(ValueError, match=r"label_n must be in 9\.81\.\.29\.43 N \(a label"):
+            hand.units.force(label_n=30)
+        with pytest.raises(ValueError, match=r"force 10 lies outside what was measured: 50\.\.100"):
+            hand.units.label_n(10)
+
+
+def test_a_hand_refuses_what_is_no_calibration() -> None:
+    kinds: list[Callable[..., Hand]] = [RobotiqHand, RemoteHand]
+    for kind in kinds:
+        with pytest.raises(TypeError, match="force_calibration must be None or a ForceCalibration"):
+            kind("zenoh://lab/cell/left" if kind is RemoteHand else "sim://", force_calibration=30)
+        with pytest.raises(TypeError, match="calibration must be None or a SpeedCalibration"):
+            kind("zenoh://lab/cell/left" if kind is RemoteHand else "sim://", calibration="mine.csv")

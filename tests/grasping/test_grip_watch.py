@@ -1,0 +1,316 @@
+"""What becomes of grips, from the statuses alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robotiq_async.enums import AXES, Finger, ObjectStatus
+from robotiq_async.grasping import SLIP_COUNTS, GripChange, GripEvent, GripWatch
+from robotiq_async.simulator import SimulatedGripper
+from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.wire.status import RobotiqStatus
+from tests.register_words import status_of
+
+A, B, C, S = AXES
+GAINED, SLIPPED, LOST, RELEASED = GripChange
+MOVING, OPENING, CLOSING, REACHED = ObjectStatus
+FAULT = 0x0E
+
+
+def seen(
+    what: ObjectStatus,
+    position: int,
+    request: int = 255,
+    *,
+    byte_0: int = 0x39,
+    fault: int = 0,
+    at: float = 0.0,
+) -> RobotiqStatus:
+    """A status in which A does something; the others are where they were asked to go."""
+    echo, positions = (request, 0, 0, 0), (position, 6, 6, 6)
+    return status_of(byte_0, 0xFC | what, fault, echo=echo, position=positions, at=at)
+
+
+def told(*statuses: RobotiqStatus, watch: GripWatch | None = None) -> list[tuple[GripChange, int]]:
+    """What statuses tell, and how far A has moved then."""
+    watch = watch or GripWatch()
+    events = [event for status in statuses for event in watch.see(status)]
+    assert all(event.finger is A for event in events)
+    return [(event.change, event.moved) for event in events]
+
+
+# -- each change -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("contact", "request_"), [(CLOSING, 255), (OPENING, 0)])
+def test_a_contact_is_gained(contact: ObjectStatus, request_: int) -> None:
+    watch = GripWatch()
+    before, after = seen(MOVING, 100, request_), seen(contact, 150, request_)
+    assert told(before, after, after, watch=watch) == [(GAINED, 0)]
+    assert watch.holds == A
+
+
+def test_the_contacts_of_the_first_status_are_where_it_begins() -> None:
+    watch = GripWatch()
+    assert told(seen(CLOSING, 150), seen(CLOSING, 150), watch=watch) == []
+    assert watch.holds == A
+    assert told(seen(REACHED, 241), watch=watch) == [(LOST, 91)]
+
+
+@pytest.mark.parametrize("moved", range(-6, 7))
+def test_an_axis_that_moves_in_contact_slips(moved: int) -> None:
+    slips = abs(moved) > SLIP_COUNTS
+    assert told(seen(CLOSING, 150), seen(CLOSING, 150 + moved)) == [(SLIPPED, moved)] * slips
+
+
+def test_it_slips_as_well_when_it_creeps() -> None:
+    creeping = [seen(CLOSING, position) for position in range(150, 159)]
+    assert told(*creeping) == [(SLIPPED, 4), (SLIPPED, 4)]
+
+
+def test_how_far_it_may_move_can_be_said() -> None:
+    assert told(seen(CLOSING, 150), seen(CLOSING, 152), watch=GripWatch(slip=1)) == [(SLIPPED, 2)]
+    assert told(seen(CLOSING, 150), seen(CLOSING, 160), watch=GripWatch(slip=10)) == []
+
+
+def test_an_axis_that_tries_again_and_gets_nowhere_has_kept_its_grip() -> None:
+    watch = GripWatch()
+    again = [seen(MOVING, 150), seen(MOVING, 152), seen(CLOSING, 152)]
+    assert told(seen(CLOSING, 150), *again, watch=watch) == []
+    assert watch.holds == A
+
+
+def test_an_axis_that_tries_again_and_gets_further_has_slipped() -> None:
+    watch = GripWatch()
+    on_its_way = [seen(MOVING, position) for position in (150, 153, 160, 170)]
+    assert told(seen(CLOSING, 150), *on_its_way, watch=watch) == [(SLIPPED, 10)]
+    assert watch.holds == Finger(0), "until the gripper says so again"
+    assert told(seen(CLOSING, 172), watch=watch) == [(GAINED, 0)]
+    assert told(seen(CLOSING, 174), seen(CLOSING, 176), watch=watch) == [(SLIPPED, 4)]
+
+
+@pytest.mark.parametrize(("request_", "stop"), [(255, 241), (200, 200)])
+def test_an_axis_that_closes_on_to_its_end_has_lost_the_part(request_: int, stop: int) -> None:
+    on = [seen(MOVING, 160, request_), seen(REACHED, stop, request_)]
+    assert told(seen(CLOSING, 150, request_), *on) == [(SLIPPED, 10), (LOST, stop - 160)]
+    assert told(seen(CLOSING, 150, request_), on[-1]) == [(LOST, stop - 150)], "also when nobody saw it move"
+
+
+@pytest.mark.parametrize("then", [seen(MOVING, 149, 0), seen(REACHED, 6, 0), seen(REACHED, 150, 150)])
+def test_an_axis_that_is_asked_to_let_go_has_released_the_part(then: RobotiqStatus) -> None:
+    assert told(seen(CLOSING, 150), then) == [(RELEASED, then.position(A) - 150)]
+
+
+def test_a_request_to_let_go_is_told_when_the_contact_ends() -> None:
+    assert told(seen(CLOSING, 150), seen(CLOSING, 150, 0)) == []
+
+
+def test_a_grip_from_inside_is_held_by_opening_and_released_by_closing() -> None:
+    held = seen(OPENING, 60, 0)
+    assert told(held, seen(REACHED, 6, 0)) == [(LOST, -54)]
+    assert told(held, seen(MOVING, 70, 255)) == [(RELEASED, 10)]
+    assert told(held, seen(MOVING, 50, 0), seen(OPENING, 50, 0)) == [(SLIPPED, -10), (GAINED, 0)]
+
+
+def test_the_other_contact_is_another_grip() -> None:
+    assert told(seen(CLOSING, 150), seen(OPENING, 100, 0)) == [(RELEASED, -50), (GAINED, 0)]
+    assert told(seen(CLOSING, 150), seen(OPENING, 100)) == [(LOST, -50), (GAINED, 0)]
+
+
+@pytest.mark.parametrize(
+    "then",
+    [
+        seen(MOVING, 150, byte_0=0x00),  # reset, or without power
+        seen(CLOSING, 150, byte_0=0x09),  # an automatic release
+        seen(MOVING, 150, byte_0=0x31),  # a halt after which no contact is reported
+        seen(MOVING, 150, fault=FAULT),
+        seen(MOVING, 150, 0, byte_0=0x09),
+        seen(MOVING, 150, 0, byte_0=0x31),
+        seen(MOVING, 150, 0, fault=FAULT),
+    ],
+    ids=[
+        "reset",
+        "release",
+        "halt",
+        "fault",
+        "release under another request",
+        "halt under another request",
+        "fault under another request",
+    ],
+)
+def test_what_is_not_known_to_be_held_is_lost(then: RobotiqStatus) -> None:
+    assert told(seen(CLOSING, 150), then) == [(LOST, 0)]
+
+
+def test_a_contact_that_is_still_reported_after_a_halt_or_in_a_fault_is_none_the_less_one() -> None:
+    assert told(seen(CLOSING, 150), seen(CLOSING, 150, byte_0=0x31), seen(CLOSING, 150, fault=FAULT)) == []
+
+
+def test_without_an_echo_to_go_by_nothing_counts_as_asked_for() -> None:
+    """Under simple control A's registers drive all fingers; the echoes of the others stay what they were."""
+    assert told(seen(CLOSING, 150, 0), seen(REACHED, 241, 0)) == [(LOST, 91)]
+    assert told(seen(CLOSING, 150, 0), seen(MOVING, 150, 0)) == [(LOST, 0)]
+
+
+def test_from_the_first_echo_on_that_presses_letting_go_can_be_told() -> None:
+    assert told(seen(CLOSING, 150, 0), seen(CLOSING, 150), seen(MOVING, 149, 0)) == [(RELEASED, -1)]
+
+
+def test_a_status_that_is_late_is_passed_over() -> None:
+    late = seen(REACHED, 100, 100, at=1.5)
+    assert told(seen(CLOSING, 150, at=2.0), late, seen(CLOSING, 150, at=3.0)) == []
+
+
+def test_a_status_of_another_clock_is_believed() -> None:
+    """Else whoever begins with one that was kept from before a restart of the computer hears nothing."""
+    assert told(seen(CLOSING, 150, at=5000.0), seen(REACHED, 241, at=7.0)) == [(LOST, 91)]
+
+
+def test_only_the_axes_that_are_watched_tell() -> None:
+    nothing, all_hold = status_of(0x39, 0x00, echo=255), status_of(0x39, 0xAA, echo=255, position=150)
+    for fingers in (A, B | C, Finger.ABC, Finger.ALL):
+        watch = GripWatch(fingers)
+        assert watch.see(nothing) == []
+        events = watch.see(all_hold)
+        assert [event.finger for event in events] == list(fingers)
+        assert {event.holds for event in events} == {fingers}
+
+
+def test_an_event_says_where_and_when() -> None:
+    watch = GripWatch()
+    watch.see(seen(CLOSING, 150, at=1.0))
+    (event,) = watch.see(seen(CLOSING, 158, at=2.5))
+    assert (event.position, event.timestamp, event.status.sequence) == (158, 2.5, 0)
+    assert repr(event) == "<GripEvent A SLIPPED by +8 at 158; contact of A>"
+
+
+@pytest.mark.parametrize("bad", [0, 256, -1])
+def test_a_slip_that_is_none_is_refused(bad: int) -> None:
+    with pytest.raises(ValueError, match=rf"slip must be in 1\.\.255, got {bad}"):
+        GripWatch(slip=bad)
+
+
+# -- whatever comes ----------------------------------------------------------------------------------------
+
+STATUSES = st.lists(
+    st.builds(
+        seen,
+        st.sampled_from(ObjectStatus),
+        st.integers(0, 255),
+        st.sampled_from([0, 100, 200, 255]),
+        byte_0=st.sampled_from([0x39, 0x39, 0x39, 0x31, 0x11, 0x00]),
+        fault=st.sampled_from([0, 0, 0, 0x05, FAULT]),
+    ),
+    max_size=30,
+)
+
+
+def reports_contact(status: RobotiqStatus) -> bool:
+    return status.is_activated and status.finger_status(A).is_contact
+
+
+@given(STATUSES)
+def test_what_the_gripper_calls_a_contact_is_held_and_what_rests_without_one_is_not(
+    statuses: list[RobotiqStatus],
+) -> None:
+    watch = GripWatch(A)
+    for status in statuses:
+        watch.see(status)
+        assert bool(watch.holds) == reports_contact(status) or (
+            watch.holds == A and A in status.moving and not status.fault.is_serious
+        )
+
+
+@given(STATUSES)
+def test_the_events_alone_tell_who_holds(statuses: list[RobotiqStatus]) -> None:
+    watch, holds, is_slipping = GripWatch(A), False, False
+    for status in [seen(REACHED, 6, 0), *statuses]:
+        for event in watch.see(status):
+            if event.change is GAINED:
+                assert not holds
+            else:
+                assert holds or (is_slipping and event.change is not SLIPPED)
+            is_slipping = event.change is SLIPPED and not reports_contact(status)
+            holds = event.change is GAINED or (event.change is SLIPPED and not is_slipping)
+        assert bool(watch.holds) == holds
+
+
+@given(STATUSES)
+def test_the_same_status_again_tells_nothing_new(statuses: list[RobotiqStatus]) -> None:
+    watch = GripWatch(A)
+    for status in statuses:
+        watch.see(status)
+        assert watch.see(status) == []
+
+
+@given(STATUSES, st.integers(0, 30))
+def test_whoever_misses_some_learns_what_is_left_of_it(statuses: list[RobotiqStatus], missed: int) -> None:
+    patient, slow = GripWatch(A), GripWatch(A)
+    end = seen(CLOSING, 150) if missed % 2 else seen(REACHED, 241)
+    for status in [*statuses, end]:
+        patient.see(status)
+    for status in [*statuses[missed:], end]:
+        slow.see(status)
+    assert patient.holds == slow.holds
+
+
+# -- on a gripper ------------------------------------------------------------------------------------------
+
+
+class Cell:
+    """A simulated gripper that is looked at every 5 ms, and a watch."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self.gripper = SimulatedGripper(lambda: self.now, spread=False)
+        self.watch = GripWatch()
+        self._write(0, 64, go=False)
+        for _ in self.statuses(10):
+            pass
+
+    def ask(self, position: int, force: int = 64, seconds: float = 5.0) -> list[GripEvent]:
+        """What is told after a request."""
+        self._write(position, force)
+        return [event for status in self.statuses(seconds) for event in self.watch.see(status)]
+
+    def statuses(self, seconds: float) -> Iterator[RobotiqStatus]:
+        for _ in range(round(seconds / 0.005)):
+            self.now += 0.005
+            yield RobotiqStatus(self.gripper.status_registers(), self.now)
+
+    def _write(self, position: int, force: int, *, go: bool = True) -> None:
+        axes = (AxisRequest(position, 255, force),) * 3 + (AxisRequest(137, 255, 64),)
+        self.gripper.write(0, Request(activate=True, go=go, axes=axes).registers)
+
+
+def changes(events: list[GripEvent]) -> list[tuple[GripChange, Finger]]:
+    return [(event.change, event.finger) for event in events]
+
+
+def test_a_part_is_grasped_tightened_and_let_go() -> None:
+    cell = Cell()
+    cell.gripper.place_object(Finger.ABC, 150)
+    assert changes(cell.ask(255)) == [(GAINED, A), (GAINED, B), (GAINED, C)]
+    assert cell.ask(255, force=200) == [], "they press again, and get nowhere"
+    assert changes(cell.ask(0)) == [(RELEASED, A), (RELEASED, B), (RELEASED, C)]
+
+
+def test_a_part_that_gives_way_slips_through() -> None:
+    cell = Cell()
+    cell.gripper.place_object(A, 150)
+    cell.ask(255)
+    cell.gripper.remove_object(A)
+    events = cell.ask(255, force=200)
+    assert changes(events) == [(SLIPPED, A), (LOST, A)]
+    assert sum(event.moved for event in events) == 241 - 150
+
+
+def test_something_soft_that_is_pressed_deeper_slips() -> None:
+    cell = Cell()
+    cell.gripper.place_object(A, 150, soft=40)
+    cell.ask(255, force=50)
+    assert changes(cell.ask(255, force=255)) == [(SLIPPED, A), (GAINED, A)]
