@@ -14,7 +14,7 @@ from ..link.modbus import ModbusTransport
 from ..link.places import place_of
 from ..link.simulated import SimulatedTransport, new_gripper
 from ..link.transport import Transport
-from ..wire.checks import check_byte, check_int, check_seconds
+from ..wire.checks import check_byte, check_flag, check_int, check_seconds
 from ..wire.registers import REGISTER_COUNT, RTU_REGISTERS, TCP_REGISTERS
 from .claims import Gripper
 from .reconnecting import ReconnectPolicy
@@ -53,6 +53,8 @@ class Options:
     force: int
     closing_time: Callable[[int], float]
     """Seconds of a full closing at a speed."""
+    keep_grip: bool = False
+    """What a stop does about it unless told."""
 
 
 def check_options(
@@ -69,6 +71,7 @@ def check_options(
     request_address: object,
     status_address: object,
     calibration: object,
+    keep_grip: object,
 ) -> Options:
     """Check every option and make the transport; opens nothing and needs no running loop.
 
@@ -116,6 +119,7 @@ def check_options(
         speed=check_byte("speed", speed),
         force=check_byte("force", force),
         closing_time=_check_calibration(calibration),
+        keep_grip=check_flag("keep_grip", keep_grip),
     )
 
 

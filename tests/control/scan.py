@@ -126,9 +126,9 @@ class Scan:
         self.controller.halt(outcome)
         return outcome
 
-    def stop(self) -> None:
+    def stop(self, *, keep_grip: bool = False) -> None:
         self.controller.stop()
-        self.controller.shut_down()
+        self.controller.shut_down(keep_grip=keep_grip)
         self.until(lambda: not self.controller.machine.is_busy, 1.0)
 
     # -- what has happened -----------------------------------------------------------------------------
