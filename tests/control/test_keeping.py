@@ -7,13 +7,11 @@ from collections.abc import Callable
 
 import pytest
 
-from robotiq_async import Fault, Finger, NotStartedError, ObjectStatus
+from robotiq_async import Fault, Finger, NotStartedError
 from robotiq_async.control.keeping import KEEP_S, REST_S
-from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.wire import registers as reg
-from robotiq_async.wire.registers import Registers
 from tests.control.other_client import image
 from tests.control.scan import POLL_S, Scan, started
+from tests.restless import Restless
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 CYCLES = pytest.mark.parametrize("device_cycle", [0.0, 0.005, 0.03, 0.2])
@@ -242,15 +240,6 @@ def test_an_activation_of_ours_is_taken_back_all_the_same() -> None:
     scan.run(1.0)
     stopped(scan)
     assert not scan.last_image.activate
-
-
-class Restless(SimulatedGripper):
-    """Says for ever that the scissor moves."""
-
-    def status_registers(self) -> Registers:
-        block = list(super().status_registers())
-        reg.gDT[3].write(block, ObjectStatus.IN_MOTION)
-        return tuple(block)
 
 
 def test_what_does_not_come_to_rest_is_stopped_in_time(caplog: pytest.LogCaptureFixture) -> None:
