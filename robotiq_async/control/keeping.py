@@ -50,6 +50,7 @@ class Keeping:
     def sequence(self) -> Sequence:
         """Hold what moves and leave rGTO set once everything rests; on any doubt, clear it and see it."""
         status = yield None
+        # How long an axis has stood still is counted by when that was asked: replies may be looked at late.
         until, since, may_hold = status.timestamp + KEEP_S, math.inf, True
         while not (doubt := self._doubt(status, until)):
             image = self._held(status) if may_hold else None
@@ -57,14 +58,14 @@ class Keeping:
                 may_hold, since = False, math.inf
                 status = yield image
                 continue
-            since = min(since, status.timestamp) if self.rests(status) else math.inf
-            if status.timestamp - since >= REST_S:
+            since = min(since, self._shadow.asked) if self.rests(status) else math.inf
+            if self._shadow.asked - since >= REST_S:
                 log.info("stopped with rGTO set; in contact: %s", status.contacts or "nothing")
                 return
             status = yield None
         last = self._shadow.last_image(status)
         if last is not None:
-            log.warning("rGTO is cleared, and the grip is not kept: %s", doubt)
+            log.warning("rGTO is cleared, and no grip is kept: %s", doubt)
             yield from stop_fingers(last)
 
     def _doubt(self, status: RobotiqStatus, until: float) -> str:
@@ -76,6 +77,8 @@ class Keeping:
             return f"the {condition.value} ({status.fault.description})"
         if not self._shadow.is_ours(status):
             return "another client commands the gripper"
+        if status.timestamp - self._shadow.asked > KEEP_S:
+            return "the newest status is old: something holds up the event loop"
         if not self._shadow.is_certain:
             return "what the gripper was asked is not known for certain"
         if self._shadow.is_settled and not status.go_echo:

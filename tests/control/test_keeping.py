@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from robotiq_async import Fault, Finger, NotStartedError
+from robotiq_async import Fault, Finger, NotStartedError, RobotiqStatus
 from robotiq_async.control.keeping import KEEP_S, REST_S
 from tests.control.other_client import image
 from tests.control.scan import POLL_S, Scan, started
@@ -115,10 +115,7 @@ def test_fingers_that_press_again_are_held_like_all_that_moves() -> None:
 
 
 def test_an_adopted_grip_is_kept_without_a_write() -> None:
-    first = holding()
-    scan = Scan(gripper=first.gripper)
-    scan.now = first.now
-    first.gripper._clock = lambda: scan.now
+    scan = Scan(after=holding())
     scan.connect()
     stopped(scan)
     assert not scan.written
@@ -217,7 +214,7 @@ def test_on_any_doubt_rgto_is_cleared_and_a_word_says_why(
     assert not scan.last_image.go
     assert scan.last_image.activate
     assert not scan.status().go_echo
-    (said,) = [each for each in caplog.messages if "the grip is not kept" in each]
+    (said,) = [each for each in caplog.messages if "no grip is kept" in each]
     assert why in said
 
 
@@ -232,6 +229,25 @@ def test_a_link_that_goes_down_meanwhile_is_a_doubt() -> None:
     scan.until(lambda: not scan.controller.machine.is_busy, 1.0)
     assert not scan.gripper.grips
     assert not scan.last_image.go
+
+
+def test_replies_that_were_looked_at_late_tell_of_no_rest(caplog: pytest.LogCaptureFixture) -> None:
+    """The loop was held up: they are as old as their requests."""
+    scan = holding()
+    scan.controller.stop()
+    scan.controller.shut_down(keep_grip=True)
+    images = []
+    for late in (0.0, 0.3, 0.3, 0.6):
+        status = scan.status()
+        at = scan.now + late
+        scan.controller.see(RobotiqStatus(status.registers, at, status.sequence), scan.now)
+        images.append(scan.controller.decide(at))
+        assert scan.controller.machine.is_busy
+        scan.now += POLL_S
+    assert images[:3] == [None] * 3
+    assert images[3] is not None
+    assert not images[3].go
+    assert "the newest status is old" in caplog.text
 
 
 def test_an_activation_of_ours_is_taken_back_all_the_same() -> None:

@@ -193,7 +193,7 @@ async def next_moves_another(here: Bench) -> str:
     async with RobotiqHand(here.server.address) as hand:
         await hand.move(100, A)
         asked = {hand.status.requested_position(axis) == 255 for axis in (B, C)}
-        assert asked == {here.keeps}, "166 requested 166, as the issue has it"
+        assert asked == {here.keeps}, "its own position, unless the echo is to be believed"
         return here.word
 
 
