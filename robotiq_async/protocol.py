@@ -83,13 +83,15 @@ class Hand(Protocol):
             RobotiqError: no gripper there, a link that failed, or an activation that failed.
         """
 
-    async def stop(self, *, halt: bool = True) -> None:
+    async def stop(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:
         """Stop the fingers and disconnect, within 2 s and also when cancelled meanwhile. Idempotent.
 
         What others wait for ends with NotStartedError. The state is SHUTDOWN afterwards.
 
         Args:
             halt: False leaves the fingers to what they do.
+            keep_grip: True holds what moves and lets a grip stay in force; on any doubt the fingers are
+                stopped as ever. None for what the hand was made with.
         """
 
     # -- commands --------------------------------------------------------------------------------------

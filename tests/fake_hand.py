@@ -104,8 +104,8 @@ class FakeHand(Grasping):
     async def start(self, activate: bool = True) -> None:  # noqa: ARG002
         self._enter(State.RUNNING_IDLE, Trigger.SEEN_READY)
 
-    async def stop(self, *, halt: bool = True) -> None:
-        if halt and self.state is not State.SHUTDOWN:
+    async def stop(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:
+        if halt and not keep_grip and self.state is not State.SHUTDOWN:
             self._write(go=False)
         self._enter(State.SHUTDOWN, Trigger.STOPPED)
         while self._streams:

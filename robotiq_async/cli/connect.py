@@ -67,13 +67,16 @@ def make_operator(address: str, link: Link, *, speed: int, force: int) -> Operat
 
 
 @asynccontextmanager
-async def connected(address: str, link: Link = USUAL, *, halt: bool) -> AsyncIterator[Hand]:
+async def connected(
+    address: str, link: Link = USUAL, *, halt: bool, keep_grip: bool = False
+) -> AsyncIterator[Hand]:
     """A started hand; nothing has been written to the gripper.
 
     Args:
         address: the gripper.
         link: how it is reached.
         halt: whether leaving stops the fingers; False for a command that only reads.
+        keep_grip: whether a grip stays in force then.
 
     Raises:
         UsageError: a malformed address.
@@ -84,7 +87,7 @@ async def connected(address: str, link: Link = USUAL, *, halt: bool) -> AsyncIte
         await hand.start(activate=False)
         yield hand
     finally:
-        await hand.stop(halt=halt)
+        await hand.stop(halt=halt, keep_grip=keep_grip)
 
 
 @asynccontextmanager

@@ -25,6 +25,7 @@ from ..log import log
 from ..wire.request import Request
 from ..wire.status import RobotiqStatus
 from .callers import Callers
+from .keeping import Keeping
 from .merging import merged
 from .motion import Move
 from .pending import Command
@@ -70,6 +71,10 @@ class Controller:
         """Whether an activation of ours may still be under way: to be taken back if the hand is stopped."""
         self._hold_on_return = NO_AXES
         """Axes whose hold was not delivered before the link went down."""
+        self._keeping = Keeping(self._shadow)
+        """Whether rGTO may be left set when the hand is stopped."""
+        self._keeps_grip = False
+        """Whether that is asked for."""
 
     # -- what is asked ---------------------------------------------------------------------------------
 
@@ -160,6 +165,9 @@ class Controller:
 
     def stop(self) -> None:
         """The hand is being stopped: nothing more is taken, and whoever waits is told."""
+        is_running, halts = self.machine.state in RUNNING, self._callers.pending.halting is not None
+        running = "" if is_running else f"the hand was in {self.machine.state.name}"
+        self._keeping.doubt = "halt() was asked for" if halts else running
         self.machine.fire(Trigger.ASK_STOP)
         self._callers.fail(NotStartedError("the hand was stopped"))
         self.machine.drop_sequence()
@@ -169,15 +177,19 @@ class Controller:
         self.machine.drop_sequence()
         self.machine.fire(Trigger.STOPPED)
 
-    def shut_down(self) -> None:
+    def shut_down(self, *, keep_grip: bool = False) -> None:
         """Begin to stop the fingers, if there is anything to stop.
 
         An activation that this hand began is taken back (rACT = 0): clearing rGTO would not stop it.
+
+        Args:
+            keep_grip: leave rGTO set if everything is at rest, and known to be.
         """
+        self._keeps_grip = keep_grip
         if self._activating:
             self._begin(reset(self._shadow.at_rest))
         elif self.status is not None:
-            self._begin(shutdown(self._shadow.last_image))
+            self._begin(self._keeping.sequence() if keep_grip else shutdown(self._shadow.last_image))
 
     # -- what is known ---------------------------------------------------------------------------------
 
@@ -233,6 +245,8 @@ class Controller:
         if not self.machine.is_busy or self.status is None:
             return self._callers.pending.halting is not None
         state, may_move = self.machine.state, self._activating or self._shadow.may_go(self.status)
+        if self._keeps_grip and self._keeping.rests(self.status):
+            may_move = False  # whether to leave it so is decided on what is read next
         stops = state is State.DO_RESET or (state is State.DO_SHUTDOWN and may_move)
         return stops and not self._step
 
@@ -257,6 +271,8 @@ class Controller:
                 self.machine.delivered()
             return None
         sent = self._callers.take()
+        if image.go and not shadow.base.go:
+            _tell_of_lost_grips(status.contacts & ~shadow.gripping(status) & ~sent.moved)
         number = shadow.writing(image, sent.moved, now)
         if sent.positions:
             self._callers.moves.written(number)
@@ -272,6 +288,7 @@ class Controller:
     def lost(self, why: RobotiqError | None = None) -> None:
         """The link is down: what was not acknowledged is dropped, never to be sent again."""
         self.machine.fire(Trigger.LINK_LOST)
+        self._keeping.doubt = "the link went down"
         error = ConnectionLostError(f"the link went down before this was done: {why}")
         error.__cause__ = why
         self._hold_on_return |= self._callers.lost(error)
@@ -373,3 +390,9 @@ class Controller:
             # Which axes drift is decided when the hold is written: a command that was sent just before
             # may not act yet, and its motion would begin when the fault clears.
             self._callers.hold(self._shadow.ours, "the fingers are held")
+
+
+def _tell_of_lost_grips(axes: Finger) -> None:
+    """Setting rGTO drives every axis; those that were adopted without it have no request but their place."""
+    if axes:
+        log.warning("%s touched something while rGTO was clear: asked to stay there, and grip no more", axes)

@@ -94,8 +94,12 @@ def shutdown(last_image: Callable[[RobotiqStatus], Request | None]) -> Sequence:
     """
     status = yield None
     last = last_image(status)
-    if last is None:
-        return
+    if last is not None:
+        yield from stop_fingers(last)
+
+
+def stop_fingers(last: Request) -> Sequence:
+    """Write the last image and wait until its echo is back: the end of a shutdown."""
     status = yield last
     while status.echo != last.echo:
         status = yield None

@@ -49,7 +49,7 @@ class RequestShadow:
         self.arrived = Finger.ALL
         """Axes that have been seen at rest under the position that they were asked last; the others move, or
         are about to."""
-        self._asked = 0.0
+        self.asked = 0.0
         """When the newest status was asked for. What it shows may be as old as that, however late its reply
         was looked at; so this is the time that the age of a write is measured by."""
         self._sure_at = 0.0
@@ -96,7 +96,7 @@ class RequestShadow:
         link went down may have arrived, and shows within a device cycle: what is written before that would
         take the axes back to what they were asked before it.
         """
-        if self._writes.is_in_doubt and self._asked - self._sure_at < SILENT_S:
+        if self._writes.is_in_doubt and self.asked - self._sure_at < SILENT_S:
             return False
         return self._adoption is None or self._adoption.is_certain
 
@@ -135,7 +135,7 @@ class RequestShadow:
 
     def acts(self, number: int) -> bool:
         """Whether the image of this number acts."""
-        return self._writes.acts(number, self._asked)
+        return self._writes.acts(number, self.asked)
 
     # -- what is written -------------------------------------------------------------------------------
 
@@ -163,7 +163,7 @@ class RequestShadow:
 
     def see(self, status: RobotiqStatus, asked: float) -> None:
         """Take in a status and when it was asked for; what follows is about it."""
-        self._asked = asked
+        self.asked = asked
         if self._writes.last_number:
             self._shown = self._writes.see(status, asked)
         else:
@@ -174,22 +174,22 @@ class RequestShadow:
 
     def returned(self, status: RobotiqStatus) -> None:
         """The link was lost and is back, and the gripper follows requests: ours, or it is adopted."""
-        self._unsure_until = self._asked + WINDOW_S
+        self._unsure_until = self.asked + WINDOW_S
         if self._shown is None or self._shown is self._adopted:
             self._moved = NO_AXES
             self.adopt(status)
         else:
             self._image = self._writes.newest_that_shows_like(self._shown)
-            self._writes.adopt(self._image, status.echo, self._asked)
+            self._writes.adopt(self._image, status.echo, self.asked)
 
     def adopt(self, status: RobotiqStatus) -> None:
         """Take the gripper as it is, without writing."""
         self._contacts.clear()
         # Who writes again and again must not make us wait again and again.
-        since = self._asked if self._adoption is None else self._adoption.since
-        self._adoption = Adoption(status, self._asked, since)
+        since = self.asked if self._adoption is None else self._adoption.since
+        self._adoption = Adoption(status, self.asked, since)
         self._adopted = self.base
-        self._writes.adopt(self._adopted, status.echo, self._asked)
+        self._writes.adopt(self._adopted, status.echo, self.asked)
 
     def is_ours(self, status: RobotiqStatus) -> bool:
         """Whether a gripper that follows requests follows ours, and not those of somebody else."""
@@ -197,10 +197,10 @@ class RequestShadow:
         if shown is None:
             return False
         if self._adoption is not None and shown is self._adopted:
-            self._adoption.see(status, self._asked)
-        elif self._asked < self._unsure_until and shown is self._adopted:
+            self._adoption.see(status, self.asked)
+        elif self.asked < self._unsure_until and shown is self._adopted:
             self.adopt(status)
-        elif self._adoption is not None or self._asked < self._unsure_until:
+        elif self._adoption is not None or self.asked < self._unsure_until:
             # Nothing was written since the link came back, or since another client wrote, and now an older
             # write of ours shows: go on from it.
             self._image, self._adoption = self._writes.newest_that_shows_like(shown), None
@@ -213,7 +213,7 @@ class RequestShadow:
             Whether the status shows that. If not, another client has written meanwhile. rATR has no echo; a
             gripper that follows requests does not follow that one.
         """
-        self._writes.restart(self._image, status.echo, self._asked)
+        self._writes.restart(self._image, status.echo, self.asked)
         return status.echo == self._image.echo and not self._image.release
 
     def see_arrivals(self, status: RobotiqStatus) -> None:

@@ -20,6 +20,7 @@ from ..session.options import (
 from ..session.reconnecting import ReconnectPolicy
 from ..session.session import Session
 from ..session.streams import Channels
+from ..wire.checks import check_flag
 from .commands import Commands
 from .grasping import Grasping
 
@@ -51,6 +52,7 @@ class RobotiqHand(Commands, Grasping):
         status_address: int | None = None,
         calibration: SpeedCalibration | None = None,
         force_calibration: ForceCalibration | None = None,
+        keep_grip: bool = False,
     ) -> None:
         """Check every option. Opens nothing and needs no running loop.
 
@@ -75,6 +77,8 @@ class RobotiqHand(Commands, Grasping):
             calibration: how fast this gripper is: default timeouts of moves come from it, and the speeds of
                 :attr:`units`. None for the thesis's gripper.
             force_calibration: what :attr:`units` labels force values with. None for the manual's figures.
+            keep_grip: what :meth:`stop` does unless told: False stops the fingers for certain (rGTO = 0),
+                True holds what moves and lets a grip stay in force. It is also what leaving the block does.
 
         Raises:
             TypeError: an option of the wrong type.
@@ -94,6 +98,7 @@ class RobotiqHand(Commands, Grasping):
             status_address=status_address,
             calibration=calibration,
             force_calibration=force_calibration,
+            keep_grip=keep_grip,
         )
         self._machine = StateMachine()
         self._channels = Channels()
@@ -133,8 +138,7 @@ class RobotiqHand(Commands, Grasping):
             NotActivatedError: the gripper was reset during the activation that was begun.
             ActivationTimeoutError: the activation was not finished in time.
         """
-        if not isinstance(activate, bool):
-            raise TypeError(f"activate must be True or False, got {activate!r}")
+        check_flag("activate", activate)
         running_loop()
         self._abandon_if_loop_closed()
         self._session = session = Session(self._options, self._machine, self._channels, activate=activate)
@@ -146,26 +150,33 @@ class RobotiqHand(Commands, Grasping):
             await self.stop()
             raise
 
-    async def stop(self, *, halt: bool = True) -> None:
+    async def stop(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:
         """Stop the fingers (rGTO = 0), keep the activation, disconnect. Idempotent.
 
         Ends within 2 s even on a dead link, and also when cancelled meanwhile: the cancellation is
         raised once the hand has stopped. If the link is down, it is tried once more. What other tasks
         wait for ends with NotStartedError.
 
+        With ``keep_grip`` axes that move are held where they are, and rGTO stays set, so that what grips
+        goes on gripping while nobody is connected. But only when every axis has been seen at rest: on any
+        doubt (within half a second one has not come to rest; the link is or goes down; a fault; a sequence;
+        another client commands the gripper; ``halt()`` was asked) rGTO is cleared as ever, and the log says
+        why. What a real gripper does with either is not known.
+
         Args:
             halt: False disconnects and leaves the fingers to what they do; for programs that only look.
+            keep_grip: whether a grip stays in force; None for what the hand was made with.
 
         Raises:
             RuntimeError: called in another event loop than the hand runs in; it goes on. (When that loop
                 has been closed, nothing can reach the gripper any more: the hand counts as stopped, and
                 the fingers go on with what they do.)
         """
-        if not isinstance(halt, bool):
-            raise TypeError(f"halt must be True or False, got {halt!r}")
+        check_flag("halt", halt)
+        keep_grip = self._options.keep_grip if keep_grip is None else check_flag("keep_grip", keep_grip)
         self._abandon_if_loop_closed()
         if self._session is not None and not self._session.is_over:
-            await self._session.stop(halt=halt)
+            await self._session.stop(halt=halt, keep_grip=keep_grip)
 
     def __repr__(self) -> str:
         """Address and state."""

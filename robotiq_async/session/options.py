@@ -14,7 +14,7 @@ from ..link.modbus import ModbusTransport
 from ..link.places import place_of
 from ..link.simulated import SimulatedTransport, new_gripper
 from ..link.transport import Transport
-from ..wire.checks import check_byte, check_int, check_seconds
+from ..wire.checks import check_byte, check_flag, check_int, check_seconds
 from ..wire.registers import REGISTER_COUNT, RTU_REGISTERS, TCP_REGISTERS
 from .claims import Gripper
 from .reconnecting import ReconnectPolicy
@@ -54,6 +54,8 @@ class Options:
     force: int
     units: Units
     """What positions, speeds and forces mean to people; default timeouts of moves come from its speeds."""
+    keep_grip: bool = False
+    """What a stop does about it unless told."""
 
 
 def check_options(
@@ -71,6 +73,7 @@ def check_options(
     status_address: object,
     calibration: object,
     force_calibration: object,
+    keep_grip: object,
 ) -> Options:
     """Check every option and make the transport; opens nothing and needs no running loop.
 
@@ -118,6 +121,7 @@ def check_options(
         speed=check_byte("speed", speed),
         force=check_byte("force", force),
         units=check_units(calibration, force_calibration),
+        keep_grip=check_flag("keep_grip", keep_grip),
     )
 
 

@@ -88,15 +88,19 @@ class Poller:
         self._stopping = False
         self._end_by = math.inf
         self._halt_at_stop = True
+        self._keep_grip = False
         self._interruptible: anyio.CancelScope | None = None
         self._tick = Tick(options.poll_interval)
         self._last_poll = 0.0
         self._warned = -math.inf
 
-    def request_stop(self, *, halt: bool) -> None:
-        """Ask the task to end; with ``halt`` it stops the fingers first. Never blocks."""
+    def request_stop(self, *, halt: bool, keep_grip: bool = False) -> None:
+        """Ask the task to end; with ``halt`` it stops the fingers first. Never blocks.
+
+        With ``keep_grip`` as well it holds what moves, and leaves rGTO set if it sees everything at rest.
+        """
         if not self._stopping:
-            self._stopping, self._halt_at_stop = True, halt
+            self._stopping, self._halt_at_stop, self._keep_grip = True, halt, keep_grip
             self._end_by = self._loop.time() + STOP_S
         if self._interruptible is not None:
             self._interruptible.cancel()
@@ -309,7 +313,7 @@ class Poller:
             # activated by what was known of it before.
             await self._transport.open()
             await self._poll_once()
-        self._controller.shut_down()
+        self._controller.shut_down(keep_grip=self._keep_grip)
         while True:
             await self._cycle()
             if not self._controller.machine.is_busy:

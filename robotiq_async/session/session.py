@@ -87,14 +87,16 @@ class Session:
         """Whether the loop was closed under it: its task can never end then."""
         return not self.is_over and self._loop.is_closed()
 
-    async def stop(self, *, halt: bool) -> None:
+    async def stop(self, *, halt: bool, keep_grip: bool = False) -> None:
         """Stop the fingers (with ``halt``) and disconnect; also when cancelled meanwhile.
+
+        With ``keep_grip`` they are held, and rGTO stays set if everything is seen at rest.
 
         Raises:
             RuntimeError: called in another event loop.
         """
         self.check_loop("hand.stop()")
-        self._poller.request_stop(halt=halt)
+        self._poller.request_stop(halt=halt, keep_grip=keep_grip)
         try:
             await wait_shielded(self._task)
         finally:

@@ -135,3 +135,14 @@ def check_timeout(name: str, value: object) -> float | None:
 
 
 _SINGLE: Final = frozenset(_BY_VALUE.values())
+
+
+def check_flag(name: str, value: object) -> bool:
+    """True or False.
+
+    Raises:
+        TypeError: neither.
+    """
+    if not isinstance(value, bool):
+        raise TypeError(f"{name} must be True or False, got {value!r}")
+    return value

@@ -26,6 +26,8 @@ IDLE_S = 1.0
 """So long a trouble goes on when there is no call."""
 ESCALATION_S = 5.0
 """Interference is a major fault after this time (20 s of the gripper, which is five times as fast)."""
+STOP_S = 2.0
+"""What a stop has promised to take at most: the phases that end so are stops."""
 MOVES_EVERYTHING = ("foreign", "release")
 SETTLED = (*RUNNING, State.RESET, State.FAULT, State.ATR_DONE, State.SHUTDOWN)
 
@@ -50,7 +52,9 @@ async def outcome(world: World, phase: Phase, words: str) -> str:
         told = _noticed(world) if task is None else await _told(task, before.time + phase.bound)
         await _rest(world)
         state = world.hand.state
-        if phase.name == "stopping" and abs(world.gripper.position(Finger.A) - TARGET) <= 2:
+        if phase.name == "keeping a grip":
+            told += ", kept" if world.gripper.grips == Finger.B | Finger.C else ", let go"
+        if phase.bound == STOP_S and abs(world.gripper.position(Finger.A) - TARGET) <= 2:
             told += ", fingers went on"
         _check_motions(world, before, phase, words.split()[0], told)
         await _works(world)

@@ -98,6 +98,17 @@ async def stopping(world: World) -> Call:
     return world.hand.stop
 
 
+async def keeping(world: World) -> Call:
+    world.gripper.place_object(B | C, 100)
+    await idle(world)
+    result = await world.hand.close(B | C, speed=255)
+    assert result.contacts == B | C
+    await world.hand.set_speed(0, A)
+    await world.hand.set_position(TARGET, A)
+    await world.until_moving()
+    return lambda: world.hand.stop(keep_grip=True)
+
+
 PHASES = (
     Phase("connecting", connecting, NOBODY, 5.0),
     Phase("activating", activating, A | B | C | S, 25.0),
@@ -108,4 +119,5 @@ PHASES = (
     Phase("resetting", resetting, NOBODY, 5.0, on_write=True),
     Phase("releasing", releasing, A | B | C | S, 65.0),
     Phase("stopping", stopping, A, 2.0, on_write=True),
+    Phase("keeping a grip", keeping, A, 2.0, on_write=True),
 )

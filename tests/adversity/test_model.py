@@ -15,7 +15,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from robotiq_async import Finger, MoveResult, ObjectStatus, RobotiqError, State
+from robotiq_async import Fault, Finger, MoveResult, ObjectStatus, RobotiqError, State
 from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.enums import AXES
 from robotiq_async.simulator import Trouble
@@ -168,12 +168,14 @@ class LiveUse(RuleBasedStateMachine):
         waiting[which % len(waiting)].cancel()
         self.run(asyncio.sleep(0))
 
-    @rule(activate=st.booleans())
-    def stop_and_start(self, activate: bool) -> None:
+    @rule(activate=st.booleans(), keep_grip=st.booleans())
+    def stop_and_start(self, activate: bool, keep_grip: bool) -> None:
         async def again() -> None:
             began = self.world.loop.time()
-            await self.hand.stop()
+            await self.hand.stop(keep_grip=keep_grip)
             assert self.world.loop.time() - began < 2.0
+            if self.hand.status.fault is not Fault.AUTOMATIC_RELEASE:  # which rGTO does not end
+                await self.world.nothing_moves_for(1.0)
             try:
                 await self.hand.start(activate=activate)
             except RobotiqError:

@@ -10,6 +10,7 @@ import pytest
 from robotiq_async import Finger, NotStartedError, RobotiqError, State
 from robotiq_async.simulator import Trouble
 from robotiq_async.wire.request import Request
+from tests.adversity.phases import PHASES, Phase
 from tests.adversity.world import world
 from tests.virtual import run
 
@@ -82,6 +83,33 @@ def test_stop_during_a_reset_does_not_activate_again(device_cycle: float) -> Non
                 await resetting
             await here.nothing_moves_for(6)
             assert not Request.from_registers(here.gripper.request_registers).activate
+
+    run(main)
+
+
+@pytest.mark.parametrize("device_cycle", [0.005, 0.2])
+@pytest.mark.parametrize("after", [0.0, 0.02, 0.3])
+@pytest.mark.parametrize(
+    "phase", [phase for phase in PHASES if phase.name != "releasing"], ids=lambda phase: phase.name
+)
+def test_a_stop_that_keeps_a_grip_leaves_nothing_moving_whatever_it_meets(
+    phase: Phase, after: float, device_cycle: float
+) -> None:
+    """A release aside: rGTO does not end it, and no stop does."""
+
+    async def main() -> None:
+        async with world() as here:
+            call = await phase.reach(here)
+            here.gripper.device_cycle = device_cycle * here.gripper.speedup
+            task = asyncio.ensure_future(asyncio.sleep(0) if call is None else call())
+            await asyncio.sleep(after)
+            began = here.loop.time()
+            await here.hand.stop(keep_grip=True)
+            assert here.loop.time() - began < 2.0
+            await asyncio.gather(task, return_exceptions=True)
+            await here.nothing_moves_for(6)
+            if phase.name == "holding":
+                assert here.gripper.grips == Finger.ABC
 
     run(main)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 import signal
 import socket
 import sys
@@ -16,6 +17,8 @@ import pytest
 from robotiq_async import Fault, Finger
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.wire import registers as reg
+from robotiq_async.wire.request import Request
+from tests.cli.conftest import served
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Call, Shell
@@ -110,6 +113,58 @@ def test_a_contact_is_a_success(call: Call, there: SimulatorServer) -> None:
     assert outcome.code == 0
     assert outcome.out.count("CONTACT_CLOSING") == 1
     assert "an object is in the way" in outcome.out
+
+
+def test_a_grip_is_kept_from_one_move_to_the_next(call: Call, there: SimulatorServer) -> None:
+    held = Finger.B | Finger.C
+    call("move", "0", "--yes", there.address).assert_succeeded()
+    there.gripper.place_object(held, position=120)
+    outcome = call("move", "255", "--keep", "--yes", there.address)
+    outcome.assert_succeeded()
+    assert "the grip is in force" in outcome.out
+    assert there.gripper.grips == held
+    outcome = call("move", "60", "--fingers", "A", "--keep", "--yes", there.address)
+    outcome.assert_succeeded()
+    assert "rGTO" not in outcome.err
+    assert there.gripper.grips == held
+
+
+def test_a_grip_that_was_let_go_is_not_taken_up_again_without_a_word(
+    call: Call, there: SimulatorServer
+) -> None:
+    there.gripper.write(0, ACTIVATE)
+    call("move", "0", "--yes", there.address).assert_succeeded()
+    there.gripper.place_object(Finger.B | Finger.C, position=120)
+    outcome = call("move", "255", "--fingers", "B,C", "--yes", there.address)
+    assert "what is held may fall" in outcome.out
+    assert not there.gripper.grips
+    outcome = call("move", "60", "--fingers", "A", "--yes", there.address)
+    outcome.assert_succeeded()
+    assert "B|C touched something while rGTO was clear" in outcome.err
+
+
+class InterruptingGripper(SimulatedGripper):
+    """Ctrl-C comes when an axis is told to go to a position."""
+
+    at = -1
+
+    def write(self, address_offset: int, registers: Sequence[int]) -> None:
+        super().write(address_offset, registers)
+        if Request.from_registers(registers).position(Finger.A) == self.at:
+            os.kill(os.getpid(), signal.SIGINT)
+
+
+def test_ctrl_c_keeps_a_grip_and_holds_what_moves(call: Call) -> None:
+    gripper, held = InterruptingGripper(speedup=20), Finger.B | Finger.C
+    gripper.place_object(held, position=120)
+    with served(gripper) as server:
+        call("move", "255", "--fingers", "B,C", "--keep", "--yes", server.address).assert_succeeded()
+        gripper.at = 200
+        outcome = call("move", "200", "--fingers", "A", "--speed", "0", "--keep", "--yes", server.address)
+        outcome.assert_failed(130, "interrupted")
+        assert not gripper.is_moving
+        assert gripper.position(Finger.A) < 150
+        assert gripper.grips == held
 
 
 def test_move_in_fault_fails(call: Call, there: SimulatorServer) -> None:

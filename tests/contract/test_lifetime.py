@@ -20,7 +20,7 @@ from robotiq_async import (
 from robotiq_async.fleet.network.bus import Bus
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.protocol import Hand
-from tests.contract.bench import LOCAL, REMOTE, A, bench, contract, ended, statuses
+from tests.contract.bench import LOCAL, REMOTE, A, B, C, bench, contract, ended, statuses
 
 
 @pytest.mark.parametrize("where", [LOCAL, REMOTE])
@@ -167,6 +167,51 @@ async def test_stop_may_leave_the_fingers_to_what_they_do(where: str) -> None:
         await asyncio.sleep(10)
         assert here.writes == writes
         assert here.gripper.position(A) >= 195
+
+
+@contract
+async def test_stop_may_keep_a_grip(where: str) -> None:
+    async with bench(where) as here:
+        here.gripper.place_object(B | C, 100)
+        hand = here.make()
+        await hand.start()
+        await hand.close(B | C)
+        writes = here.writes
+        await hand.stop(keep_grip=True)
+        assert hand.state is State.SHUTDOWN
+        await asyncio.sleep(5)
+        assert here.gripper.grips == B | C
+        assert here.writes == writes
+
+
+@contract
+async def test_a_stop_that_keeps_a_grip_holds_what_moves(where: str) -> None:
+    async with bench(where) as here:
+        here.gripper.place_object(B | C, 100)
+        hand = here.make()
+        await hand.start()
+        await hand.close(B | C)
+        await hand.set_speed(0, A)
+        await hand.set_position(255, A)
+        await here.moves()
+        await hand.stop(keep_grip=True)
+        assert not here.gripper.is_moving
+        await asyncio.sleep(5)
+        assert here.gripper.position(A) < 40
+        assert here.gripper.grips == B | C
+
+
+@contract
+async def test_in_a_fault_no_grip_is_kept(where: str) -> None:
+    async with bench(where) as here:
+        here.gripper.place_object(B | C, 100)
+        hand = here.make()
+        await hand.start()
+        await hand.close(B | C)
+        here.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
+        await hand.wait_for_state(State.FAULT)
+        await hand.stop(keep_grip=True)
+        assert not here.last_write.go
 
 
 @contract
@@ -323,3 +368,6 @@ async def test_flags_are_flags(where: str, value: object) -> None:
             await hand.start(activate=value)  # type: ignore[arg-type]
         with pytest.raises(TypeError, match="halt"):
             await hand.stop(halt=value)  # type: ignore[arg-type]
+        if value is not None:  # what the hand was made with
+            with pytest.raises(TypeError, match="keep_grip"):
+                await hand.stop(keep_grip=value)  # type: ignore[arg-type]

@@ -24,15 +24,32 @@ class Scan:
     """Steps the controller and the gripper through them."""
 
     def __init__(
-        self, *, device_cycle: float = 0.005, gripper: SimulatedGripper | None = None, speed: int = 128
+        self,
+        *,
+        device_cycle: float = 0.005,
+        gripper: SimulatedGripper | None = None,
+        speed: int = 128,
+        after: Scan | None = None,
     ) -> None:
-        self.now = 100.0
+        """``after`` is the program before this one: the gripper is its, and so is the time."""
+        self._time: list[float] = [100.0] if after is None else after._time
+        self.gripper: SimulatedGripper
+        if after is not None:
+            gripper = after.gripper
         self.gripper = gripper or SimulatedGripper(lambda: self.now, device_cycle=device_cycle, spread=False)
         self.transitions: list[tuple[State, State, Trigger]] = []
         self.machine = StateMachine(lambda *change: self.transitions.append(change))
         self.controller = Controller(self.machine, speed, 64, closing_time)
         self.written: list[Registers] = []
         self.polls = 0
+
+    @property
+    def now(self) -> float:
+        return self._time[0]
+
+    @now.setter
+    def now(self, value: float) -> None:
+        self._time[0] = value
 
     # -- the link --------------------------------------------------------------------------------------
 
@@ -126,9 +143,9 @@ class Scan:
         self.controller.halt(outcome)
         return outcome
 
-    def stop(self) -> None:
+    def stop(self, *, keep_grip: bool = False) -> None:
         self.controller.stop()
-        self.controller.shut_down()
+        self.controller.shut_down(keep_grip=keep_grip)
         self.until(lambda: not self.controller.machine.is_busy, 1.0)
 
     # -- what has happened -----------------------------------------------------------------------------

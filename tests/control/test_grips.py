@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from robotiq_async import Fault, Finger, ObjectStatus, State
 from tests.control.other_client import reset_and_activated_by_another
 from tests.control.scan import Scan, started
@@ -39,6 +41,34 @@ def test_a_halted_grip_survives_a_blink_of_the_link(scan: Scan) -> None:
     scan.run(0.1)
     scan.moved(60, A)
     assert scan.latest.requested_position(B) == 255
+
+
+def test_a_grip_that_is_not_taken_up_again_is_told(caplog: pytest.LogCaptureFixture) -> None:
+    """The first program let go of rGTO; who comes next cannot know what its fingers were asked."""
+    first = started()
+    first.gripper.place_object(A | B | C, 150)
+    first.moved(255)
+    first.stop()
+    scan = Scan(after=first)
+    scan.connect()
+    scan.moved(60, A | S)
+    (said,) = caplog.messages
+    assert said.startswith("B|C touched something while rGTO was clear")
+    assert scan.latest.requested_position(B) == scan.latest.position(B) == 150
+    assert not scan.gripper.grips
+    scan.moved(80, A)
+    assert caplog.messages == [said], "once"
+
+
+def test_a_grip_that_is_taken_up_again_needs_no_word(scan: Scan, caplog: pytest.LogCaptureFixture) -> None:
+    scan.gripper.place_object(B, 60)
+    scan.moved(255, B)
+    halted = scan.halt()
+    scan.until(lambda: halted.is_told)
+    assert not scan.gripper.grips
+    scan.moved(100, A)
+    assert scan.gripper.grips == B
+    assert not caplog.messages
 
 
 def test_a_grip_that_is_somewhere_else_by_now_is_none(scan: Scan) -> None:

@@ -32,6 +32,14 @@ class RandomUse(RuleBasedStateMachine):
         self.travel = {axis: self.scan.gripper.travel(axis) for axis in AXES}
         self.told: list[tuple[Move | None, Outcome]] = []
 
+    def teardown(self) -> None:
+        """Whatever was going on, a stop that keeps a grip leaves nothing going."""
+        if hasattr(self, "scan"):
+            self.scan.stop(keep_grip=True)
+            before = self.scan.travels()
+            self.scan.now += 10
+            assert self.scan.travels() == before, "something went on"
+
     @property
     def running(self) -> bool:
         return self.scan.state in RUNNING

@@ -63,7 +63,7 @@ def agree(shown: str, printed: str) -> bool:
 
 
 def test_every_python_block_shows_its_output() -> None:
-    assert len(TYPED) >= 11
+    assert len(TYPED) >= 12
     assert all(output.language == "text" for _, output in [*TYPED, PROGRAM, TEST])
     assert {block.language for block in BLOCKS} == {"sh", "python", "text"}
 

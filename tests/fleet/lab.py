@@ -57,15 +57,21 @@ async def activate_beforehand(gripper: SimulatedGripper) -> None:
 
 
 @asynccontextmanager
-async def lab(*, window: float = 1.0, active: bool = True) -> AsyncIterator[Lab]:
+async def lab(
+    *,
+    window: float = 1.0,
+    active: bool = True,
+    kind: type[SimulatedGripper] = SimulatedGripper,
+    keep_grip: bool = False,
+) -> AsyncIterator[Lab]:
     """An agent that serves zenoh://lab/cell/left, and a network named by the buses "agent" and "client"."""
     loop = asyncio.get_running_loop()
     network = Network()
-    gripper = SimulatedGripper(loop.time, speedup=SPEEDUP, device_cycle=0.005 * SPEEDUP, spread=False)
+    gripper = kind(loop.time, speedup=SPEEDUP, device_cycle=0.005 * SPEEDUP, spread=False)
     async with SimulatorServer(gripper) as server:
         if active:
             await activate_beforehand(gripper)
-        hand = RobotiqHand(server.address)
+        hand = RobotiqHand(server.address, keep_grip=keep_grip)
         agent = Agent("lab", "cell", {"left": hand}, network.bus("agent"), window=window)
         ready = asyncio.Event()
         serving = asyncio.create_task(agent.run(ready.set))

@@ -56,6 +56,7 @@ def test_everything(tmp_path: Path) -> None:
         speed = 255
         force = 0
         poll_interval = 0.01
+        keep_grip = true
         """,
     )
     assert settings.listen == ("tls/0.0.0.0:7447", "quic/[::]:7447")
@@ -63,6 +64,7 @@ def test_everything(tmp_path: Path) -> None:
     assert list(settings.grippers) == ["right", "left"]
     assert settings.grippers["left"].speed == 255
     assert settings.grippers["right"].status_address == 2000
+    assert [each.keep_grip for each in settings.grippers.values()] == [False, True]
     assert settings.grippers["left"].make_hand().address == "tcp://192.168.1.11:502"
 
 

@@ -41,6 +41,51 @@ async def test_an_end_that_only_looks_leaves_the_fingers_to_what_they_do() -> No
 
 
 @virtual
+async def test_an_end_that_keeps_a_grip_leaves_rgto_set() -> None:
+    async with polled() as here:
+        here.controller.command(Command(Finger.ABC, 50, 255))
+        await here.polls(300)
+        here.poller.request_stop(halt=True, keep_grip=True)
+        await here.end()
+        assert here.statuses[-1].go_echo
+        assert len(here.requests) == 1
+
+
+@virtual
+async def test_what_is_to_be_held_at_the_end_is_told_before_anything_is_read() -> None:
+    """A gripper that hears and is not heard holds, too."""
+    async with polled() as here:
+        here.controller.command(Command(Finger.ABC, 200, 0))
+        await here.polls(20)
+
+        def stop() -> None:
+            here.wire.silent.add("read")
+            here.poller.request_stop(halt=True, keep_grip=True)
+
+        here.at_next_status = stop
+        await here.end()
+        assert here.requests[-1].request.go
+        assert not here.wire.gripper.is_moving
+        assert here.wire.gripper.position(Finger.A) < 30
+
+
+@virtual
+async def test_a_link_that_is_lost_at_the_end_lets_a_grip_go() -> None:
+    async with polled() as here:
+        here.controller.command(Command(Finger.ABC, 50, 255))
+        await here.polls(300)
+
+        def stop() -> None:
+            here.wire.failing["read"] = LOST
+            here.poller.request_stop(halt=True, keep_grip=True)
+            asyncio.get_running_loop().call_later(0.1, here.wire.failing.clear)
+
+        here.at_next_status = stop
+        await here.end()
+        assert not here.requests[-1].request.go
+
+
+@virtual
 async def test_a_stop_that_was_not_heard_is_sent_again() -> None:
     """Unlike a motion: a gripper that lost its client goes on moving."""
     async with polled() as here:

@@ -51,6 +51,27 @@ def test_every_axis_feels_both_directions(individual: Bench, axis: Finger) -> No
     assert where(individual, axis) == (60, OPENING)
 
 
+def test_an_axis_grips_while_it_is_driven_against_what_it_touches(individual: Bench) -> None:
+    """An assumption: what becomes of a grip when rGTO is cleared no public source says."""
+    individual.gripper.place_object(Finger.A, 150)
+    individual.gripper.place_object(Finger.B, 60, opening=True)
+    individual.go({Finger.B: 255})
+    individual.settle()
+    assert not individual.gripper.grips
+    individual.go({Finger.A: 200, Finger.B: 0})
+    assert not individual.gripper.grips, "they are on their way"
+    individual.settle()
+    assert individual.gripper.grips == Finger.A | Finger.B
+    individual.write(go=False)
+    assert not individual.gripper.grips
+    assert where(individual, Finger.A) == (150, CLOSING), "it stands where it was, and still tells of it"
+    individual.write(go=True)
+    individual.settle()
+    assert individual.gripper.grips == Finger.A | Finger.B
+    individual.go({Finger.A: 150})
+    assert individual.gripper.grips == Finger.B, "to be asked to be where it is lets go"
+
+
 def test_a_request_that_ends_at_the_object_is_no_contact(individual: Bench) -> None:
     individual.gripper.place_object(Finger.A, 150)
     individual.go({Finger.A: 150})

@@ -16,6 +16,9 @@ from ..failures import usage
 WARNING = """this MOVES {fingers} to {position}.
 If it is not active yet ALL its fingers open and close to their stops first, and what they hold drops."""
 
+IN_FORCE = "rGTO stays set: the grip is in force, and nobody is connected."
+LET_GO = "rGTO is clear now: what is held may fall. With --keep it stays set."
+
 
 def move(
     position: Position,
@@ -26,6 +29,7 @@ def move(
     speed: Byte | None = None,
     force: Byte | None = None,
     timeout: Annotated[float | None, Parameter(metavar="SECONDS")] = None,
+    keep: Annotated[bool, Parameter(negative=())] = False,
     yes: Yes = False,
     link: Link = USUAL,
 ) -> Coroutine[None, None, None]:
@@ -36,11 +40,18 @@ def move(
     success, and the table says so. Unless the gripper is that of sim:// it asks
     first; without a terminal it needs --yes.
 
+    In the end it stops every axis (rGTO = 0), also those that hold something. A
+    finger locks itself, so the part may stay; nobody has tried it. The next move
+    does not take that grip up again. With --keep rGTO stays set if everything has
+    come to rest, Ctrl-C or not, and the next move leaves the other axes their grip.
+    Speed and force cannot be read back: the other axes get 128 and 64 then.
+
     For example:
 
         robotiq-async move 255
         robotiq-async move 100 tcp://192.168.1.11 --fingers A,B --speed 64
         robotiq-async move 255 192.168.1.11 --fingers scissor --force 0 --yes
+        robotiq-async move 255 192.168.1.11 --keep
 
     Args:
         position: 0 is open, 255 is closed; for the scissor 0 is wide and 255 is pinch.
@@ -48,13 +59,14 @@ def move(
         speed: 0 is the slowest (10 s for a full stroke), 255 the fastest (2 s).
         force: 0 is the weakest, 255 the strongest.
         timeout: Give up after so many seconds; by default from distance and speed.
+        keep: Let a grip stay in force when the command ends.
         yes: Do not ask.
     """
     with usage():
         check_timeout("timeout", timeout)
     # Asked here and not in the coroutine: a question would block the event loop.
     consent(address, WARNING.format(fingers=fingers.name, position=position), yes=yes)
-    return _move(position, address, fingers, speed, force, timeout, link)
+    return _move(position, address, fingers, speed, force, timeout, keep, link)
 
 
 async def _move(
@@ -64,14 +76,17 @@ async def _move(
     speed: int | None,
     force: int | None,
     timeout: float | None,
+    keep: bool,
     link: Link,
 ) -> None:
     from ..connect import connected
     from ..tables import print_outcomes
 
-    async with connected(address, link, halt=True) as hand:
+    async with connected(address, link, halt=True, keep_grip=keep) as hand:
         if not hand.is_activated:
             print("Activating: the fingers open and close.", flush=True)
             await hand.activate()
         result = await hand.move(position, fingers, speed=speed, force=force, timeout=timeout)
     print_outcomes(result)
+    if result.object_detected:
+        print(IN_FORCE if hand.status.go_echo else LET_GO)

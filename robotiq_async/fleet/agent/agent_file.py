@@ -53,6 +53,7 @@ class GripperSettings:
     force: int = DEFAULT_FORCE
     request_address: int | None = None
     status_address: int | None = None
+    keep_grip: bool = False
 
     def make_hand(self) -> RobotiqHand:
         """A hand for the gripper; opens nothing.

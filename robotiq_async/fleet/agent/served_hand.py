@@ -8,6 +8,7 @@ from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from typing import Any, Final, TypeVar
 
+from ...control.keeping import KEEP_S
 from ...control.motion import MoveResult
 from ...control.state_machine import RUNNING
 from ...enums import Finger
@@ -210,16 +211,30 @@ class ServedHand:
 
     def _release(self, call: Call, question: Question) -> None:
         leaves = call.arguments.get("halt") is False
+        keeps = call.arguments.get("keep_grip") is True and self._hand.state in RUNNING
         if leaves:
             self._commanded = Finger(0)
             self._requests = {at: each for at, each in self._requests.items() if each.name != "move"}
         self.end_lease("released")
 
         async def release() -> None:
-            if not leaves:
+            if keeps and not leaves:
+                await self._come_to_rest()
+            elif not leaves:
                 await self._hand.halt()
 
         self._start(_Request("release", call, question), release())
+
+    async def _come_to_rest(self) -> None:
+        """Hold what moves; halt if that does not come to rest in time, and nobody commands by then."""
+        await self._hand.hold(Finger.ALL)
+        with suppress(TimeoutError):
+            async with asyncio.timeout(KEEP_S):
+                async for _ in self._hand.statuses():
+                    if not self._hand.is_moving:
+                        return
+        if self._lease.holder is None:
+            await self._hand.halt()
 
     def end_lease(self, reason: str, by: str = "") -> None:
         """Take the lease from whoever holds it: what it commanded and still moves is held, grips stay."""

@@ -86,7 +86,7 @@ class LeaseKeeper:
                 if getattr(error, "reason", "late") != "late" or now() >= deadline:
                     raise
 
-    async def end(self, *, halt: bool) -> None:
+    async def end(self, *, halt: bool, keep_grip: bool) -> None:
         """The run ends: give the lease back.
 
         Raises:
@@ -95,7 +95,7 @@ class LeaseKeeper:
         self._wants_control = False
         if self.is_in_control:
             self.is_in_control = False
-            await self._give_back(halt=halt)
+            await self._give_back(halt=halt, keep_grip=keep_grip)
 
     def abandon(self) -> None:
         """Nothing can be sent any more."""
@@ -120,7 +120,7 @@ class LeaseKeeper:
                 return  # asked for again, the agent would take what is under way for forgotten
             await self._acquire({"what": "take" if take else "acquire"})
 
-    async def release(self, *, halt: bool) -> None:
+    async def release(self, *, halt: bool, keep_grip: bool) -> None:
         """Give the lease back.
 
         Raises:
@@ -129,7 +129,7 @@ class LeaseKeeper:
         self._wants_control = False
         if self.is_in_control:
             self.lose("released", "it was given back")
-            await self._give_back(halt=halt)
+            await self._give_back(halt=halt, keep_grip=keep_grip)
 
     def look(self) -> None:
         """Renew the lease, or acquire it again when that is due; several times in a window."""
@@ -192,8 +192,8 @@ class LeaseKeeper:
         except RobotiqError:
             pass  # again in a moment
 
-    async def _give_back(self, *, halt: bool) -> None:
-        call = self._run.call({"what": "release", "halt": halt})
+    async def _give_back(self, *, halt: bool, keep_grip: bool) -> None:
+        call = self._run.call({"what": "release", "halt": halt, "keep_grip": keep_grip})
         await self._run.send(call, "lease", timeout=RELEASE_S)
 
     async def _renew(self) -> None:

@@ -12,7 +12,7 @@ from ...hand.grasping import Grasping
 from ...session.event_loop import running_loop
 from ...session.options import check_units
 from ...session.streams import Channels
-from ...wire.checks import check_seconds
+from ...wire.checks import check_flag, check_seconds
 from ..network.bus import Bus
 from ..network.route import parse_remote_address
 from .commands import RemoteCommands
@@ -42,6 +42,7 @@ class RemoteHand(RemoteCommands, Grasping):
         bus: Bus | None = None,
         calibration: SpeedCalibration | None = None,
         force_calibration: ForceCalibration | None = None,
+        keep_grip: bool = False,
     ) -> None:
         """Check every option. Opens nothing and needs no running loop.
 
@@ -56,6 +57,7 @@ class RemoteHand(RemoteCommands, Grasping):
             calibration: the speeds of :attr:`units`; default timeouts are the agent's. None for the thesis's
                 gripper.
             force_calibration: what :attr:`units` labels force values with. None for the manual's figures.
+            keep_grip: what :meth:`stop` and :meth:`release` do unless told, and what leaving the block does.
 
         Raises:
             TypeError: an option of the wrong type.
@@ -67,6 +69,7 @@ class RemoteHand(RemoteCommands, Grasping):
         self._connect_timeout = check_seconds("connect_timeout", connect_timeout, 0.1, 60.0)
         self._control = control
         self._units = check_units(calibration, force_calibration)
+        self._keep_grip = check_flag("keep_grip", keep_grip)
         if bus is None:
             self._route.configuration()  # malformed or unprotected: said here, and not when it starts
         self._shared = bus
@@ -105,8 +108,7 @@ class RemoteHand(RemoteCommands, Grasping):
             ControlLostError: another client commands the gripper.
             RobotiqError: as for a hand of this process, where the gripper is.
         """
-        if not isinstance(activate, bool):
-            raise TypeError(f"activate must be True or False, got {activate!r}")
+        check_flag("activate", activate)
         running_loop()
         self._abandon_if_loop_closed()
         before = self._session
@@ -135,7 +137,7 @@ class RemoteHand(RemoteCommands, Grasping):
             await self.stop()
             raise
 
-    async def stop(self, *, halt: bool = True) -> None:
+    async def stop(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:
         """Stop the fingers, give the lease back, and disconnect; the agent's hand goes on.
 
         Ends within 2 s also when the agent is silent, or when cancelled meanwhile. A hand that does not hold
@@ -143,19 +145,22 @@ class RemoteHand(RemoteCommands, Grasping):
 
         Args:
             halt: False leaves the fingers to what they do.
+            keep_grip: True lets the agent hold what moves, so that a grip stays in force; it halts when an
+                axis does not come to rest, and in a fault or a sequence. None for what the hand was made
+                with.
 
         Raises:
             RuntimeError: called in another event loop than the hand runs in; it goes on. (When that loop
                 has been closed, the hand counts as stopped, and its agent holds what moves.)
         """
-        if not isinstance(halt, bool):
-            raise TypeError(f"halt must be True or False, got {halt!r}")
+        check_flag("halt", halt)
+        keep_grip = self._keep_grip if keep_grip is None else check_flag("keep_grip", keep_grip)
         self._abandon_if_loop_closed()
         self._opening = None
         session = self._session
         if session is not None and not session.has_ended:
             session.check_loop()
-            await session.close(halt=halt)
+            await session.close(halt=halt, keep_grip=keep_grip)
 
     async def _open(self) -> Bus:
         """The session to use.
@@ -213,17 +218,20 @@ class RemoteHand(RemoteCommands, Grasping):
         with plainly():
             await self._asked().keeper.acquire(take=True)
 
-    async def release(self, *, halt: bool = True) -> None:
+    async def release(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:
         """Give the lease back, and read on.
 
         Args:
             halt: False leaves the fingers to what they do.
+            keep_grip: as for :meth:`stop`.
 
         Raises:
             RobotiqError: not started, the agent does not answer, or the fingers were not seen to stop.
         """
+        check_flag("halt", halt)
+        keep_grip = self._keep_grip if keep_grip is None else check_flag("keep_grip", keep_grip)
         with plainly():
-            await self._asked().keeper.release(halt=halt)
+            await self._asked().keeper.release(halt=halt, keep_grip=keep_grip)
 
     def __repr__(self) -> str:
         """Address and state."""

@@ -168,18 +168,18 @@ class RemoteSession:
         why = "no agent of it is heard: none runs, or the network or a certificate is in the way"
         raise ConnectFailedError(str(self.name), why)
 
-    async def close(self, *, halt: bool) -> None:
+    async def close(self, *, halt: bool, keep_grip: bool) -> None:
         """End the run; within two seconds, also when cancelled meanwhile, and whoever asks waits for it."""
         if self._closing is None:
             self.is_over = True
             self.mirror.shut_down(State.DO_SHUTDOWN, Trigger.ASK_STOP, now())
-            self._closing = self.loop.create_task(self._close(halt=halt))
+            self._closing = self.loop.create_task(self._close(halt=halt, keep_grip=keep_grip))
         await wait_shielded(self._closing)
         self._closing.result()
 
-    async def _close(self, *, halt: bool) -> None:
+    async def _close(self, *, halt: bool, keep_grip: bool) -> None:
         try:
-            await self.keeper.end(halt=halt)
+            await self.keeper.end(halt=halt, keep_grip=keep_grip)
         except RobotiqError as error:
             log.warning("%s: the end was not acknowledged (%s): the agent holds what moves", self.name, error)
         finally:

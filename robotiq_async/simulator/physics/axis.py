@@ -82,6 +82,11 @@ class Axis:
         return self.ends_at < math.inf
 
     @property
+    def grips(self) -> bool:
+        """Whether the axis is driven against what it touches."""
+        return self._goal is not None and self._is_latched_against(self._goal)
+
+    @property
     def target(self) -> int:
         """Where the axis is driven to, in counts within its stops; at rest without a goal, where it is."""
         return round(self._origin) if self._goal is None else self._within_stops(self._goal.position)

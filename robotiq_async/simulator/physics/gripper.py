@@ -6,9 +6,11 @@ import math
 import sys
 import time
 from collections import deque
+from functools import reduce
+from operator import or_
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from robotiq_async.enums import AXES, Fault, Finger
+from robotiq_async.enums import AXES, NO_AXES, Fault, Finger
 from robotiq_async.wire import registers as reg
 from robotiq_async.wire.checks import check_axis, check_byte, check_int, check_mask, check_seconds
 from robotiq_async.wire.request import Request
@@ -55,6 +57,8 @@ class SimulatedGripper:
     * An axis that meets something, or tries again, presses for 50 ms with gDT 0 before it reports a contact.
     * An axis that stands within 2 counts of a new request has reached it, and does not move.
     * Activation closes and opens at full speed (4.2 s); a failed one stays at gIMC = 1 with fault 0x0D.
+    * Clearing rGTO ends a grip (:attr:`grips`), though the axis stays in its place and its gDT tells of the
+      contact still. A real finger locks itself; whether that holds a part nobody has tried.
     * gMOD, gGTO and the position echoes follow the request also while reset.
     * A minor or major fault stops the axes where they are, with gDT 0; interference below 20 s stops the
       scissor only. When a minor fault ends, a request with rGTO = 1 goes on by itself.
@@ -306,6 +310,13 @@ class SimulatedGripper:
         """Whether an axis really moves, for whatever reason."""
         self._catch_up()
         return any(axis.is_moving for axis in self._controller.axes)
+
+    @property
+    def grips(self) -> Finger:
+        """The axes that are driven against what they touch: rGTO is set, and the request lies beyond it."""
+        self._catch_up()
+        gripping = (name for name, axis in zip(AXES, self._controller.axes, strict=True) if axis.grips)
+        return reduce(or_, gripping, NO_AXES)
 
     def position(self, finger: Finger | int) -> int:
         """Where one axis is, in counts, as gPO reads.

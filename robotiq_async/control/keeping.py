@@ -1,0 +1,95 @@
+"""The end of a hand that keeps its grip: rGTO stays set, if nothing moves.
+
+Clearing rGTO is what stops the fingers for certain; what becomes of a grip then no public source says. So a
+hand may leave rGTO set when it is stopped, but only if every axis has been seen at rest under requests that
+are known. What moves is held first, once, as a cancelled move is. On any doubt rGTO is cleared, as ever.
+docs/decisions/keeping-a-grip.md has the reasons.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from ..enums import NO_AXES, Fault, Finger
+from ..log import log
+from ..wire.request import Request
+from ..wire.status import RobotiqStatus
+from .merging import merged
+from .pending import PendingCommand
+from .sequences import Sequence, stop_fingers
+from .shadow import RequestShadow
+from .triggers import Trigger, classify
+
+KEEP_S: Final = 0.5
+"""So long axes have to come to rest. What is left of the time of a stop is enough to clear rGTO also on the
+slowest gripper that is reckoned with (a device cycle of 0.2 s)."""
+REST_S: Final = 0.05
+"""So long every axis must have stood still: ten polls. A gDT that lags behind its echo by a reading or two is
+no motion left unseen."""
+
+
+class Keeping:
+    """Judges the statuses of a hand that is being stopped and is to keep its grip."""
+
+    def __init__(self, shadow: RequestShadow, doubt: str = "") -> None:
+        """Judge by what the gripper was asked.
+
+        Args:
+            shadow: what it was asked.
+            doubt: why rGTO is to be cleared, if that is known already.
+        """
+        self._shadow = shadow
+        self.doubt = doubt
+
+    def rests(self, status: RobotiqStatus) -> bool:
+        """Whether a status shows every axis at rest under what it was asked last, and no fault."""
+        ready = classify(status) is Trigger.SEEN_READY and status.fault is Fault.NONE
+        return ready and status.go_echo and not status.moving and self._shadow.is_settled and not self.doubt
+
+    def sequence(self) -> Sequence:
+        """Hold what moves and leave rGTO set once everything rests; on any doubt, clear it and see it."""
+        status = yield None
+        # How long an axis has stood still is counted by when that was asked: replies may be looked at late.
+        until, since, may_hold = status.timestamp + KEEP_S, math.inf, True
+        while not (doubt := self._doubt(status, until)):
+            image = self._held(status) if may_hold else None
+            if image is not None:
+                may_hold, since = False, math.inf
+                status = yield image
+                continue
+            since = min(since, self._shadow.asked) if self.rests(status) else math.inf
+            if self._shadow.asked - since >= REST_S:
+                log.info("stopped with rGTO set; in contact: %s", status.contacts or "nothing")
+                return
+            status = yield None
+        last = self._shadow.last_image(status)
+        if last is not None:
+            log.warning("rGTO is cleared, and no grip is kept: %s", doubt)
+            yield from stop_fingers(last)
+
+    def _doubt(self, status: RobotiqStatus, until: float) -> str:
+        """Why the fingers cannot be left as they are; empty for no reason."""
+        if self.doubt:
+            return self.doubt
+        condition = classify(status)
+        if condition is not Trigger.SEEN_READY or status.fault is not Fault.NONE:
+            return f"the {condition.value} ({status.fault.description})"
+        if not self._shadow.is_ours(status):
+            return "another client commands the gripper"
+        if status.timestamp - self._shadow.asked > KEEP_S:
+            return "the newest status is old: something holds up the event loop"
+        if not self._shadow.is_certain:
+            return "what the gripper was asked is not known for certain"
+        if self._shadow.is_settled and not status.go_echo:
+            return "rGTO was clear"
+        if status.timestamp >= until and not self.rests(status):
+            return f"not every axis came to rest within {KEEP_S:g} s"
+        return ""
+
+    def _held(self, status: RobotiqStatus) -> Request | None:
+        """The image in which everything that moves, or is about to, is held; None if nothing does."""
+        shadow = self._shadow
+        held = PendingCommand(hold=Finger.ALL)
+        image = merged(shadow.base, held, status, gripping=NO_AXES, arrived=shadow.arrived)
+        return None if image == shadow.base else image
