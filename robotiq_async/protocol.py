@@ -52,9 +52,10 @@ class Hand(Protocol):
     """A gripper, as a program sees it.
 
     Calls belong to one event loop, never block it, and end in bounded time; any number of tasks may make
-    them. Masks are :class:`Finger` or the same integers; values are integers in 0..255. Anything else is a
-    TypeError or a ValueError, and nothing has been asked of the gripper then. Timestamps are monotonic
-    seconds by the clock of this process, wherever the gripper is. No command is ever sent twice.
+    them. Masks are :class:`Finger` or the same integers; values are integers in 0..255, whatever has an
+    ``__index__`` being one. Anything else is a TypeError or a ValueError, and nothing has been asked of the
+    gripper then. Timestamps are monotonic seconds by the clock of this process, wherever the gripper is. No
+    command is ever sent twice.
     """
 
     # -- lifetime --------------------------------------------------------------------------------------

@@ -15,6 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import robotiq_async
@@ -29,6 +30,7 @@ from robotiq_async import (
     MoveTimeoutError,
     ObjectStatus,
     ReconnectPolicy,
+    RobotiqStatus,
     SentRequest,
     Severity,
     State,
@@ -50,6 +52,7 @@ from robotiq_async.link.address import parse_address
 from robotiq_async.session.statistics import Counters
 from robotiq_async.simulator import Trouble
 from robotiq_async.values import FrozenMapping
+from robotiq_async.web.settings import PageSettings
 from robotiq_async.wire.registers import TCP_REGISTERS, gDT
 from robotiq_async.wire.request import AxisRequest, Request
 from tests.register_words import status_of
@@ -224,6 +227,38 @@ def test_no_value_is_forgotten() -> None:
     there = {kind.__name__ for kind in kinds() if dataclasses.is_dataclass(kind)}
     tried = {type(value).__name__ for value in VALUES if dataclasses.is_dataclass(value)}
     assert there - tried - set(NO_VALUES) == set()
+
+
+BYTE: Any = np.uint8(9)
+HALF: Any = np.float32(0.5)
+WORDS: Any = np.arange(8, dtype=np.uint16)
+NUMPY: dict[str, tuple[object, object]] = {
+    "policy": (ReconnectPolicy(HALF, BYTE, BYTE), ReconnectPolicy(0.5, 9.0, 9.0)),
+    "calibration": (
+        SpeedCalibration("mine", [(np.uint8(0), HALF), (np.uint8(255), BYTE)]),  # type: ignore[arg-type]
+        SpeedCalibration("mine", ((0, 0.5), (255, 9.0))),
+    ),
+    "delay": (Trouble("delay", HALF, at=BYTE), Trouble("delay", 0.5, at=9.0)),
+    "fault": (Trouble("fault", BYTE, lasts=HALF, every=BYTE), Trouble("fault", 9, lasts=0.5, every=9.0)),
+    "status": (
+        RobotiqStatus.from_registers(WORDS, timestamp=HALF, sequence=BYTE),
+        RobotiqStatus(tuple(range(8)), 0.5, 9),
+    ),
+    "request": (Request.from_registers(WORDS), Request.from_registers(range(8))),
+    "page": (
+        PageSettings(port=BYTE, speed=BYTE, token="t", folder="f"),
+        PageSettings(port=9, speed=9, token="t", folder="f"),
+    ),
+    "code": (Fault(np.uint8(12)), Fault(12)),  # type: ignore[arg-type]
+}
+
+
+@pytest.mark.parametrize("what", NUMPY)
+def test_what_is_made_of_numbers_of_numpy_holds_plain_ones(what: str) -> None:
+    given, kept = NUMPY[what]
+    assert given == kept
+    assert "np." not in repr(given)
+    assert hash(given) == hash(kept)
 
 
 # -- the result of a move ----------------------------------------------------------------------------------

@@ -110,7 +110,7 @@ async def serve_metrics(
     """
     if not hands:
         raise ValueError("hands must name at least one hand, got none")
-    check_int("port", port, 0, 65535)
+    port = check_int("port", port, 0, 65535)
     registry = CollectorRegistry()
     registry.register(HandCollector(hands))
     server, thread = start_http_server(port, addr=host, registry=registry)

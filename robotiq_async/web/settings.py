@@ -7,6 +7,8 @@ import secrets
 from dataclasses import asdict, dataclass, field
 from typing import Final, Self
 
+from ..wire.checks import check_int
+
 LOOPBACK: Final = "127.0.0.1"
 PORT: Final = 8766
 """Beside that of the viewers."""
@@ -49,8 +51,12 @@ class PageSettings:
         """Keep who may not get in outside.
 
         Raises:
-            ValueError: another interface without a password and without a certificate, or half a certificate.
+            TypeError: port, speed or force is not an int.
+            ValueError: one of them is outside its range; another interface without a password and without a
+                certificate, or half a certificate.
         """
+        for name, high in (("port", 65535), ("speed", 255), ("force", 255)):
+            object.__setattr__(self, name, check_int(name, getattr(self, name), 0, high))
         if bool(self.certificate) != bool(self.key):
             raise ValueError("a certificate needs its key, and a key its certificate")
         if not self.loopback and not (self.password or self.certificate):

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 
 from ..enums import AXES, Fault, Finger, Initialization, Mode, ObjectStatus
 from . import registers as reg
-from .checks import check_axis
+from .checks import check_axis, check_int, check_seconds
 
 _set = object.__setattr__
 _INDEX = {axis: index for index, axis in enumerate(AXES)}
@@ -62,10 +63,12 @@ class RobotiqStatus:
         """A status from eight registers.
 
         Raises:
-            TypeError: a register is not an int.
-            ValueError: not eight registers, or one outside 0..65535.
+            TypeError: a register or the sequence is not an int, or the timestamp not a number.
+            ValueError: not eight registers, or one outside 0..65535; a timestamp that is not finite, or a
+                sequence below 0.
         """
-        return cls(reg.check_registers(registers), timestamp, sequence)
+        at = check_seconds("timestamp", timestamp, -sys.float_info.max, sys.float_info.max)
+        return cls(reg.check_registers(registers), at, check_int("sequence", sequence, 0, sys.maxsize))
 
     @property
     def registers(self) -> reg.Registers:
