@@ -30,6 +30,13 @@ class Finger(IntFlag):
 
 AXES: Final = (Finger.A, Finger.B, Finger.C, Finger.SCISSOR)
 """The four axes in the order of their registers."""
+
+
+def names_of(axes: Finger) -> list[str]:
+    """The names of the axes of a mask, in the order of their registers."""
+    return [str(axis.name) for axis in AXES if axis in axes]
+
+
 NO_AXES: Final = Finger(0)
 """The empty mask."""
 

@@ -14,7 +14,7 @@ from ..enums import Fault, State
 from ..session.clock import now
 from ..session.streams import Transition
 from ..telemetry.feed import compact
-from ..telemetry.payloads import Fields, fault_fields, status_fields, transition_fields
+from ..telemetry.payloads import Fields, fault_fields, transition_fields
 from ..telemetry.raw_output import write_all
 from ..wire.status import RobotiqStatus
 from .log_capture import forwarded_warnings
@@ -101,7 +101,7 @@ class _History:
                 self._state = each.target
                 yield stamp | transition_fields(each)
                 continue
-            yield stamp | {"kind": "status", "state": self._state.name} | status_fields(each)
+            yield stamp | {"kind": "status", "state": self._state.name} | each.as_dict()
             if each.fault != self._fault:
                 self._fault = each.fault
                 yield stamp | fault_fields(each)

@@ -12,11 +12,11 @@ import itertools
 import weakref
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Generic, Self, TypeVar
 
 from ..control.triggers import Trigger
-from ..enums import State
+from ..enums import AXES, State
 from ..errors import RobotiqError
 from ..wire.request import Request
 from ..wire.status import RobotiqStatus
@@ -42,6 +42,15 @@ class Transition:
     trigger: Trigger
     timestamp: float
 
+    def as_dict(self) -> dict[str, Any]:
+        """All of it in types that JSON and pandas take; states and trigger by name."""
+        return {
+            "timestamp": self.timestamp,
+            "source": self.source.name,
+            "target": self.target.name,
+            "trigger": self.trigger.name,
+        }
+
 
 @dataclass(frozen=True, slots=True)
 class SentRequest:
@@ -56,6 +65,25 @@ class SentRequest:
     request: Request
     timestamp: float
     acknowledged: bool
+
+    def as_dict(self) -> dict[str, Any]:
+        """All of it in types that JSON and pandas take, the request's attributes beside its own.
+
+        What is asked of one axis stands below its name: ``position``, ``speed`` and ``force``.
+        """
+        request = self.request
+        return {
+            "timestamp": self.timestamp,
+            "acknowledged": self.acknowledged,
+            "registers": list(request.registers),
+            "activate": request.activate,
+            "go": request.go,
+            "release": request.release,
+            "mode": request.mode.name,
+            "individual_fingers": request.individual_fingers,
+            "individual_scissor": request.individual_scissor,
+            **{str(axis.name): asdict(asked) for axis, asked in zip(AXES, request.axes, strict=True)},
+        }
 
 
 class Stream(Generic[T]):

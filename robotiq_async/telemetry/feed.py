@@ -25,11 +25,9 @@ from .joint_states import SCHEMA, SCHEMA_NAME, JointStateEncoder
 from .payloads import (
     SCHEMAS,
     Fields,
-    command_fields,
     efforts,
     fault_fields,
     initial_state_fields,
-    status_fields,
     transition_fields,
 )
 
@@ -184,7 +182,7 @@ class Feed:
         self._publish(Message(topic, self.nanoseconds(timestamp), compact(fields), sequence))
 
     def _publish_status(self, status: RobotiqStatus) -> None:
-        self._publish_json(STATUS, status.timestamp, status_fields(status), status.sequence)
+        self._publish_json(STATUS, status.timestamp, status.as_dict(), status.sequence)
         self._publish_joints(status)
         if status.fault != self._fault:
             self._fault = status.fault
@@ -201,7 +199,7 @@ class Feed:
         self._publish(Message(JOINTS, stamp, data, status.sequence))
 
     def _publish_request(self, sent: SentRequest) -> None:
-        self._publish_json(COMMAND, sent.timestamp, command_fields(sent))
+        self._publish_json(COMMAND, sent.timestamp, sent.as_dict())
 
     def _publish_transition(self, transition: Transition) -> None:
         self._publish_json(EVENT, transition.timestamp, transition_fields(transition))

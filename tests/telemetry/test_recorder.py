@@ -75,7 +75,7 @@ async def test_commands_transitions_and_faults(
         write.registers for write in list(gripper.writes)[-len(commands) :]
     ]
     events = [entry.fields for entry in entries if entry.topic == "/gripper/event"]
-    faults = [event["code"] for event in events if event["kind"] == "fault"]
+    faults = [event["fault_code"] for event in events if event["kind"] == "fault"]
     assert faults == [9, 0]
     moves = [(event["source"], event["target"]) for event in events if event["kind"] == "transition"]
     assert ("RUNNING_IDLE", "FAULT") in moves

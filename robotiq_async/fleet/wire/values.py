@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict
 from typing import Any, Final
 
 from ... import errors
@@ -210,7 +209,7 @@ def read_request(fields: Mapping[str, Any], clock: Clock) -> SentRequest:
 
 def statistics_fields(statistics: Statistics) -> Fields:
     """The object for a snapshot of the polling."""
-    return asdict(statistics)
+    return statistics.as_dict()
 
 
 def read_statistics(fields: Mapping[str, Any]) -> Statistics:
