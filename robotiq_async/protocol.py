@@ -231,6 +231,10 @@ class Hand(Protocol):
     # -- what is going on ------------------------------------------------------------------------------
 
     @property
+    def name(self) -> str:
+        """What the hand is called, in the log and in metrics: by its address, unless it was given a name."""
+
+    @property
     def address(self) -> str:
         """Which gripper, for people and labels: no two hands of a process have the same one."""
 

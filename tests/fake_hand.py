@@ -80,7 +80,7 @@ class FakeHand:
         obstacle: what closing fingers meet, in counts; 256 for nothing.
     """
 
-    address = "fake://hand"
+    name = address = "fake://hand"
     is_moving = False
 
     def __init__(self) -> None:

@@ -48,7 +48,7 @@ async def watch(hand: Hand) -> None:
 
 
 async def _print(history: _History, formatter: Formatter, interval: float) -> None:
-    with forwarded_warnings(history.add_warning):
+    with forwarded_warnings(history.add_warning, of=history.name):
         ended = False
         while not ended:
             ended = history.has_ended  # and once more for what has come with the end
@@ -76,6 +76,11 @@ class _History:
         self._missed = 0
         # Timestamps are monotonic; people and files go by wall-clock time.
         self._epoch = time.time() - now()
+
+    @property
+    def name(self) -> str:
+        """Of the hand."""
+        return self._hand.name
 
     @property
     def has_ended(self) -> bool:

@@ -21,7 +21,6 @@ from ..errors import (
     NotStartedError,
     RobotiqError,
 )
-from ..log import log
 from ..wire.request import Request
 from ..wire.status import RobotiqStatus
 from .callers import Callers
@@ -353,7 +352,7 @@ class Controller:
         self.foreign_commands += 1
         if status.timestamp - self._warned >= WARNING_S:
             self._warned = status.timestamp
-            log.warning("another client commands the gripper: %r", status)
+            self.machine.log.warning("another client commands the gripper: %r", status)
         self._shadow.adopt(status)
         self._callers.pending.hold &= self._shadow.ours | self._callers.pending.asked_to_hold
         self._callers.moves.fail(

@@ -7,7 +7,7 @@ from typing import Final
 
 from ..actions import ACTIONS, Operator
 from ..errors import RobotiqError
-from ..log import log
+from ..log import Log
 from ..protocol import Hand
 from .goals import GoalRunner, Outcome
 from .hands import why_not
@@ -69,7 +69,7 @@ class Connection:
         try:
             await self._operator.act(ACTIONS["halt"])
         except RobotiqError as error:
-            log.error("no halt, the fingers MAY STILL MOVE: %s", error)
+            Log(self.hand.name).error("no halt, the fingers MAY STILL MOVE: %s", error)
 
     async def close(self, reason: str) -> None:
         """Disconnect; the fingers are stopped if commands were ever taken. Idempotent."""

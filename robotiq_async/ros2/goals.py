@@ -11,7 +11,7 @@ from typing import Final
 from ..control.motion import MoveResult
 from ..enums import Finger
 from ..errors import RobotiqError
-from ..log import log
+from ..log import Log
 from ..protocol import Hand
 from .joints import Targets
 
@@ -163,7 +163,9 @@ class GoalRunner:
             await self._hand.hold(axes)
         except RobotiqError as error:
             if self._newest is goal:  # or else the next goal has them
-                log.error("a goal was canceled, and the hold was not acknowledged: %s", error)
+                Log(self._hand.name).error(
+                    "a goal was canceled, and the hold was not acknowledged: %s", error
+                )
 
 
 async def _move(hand: Hand, targets: Targets, speed: int, force: int) -> Sequence[MoveResult]:

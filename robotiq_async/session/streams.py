@@ -18,6 +18,7 @@ from typing import Any, Generic, Self, TypeVar
 from ..control.triggers import Trigger
 from ..enums import AXES, State
 from ..errors import RobotiqError
+from ..log import Log, log
 from ..wire.request import Request
 from ..wire.status import RobotiqStatus
 from .event_loop import check_loop
@@ -266,10 +267,10 @@ class Channels:
         numbers: of the statuses, from the first start on.
     """
 
-    def __init__(self) -> None:
-        """Begin without readers."""
+    def __init__(self, log: Log = log) -> None:
+        """Begin without readers; ``log`` is that of the hand."""
         self.numbers = itertools.count()
-        self.listeners = Listeners()
+        self.listeners = Listeners(log)
         self.statuses: Channel[RobotiqStatus] = Channel(self.listeners)
         self.transitions: Channel[Transition] = Channel(self.listeners)
         self.requests: Channel[SentRequest] = Channel(self.listeners)

@@ -16,7 +16,7 @@ from typing import Any, Final
 from ..enums import Fault
 from ..errors import RobotiqConnectionError
 from ..kinematics import joint_angles, joint_velocities
-from ..log import log
+from ..log import Log
 from ..protocol import Hand, HandStream
 from ..session.clock import now
 from ..session.streams import SentRequest, Transition
@@ -170,7 +170,9 @@ class Feed:
             task.cancel()
         for ended in await asyncio.gather(*self._tasks, return_exceptions=True):
             if isinstance(ended, Exception):
-                log.critical("a feed failed: what happens to the hand is no longer published", exc_info=ended)
+                Log(self._hand.name).critical(
+                    "a feed failed: what happens to the hand is no longer published", exc_info=ended
+                )
         for source in self._sources:
             source.drain()
 

@@ -77,6 +77,7 @@ SCHEMAS: Final = {
         **_FAULT,
     ),
     "state": _object(
+        name=_STRING,
         address=_STRING,
         state=_STRING,
         age=_NUMBER,
@@ -97,6 +98,11 @@ SCHEMAS: Final = {
     ),
 }
 """A JSON Schema for each kind of object."""
+
+
+def title(hand: Hand) -> str:
+    """Which hand, for people: its name and its address, where the one is not the other."""
+    return hand.address if hand.name == hand.address else f"{hand.name} ({hand.address})"
 
 
 def printable(text: str) -> str:
@@ -136,6 +142,7 @@ def reading_fields(hand: Hand) -> Fields:
     """
     status = hand.status
     return {
+        "name": hand.name,
         "address": hand.address,
         "state": hand.state.name,
         **status.as_dict(),
@@ -151,6 +158,7 @@ def state_fields(hand: Hand, now: float) -> Fields:
         now: monotonic seconds.
     """
     fields: Fields = {
+        "name": hand.name,
         "address": hand.address,
         "state": hand.state.name,
         **hand.statistics.as_dict(),

@@ -23,7 +23,7 @@ class PageSettings:
         port: the TCP port; 0 takes a free one.
         control: whether the page may command.
         loopback: whether only programs of this machine reach the interface.
-        addresses: of the hands, in their order.
+        addresses: what the hands are called on the page, in their order.
         speed: where the slider of the speed begins.
         force: where the slider of the force begins.
         password: asked of everybody; empty for the token in the printed address.

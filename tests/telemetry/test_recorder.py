@@ -83,6 +83,15 @@ async def test_commands_transitions_and_faults(
     assert all(before[1] == after[0] for before, after in pairwise(moves))
 
 
+async def test_it_tells_which_hand_it_is_of(file: Path) -> None:
+    hand = RobotiqHand(name="left")
+    async with Recorder(hand, file):
+        pass
+    with file.open("rb") as stream:
+        (metadata,) = make_reader(stream).iter_metadata()
+    assert (metadata.metadata["name"], metadata.metadata["address"]) == ("left", hand.address)
+
+
 async def test_a_request_tells_whether_it_was_acknowledged(gripper: SimulatedGripper) -> None:
     async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
         requests = hand.requests()

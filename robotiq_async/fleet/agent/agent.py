@@ -10,7 +10,7 @@ from typing import Final
 
 from ...errors import AgentError
 from ...hand import RobotiqHand
-from ...log import log
+from ...log import Log, log
 from ...session.clock import now
 from ..control.lease import WINDOW_S
 from ..network.bus import Bus, Question, Undo
@@ -137,7 +137,7 @@ class Agent:
         other = self._other(key)
         if is_there and other is not None:
             _, name = other
-            log.error("another agent serves %s too: one of them has to go", name)
+            Log(str(name)).error("another agent serves it too: one of them has to go")
             self.hands[name.gripper].news.add({"kind": "conflict", "key": key})
 
     def _hear(self, question: Question) -> None:

@@ -8,7 +8,7 @@ from typing import Final
 
 from ...control.triggers import Trigger
 from ...enums import State
-from ...log import log
+from ...log import Log, log
 from ...session.streams import Channels, Transition
 from ...wire.status import RobotiqStatus
 from ..control.lease import WINDOW_S
@@ -83,6 +83,7 @@ class Mirror:
         channels: Channels,
         entered: Callable[[State], None],
         before: Mirror | None = None,
+        log: Log = log,
     ) -> None:
         """Mirror the gripper with this mark.
 
@@ -91,7 +92,9 @@ class Mirror:
             channels: what happens is handed on there.
             entered: is told of each state.
             before: of the run before this one, if there was one: states and sequences go on from there.
+            log: of the hand.
         """
+        self.log = log
         self.clock = AgentClock()
         self.newest: StatusMessage | None = None
         self.status: RobotiqStatus | None = None
@@ -136,7 +139,7 @@ class Mirror:
         if mark == self._mark:
             return False
         self.misrouted += 1
-        log.warning("a message about another gripper was dropped (%d so far)", self.misrouted)
+        self.log.warning("a message about another gripper was dropped (%d so far)", self.misrouted)
         return True
 
     def is_superseded(self, message: StatusMessage, arrival: float, window: float = WINDOW_S) -> bool:

@@ -7,6 +7,7 @@ from typing import Self
 
 from ...enums import State
 from ...errors import InvalidStateError, NotStartedError
+from ...log import Log
 from ...session.event_loop import running_loop
 from ...session.streams import Channels
 from ...wire.checks import check_seconds
@@ -63,7 +64,7 @@ class RemoteHand(RemoteCommands):
         self._shared = bus
         self._opening: object = None
         """Stands for the start that opens a session; None if there is none, or if it is to end."""
-        self._channels = Channels()
+        self._channels = Channels(Log(str(self._name)))
         self._session: RemoteSession | None = None
         self._outbox: Outbox | None = None
 

@@ -20,7 +20,7 @@ from ...errors import (
     NotStartedError,
     RobotiqError,
 )
-from ...log import log
+from ...log import Log
 from ...session.clock import now
 from ...session.event_loop import check_loop
 from ...session.state_waiters import StateWaiters
@@ -48,6 +48,7 @@ class RemoteSession:
     """One run. Everything happens in the event loop it was made in.
 
     Attributes:
+        log: for what happens to the hand.
         mirror: what has been heard.
         keeper: the lease.
         waiters: who waits for a state.
@@ -77,9 +78,10 @@ class RemoteSession:
             before: what the run before this one has heard.
         """
         self.name = name
+        self.log = Log(str(name))
         self.loop = asyncio.get_running_loop()
         self.waiters = StateWaiters()
-        self.mirror = Mirror(name.mark, channels, self.waiters.reached, before)
+        self.mirror = Mirror(name.mark, channels, self.waiters.reached, before, self.log)
         self.is_over = False
         self.has_ended = False
         self.statistics: Statistics = Counters().snapshot(0)
@@ -174,7 +176,7 @@ class RemoteSession:
         try:
             await self.keeper.end(halt=halt)
         except RobotiqError as error:
-            log.warning("%s: the end was not acknowledged (%s): the agent holds what moves", self.name, error)
+            self.log.warning("the end was not acknowledged (%s): the agent holds what moves", error)
         finally:
             self._undo()
             for task in self._tasks:
@@ -198,7 +200,7 @@ class RemoteSession:
 
     def abandon(self) -> None:
         """Count as over when the loop was closed under it; the agent holds what moves by itself."""
-        log.warning("%s: the event loop was closed before stop()", self.name)
+        self.log.warning("the event loop was closed before stop()")
         self.keeper.abandon()
         self.waiters = StateWaiters()
         self._end()
@@ -232,7 +234,7 @@ class RemoteSession:
                 else:
                     self._hear_status(payload, in_turn=True)
         except RobotiqError as error:
-            log.warning("%s: %s", self.name, error)
+            self.log.warning("%s", error)
         if self.mirror.has_missed() and not self.is_over:
             self._missed.fetch()  # an event was dropped on the way
 
@@ -287,7 +289,7 @@ class RemoteSession:
     def _fall_silent(self, at: float) -> None:
         if self.mirror.is_silent:
             return
-        log.warning("%s: the agent is silent", self.name)
+        self.log.warning("the agent is silent")
         self.mirror.fall_silent(at)
         self.keeper.lose("expired", "the agent is silent")
         self._requests.fall_silent()

@@ -74,8 +74,11 @@ def read_status(fields: Mapping[str, Any], clock: Clock) -> RobotiqStatus:
 
 
 def error_fields(error: Exception) -> Fields:
-    """The object for an error: its kind, its message, and what it knows."""
-    fields: Fields = {"kind": type(error).__name__, "message": str(error)}
+    """The object for an error: its kind, its message without the name of the agent's hand, what it knows."""
+    fields: Fields = {
+        "kind": type(error).__name__,
+        "message": error.message if isinstance(error, RobotiqError) else str(error),
+    }
     state: State | None = getattr(error, "state", None)
     fault: Fault | None = getattr(error, "fault", None)
     status: RobotiqStatus | None = getattr(error, "status", None)
