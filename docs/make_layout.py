@@ -67,10 +67,10 @@ def panels() -> dict[str, Panel]:
     names = [str(axis.name) for axis in AXES]
     states = [(state.name, STATES.get(state, YELLOW), state.name) for state in State]
     faults = [(str(int(fault)), COLOURS[fault.severity], fault.description) for fault in Fault]
-    series = [("state", "/gripper/event.target"), *((n, f"/gripper/status.{n}.status") for n in names)]
+    series = [("state", "/gripper/event.target"), *((n, f"/gripper/status.{n}.axis_state") for n in names)]
     return {
         "Indicator!state": _indicator("state", states),
-        "Indicator!fault": _indicator("fault", faults),
+        "Indicator!fault": _indicator("fault_code", faults),
         "3D!hand": _hand(),
         "Plot!positions": _plot("Positions", [(name, f"{name}.position") for name in names]),
         "Plot!currents": _plot("Currents in mA", [(name, f"{name}.current_ma") for name in names]),

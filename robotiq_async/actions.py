@@ -27,6 +27,7 @@ from .enums import (
 from .errors import MoveSupersededError, NotStartedError
 from .protocol import Hand
 from .session.clock import now
+from .wire.checks import check_byte
 
 CANCELS_RECOVERY: Final = frozenset({"halt", "reset", "release"})
 """Actions after which no recovery may go on by itself."""
@@ -67,10 +68,14 @@ class Operator:
             hand: started before or after.
             speed: what the hand was constructed with.
             force: what the hand was constructed with.
+
+        Raises:
+            TypeError: speed or force is not an int.
+            ValueError: speed or force is outside 0..255.
         """
         self.hand = hand
-        self.speed = speed
-        self.force = force
+        self.speed = check_byte("speed", speed)
+        self.force = check_byte("force", force)
         self._requests = hand.requests(1)
         self._asking = 0
         """Number of motions under way that this person has asked for."""
@@ -146,7 +151,7 @@ class Operator:
             TypeError, ValueError, RobotiqError: as :meth:`Hand.set_speed`.
         """
         await self.hand.set_speed(value)
-        self.speed = value
+        self.speed = check_byte("value", value)
         return str(value)
 
     async def set_force(self, value: int) -> str:
@@ -156,7 +161,7 @@ class Operator:
             TypeError, ValueError, RobotiqError: as :meth:`Hand.set_force`.
         """
         await self.hand.set_force(value)
-        self.force = value
+        self.force = check_byte("value", value)
         return str(value)
 
     async def change_speed(self, by: int) -> str:

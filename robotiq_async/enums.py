@@ -5,6 +5,7 @@ Everything here is a plain enumeration or a constant; nothing here imports the p
 
 from __future__ import annotations
 
+import operator
 from enum import Enum, IntEnum, IntFlag
 from typing import Final
 
@@ -29,6 +30,13 @@ class Finger(IntFlag):
 
 AXES: Final = (Finger.A, Finger.B, Finger.C, Finger.SCISSOR)
 """The four axes in the order of their registers."""
+
+
+def names_of(axes: Finger) -> list[str]:
+    """The names of the axes of a mask, in the order of their registers."""
+    return [str(axis.name) for axis in AXES if axis in axes]
+
+
 NO_AXES: Final = Finger(0)
 """The empty mask."""
 
@@ -137,14 +145,22 @@ class Fault(IntEnum):
 
     @classmethod
     def _missing_(cls, value: object) -> Fault | None:
-        if type(value) is not int or not 0 <= value <= 15:
+        if isinstance(value, bool):
             return None
+        try:
+            code = int(operator.index(value))  # type: ignore[arg-type]  # what it refuses is no code
+        except TypeError:
+            return None
+        if not 0 <= code <= 15:
+            return None
+        if code in cls._value2member_map_:
+            return cls(code)
         # An IntEnum's own constructor refuses new values, so the member is made by hand and
         # registered: Fault(12) is Fault(12), and it hashes, compares and prints like the others.
-        member = int.__new__(cls, value)
-        member._name_ = f"UNKNOWN_0x{value:02X}"
-        member._value_ = value
-        cls._value2member_map_[value] = member
+        member = int.__new__(cls, code)
+        member._name_ = f"UNKNOWN_0x{code:02X}"
+        member._value_ = code
+        cls._value2member_map_[code] = member
         return member
 
     def __reduce_ex__(self, protocol: object) -> tuple[type[Fault], tuple[int]]:

@@ -43,7 +43,27 @@ if TYPE_CHECKING:
 
 
 class RobotiqError(Exception):
-    """Base of everything the library raises, bad arguments aside. Can be pickled and copied."""
+    """Base of everything the library raises, bad arguments aside. Can be pickled and copied.
+
+    Attributes:
+        hand: the name of the hand it comes from, as that was given to its constructor; empty if none was. The
+            error as a text begins with it.
+    """
+
+    hand: str = ""
+
+    @property
+    def message(self) -> str:
+        """What it says, without the name of the hand."""
+        return super().__str__()
+
+    def __str__(self) -> str:
+        """The name of the hand, and what it says."""
+        return f"{self.hand}: {self.message}" if self.hand else self.message
+
+    def __repr__(self) -> str:
+        """The same, with the kind of error."""
+        return f"{type(self).__name__}({str(self)!r})" if self.hand else super().__repr__()
 
     def __reduce__(self) -> tuple[Callable[..., RobotiqError], tuple[object, ...], dict[str, object]]:
         """Restore message and attributes without the constructor, which asks for other arguments."""

@@ -1,4 +1,4 @@
-"""The library's logger, ``robotiq_async``, which never fails.
+"""The library's logger, ``robotiq_async``, which never fails, and tells which hand a record is about.
 
 A handler of the application that raises (a full disk, a closed stream) must not end the task that owns the
 link, or keep it from stopping the fingers.
@@ -12,9 +12,25 @@ import traceback
 from typing import Any, Final
 
 
-class _Log(logging.LoggerAdapter[logging.Logger]):
+class Log(logging.LoggerAdapter[logging.Logger]):
+    """What is logged about one hand: its messages begin with the name of it, and its records have it.
+
+    Attributes:
+        hand: the name; empty for what is about no hand in particular. Every record has it as ``hand``.
+    """
+
+    def __init__(self, hand: str = "") -> None:
+        """Log about a hand."""
+        super().__init__(logging.getLogger("robotiq_async"), {"hand": hand})
+        self.hand = hand
+
     def log(self, level: int, msg: object, *args: object, **kwargs: Any) -> None:  # noqa: ANN401  # as the base class has it
         """Log; what goes wrong with that is shown as the logging module shows it."""
+        if not self.isEnabledFor(level):
+            return
+        if self.hand:
+            # As an argument: a name may hold a percent sign.
+            msg, args = f"%s: {msg}", (self.hand, *args)
         try:
             super().log(level, msg, *args, **{"stacklevel": 2} | kwargs)
         except Exception:  # noqa: BLE001  # whatever a handler raises
@@ -22,4 +38,5 @@ class _Log(logging.LoggerAdapter[logging.Logger]):
                 traceback.print_exc()
 
 
-log: Final = _Log(logging.getLogger("robotiq_async"))
+log: Final = Log()
+"""For what is about no hand in particular."""

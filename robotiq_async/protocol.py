@@ -54,9 +54,10 @@ class Hand(Protocol):
     """A gripper, as a program sees it.
 
     Calls belong to one event loop, never block it, and end in bounded time; any number of tasks may make
-    them. Masks are :class:`Finger` or the same integers; values are integers in 0..255. Anything else is a
-    TypeError or a ValueError, and nothing has been asked of the gripper then. Timestamps are monotonic
-    seconds by the clock of this process, wherever the gripper is. No command is ever sent twice.
+    them. Masks are :class:`Finger` or the same integers; values are integers in 0..255, whatever has an
+    ``__index__`` being one. Anything else is a TypeError or a ValueError, and nothing has been asked of the
+    gripper then. Timestamps are monotonic seconds by the clock of this process, wherever the gripper is. No
+    command is ever sent twice.
     """
 
     # -- lifetime --------------------------------------------------------------------------------------
@@ -262,6 +263,10 @@ class Hand(Protocol):
         """
 
     # -- what is going on ------------------------------------------------------------------------------
+
+    @property
+    def name(self) -> str:
+        """What the hand is called, in the log and in metrics: by its address, unless it was given a name."""
 
     @property
     def address(self) -> str:

@@ -82,7 +82,7 @@ class FakeHand(Grasping):
         obstacle: what closing fingers meet, in counts; 256 for nothing.
     """
 
-    address = "fake://hand"
+    name = address = "fake://hand"
     is_moving = False
     units = Units()
 

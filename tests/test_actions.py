@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 import inspect
 from collections.abc import AsyncIterator
+from typing import Any
 
+import numpy as np
 import pytest
 
 from robotiq_async import (
@@ -72,6 +74,14 @@ async def test_speed_and_force_stay_in_range(operator: Operator) -> None:
     assert await operator.change_speed(-5) == "250"
     assert await operator.change_force(-1000) == "0"
     assert (operator.speed, operator.force) == (250, 0)
+
+
+async def test_a_small_integer_of_numpy_does_not_wrap(operator: Operator) -> None:
+    byte: Any = np.uint8(250)
+    await operator.act(ACTIONS["activate"])
+    await operator.set_speed(byte)
+    assert await operator.change_speed(16) == "255"
+    assert await Operator(operator.hand, force=byte).change_force(16) == "255"
 
 
 async def test_what_is_refused_changes_nothing(operator: Operator) -> None:

@@ -24,7 +24,6 @@ from robotiq_async import (
     Stream,
 )
 from robotiq_async.actions import ACTIONS, Operator
-from robotiq_async.cli.commands.status import as_dict
 from robotiq_async.cli.stream_output import print_objects
 from robotiq_async.cli.tables import print_outcomes, print_status
 from robotiq_async.cli.tui.screen import Monitor
@@ -32,6 +31,7 @@ from robotiq_async.errors import MeasuringError
 from robotiq_async.measure.campaigns import grasp, time_closing
 from robotiq_async.protocol import Hand, HandStream
 from robotiq_async.telemetry.metrics import serve_metrics
+from robotiq_async.telemetry.payloads import reading_fields
 from robotiq_async.telemetry.recorder import Recorder
 from robotiq_async.telemetry.recordings import read_recording
 from tests.fake_hand import FakeHand, FakeStream
@@ -148,8 +148,8 @@ async def test_a_recording(tmp_path: Path) -> None:
     commands = [entry.fields for entry in entries if entry.topic == "/gripper/command"]
     assert commands[0]["B"]["force"] == 200
     events = [entry.fields for entry in entries if entry.topic == "/gripper/event"]
-    assert events[0] | {"monotonic": 0} == {"kind": "state", "target": "DISCONNECTED", "monotonic": 0}
-    assert [event["code"] for event in events if event["kind"] == "fault"] == [14]
+    assert events[0] | {"timestamp": 0} == {"kind": "state", "target": "DISCONNECTED", "timestamp": 0}
+    assert [event["fault_code"] for event in events if event["kind"] == "fault"] == [14]
     assert events[-1]["target"] == "SHUTDOWN"
 
 
@@ -193,7 +193,7 @@ async def test_the_monitor(hand: FakeHand) -> None:
 async def test_what_is_printed(hand: FakeHand, capfd: pytest.CaptureFixture[str]) -> None:
     print_outcomes(await hand.move(90, Finger.C))
     print_status(hand)
-    assert as_dict(hand)["state"] == "RUNNING_IDLE"
+    assert reading_fields(hand)["state"] == "RUNNING_IDLE"
     printing = asyncio.create_task(print_objects(hand))
     await asyncio.sleep(0)  # begun
     await hand.move(100, Finger.A)

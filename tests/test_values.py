@@ -12,9 +12,11 @@ import pkgutil
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future
 from datetime import UTC, datetime
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import robotiq_async
@@ -32,6 +34,7 @@ from robotiq_async import (
     MoveTimeoutError,
     ObjectStatus,
     ReconnectPolicy,
+    RobotiqStatus,
     SentRequest,
     Severity,
     State,
@@ -54,6 +57,7 @@ from robotiq_async.link.address import parse_address
 from robotiq_async.session.statistics import Counters
 from robotiq_async.simulator import Trouble
 from robotiq_async.values import FrozenMapping
+from robotiq_async.web.settings import PageSettings
 from robotiq_async.wire.registers import TCP_REGISTERS, gDT
 from robotiq_async.wire.request import AxisRequest, Request
 from tests.register_words import status_of
@@ -233,6 +237,38 @@ def test_no_value_is_forgotten() -> None:
     assert there - tried - set(NO_VALUES) == set()
 
 
+BYTE: Any = np.uint8(9)
+HALF: Any = np.float32(0.5)
+WORDS: Any = np.arange(8, dtype=np.uint16)
+NUMPY: dict[str, tuple[object, object]] = {
+    "policy": (ReconnectPolicy(HALF, BYTE, BYTE), ReconnectPolicy(0.5, 9.0, 9.0)),
+    "calibration": (
+        SpeedCalibration("mine", [(np.uint8(0), HALF), (np.uint8(255), BYTE)]),  # type: ignore[arg-type]
+        SpeedCalibration("mine", ((0, 0.5), (255, 9.0))),
+    ),
+    "delay": (Trouble("delay", HALF, at=BYTE), Trouble("delay", 0.5, at=9.0)),
+    "fault": (Trouble("fault", BYTE, lasts=HALF, every=BYTE), Trouble("fault", 9, lasts=0.5, every=9.0)),
+    "status": (
+        RobotiqStatus.from_registers(WORDS, timestamp=HALF, sequence=BYTE),
+        RobotiqStatus(tuple(range(8)), 0.5, 9),
+    ),
+    "request": (Request.from_registers(WORDS), Request.from_registers(range(8))),
+    "page": (
+        PageSettings(port=BYTE, speed=BYTE, token="t", folder="f"),
+        PageSettings(port=9, speed=9, token="t", folder="f"),
+    ),
+    "code": (Fault(np.uint8(12)), Fault(12)),  # type: ignore[arg-type]
+}
+
+
+@pytest.mark.parametrize("what", NUMPY)
+def test_what_is_made_of_numbers_of_numpy_holds_plain_ones(what: str) -> None:
+    given, kept = NUMPY[what]
+    assert given == kept
+    assert "np." not in repr(given)
+    assert hash(given) == hash(kept)
+
+
 # -- the result of a move ----------------------------------------------------------------------------------
 
 
@@ -257,6 +293,78 @@ def test_a_result_and_statistics_go_into_json() -> None:
     fields = dataclasses.asdict(result())
     assert json.loads(json.dumps(fields["positions"])) == {"1": 150, "2": 200}
     assert json.loads(json.dumps(dataclasses.asdict(statistics())))["moves"] == {"reached": 3}
+
+
+# -- for JSON and for tables --------------------------------------------------------------------------------
+
+
+TOLD: dict[str, Any] = {type(value).__name__: value for value in VALUES if hasattr(value, "as_dict")}
+
+
+def leaves(fields: Any) -> Iterator[object]:
+    """What is in a dict of dicts, with its keys; a list may hold nothing but numbers and words."""
+    for key, value in fields.items():
+        yield key
+        if type(value) is dict:
+            yield from leaves(value)
+        else:
+            yield from value if type(value) is list else [value]
+
+
+def test_what_happens_to_a_hand_can_be_told() -> None:
+    assert set(TOLD) == {"RobotiqStatus", "MoveResult", "Statistics", "Transition", "SentRequest"}
+
+
+@pytest.mark.parametrize("kind", TOLD)
+def test_a_value_as_a_dict_holds_what_json_knows_and_nothing_else(kind: str) -> None:
+    fields = TOLD[kind].as_dict()
+    assert json.loads(json.dumps(fields)) == fields
+    assert {type(each) for each in leaves(fields)} <= {int, float, bool, str}
+    fields.clear()
+    assert TOLD[kind].as_dict(), "it is made anew each time"
+
+
+@pytest.mark.parametrize("kind", TOLD)
+def test_the_keys_are_the_names_of_the_attributes(kind: str) -> None:
+    value = TOLD[kind]
+    for name, told in value.as_dict().items():
+        if name in Finger.__members__ or name == "fault_code":
+            continue
+        held = getattr(value, name) if hasattr(value, name) else getattr(value.request, name)
+        if isinstance(held, Finger):
+            held = [axis.name for axis in held]
+        elif isinstance(held, Enum):
+            held = held.name
+        elif name == "registers":
+            held = list(held)
+        elif name == "status":
+            held = held.as_dict()
+        assert told == held, name
+
+
+def test_what_is_of_one_axis_stands_below_its_name() -> None:
+    status = status_of(0xB9, 0x0A, echo=200, position=150, current=31)
+    assert status.as_dict()["B"] == {
+        "position": status.position(B),
+        "requested_position": status.requested_position(B),
+        "current_ma": status.current_ma(B),
+        "axis_state": status.axis_state(B),
+    }
+    assert result().as_dict()["A"] == {
+        "outcome": "CONTACT_CLOSING",
+        "position": 150,
+        "peak_current_ma": 310,
+    }
+    assert "C" not in result().as_dict(), "it was not addressed"
+    assert TOLD["SentRequest"].as_dict()["C"] == {"position": 1, "speed": 2, "force": 3}
+
+
+def test_a_status_is_made_again_of_what_was_told() -> None:
+    status = status_of(0xB9, 0xEA, fault=0x0C, at=12.5, sequence=7)
+    told = status.as_dict()
+    assert (told["fault"], told["fault_code"]) == ("UNKNOWN_0x0C", 12)
+    timed = {name: told[name] for name in ("timestamp", "sequence")}
+    assert RobotiqStatus.from_registers(told["registers"], **timed) == status
 
 
 # -- mappings ----------------------------------------------------------------------------------------------

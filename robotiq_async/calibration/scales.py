@@ -89,8 +89,7 @@ class SpeedCalibration:
             TypeError: a value or a figure of the wrong type.
             ValueError: fewer than two, not rising, or outside 0..255 and 0..600 s.
         """
-        object.__setattr__(self, "points", frozen(self.points))
-        check_points(self.points, LONGEST_S)
+        object.__setattr__(self, "points", checked_points(self.points, LONGEST_S))
         if not all(seconds for _, seconds in self.points):
             raise ValueError("points: a closing time must be above 0 s")
 
@@ -180,8 +179,7 @@ class ForceCalibration:
             TypeError: a value or a figure of the wrong type.
             ValueError: fewer than two, not rising, or outside 0..255 and 0..1000 N.
         """
-        object.__setattr__(self, "points", frozen(self.points))
-        check_points(self.points, STRONGEST_N)
+        object.__setattr__(self, "points", checked_points(self.points, STRONGEST_N))
 
     @classmethod
     def nominal(cls) -> ForceCalibration:
@@ -258,26 +256,23 @@ def newton(grams: float) -> float:
     return grams / 1000 * GRAVITY
 
 
-def frozen(points: Iterable[tuple[int, float]]) -> Points:
-    """Points that stay as they are, from whatever they come in."""
-    return tuple((value, figure) for value, figure in points)
-
-
-def check_points(points: Points, high: float) -> None:
-    """Refuse what is no curve.
+def checked_points(given: Iterable[tuple[int, float]], high: float) -> Points:
+    """Points that stay as they are, plain numbers, from whatever they come in; refuses what is no curve.
 
     Raises:
         TypeError: a value or a figure of the wrong type.
         ValueError: fewer than two points, values that do not rise, or a figure outside 0..high.
     """
+    points = tuple(
+        (check_byte("a value of points", value), check_number("a figure of points", figure, 0.0, high))
+        for value, figure in given
+    )
     if len(points) < 2:
         raise ValueError(f"points: at least two are needed, got {len(points)}")
-    for value, figure in points:
-        check_byte("a value of points", value)
-        check_number("a figure of points", figure, 0.0, high)
     values = [value for value, _ in points]
     if values != sorted(set(values)):
         raise ValueError(f"points: the values must rise, got {values}")
+    return points
 
 
 def covered(points: Points) -> range:
@@ -293,7 +288,8 @@ def interpolated(name: str, value: int, points: Sequence[tuple[int, float]]) -> 
         ValueError: value is outside 0..255, or beyond the points.
     """
     low, high = points[0][0], points[-1][0]
-    if not low <= check_byte(name, value) <= high:
+    value = check_byte(name, value)
+    if not low <= value <= high:
         raise ValueError(f"{name} {value} lies outside what was measured: {low}..{high}")
     after = min(bisect_right(points, value, key=lambda point: point[0]), len(points) - 1)
     (left, at_left), (right, at_right) = points[after - 1], points[after]
@@ -307,8 +303,8 @@ def closest(name: str, wanted: float, figures: Mapping[int, float]) -> int:
         TypeError: wanted is not a number.
         ValueError: wanted is below or above all figures.
     """
-    check_number(name, wanted, min(figures.values()), max(figures.values()))
-    return nearest(wanted, figures)
+    figure = check_number(name, wanted, min(figures.values()), max(figures.values()))
+    return nearest(figure, figures)
 
 
 def nearest(wanted: float, figures: Mapping[int, float]) -> int:

@@ -17,13 +17,14 @@ def forget(stream: TextIO) -> None:
 class _Forwarder(logging.Handler):
     """Calls a function with the message of each record."""
 
-    def __init__(self, to: Callable[[str], object]) -> None:
+    def __init__(self, to: Callable[[str], object], of: str) -> None:
         super().__init__(logging.WARNING)
         self._to = to
+        self._known = f"{of}: "
 
     def emit(self, record: logging.LogRecord) -> None:
         try:
-            self._to(record.getMessage())
+            self._to(record.getMessage().removeprefix(self._known))
         except Exception:  # noqa: BLE001  # it is called in the hand's own task, which must not end
             self.handleError(record)
 
@@ -37,10 +38,15 @@ def collected_warnings() -> Iterator[list[str]]:
 
 
 @contextmanager
-def forwarded_warnings(to: Callable[[str], object]) -> Iterator[None]:
-    """Forward the library's warnings, and those of foxglove-sdk, to a function, and to no outer one."""
+def forwarded_warnings(to: Callable[[str], object], *, of: str = "") -> Iterator[None]:
+    """Forward the library's warnings, and those of foxglove-sdk, to a function, and to no outer one.
+
+    Args:
+        to: the function.
+        of: the name of the one hand that is shown there: it need not be said with every warning.
+    """
     foxglove = logging.getLogger("foxglove")
-    log, forwarder = logging.getLogger("robotiq_async"), _Forwarder(to)
+    log, forwarder = logging.getLogger("robotiq_async"), _Forwarder(to, of)
     others = [handler for handler in log.handlers if isinstance(handler, _Forwarder)]
     for other in others:
         log.removeHandler(other)

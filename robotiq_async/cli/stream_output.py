@@ -14,7 +14,7 @@ from ..enums import Fault, State
 from ..session.clock import now
 from ..session.streams import Transition
 from ..telemetry.feed import compact
-from ..telemetry.payloads import Fields, fault_fields, status_fields, transition_fields
+from ..telemetry.payloads import Fields, fault_fields, transition_fields
 from ..telemetry.raw_output import write_all
 from ..wire.status import RobotiqStatus
 from .log_capture import forwarded_warnings
@@ -48,7 +48,7 @@ async def watch(hand: Hand) -> None:
 
 
 async def _print(history: _History, formatter: Formatter, interval: float) -> None:
-    with forwarded_warnings(history.add_warning):
+    with forwarded_warnings(history.add_warning, of=history.name):
         ended = False
         while not ended:
             ended = history.has_ended  # and once more for what has come with the end
@@ -78,6 +78,11 @@ class _History:
         self._epoch = time.time() - now()
 
     @property
+    def name(self) -> str:
+        """Of the hand."""
+        return self._hand.name
+
+    @property
     def has_ended(self) -> bool:
         """Whether nothing more will come."""
         return self._hand.state is State.SHUTDOWN
@@ -101,7 +106,7 @@ class _History:
                 self._state = each.target
                 yield stamp | transition_fields(each)
                 continue
-            yield stamp | {"kind": "status", "state": self._state.name} | status_fields(each)
+            yield stamp | {"kind": "status", "state": self._state.name} | each.as_dict()
             if each.fault != self._fault:
                 self._fault = each.fault
                 yield stamp | fault_fields(each)

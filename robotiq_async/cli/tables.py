@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..enums import AXES, Fault, Finger
-from .text import object_status
+from .text import axis_words
 
 if TYPE_CHECKING:
     from .. import MoveResult, RobotiqStatus
@@ -27,12 +27,12 @@ def print_status(hand: Hand) -> None:
         (
             last.position(axis),
             last.requested_position(axis),
-            object_status(last.finger_status(axis).name, is_moving=axis in last.moving),
+            axis_words(last.axis_state(axis)),
             last.current_ma(axis),
         )
         for axis in AXES
     ]
-    _print_table(("position", "requested", "object", "mA"), AXES, rows)
+    _print_table(("position", "requested", "state", "mA"), AXES, rows)
 
 
 def _activation(status: RobotiqStatus) -> str:
@@ -54,7 +54,7 @@ def print_outcomes(result: MoveResult) -> None:
 def _print_table(heads: Sequence[str], axes: Sequence[Finger], rows: Sequence[Sequence[object]]) -> None:
     table = Table("axis", box=box.SIMPLE_HEAD)
     for head in heads:
-        table.add_column(head, justify="left" if head in ("object", "outcome") else "right")
+        table.add_column(head, justify="left" if head in ("state", "outcome") else "right")
     for axis, row in zip(axes, rows, strict=True):
         table.add_row(axis.name, *map(str, row))
     Console().print(table)

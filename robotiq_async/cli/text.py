@@ -6,11 +6,13 @@ from collections.abc import Callable
 from datetime import datetime
 from typing import Final
 
-from ..enums import AXES, ObjectStatus
+from ..control.triggers import Trigger
+from ..enums import AXES
 from ..telemetry.payloads import Fields
+from ..wire.status import NO_REQUEST
 
 NOTHING: Final = "-"
-"""Stands for an object status that means nothing."""
+"""Stands for what means nothing."""
 _NAMES: Final = [str(axis.name) for axis in AXES]
 
 
@@ -20,25 +22,14 @@ def clock(seconds: float) -> str:
 
 
 def status_line(fields: Fields) -> str:
-    """The line for a status: position and object status of every axis."""
-    axes = (f"{name}={fields[name]['position']} {_object_status(fields, name)}" for name in _NAMES)
+    """The line for a status: where every axis is, and what it does."""
+    axes = (f"{n}={fields[n]['position']} {axis_words(fields[n]['axis_state'])}" for n in _NAMES)
     return f"status   {' '.join(axes)}"
 
 
-def _object_status(fields: Fields, name: str) -> str:
-    return object_status(str(fields[name]["status"]), is_moving=fields["moving"])
-
-
-def object_status(reported: str, *, is_moving: bool) -> str:
-    """The object status of an axis, or ``-`` where it means nothing.
-
-    The gripper reports IN_MOTION also of an axis that was never told to go.
-
-    Args:
-        reported: its object status, by name.
-        is_moving: whether it moves, as the whole status shows.
-    """
-    return NOTHING if reported == ObjectStatus.IN_MOTION.name and not is_moving else reported
+def axis_words(state: str) -> str:
+    """What an axis does, of its state; ``-`` where that means nothing."""
+    return NOTHING if state == NO_REQUEST else state
 
 
 def command_line(fields: Fields) -> str:
@@ -55,8 +46,10 @@ def event_line(fields: Fields) -> str:
     if fields["kind"] == "state":
         return f"state    {fields['target']}"
     if fields["kind"] == "fault":
-        return f"fault    0x{fields['code']:02X} {fields['name']}: {fields['description']}"
-    return f"state    {fields['source']} -> {fields['target']} ({fields['trigger']})"
+        return f"fault    0x{fields['fault_code']:02X} {fields['fault']}: {fields['description']}"
+    trigger = fields["trigger"]
+    why = Trigger[trigger].value if trigger in Trigger.__members__ else trigger
+    return f"state    {fields['source']} -> {fields['target']} ({why})"
 
 
 FORMATTERS: Final[dict[str, Callable[[Fields], str]]] = {

@@ -21,7 +21,6 @@ from ..errors import (
     NotStartedError,
     RobotiqError,
 )
-from ..log import log
 from ..wire.request import Request
 from ..wire.status import RobotiqStatus
 from .callers import Callers
@@ -71,7 +70,7 @@ class Controller:
         """Whether an activation of ours may still be under way: to be taken back if the hand is stopped."""
         self._hold_on_return = NO_AXES
         """Axes whose hold was not delivered before the link went down."""
-        self._keeping = Keeping(self._shadow)
+        self._keeping = Keeping(self._shadow, log=machine.log)
         """Whether rGTO may be left set when the hand is stopped."""
         self._keeps_grip = False
         """Whether that is asked for."""
@@ -272,7 +271,7 @@ class Controller:
             return None
         sent = self._callers.take()
         if image.go and not shadow.base.go:
-            _tell_of_lost_grips(status.contacts & ~shadow.gripping(status) & ~sent.moved)
+            self._tell_of_lost_grips(status.contacts & ~shadow.gripping(status) & ~sent.moved)
         number = shadow.writing(image, sent.moved, now)
         if sent.positions:
             self._callers.moves.written(number)
@@ -370,13 +369,20 @@ class Controller:
         self.foreign_commands += 1
         if status.timestamp - self._warned >= WARNING_S:
             self._warned = status.timestamp
-            log.warning("another client commands the gripper: %r", status)
+            self.machine.log.warning("another client commands the gripper: %r", status)
         self._shadow.adopt(status)
         self._callers.pending.hold &= self._shadow.ours | self._callers.pending.asked_to_hold
         self._callers.moves.fail(
             MoveSupersededError("another client commands the gripper"),
             lambda move: move.write is not None and not move.is_under(status),
         )
+
+    def _tell_of_lost_grips(self, axes: Finger) -> None:
+        """Setting rGTO drives every axis; those adopted without it have no request but their place."""
+        if axes:
+            self.machine.log.warning(
+                "%s touched something while rGTO was clear: asked to stay there, and grip no more", axes
+            )
 
     def _leave(self, after: State, status: RobotiqStatus) -> None:
         """The gripper is not active any more, or reports a fault: nothing asked before may resume."""
@@ -390,9 +396,3 @@ class Controller:
             # Which axes drift is decided when the hold is written: a command that was sent just before
             # may not act yet, and its motion would begin when the fault clears.
             self._callers.hold(self._shadow.ours, "the fingers are held")
-
-
-def _tell_of_lost_grips(axes: Finger) -> None:
-    """Setting rGTO drives every axis; those that were adopted without it have no request but their place."""
-    if axes:
-        log.warning("%s touched something while rGTO was clear: asked to stay there, and grip no more", axes)

@@ -12,7 +12,7 @@ import math
 from typing import Final
 
 from ..enums import NO_AXES, Fault, Finger
-from ..log import log
+from ..log import Log, log
 from ..wire.request import Request
 from ..wire.status import RobotiqStatus
 from .merging import merged
@@ -32,15 +32,17 @@ no motion left unseen."""
 class Keeping:
     """Judges the statuses of a hand that is being stopped and is to keep its grip."""
 
-    def __init__(self, shadow: RequestShadow, doubt: str = "") -> None:
+    def __init__(self, shadow: RequestShadow, doubt: str = "", *, log: Log = log) -> None:
         """Judge by what the gripper was asked.
 
         Args:
             shadow: what it was asked.
             doubt: why rGTO is to be cleared, if that is known already.
+            log: that of the hand.
         """
         self._shadow = shadow
         self.doubt = doubt
+        self._log = log
 
     def rests(self, status: RobotiqStatus) -> bool:
         """Whether a status shows every axis at rest under what it was asked last, and no fault."""
@@ -60,12 +62,12 @@ class Keeping:
                 continue
             since = min(since, self._shadow.asked) if self.rests(status) else math.inf
             if self._shadow.asked - since >= REST_S:
-                log.info("stopped with rGTO set; in contact: %s", status.contacts or "nothing")
+                self._log.info("stopped with rGTO set; in contact: %s", status.contacts or "nothing")
                 return
             status = yield None
         last = self._shadow.last_image(status)
         if last is not None:
-            log.warning("rGTO is cleared, and no grip is kept: %s", doubt)
+            self._log.warning("rGTO is cleared, and no grip is kept: %s", doubt)
             yield from stop_fingers(last)
 
     def _doubt(self, status: RobotiqStatus, until: float) -> str:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
-from ..enums import AXES, STROKE_COUNTS, Finger, ObjectStatus
+from ..enums import AXES, STROKE_COUNTS, Finger, ObjectStatus, names_of
 from ..errors import ConnectionLostError, RobotiqError
 from ..values import FrozenMapping
 from ..wire.status import RobotiqStatus
@@ -45,6 +45,27 @@ class MoveResult:
     def object_detected(self) -> bool:
         """Whether a contact stopped at least one addressed axis."""
         return bool(self.contacts)
+
+    def as_dict(self) -> dict[str, Any]:
+        """All of it in types that JSON and pandas take; enumerations and masks as in a status.
+
+        What is of one axis stands below its name: ``outcome``, ``position`` and ``peak_current_ma``.
+        """
+        return {
+            "duration": self.duration,
+            "object_detected": self.object_detected,
+            "contacts": names_of(self.contacts),
+            **{
+                str(axis.name): {
+                    "outcome": self.outcomes[axis].name,
+                    "position": self.positions[axis],
+                    "peak_current_ma": self.peak_current_ma[axis],
+                }
+                for axis in AXES
+                if axis in self.outcomes
+            },
+            "status": self.status.as_dict(),
+        }
 
     def __repr__(self) -> str:
         """The words a person looks for first."""

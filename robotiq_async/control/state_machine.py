@@ -28,7 +28,7 @@ from ..errors import (
     NotStartedError,
     RobotiqError,
 )
-from ..log import log
+from ..log import Log, log
 from ..wire.request import Request
 from ..wire.status import RobotiqStatus
 from .triggers import Trigger, classify
@@ -144,8 +144,11 @@ def states_allowing(trigger: Trigger) -> frozenset[State]:
 class StateMachine:
     """The state of one hand, and the sequence under way. :meth:`fire` alone changes the state."""
 
-    def __init__(self, changed: Callable[[State, State, Trigger], None] = lambda *_: None) -> None:
-        """Start in DISCONNECTED."""
+    def __init__(
+        self, changed: Callable[[State, State, Trigger], None] = lambda *_: None, *, log: Log = log
+    ) -> None:
+        """Start in DISCONNECTED; ``log`` is that of the hand."""
+        self.log = log
         self.changed = changed
         """Called with source, target and trigger after each change of state."""
         self._state = State.DISCONNECTED
@@ -180,7 +183,7 @@ class StateMachine:
         self._state = target
         # A control loop goes to RUNNING_CC and back with every command: that is for the curious.
         level = logging.DEBUG if {source, target} <= RUNNING else logging.INFO
-        log.log(level, "%s -> %s (%s)", source.name, target.name, trigger.value)
+        self.log.log(level, "%s -> %s (%s)", source.name, target.name, trigger.value)
         self.changed(source, target, trigger)
         return True
 
@@ -212,7 +215,7 @@ class StateMachine:
         except StopIteration:
             pass
         except RobotiqError as error:
-            log.warning("%s", error)
+            self.log.warning("%s", error)
         self._sequence = None
         self.delivered()
         self.fire(classify(status))

@@ -14,6 +14,7 @@ from ..enums import CLOSED, OPEN, Finger
 from ..errors import MoveTimeoutError
 from ..session.clock import now
 from ..wire.checks import check_byte, check_mask, check_optional_byte, check_timeout
+from .naming import tells_its_hand
 from .recovery import Recovery
 
 
@@ -61,6 +62,7 @@ class Commands(Recovery):
         """
         await self._deliver(Command(check_mask(fingers), force=check_byte("value", value)))
 
+    @tells_its_hand
     def command(
         self,
         fingers: Finger | int = Finger.ABC,
@@ -92,6 +94,7 @@ class Commands(Recovery):
         speed, force = check_optional_byte("speed", speed), check_optional_byte("force", force)
         self._asked().controller.command(Command(axes, position, speed, force))
 
+    @tells_its_hand
     async def move(
         self,
         position: int,
@@ -175,6 +178,7 @@ class Commands(Recovery):
         """Close the fingers, not the connection (that is :meth:`stop`): :meth:`move` to 255."""
         return await self.move(CLOSED, fingers, speed=speed, force=force, timeout=timeout)
 
+    @tells_its_hand
     async def hold(self, fingers: Finger | int = Finger.ALL) -> None:
         """Ask axes that move to stay where they are, whoever moves them; returns when it is acknowledged.
 
@@ -199,6 +203,7 @@ class Commands(Recovery):
         axes, session = check_mask(fingers), self._asked()
         await session.answered(lambda waiter: session.controller.hold(axes, waiter))
 
+    @tells_its_hand
     async def halt(self) -> None:
         """Stop every axis now (rGTO = 0); the next command goes again, and moves only what it addresses.
 
@@ -220,6 +225,7 @@ class Commands(Recovery):
         else:
             await session.answered(session.controller.halt)
 
+    @tells_its_hand
     async def _deliver(self, command: Command) -> None:
         session = self._asked()
         await session.answered(lambda waiter: session.controller.command(command, waiter))

@@ -16,6 +16,7 @@ from ..session.statistics import Counters, Statistics
 from ..session.streams import Channel, Channels, SentRequest, Stream, Transition
 from ..wire.checks import check_int, check_timeout
 from ..wire.status import RobotiqStatus
+from .naming import tells_its_hand
 
 T = TypeVar("T")
 
@@ -28,6 +29,11 @@ class Observation:
     _channels: Channels
     _session: Session | None
     """The run under way, or the last one."""
+
+    @property
+    def name(self) -> str:
+        """What the hand is called: what its constructor was given, or else its address."""
+        return self._options.name
 
     @property
     def address(self) -> str:
@@ -48,6 +54,7 @@ class Observation:
         return self._machine.state
 
     @property
+    @tells_its_hand
     def status(self) -> RobotiqStatus:
         """The most recent status; its timestamp tells how old it is.
 
@@ -156,6 +163,7 @@ class Observation:
         self._check_owner()
         return self._channels.listeners.add(callback)
 
+    @tells_its_hand
     async def wait_for_state(self, *states: State, timeout: float | None = None) -> State:
         """Wait until the hand is, if only for a moment, in one of these states, and return it.
 
@@ -206,6 +214,7 @@ class Observation:
         session.check_loop("the hand")
         return session
 
+    @tells_its_hand
     def _current_status(self) -> RobotiqStatus:
         self._started()
         status = self.status

@@ -11,6 +11,7 @@ from ..control.triggers import Trigger
 from ..enums import Severity, State
 from ..errors import InvalidStateError, NotActivatedError, StateTimeoutError
 from ..wire.checks import check_timeout
+from .naming import tells_its_hand
 from .observation import Observation
 
 RESET_TIMEOUT_S: Final = 5.0
@@ -24,6 +25,7 @@ RECOVER_TIMEOUT_S: Final = 90.0
 class Recovery(Observation):
     """A hand whose gripper is activated, reset and released."""
 
+    @tells_its_hand
     async def activate(self) -> None:
         """Activate the gripper, if it is not active yet. The fingers MOVE to their stops.
 
@@ -53,6 +55,7 @@ class Recovery(Observation):
         """
         await self._reset(Trigger.ASK_RESET)
 
+    @tells_its_hand
     async def _reset(self, trigger: Trigger) -> None:
         session = self._asked()
         await session.reach(
@@ -63,6 +66,7 @@ class Recovery(Observation):
             what="the gripper did not report the reset",
         )
 
+    @tells_its_hand
     async def atr(self) -> None:
         """Release automatically: all axes open slowly, whatever the fault. Only in FAULT.
 
@@ -89,6 +93,7 @@ class Recovery(Observation):
             what="the automatic release was not finished",
         )
 
+    @tells_its_hand
     async def recover(self, timeout: float | None = None) -> None:
         """Do whatever the present fault needs, until the gripper is active again.
 

@@ -23,6 +23,7 @@ from ..session.streams import Channels
 from ..wire.checks import check_flag
 from .commands import Commands
 from .grasping import Grasping
+from .naming import tells_its_hand
 
 
 class RobotiqHand(Commands, Grasping):
@@ -40,6 +41,7 @@ class RobotiqHand(Commands, Grasping):
         self,
         address: str | Transport = "sim://",
         *,
+        name: str | None = None,
         device_id: int | None = None,
         poll_interval: float = POLL_INTERVAL_S,
         connect_timeout: float = CONNECT_TIMEOUT_S,
@@ -63,6 +65,8 @@ class RobotiqHand(Commands, Grasping):
         Args:
             address: ``tcp://HOST[:502]`` (or HOST, HOST:PORT), ``rtu:///dev/ttyUSB0``, ``sim://``, or a
                 transport object.
+            name: what to call this hand, in 1..64 printable characters: errors and the log begin with it,
+                metrics and recordings have it. None calls it by its address.
             device_id: Modbus unit id, 1..247; by default 2 over TCP and 9 over RTU. Two hands on one TCP
                 address need one each: that of their gripper behind the gateway.
             poll_interval: seconds between polls, 0.001..0.1.
@@ -86,6 +90,7 @@ class RobotiqHand(Commands, Grasping):
         """
         self._options = check_options(
             address,
+            name=name,
             device_id=device_id,
             poll_interval=poll_interval,
             connect_timeout=connect_timeout,
@@ -100,8 +105,8 @@ class RobotiqHand(Commands, Grasping):
             force_calibration=force_calibration,
             keep_grip=keep_grip,
         )
-        self._machine = StateMachine()
-        self._channels = Channels()
+        self._machine = StateMachine(log=self._options.log)
+        self._channels = Channels(self._options.log)
         self._session: Session | None = None
         """The run under way, or the last one."""
 
@@ -116,6 +121,7 @@ class RobotiqHand(Commands, Grasping):
         """Stop, also when the block failed or was cancelled."""
         await self.stop()
 
+    @tells_its_hand
     async def start(self, activate: bool = True) -> None:
         """Connect, read the status, activate if the gripper is reset, and poll from then on.
 
@@ -179,8 +185,9 @@ class RobotiqHand(Commands, Grasping):
             await self._session.stop(halt=halt, keep_grip=keep_grip)
 
     def __repr__(self) -> str:
-        """Address and state."""
-        return f"<RobotiqHand {self._options.address} {self.state.name}>"
+        """Name, if it was given one, address and state."""
+        name = f"{self._options.given_name} " if self._options.given_name else ""
+        return f"<RobotiqHand {name}{self._options.address} {self.state.name}>"
 
     def _abandon_if_loop_closed(self) -> None:
         if self._session is not None and self._session.lost_its_loop:

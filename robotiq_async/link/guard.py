@@ -15,7 +15,7 @@ from ..errors import (
     ResponseTimeoutError,
     RobotiqConnectionError,
 )
-from ..log import log
+from ..log import Log, log
 from ..wire.registers import Registers, check_registers
 from .transport import Transport
 from .worker import LateError, Worker
@@ -27,7 +27,13 @@ class GuardedTransport:
     """Bounds every call in time, lets no foreign exception through, and closes after a failure."""
 
     def __init__(
-        self, inner: Transport, name: str, *, connect_timeout: float, response_timeout: float
+        self,
+        inner: Transport,
+        name: str,
+        *,
+        connect_timeout: float,
+        response_timeout: float,
+        log: Log = log,
     ) -> None:
         """Wrap a transport.
 
@@ -36,7 +42,9 @@ class GuardedTransport:
             name: how messages call it.
             connect_timeout: seconds for opening it.
             response_timeout: seconds for a read or a write.
+            log: of the hand.
         """
+        self._log = log
         self._inner = inner
         self._is_open = False
         self._name = name
@@ -52,7 +60,7 @@ class GuardedTransport:
         try:
             return self._is_open and bool(self._inner.is_open)
         except Exception as error:  # noqa: BLE001  # what cannot tell is not open
-            log.warning("%s cannot tell whether it is open: %r", self._name, error)
+            self._log.warning("the transport cannot tell whether it is open: %r", error)
             return False
 
     async def open(self) -> None:
@@ -94,7 +102,7 @@ class GuardedTransport:
         self._drop()
         with anyio.CancelScope(shield=True):
             if not await self._worker.ended(self._response_timeout):
-                log.warning("%s is left to itself: what it was asked last has not ended", self._name)
+                self._log.warning("the transport is left to itself: what it was asked last has not ended")
 
     def _drop(self) -> None:
         """Have it closed as soon as it does nothing else; open() waits for that, and nobody else."""
@@ -113,7 +121,7 @@ class GuardedTransport:
             async with asyncio.timeout(self._response_timeout):
                 await self._inner.close()
         except Exception as error:  # noqa: BLE001  # there is nothing left to do about it
-            log.warning("%s did not close: %r", self._name, error)
+            self._log.warning("the transport did not close: %r", error)
 
     async def _bounded(self, call: Callable[[], Awaitable[T]], seconds: float) -> T:
         try:

@@ -31,7 +31,7 @@ COLOURS: Final = ("#0b6ea8", "#2a8f4c", "#b03a6b")
 """Colours of the fingers A, B and C."""
 WIDTHS: Final = {"A": 4.2, "B": 2.6, "C": 1.1, "SCISSOR": 1.4}
 """Line widths in the plot of a recording."""
-DRAWN: Final = ("position", "requested", "current_ma")
+DRAWN: Final = ("position", "requested_position", "current_ma")
 LABEL: Final = 0.012
 """Width of a label, as a share of the picture's."""
 LONGEST: Final = 80
@@ -172,7 +172,7 @@ def plot_recording(path: Path, entries: Iterable[Entry]) -> list[Path]:
             line: Any = {"color": colour, "lw": width}
             dotted: Any = {"color": colour, "lw": 0.8, "ls": ":", "drawstyle": "steps"}
             positions.plot(seconds, drawn[name]["position"], label=name, **line)
-            positions.plot(seconds, drawn[name]["requested"], **dotted)
+            positions.plot(seconds, drawn[name]["requested_position"], **dotted)
             currents.plot(seconds, drawn[name]["current_ma"], **line)
         positions.set_ylabel("position, counts\n(dotted: requested)")
         positions.set_ylim(-5, 260)
@@ -196,7 +196,7 @@ def _event(fields: dict[str, Any]) -> tuple[str, bool] | None:
     if "RUNNING_CC" in (fields.get("source"), fields.get("target")):
         return None
     is_fault = fields["kind"] == "fault"
-    name = printable(fields["name"] if is_fault else fields["target"])[:LONGEST]
+    name = printable(fields["fault"] if is_fault else fields["target"])[:LONGEST]
     return "fault cleared" if name == "NONE" else name, is_fault
 
 

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from ..log import log
+from ..log import Log, log
 
 Listener = Callable[[Any], None]
 
@@ -15,8 +15,9 @@ Listener = Callable[[Any], None]
 class Listeners:
     """Tells each of them everything, in its order."""
 
-    def __init__(self) -> None:
-        """Begin with nobody."""
+    def __init__(self, log: Log = log) -> None:
+        """Begin with nobody; those that raise are logged."""
+        self._log = log
         self._listeners: dict[object, Listener] = {}
         """By what :meth:`add` has made for each: the same callback may be added twice."""
         self._items: deque[object] = deque()
@@ -50,7 +51,7 @@ class Listeners:
                 listener(item)
             except (Exception, asyncio.CancelledError):  # noqa: BLE001  # nothing may end the task that polls
                 self._remove(key)
-                log.exception("a listener raised, and is not called any more: %r", listener)
+                self._log.exception("a listener raised, and is not called any more: %r", listener)
 
     def _remove(self, key: object) -> None:
         self._listeners.pop(key, None)

@@ -14,6 +14,7 @@ from ..link.modbus import ModbusTransport
 from ..link.places import place_of
 from ..link.simulated import SimulatedTransport, new_gripper
 from ..link.transport import Transport
+from ..log import Log, log
 from ..wire.checks import check_byte, check_flag, check_int, check_seconds
 from ..wire.registers import REGISTER_COUNT, RTU_REGISTERS, TCP_REGISTERS
 from .claims import Gripper
@@ -26,6 +27,8 @@ RESPONSE_TIMEOUT_S: Final = 0.4
 """Two of these, a read in flight and a write, still end within the second that a write may take."""
 ACTIVATION_TIMEOUT_S: Final = 20.0
 """What drivers that ran on hardware wait for."""
+LONGEST_NAME: Final = 64
+"""Characters of a hand's name: it begins every line of the log."""
 HINTS: Final = {
     "tcp": " (two grippers behind one gateway: give each of the hands its device_id)",
     "rtu": " (a serial port has one owner, whatever the device_id: two would read each other's replies)",
@@ -56,6 +59,15 @@ class Options:
     """What positions, speeds and forces mean to people; default timeouts of moves come from its speeds."""
     keep_grip: bool = False
     """What a stop does about it unless told."""
+    given_name: str = ""
+    """What the hand is to be called; empty if nothing was said."""
+    log: Log = log
+    """For what happens to it."""
+
+    @property
+    def name(self) -> str:
+        """What the hand is called: by its address, unless something else was said."""
+        return self.given_name or self.address
 
 
 def check_options(
@@ -74,6 +86,7 @@ def check_options(
     calibration: object,
     force_calibration: object,
     keep_grip: object,
+    name: object = None,
 ) -> Options:
     """Check every option and make the transport; opens nothing and needs no running loop.
 
@@ -81,6 +94,7 @@ def check_options(
         TypeError: an option of the wrong type; named with value and range.
         ValueError: an option outside its range, or a malformed address.
     """
+    given_name = _check_name(name)
     connect_s = check_seconds("connect_timeout", connect_timeout, 0.01, 5.0)
     response_s = check_seconds("response_timeout", response_timeout, 0.005, 0.5)
     if isinstance(address, str):
@@ -98,22 +112,22 @@ def check_options(
         if parsed.kind == "sim":
             simulated = new_gripper()
             make = partial(SimulatedTransport, simulated, registers)
-            name = f"sim://#{id(simulated):x}"  # every sim:// is a gripper of its own
-            gripper = partial(Gripper, name)
+            place = f"sim://#{id(simulated):x}"  # every sim:// is a gripper of its own
+            gripper = partial(Gripper, place)
         else:
             make = partial(ModbusTransport, parsed, registers)
-            name = str(parsed)
+            place = str(parsed)
             unit = registers.device_id if device_id is not None and parsed.kind == "tcp" else None
             gripper = lambda: Gripper(place_of(parsed), unit, HINTS[parsed.kind])  # noqa: E731
     elif isinstance(address, Transport):
-        name = f"<{type(address).__name__} at {id(address):#x}>"
-        gripper = partial(Gripper, name)
-        make = partial(GuardedTransport, address, name)
+        place = f"<{type(address).__name__} at {id(address):#x}>"
+        gripper = partial(Gripper, place)
+        make = partial(GuardedTransport, address, place, log=Log(given_name or place))
     else:
         raise TypeError(f"address must be a string or a Transport, got {address!r}")
     return Options(
         make_transport=partial(make, connect_timeout=connect_s, response_timeout=response_s),
-        address=name,
+        address=place,
         gripper=gripper,
         poll_interval=check_seconds("poll_interval", poll_interval, 0.001, 0.1),
         activation_timeout=check_seconds("activation_timeout", activation_timeout, 0.01, 120.0),
@@ -122,7 +136,20 @@ def check_options(
         force=check_byte("force", force),
         units=check_units(calibration, force_calibration),
         keep_grip=check_flag("keep_grip", keep_grip),
+        given_name=given_name,
+        log=Log(given_name or place),
     )
+
+
+def _check_name(name: object) -> str:
+    if name is None:
+        return ""
+    form = f"a text of 1..{LONGEST_NAME} printable characters without blanks around it"
+    if not isinstance(name, str):
+        raise TypeError(f"name must be None or {form}, got {name!r}")
+    if not 1 <= len(name) <= LONGEST_NAME or not name.isprintable() or name != name.strip():
+        raise ValueError(f"name must be None or {form}, got {name!r:.100}")
+    return name
 
 
 def check_units(calibration: object, force_calibration: object) -> Units:

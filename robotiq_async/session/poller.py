@@ -27,7 +27,6 @@ from ..errors import (
 )
 from ..link.modbus import HELD_S
 from ..link.transport import Transport
-from ..log import log
 from ..wire.status import RobotiqStatus
 from .options import Options
 from .reconnecting import Backoff
@@ -80,6 +79,7 @@ class Poller:
         self._counters = counters
         self._channels = channels
         self._options = options
+        self._log = options.log
         self._loop = asyncio.get_running_loop()
         self.connected: asyncio.Future[None] = self._loop.create_future()
         """Done when the first status has been taken in; holds the error when there was none."""
@@ -159,7 +159,7 @@ class Poller:
 
     async def _reconnect(self, why: RobotiqConnectionError) -> bool:
         """Open the link again; False when that is given up, or when asked to stop."""
-        log.warning("link lost: %s", why)
+        self._log.warning("link lost: %s", why)
         self._controller.lost(why)
         if self._options.policy is None:
             self.failure = why
@@ -171,14 +171,14 @@ class Poller:
             try:
                 connected = await self._contact()
             except RobotiqConnectionError as error:
-                log.debug("still no link: %s", error)
+                self._log.debug("still no link: %s", error)
                 if backoff.gives_up(self._loop.time()):
                     self.failure = error
                     return False
                 continue
             if connected:
                 self._counters.reconnects += 1
-                log.warning("link back after %.2f s", self._loop.time() - backoff.since)
+                self._log.warning("link back after %.2f s", self._loop.time() - backoff.since)
                 return True
         return False
 
@@ -272,7 +272,7 @@ class Poller:
         held = self._tick.late >= late / 2
         why = "something holds up the event loop" if held else "the gripper answers slowly"
         missed = self._counters.overruns
-        log.warning("polling is %.0f ms late: %s (%d polls missed so far)", 1000 * late, why, missed)
+        self._log.warning("polling is %.0f ms late: %s (%d polls missed so far)", 1000 * late, why, missed)
 
     # -- the end ---------------------------------------------------------------------------------------
 
@@ -286,7 +286,7 @@ class Poller:
                 if self._halt_at_stop and self._controller.status is not None:
                     await self._stop_fingers()
             if scope.cancelled_caught:
-                log.warning("the gripper did not confirm in time that the fingers were stopped")
+                self._log.warning("the gripper did not confirm in time that the fingers were stopped")
         finally:
             if not self._loop.is_closed():
                 self._tick.close()
@@ -302,7 +302,7 @@ class Poller:
                 return
             except RobotiqConnectionError as error:
                 if not failed:
-                    log.warning("the fingers could not be told to stop, trying again: %s", error)
+                    self._log.warning("the fingers could not be told to stop, trying again: %s", error)
                 failed = True
                 self._controller.lost(error)
             await asyncio.sleep(SHUTDOWN_PAUSE_S)

@@ -30,18 +30,21 @@ class ReconnectPolicy:
     activate: bool = False
 
     def __post_init__(self) -> None:
-        """Check the values.
+        """Check the values, and keep them as plain floats.
 
         Raises:
             TypeError: not a number, or activate is not a bool.
             ValueError: outside its range.
         """
-        check_seconds("first_delay", self.first_delay, 0.0, 10.0)
-        check_seconds("max_delay", self.max_delay, 0.01, 60.0)
+        self._keep("first_delay", 0.0, 10.0)
+        self._keep("max_delay", 0.01, 60.0)
         if self.give_up_after is not None:
-            check_seconds("give_up_after", self.give_up_after, 0.0, 86400.0)
+            self._keep("give_up_after", 0.0, 86400.0)
         if not isinstance(self.activate, bool):
             raise TypeError(f"activate must be True or False, got {self.activate!r}")
+
+    def _keep(self, name: str, low: float, high: float) -> None:
+        object.__setattr__(self, name, check_seconds(name, getattr(self, name), low, high))
 
 
 class Backoff:

@@ -25,7 +25,6 @@ from ..errors import (
     RobotiqError,
     StateTimeoutError,
 )
-from ..log import log
 from ..wire.status import RobotiqStatus
 from .claims import Claims
 from .clock import now
@@ -107,9 +106,7 @@ class Session:
 
         Nobody in that loop can be told. What they wait with belongs to it and is left to it.
         """
-        log.warning(
-            "%s: the event loop was closed before stop(); the fingers may still move", self.options.address
-        )
+        self.options.log.warning("the event loop was closed before stop(); the fingers may still move")
         self._release()
         self._poller.abandon()
         self._waiters = StateWaiters()
@@ -140,7 +137,7 @@ class Session:
         self._release()
         failure: Callable[[], RobotiqError] | None = None
         if not task.cancelled() and (bug := task.exception()) is not None:
-            log.critical("the task that owns the link failed", exc_info=bug)
+            self.options.log.critical("the task that owns the link failed", exc_info=bug)
             failure = lambda: ConnectionLostError(f"internal error: {bug!r}")  # noqa: E731
         elif self._poller.failure is not None:
             failure = self.link_lost
@@ -176,6 +173,7 @@ class Session:
         failure = self._poller.failure
         error = ConnectionLostError(f"the link is down{'' if failure is None else f': {failure}'}")
         error.__cause__ = failure
+        error.hand = self.options.given_name
         return error
 
     # -- waiting ---------------------------------------------------------------------------------------

@@ -6,8 +6,8 @@ import math
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from typing import Final
+from dataclasses import asdict, dataclass, field
+from typing import Any, Final
 
 from ..control.motion import MoveResult
 from ..errors import RobotiqError
@@ -55,6 +55,10 @@ class Statistics:
     def __post_init__(self) -> None:
         """Keep a mapping of our own."""
         object.__setattr__(self, "moves", FrozenMapping(self.moves))
+
+    def as_dict(self) -> dict[str, Any]:
+        """All of it in types that JSON and pandas take, each under the name of its attribute."""
+        return {**asdict(self), "moves": dict(self.moves)}
 
 
 @dataclass(slots=True)

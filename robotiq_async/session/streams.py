@@ -12,12 +12,13 @@ import itertools
 import weakref
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Generic, Self, TypeVar
 
 from ..control.triggers import Trigger
-from ..enums import State
+from ..enums import AXES, State
 from ..errors import RobotiqError
+from ..log import Log, log
 from ..wire.request import Request
 from ..wire.status import RobotiqStatus
 from .event_loop import check_loop
@@ -42,6 +43,15 @@ class Transition:
     trigger: Trigger
     timestamp: float
 
+    def as_dict(self) -> dict[str, Any]:
+        """All of it in types that JSON and pandas take; states and trigger by name."""
+        return {
+            "timestamp": self.timestamp,
+            "source": self.source.name,
+            "target": self.target.name,
+            "trigger": self.trigger.name,
+        }
+
 
 @dataclass(frozen=True, slots=True)
 class SentRequest:
@@ -56,6 +66,25 @@ class SentRequest:
     request: Request
     timestamp: float
     acknowledged: bool
+
+    def as_dict(self) -> dict[str, Any]:
+        """All of it in types that JSON and pandas take, the request's attributes beside its own.
+
+        What is asked of one axis stands below its name: ``position``, ``speed`` and ``force``.
+        """
+        request = self.request
+        return {
+            "timestamp": self.timestamp,
+            "acknowledged": self.acknowledged,
+            "registers": list(request.registers),
+            "activate": request.activate,
+            "go": request.go,
+            "release": request.release,
+            "mode": request.mode.name,
+            "individual_fingers": request.individual_fingers,
+            "individual_scissor": request.individual_scissor,
+            **{str(axis.name): asdict(asked) for axis, asked in zip(AXES, request.axes, strict=True)},
+        }
 
 
 class Stream(Generic[T]):
@@ -238,10 +267,10 @@ class Channels:
         numbers: of the statuses, from the first start on.
     """
 
-    def __init__(self) -> None:
-        """Begin without readers."""
+    def __init__(self, log: Log = log) -> None:
+        """Begin without readers; ``log`` is that of the hand."""
         self.numbers = itertools.count()
-        self.listeners = Listeners()
+        self.listeners = Listeners(log)
         self.statuses: Channel[RobotiqStatus] = Channel(self.listeners)
         self.transitions: Channel[Transition] = Channel(self.listeners)
         self.requests: Channel[SentRequest] = Channel(self.listeners)

@@ -16,7 +16,7 @@ from typing import Any, Final
 from ..enums import Fault
 from ..errors import RobotiqConnectionError
 from ..kinematics import joint_angles, joint_velocities
-from ..log import log
+from ..log import Log
 from ..protocol import Hand, HandStream
 from ..session.clock import now
 from ..session.streams import SentRequest, Transition
@@ -25,11 +25,9 @@ from .joint_states import SCHEMA, SCHEMA_NAME, JointStateEncoder
 from .payloads import (
     SCHEMAS,
     Fields,
-    command_fields,
     efforts,
     fault_fields,
     initial_state_fields,
-    status_fields,
     transition_fields,
 )
 
@@ -172,7 +170,9 @@ class Feed:
             task.cancel()
         for ended in await asyncio.gather(*self._tasks, return_exceptions=True):
             if isinstance(ended, Exception):
-                log.critical("a feed failed: what happens to the hand is no longer published", exc_info=ended)
+                Log(self._hand.name).critical(
+                    "a feed failed: what happens to the hand is no longer published", exc_info=ended
+                )
         for source in self._sources:
             source.drain()
 
@@ -184,7 +184,7 @@ class Feed:
         self._publish(Message(topic, self.nanoseconds(timestamp), compact(fields), sequence))
 
     def _publish_status(self, status: RobotiqStatus) -> None:
-        self._publish_json(STATUS, status.timestamp, status_fields(status), status.sequence)
+        self._publish_json(STATUS, status.timestamp, status.as_dict(), status.sequence)
         self._publish_joints(status)
         if status.fault != self._fault:
             self._fault = status.fault
@@ -201,7 +201,7 @@ class Feed:
         self._publish(Message(JOINTS, stamp, data, status.sequence))
 
     def _publish_request(self, sent: SentRequest) -> None:
-        self._publish_json(COMMAND, sent.timestamp, command_fields(sent))
+        self._publish_json(COMMAND, sent.timestamp, sent.as_dict())
 
     def _publish_transition(self, transition: Transition) -> None:
         self._publish_json(EVENT, transition.timestamp, transition_fields(transition))

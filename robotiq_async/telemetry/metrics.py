@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+from collections import Counter
 from collections.abc import AsyncIterator, Iterable, Iterator
 from typing import Final
 
@@ -54,9 +55,15 @@ class HandCollector(Collector):
         """Create it in the event loop that the hands run in.
 
         Args:
-            hands: the label ``hand`` of each is its address.
+            hands: the label ``hand`` of each is its name.
+
+        Raises:
+            ValueError: two of them have the same name.
         """
         self._hands = list(hands)
+        names = Counter(hand.name for hand in self._hands)
+        if twice := [name for name, count in names.items() if count > 1]:
+            raise ValueError(f"hands must have names that tell them apart, got {twice[0]!r} twice")
         self._loop = asyncio.get_running_loop()
 
     def describe(self) -> Iterable[Metric]:
@@ -69,26 +76,26 @@ class HandCollector(Collector):
         figures = asking.result(TIMEOUT_S)
         for name, meaning in _COUNTERS.items():
             counter = CounterMetricFamily(f"robotiq_{name}", meaning, labels=["hand"])
-            for address, (_, statistics) in figures.items():
-                counter.add_metric([address], getattr(statistics, name))
+            for hand, (_, statistics) in figures.items():
+                counter.add_metric([hand], getattr(statistics, name))
             yield counter
         for name, meaning in _GAUGES.items():
             gauge = GaugeMetricFamily(f"robotiq_{name}_seconds", meaning, labels=["hand"])
-            for address, (_, statistics) in figures.items():
-                gauge.add_metric([address], getattr(statistics, name))
+            for hand, (_, statistics) in figures.items():
+                gauge.add_metric([hand], getattr(statistics, name))
             yield gauge
         moves = CounterMetricFamily("robotiq_moves", "Moves by outcome.", labels=["hand", "outcome"])
         state = GaugeMetricFamily("robotiq_state", "1 for the present state.", labels=["hand", "state"])
-        for address, (present, statistics) in figures.items():
+        for hand, (present, statistics) in figures.items():
             for outcome, count in statistics.moves.items():
-                moves.add_metric([address, outcome], count)
+                moves.add_metric([hand, outcome], count)
             for each in State:
-                state.add_metric([address, each.name], float(each is present))
+                state.add_metric([hand, each.name], float(each is present))
         yield moves
         yield state
 
     async def _figures(self) -> dict[str, tuple[State, Statistics]]:
-        return {hand.address: (hand.state, hand.statistics) for hand in self._hands}
+        return {hand.name: (hand.state, hand.statistics) for hand in self._hands}
 
 
 @contextlib.asynccontextmanager
@@ -105,12 +112,12 @@ async def serve_metrics(
         host: the interface to listen on.
 
     Raises:
-        ValueError: no hand, or a port outside 0..65535.
+        ValueError: no hand, two of the same name, or a port outside 0..65535.
         OSError: the port is taken.
     """
     if not hands:
         raise ValueError("hands must name at least one hand, got none")
-    check_int("port", port, 0, 65535)
+    port = check_int("port", port, 0, 65535)
     registry = CollectorRegistry()
     registry.register(HandCollector(hands))
     server, thread = start_http_server(port, addr=host, registry=registry)

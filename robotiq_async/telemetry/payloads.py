@@ -1,15 +1,17 @@
-"""What happens to a hand as JSON objects, for files and for other programs, and their schemas."""
+"""What happens to a hand as JSON objects, for files and for other programs, and their schemas.
+
+Statuses and requests are what their ``as_dict()`` gives, here and wherever else they are JSON.
+"""
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Any, Final
 
-from ..enums import AXES, Finger, State
+from ..enums import AXES, Fault, Finger, State
 from ..errors import NotStartedError
 from ..kinematics import PREFIX
 from ..protocol import Hand
-from ..session.streams import SentRequest, Transition
+from ..session.streams import Transition
 from ..wire.status import RobotiqStatus
 
 Fields = dict[str, Any]
@@ -18,54 +20,68 @@ _INTEGER: Final = {"type": "integer"}
 _NUMBER: Final = {"type": "number"}
 _STRING: Final = {"type": "string"}
 _BOOLEAN: Final = {"type": "boolean"}
+_REGISTERS: Final = {"type": "array", "items": _INTEGER}
 
 
 def _object(**properties: object) -> dict[str, object]:
     return {"type": "object", "properties": properties}
 
 
-_AXES_NAMES: Final = {axis: str(axis.name) for axis in AXES}
+def _for_each_axis(**properties: object) -> dict[str, object]:
+    return {str(axis.name): _object(**properties) for axis in AXES}
+
+
+_FAULT: Final = {
+    "fault": _STRING,
+    "fault_code": _INTEGER,
+    "severity": _STRING,
+    "description": _STRING,
+}
 SCHEMAS: Final = {
     "status": _object(
+        registers=_REGISTERS,
+        timestamp=_NUMBER,
         sequence=_INTEGER,
-        monotonic=_NUMBER,
-        registers={"type": "array", "items": _INTEGER},
-        fault=_INTEGER,
-        activated=_BOOLEAN,
-        go=_BOOLEAN,
-        moving=_BOOLEAN,
-        **{
-            name: _object(position=_INTEGER, requested=_INTEGER, current_ma=_INTEGER, status=_STRING)
-            for name in _AXES_NAMES.values()
-        },
+        fault=_STRING,
+        fault_code=_INTEGER,
+        is_activated=_BOOLEAN,
+        is_reset=_BOOLEAN,
+        is_moving=_BOOLEAN,
+        initialization=_STRING,
+        mode=_STRING,
+        activation_echo=_BOOLEAN,
+        go_echo=_BOOLEAN,
+        contacts={"type": "array", "items": _STRING},
+        **_for_each_axis(
+            position=_INTEGER, requested_position=_INTEGER, current_ma=_INTEGER, axis_state=_STRING
+        ),
     ),
     "command": _object(
-        monotonic=_NUMBER,
+        timestamp=_NUMBER,
         acknowledged=_BOOLEAN,
+        registers=_REGISTERS,
         activate=_BOOLEAN,
         go=_BOOLEAN,
         release=_BOOLEAN,
-        registers={"type": "array", "items": _INTEGER},
-        **{name: _object(position=_INTEGER, speed=_INTEGER, force=_INTEGER) for name in _AXES_NAMES.values()},
+        mode=_STRING,
+        individual_fingers=_BOOLEAN,
+        individual_scissor=_BOOLEAN,
+        **_for_each_axis(position=_INTEGER, speed=_INTEGER, force=_INTEGER),
     ),
     "event": _object(
         kind={"type": "string", "enum": ["state", "transition", "fault"]},
-        monotonic=_NUMBER,
+        timestamp=_NUMBER,
         source=_STRING,
         target=_STRING,
         trigger=_STRING,
-        code=_INTEGER,
-        name=_STRING,
-        severity=_STRING,
-        description=_STRING,
+        **_FAULT,
     ),
     "state": _object(
+        name=_STRING,
         address=_STRING,
         state=_STRING,
         age=_NUMBER,
-        fault=_INTEGER,
-        severity=_STRING,
-        description=_STRING,
+        **_FAULT,
         polls=_INTEGER,
         writes=_INTEGER,
         overruns=_INTEGER,
@@ -84,76 +100,53 @@ SCHEMAS: Final = {
 """A JSON Schema for each kind of object."""
 
 
+def title(hand: Hand) -> str:
+    """Which hand, for people: its name and its address, where the one is not the other."""
+    return hand.address if hand.name == hand.address else f"{hand.name} ({hand.address})"
+
+
 def printable(text: str) -> str:
     """A text of others with what steers a terminal written out, as Python does it."""
     return "".join(each if each.isprintable() else ascii(each)[1:-1] for each in text)
 
 
-def status_fields(status: RobotiqStatus) -> Fields:
-    """The object for a status."""
-    return {
-        "monotonic": _seconds(status.timestamp),
-        "sequence": status.sequence,
-        "registers": status.registers,
-        "fault": int(status.fault),
-        "activated": status.is_activated,
-        "go": status.go_echo,
-        "moving": status.is_moving,
-        **{
-            name: {
-                "position": status.position(axis),
-                "requested": status.requested_position(axis),
-                "current_ma": status.current_ma(axis),
-                "status": status.finger_status(axis).name,
-            }
-            for axis, name in _AXES_NAMES.items()
-        },
-    }
-
-
-def command_fields(sent: SentRequest) -> Fields:
-    """The object for a request that was written."""
-    request = sent.request
-    return {
-        "monotonic": _seconds(sent.timestamp),
-        "acknowledged": sent.acknowledged,
-        "activate": request.activate,
-        "go": request.go,
-        "release": request.release,
-        "registers": request.registers,
-        **{
-            name: {"position": axis.position, "speed": axis.speed, "force": axis.force}
-            for name, axis in zip(_AXES_NAMES.values(), request.axes, strict=True)
-        },
-    }
-
-
 def initial_state_fields(state: State, now: float) -> Fields:
     """The event that opens a feed: the state the hand is in."""
-    return {"monotonic": _seconds(now), "kind": "state", "target": state.name}
+    return {"kind": "state", "timestamp": now, "target": state.name}
 
 
 def transition_fields(transition: Transition) -> Fields:
     """The event for a change of state."""
-    return {
-        "monotonic": _seconds(transition.timestamp),
-        "kind": "transition",
-        "source": transition.source.name,
-        "target": transition.target.name,
-        "trigger": transition.trigger.value,
-    }
+    return {"kind": "transition", **transition.as_dict()}
 
 
 def fault_fields(status: RobotiqStatus) -> Fields:
     """The event for a fault that has appeared, or cleared (NONE); the status is the first that shows it."""
-    fault = status.fault
+    return {"kind": "fault", "timestamp": status.timestamp, **_in_words(status.fault)}
+
+
+def _in_words(fault: Fault) -> Fields:
     return {
-        "monotonic": _seconds(status.timestamp),
-        "kind": "fault",
-        "code": int(fault),
-        "name": fault.name,
-        "severity": fault.severity.value,
+        "fault": fault.name,
+        "fault_code": int(fault),
+        "severity": fault.severity.name,
         "description": fault.description,
+    }
+
+
+def reading_fields(hand: Hand) -> Fields:
+    """A hand and its newest status.
+
+    Raises:
+        NotStartedError: there is no status yet.
+    """
+    status = hand.status
+    return {
+        "name": hand.name,
+        "address": hand.address,
+        "state": hand.state.name,
+        **status.as_dict(),
+        **_in_words(status.fault),
     }
 
 
@@ -164,16 +157,19 @@ def state_fields(hand: Hand, now: float) -> Fields:
         hand: the hand.
         now: monotonic seconds.
     """
-    fields: Fields = {"address": hand.address, "state": hand.state.name, **asdict(hand.statistics)}
+    fields: Fields = {
+        "name": hand.name,
+        "address": hand.address,
+        "state": hand.state.name,
+        **hand.statistics.as_dict(),
+    }
     try:
         status = hand.status
     except NotStartedError:
         return fields
-    fields["age"] = _seconds(now - status.timestamp)
+    fields["age"] = round(now - status.timestamp, 6)
     if hand.state not in (State.DISCONNECTED, State.SHUTDOWN):
-        fields["fault"] = int(status.fault)
-        fields["severity"] = status.fault.severity.value
-        fields["description"] = status.fault.description
+        fields |= _in_words(status.fault)
     return fields
 
 
@@ -182,7 +178,3 @@ def efforts(status: RobotiqStatus) -> list[float]:
     scissor = status.current_ma(Finger.SCISSOR) / 1000
     one, two, middle = (status.current_ma(finger) / 1000 for finger in PREFIX)
     return [scissor, one, 0.0, 0.0, scissor, two, 0.0, 0.0, middle, 0.0, 0.0]
-
-
-def _seconds(timestamp: float) -> float:
-    return round(timestamp, 6)

@@ -85,7 +85,7 @@ class Recorder:
         self.recorded = 0
         self._profile = "ros2" if ros2 else ""
         self._topics: tuple[Topic, ...] = (JOINTS,) if ros2 else TOPICS
-        self._address = hand.address
+        self._hand = hand
         self._feed = Feed(hand, self._take)
         self._outbox = _Outbox()
         self._file: FileIO
@@ -150,7 +150,12 @@ class Recorder:
     def _begin(self) -> None:
         self._writer = writer = Writer(self._outbox, compression=CompressionType.ZSTD)  # type: ignore[arg-type]
         writer.start(profile=self._profile, library=f"robotiq_async {__version__}")
-        metadata = {"version": __version__, "address": self._address, "note": "never run on real hardware"}
+        metadata = {
+            "version": __version__,
+            "name": self._hand.name,
+            "address": self._hand.address,
+            "note": "never run on real hardware",
+        }
         writer.add_metadata("robotiq_async", metadata)
         for topic in self._topics:
             schema = writer.register_schema(topic.schema_name, topic.schema_encoding, topic.schema)

@@ -77,6 +77,9 @@ class Entry:
         fields = self.fields
         try:
             return what(fields)
+        except KeyError as error:
+            why = f"is not one of ours, or of another version of robotiq_async: it has no {error!s:.80}"
+            raise self._refused(why) from error
         except NOT_OURS as error:
             raise self._refused("is not one of ours") from error
 

@@ -40,7 +40,7 @@ from ..session.clock import now
 from ..wire.checks import check_int
 from .feed import EVENT, JOINTS, TOPICS, Feed, Message, Topic, compact, json_topic
 from .gate import Gate, hidden_address
-from .payloads import SCHEMAS, state_fields
+from .payloads import SCHEMAS, state_fields, title
 from .robot_description import (
     SCHEMA,
     SCHEMA_NAME,
@@ -194,7 +194,7 @@ class Viewer:
         services = [] if self._operator is None else list(SERVICES.values())
         host = hidden_address()
         server = foxglove.start_server(
-            name="robotiq_async",
+            name=f"robotiq_async: {title(self._hand)}",
             host=host,
             port=0,
             capabilities=[Capability.Services] if services else [],

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import asdict
 from typing import Final
 
 from ..enums import AXES, Fault, State
@@ -96,9 +95,9 @@ class HandNews:
         """Now and then: percentiles are dear."""
         if now() - self._counted_at >= STATISTICS_S:
             self._counted_at = now()
-            yield "statistics", asdict(self.hand.statistics)
+            yield "statistics", self.hand.statistics.as_dict()
 
 
 def _stamped(fields: Fields) -> Fields:
     """With the time of day: the clock of the hand means nothing to a person."""
-    return {**fields, "time": time.time() - max(now() - fields["monotonic"], 0.0)}
+    return {**fields, "time": time.time() - max(now() - fields["timestamp"], 0.0)}

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Final, Self
 
 from ..telemetry.gate import is_loopback
+from ..wire.checks import check_int
 
 LOOPBACK: Final = "127.0.0.1"
 PORT: Final = 8766
@@ -22,7 +23,7 @@ class PageSettings:
         host: the interface to listen on.
         port: the TCP port; 0 takes a free one.
         control: whether the page may command.
-        addresses: of the hands, in their order.
+        addresses: what the hands are called on the page, in their order.
         speed: where the slider of the speed begins.
         force: where the slider of the force begins.
         password: asked of everybody; empty for the token in the printed address.
@@ -49,8 +50,12 @@ class PageSettings:
         """Keep who may not get in outside.
 
         Raises:
-            ValueError: another interface without a password and without a certificate, or half a certificate.
+            TypeError: port, speed or force is not an int.
+            ValueError: one of them is outside its range; another interface without a password and without a
+                certificate, or half a certificate.
         """
+        for name, high in (("port", 65535), ("speed", 255), ("force", 255)):
+            object.__setattr__(self, name, check_int(name, getattr(self, name), 0, high))
         if bool(self.certificate) != bool(self.key):
             raise ValueError("a certificate needs its key, and a key its certificate")
         if not self.loopback and not (self.password or self.certificate):

@@ -1,8 +1,15 @@
-"""Argument checks: each names the argument, the value and the range, and nothing is clamped."""
+"""Argument checks: each names the argument, the value and the range, and nothing is clamped.
+
+An int is whatever says that it is one (``__index__``), numpy's integers too; a number is a real one or an
+int. What comes out is a plain int or float. No bool passes for either: it stands where an argument slipped.
+"""
 
 from __future__ import annotations
 
+import math
+import operator
 import sys
+from numbers import Real
 from typing import Final
 
 from ..enums import Finger
@@ -37,11 +44,22 @@ def check_int(name: str, value: object, low: int, high: int) -> int:
         TypeError: not an int (a bool is not one here).
         ValueError: outside the range.
     """
-    if not isinstance(value, int) or isinstance(value, bool):
+    number = as_int(value)
+    if number is None:
         raise TypeError(f"{name} must be an int in {low}..{high}, got {value!r}")
-    if not low <= value <= high:
+    if not low <= number <= high:
         raise ValueError(f"{name} must be in {low}..{high}, got {value!r}")
-    return int(value)
+    return number
+
+
+def as_int(value: object) -> int | None:
+    """The plain int that a value stands for; None if it is no int, or a bool."""
+    if isinstance(value, bool):
+        return None
+    try:
+        return int(operator.index(value))  # type: ignore[arg-type]  # what it refuses is what we ask
+    except TypeError:
+        return None
 
 
 def check_mask(fingers: object) -> Finger:
@@ -51,11 +69,12 @@ def check_mask(fingers: object) -> Finger:
         TypeError: not a Finger or an int.
         ValueError: empty, or bits beyond the four axes.
     """
-    if not isinstance(fingers, int) or isinstance(fingers, bool):
+    mask = as_int(fingers)
+    if mask is None:
         raise TypeError(f"fingers must be a Finger mask or an int in 1..15, got {fingers!r}")
-    if not 1 <= int(fingers) <= 15:
-        raise ValueError(f"fingers must be a mask of Finger members in 1..15, got {int(fingers)!r}")
-    return Finger(int(fingers))
+    if not 1 <= mask <= 15:
+        raise ValueError(f"fingers must be a mask of Finger members in 1..15, got {mask!r}")
+    return Finger(mask)
 
 
 def parse_fingers(name: str, text: str) -> Finger:
@@ -86,9 +105,10 @@ def check_axis(finger: object) -> Finger:
     """
     if type(finger) is Finger and finger in _SINGLE:
         return finger
-    if not isinstance(finger, int) or isinstance(finger, bool):
+    value = as_int(finger)
+    if value is None:
         raise TypeError(f"finger must be one Finger (A, B, C or SCISSOR), got {finger!r}")
-    axis = _BY_VALUE.get(int(finger))
+    axis = _BY_VALUE.get(value)
     if axis is None:
         raise ValueError(f"finger must be one of Finger.A, B, C or SCISSOR (1, 2, 4 or 8), got {finger!r}")
     return axis
@@ -111,11 +131,26 @@ def check_number(name: str, value: object, low: float, high: float, what: str = 
         TypeError: not a number.
         ValueError: not finite, or outside the range.
     """
-    if not isinstance(value, int | float) or isinstance(value, bool):
+    number = as_float(value)
+    if number is None:
         raise TypeError(f"{name} must be {what} in {low}..{high}, got {value!r}")
-    if not low <= value <= high:
+    if not low <= number <= high:
         raise ValueError(f"{name} must be {what} in {low}..{high}, got {value!r}")
-    return float(value)
+    return number
+
+
+def as_float(value: object) -> float | None:
+    """The plain float that a value stands for, infinite beyond all; None if it is no number, or a bool.
+
+    ``__float__`` alone does not make a number: numpy's bool has it, and its complex, which loses a part.
+    """
+    number = value if isinstance(value, float | Real) and not isinstance(value, bool) else as_int(value)
+    try:
+        return None if number is None else float(number)
+    except OverflowError:
+        return math.inf
+    except TypeError:  # numpy's timedelta counts as an integer, and is none
+        return None
 
 
 def check_timeout(name: str, value: object) -> float | None:
@@ -127,11 +162,12 @@ def check_timeout(name: str, value: object) -> float | None:
     """
     if value is None:
         return None
-    if not isinstance(value, int | float) or isinstance(value, bool):
+    number = as_float(value)
+    if number is None:
         raise TypeError(f"{name} must be None or seconds above 0, got {value!r}")
-    if not 0 < value <= sys.float_info.max:
+    if not 0 < number <= sys.float_info.max:
         raise ValueError(f"{name} must be None or seconds above 0, got {value!r}")
-    return float(value)
+    return number
 
 
 _SINGLE: Final = frozenset(_BY_VALUE.values())

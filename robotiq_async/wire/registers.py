@@ -12,6 +12,8 @@ from collections.abc import MutableSequence, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from .checks import as_int
+
 REGISTER_COUNT: Final = 8
 """Registers in either block."""
 
@@ -110,7 +112,7 @@ RTU_REGISTERS: Final = RegisterMap(request=0x03E8, status=0x07D0, read_function=
 
 
 def check_registers(registers: Sequence[int]) -> Registers:
-    """Eight registers of 16 bits as a tuple.
+    """Eight registers of 16 bits as a tuple of plain ints.
 
     Raises:
         TypeError: a register is not an int.
@@ -119,9 +121,13 @@ def check_registers(registers: Sequence[int]) -> Registers:
     block = tuple(registers)
     if len(block) != REGISTER_COUNT:
         raise ValueError(f"registers: expected {REGISTER_COUNT} of them, got {len(block)}")
-    for index, register in enumerate(block):
-        if type(register) is not int:
-            raise TypeError(f"registers[{index}] must be an int in 0..65535, got {register!r}")
-        if not 0 <= register <= 0xFFFF:
-            raise ValueError(f"registers[{index}] must be in 0..65535, got {register}")
-    return block
+    return tuple(_register(index, register) for index, register in enumerate(block))
+
+
+def _register(index: int, given: object) -> int:
+    register = as_int(given)
+    if register is None:
+        raise TypeError(f"registers[{index}] must be an int in 0..65535, got {given!r}")
+    if not 0 <= register <= 0xFFFF:
+        raise ValueError(f"registers[{index}] must be in 0..65535, got {register}")
+    return register

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
+from typing import Any, Final
 
-from ..enums import AXES, Fault, Finger, Initialization, Mode, ObjectStatus
+from ..enums import AXES, Fault, Finger, Initialization, Mode, ObjectStatus, names_of
 from . import registers as reg
-from .checks import check_axis
+from .checks import check_axis, check_int, check_seconds
+
+NO_REQUEST: Final = "NO_REQUEST"
+"""What :meth:`RobotiqStatus.axis_state` says of an axis whose gDT of 0 does not mean motion."""
 
 _set = object.__setattr__
 _INDEX = {axis: index for index, axis in enumerate(AXES)}
@@ -62,10 +67,12 @@ class RobotiqStatus:
         """A status from eight registers.
 
         Raises:
-            TypeError: a register is not an int.
-            ValueError: not eight registers, or one outside 0..65535.
+            TypeError: a register or the sequence is not an int, or the timestamp not a number.
+            ValueError: not eight registers, or one outside 0..65535; a timestamp that is not finite, or a
+                sequence below 0.
         """
-        return cls(reg.check_registers(registers), timestamp, sequence)
+        at = check_seconds("timestamp", timestamp, -sys.float_info.max, sys.float_info.max)
+        return cls(reg.check_registers(registers), at, check_int("sequence", sequence, 0, sys.maxsize))
 
     @property
     def registers(self) -> reg.Registers:
@@ -85,13 +92,29 @@ class RobotiqStatus:
     # One axis. Each takes one Finger member; a mask of several is a ValueError.
 
     def finger_status(self, finger: Finger | int) -> ObjectStatus:
-        """Whether the axis moves, touches something or has arrived (gDT).
+        """Whether the axis moves, touches something or has arrived (gDT), as the gripper says it.
+
+        It says IN_MOTION of an axis that was never asked for anything, too: see :meth:`axis_state`.
 
         Raises:
             TypeError: not a Finger or an int.
             ValueError: not exactly one axis.
         """
         return ObjectStatus(reg.gDT[_INDEX[check_axis(finger)]].read(self._registers))
+
+    def axis_state(self, finger: Finger | int) -> str:
+        """What the axis does, in a word for people and files: the name of its :meth:`finger_status`.
+
+        ``NO_REQUEST`` where that means nothing: gDT = 0 while no position request is in force (gGTO = 0, or
+        gIMC other than 3). So IN_MOTION are the axes in :attr:`moving`, and no others. In an activation and
+        in a release axes move of which the gripper says nothing.
+
+        Raises:
+            TypeError, ValueError: as :meth:`finger_status`.
+        """
+        axis = check_axis(finger)
+        what = self.finger_status(axis)
+        return NO_REQUEST if what is ObjectStatus.IN_MOTION and axis not in self.moving else what.name
 
     def position(self, finger: Finger | int) -> int:
         """Position in counts, 0..255: open reads 6-7, closed 240 or more (gPO)."""
@@ -184,6 +207,38 @@ class RobotiqStatus:
         """The axes stopped by a contact (empty when none is)."""
         return _CONTACTS[self._registers[0] & 0xFF]
 
+    def as_dict(self) -> dict[str, Any]:
+        """All of it in types that JSON and pandas take, each under the name of its attribute.
+
+        Enumerations stand as their names, masks as lists of the names of axes; what is of one axis stands
+        below its name (``A``, ``B``, ``C``, ``SCISSOR``), and ``fault_code`` is the fault's number.
+        :meth:`from_registers` makes the same status of the first three again.
+        """
+        return {
+            "registers": list(self._registers),
+            "timestamp": self._timestamp,
+            "sequence": self._sequence,
+            "fault": self.fault.name,
+            "fault_code": int(self.fault),
+            "is_activated": self.is_activated,
+            "is_reset": self.is_reset,
+            "is_moving": self.is_moving,
+            "initialization": self.initialization.name,
+            "mode": self.mode.name,
+            "activation_echo": self.activation_echo,
+            "go_echo": self.go_echo,
+            "contacts": names_of(self.contacts),
+            **{
+                str(axis.name): {
+                    "position": self.position(axis),
+                    "requested_position": self.requested_position(axis),
+                    "current_ma": self.current_ma(axis),
+                    "axis_state": self.axis_state(axis),
+                }
+                for axis in AXES
+            },
+        }
+
     def __eq__(self, other: object) -> bool:
         """Equal registers, timestamp and sequence."""
         if not isinstance(other, RobotiqStatus):
@@ -206,7 +261,7 @@ class RobotiqStatus:
         """The words a person looks for first."""
         axes = ", ".join(
             f"{axis.name}={self.position(axis)}->{self.requested_position(axis)} "
-            f"{self.finger_status(axis).name} {self.current_ma(axis)}mA"
+            f"{self.axis_state(axis)} {self.current_ma(axis)}mA"
             for axis in AXES
         )
         return (

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from robotiq_async import Fault, Finger
+from robotiq_async import Fault, Finger, RobotiqStatus
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.wire import registers as reg
 from robotiq_async.wire.request import Request
@@ -55,11 +55,12 @@ def test_status_as_json(call: Call, there: SimulatorServer) -> None:
     outcome = call("status", "--json", there.address)
     outcome.assert_succeeded()
     reading = json.loads(outcome.out)
-    assert reading["fault"] == {"code": 0, "name": "NONE", "severity": "none", "description": "no fault"}
-    assert reading.keys() == {"state", "fault", "activated", "reset", "moving", "mode", "axes"}
-    assert list(reading["axes"]) == ["A", "B", "C", "SCISSOR"]
-    assert reading["axes"]["A"].keys() == {"position", "requested", "object", "current_ma"}
-    assert reading["mode"] == "BASIC"
+    status = RobotiqStatus.from_registers(
+        reading["registers"], timestamp=reading["timestamp"], sequence=reading["sequence"]
+    )
+    hand = {"address": there.address, "state": "RUNNING_IDLE", "severity": "NONE", "description": "no fault"}
+    assert reading == hand | status.as_dict()
+    assert reading["A"]["axis_state"] == "NO_REQUEST", "it was never asked for anything"
 
 
 def test_status_of_a_gripper_at_rest_and_in_words(call: Call, there: SimulatorServer) -> None:
@@ -82,7 +83,8 @@ def test_status_shows_a_fault(call: Call, there: SimulatorServer) -> None:
     assert "FAULT" in outcome.out
     assert "major fault 0x0E: interference on the scissor for more than 20 s" in outcome.out
     reading = json.loads(call("status", "--json", there.address).out)
-    assert (reading["fault"]["code"], reading["fault"]["severity"]) == (14, "major")
+    assert (reading["fault"], reading["fault_code"]) == ("SCISSOR_BLOCKED", 14)
+    assert (reading["severity"], reading["description"]) == ("MAJOR", Fault.SCISSOR_BLOCKED.description)
 
 
 def test_move_activates_and_closes(call: Call, there: SimulatorServer) -> None:

@@ -51,12 +51,12 @@ async def test_objects_tell_of_faults_and_lost_links(
             if found["kind"] == kind and fields.items() <= found.items():
                 return found
 
-    assert (await object_of("fault"))["name"] == "SCISSOR_BLOCKED"
+    assert (await object_of("fault"))["fault"] == "SCISSOR_BLOCKED"
     await object_of("transition", target="FAULT")
-    assert (await object_of("status", fault=14))["state"] in ("RESET", "FAULT")
+    assert (await object_of("status", fault_code=14))["state"] in ("RESET", "FAULT")
     server.cut()
     await object_of("transition", target="DISCONNECTED")
-    assert (await object_of("status"))["fault"] == 14, "it comes back by itself"
+    assert (await object_of("status"))["fault_code"] == 14, "it comes back by itself"
 
 
 async def test_watch_prints_what_changes(

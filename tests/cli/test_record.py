@@ -227,7 +227,7 @@ def test_the_name_of_a_picture_may_have_its_suffix(grasp: Path) -> None:
 
 
 def event(**fields: object) -> bytes:
-    return json.dumps({"monotonic": 1.0, **fields}).encode()
+    return json.dumps({"timestamp": 1.0, **fields}).encode()
 
 
 STATE = event(kind="state", target="RESET")
@@ -237,8 +237,14 @@ HOSTILE: dict[str, bytes] = {
     "a list": b"[]",
     "deeply nested": b"[" * 100_000,
     "without what it is about": event(kind="transition"),
-    "a code that is no number": event(kind="fault", code="9", name="N", description="D"),
+    "a code that is no number": event(kind="fault", fault_code="9", fault="N", description="D"),
 }
+AXIS = {"position": 6, "requested": 0, "current_ma": 0, "status": "AT_POSITION"}
+OTHER_NAMES = {
+    "/gripper/status": (event(moving=False, **dict.fromkeys(("A", "B", "C", "SCISSOR"), AXIS)), "axis_state"),
+    "/gripper/event": (event(kind="fault", code=9, name="N", description="D"), "fault_code"),
+}
+"""As they were recorded before, each with what it lacks first."""
 
 
 @pytest.fixture
@@ -281,6 +287,20 @@ def test_plot_refuses_what_is_not_ours_in_one_line(
     assert f"foreign.mcap: a message on '{topic}' is no" in err
 
 
+@pytest.mark.parametrize("topic", OTHER_NAMES)
+@pytest.mark.parametrize("command", ["replay", "plot"])
+def test_a_recording_with_other_names_is_one_line_that_says_so(
+    foreign: Callable[..., Path], command: str, topic: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    message, lacks = OTHER_NAMES[topic]
+    assert main([command, str(foreign(message, topic=topic))]) == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    lacks = {"axis_state": "requested_position", "fault_code": "fault"}[lacks] if command == "plot" else lacks
+    why = f"is not one of ours, or of another version of robotiq_async: it has no '{lacks}'"
+    assert err == f"robotiq-async: {foreign()}: a message on '{topic}' {why}\n"
+
+
 @pytest.mark.parametrize("command", ["replay", "plot", "recover"])
 def test_a_message_of_no_channel_is_one_line(
     foreign: Callable[..., Path], command: str, capsys: pytest.CaptureFixture[str]
@@ -297,7 +317,7 @@ STEERING = "\x1b[2J\x9b31m\x07\r\nroot# \u202e\ud800"
 def test_what_steers_a_terminal_is_written_out(
     foreign: Callable[..., Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    fault = event(kind="fault", code=9, name=STEERING, description=STEERING)
+    fault = event(kind="fault", fault_code=9, fault=STEERING, description=STEERING)
     assert main(["replay", str(foreign(fault))]) == 0
     out, err = capsys.readouterr()
     assert out.count("\n") == 1

@@ -96,7 +96,7 @@ def test_status_move_and_the_demo(
     call("move", "100", "--yes", "--fingers", "A", "--speed", "255", ADDRESS).assert_succeeded()
     outcome = call("status", "--json", ADDRESS)
     outcome.assert_succeeded()
-    assert abs(json.loads(outcome.out)["axes"]["A"]["position"] - 100) <= 2
+    assert abs(json.loads(outcome.out)["A"]["position"] - 100) <= 2
     outcome = call("demo", "--yes", ADDRESS)
     outcome.assert_succeeded()
     assert f"async with RemoteHand('{ADDRESS}') as hand:" in outcome.out

@@ -7,10 +7,11 @@ import re
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 
 from robotiq_async import Finger
-from tests.contract.bench import bench, contract
+from tests.contract.bench import at_rest, bench, contract
 
 Call = Callable[[Any], Any]
 CALLS: dict[str, tuple[Call, str]] = {
@@ -44,7 +45,7 @@ TIMEOUTS: dict[str, Call] = {
     "recover": lambda bad: lambda hand: hand.recover(timeout=bad),
     "wait_for_state": lambda bad: lambda hand: hand.wait_for_state(hand.state, timeout=bad),
 }
-WRONG_TYPES = [1.0, "3", True, b"3", [3]]
+WRONG_TYPES = [1.0, "3", True, b"3", [3], np.bool_(True), np.float64(3)]
 WRONG_VALUES = [-1, 256, 10**400]
 
 
@@ -90,7 +91,7 @@ async def test_outside_the_range(where: str, what: str) -> None:
 async def test_timeouts(where: str, what: str) -> None:
     for value in (0, -1, float("nan"), float("inf"), 10**400):
         await refused(where, TIMEOUTS[what], "timeout", value, ValueError)
-    for kind in ("1", True):
+    for kind in ("1", True, np.bool_(True), np.complex64(1)):
         await refused(where, TIMEOUTS[what], "timeout", kind, TypeError)
 
 
@@ -147,3 +148,25 @@ async def test_an_integer_mask_is_as_good_as_fingers(where: str) -> None:
         assert [axis.speed for axis in here.last_write.axes] == [128, 5, 128, 5]
         result = await hand.move(50, 1)
         assert set(result.outcomes) == {Finger.A}
+
+
+@contract
+async def test_integers_of_numpy_are_integers(where: str) -> None:
+    async with bench(where) as here, here.make() as hand:
+        abc: Any = np.int64(7)
+        value: Any = np.uint8(90)
+        seconds: Any = np.float32(30)
+        result = await hand.move(value, abc, speed=value, force=value, timeout=seconds)
+        assert set(result.outcomes) == {Finger.A, Finger.B, Finger.C}
+        await hand.set_position(value, abc)
+        await hand.set_speed(value, abc)
+        await hand.set_force(value, abc)
+        hand.command(abc, position=value, speed=value, force=value)
+        await hand.hold(abc)
+        assert await hand.wait_for_state(hand.state, timeout=seconds) is hand.state
+        await at_rest(hand)
+        for axis in here.last_write.axes[:3]:
+            assert (axis.position, axis.speed, axis.force) == (90, 90, 90)
+        assert hand.status.current(abc & 1) == hand.status.current(Finger.A)
+        hand.statuses(value)
+        hand.requests(value)

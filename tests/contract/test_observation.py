@@ -21,6 +21,14 @@ async def lose_the_gripper(here: Bench, hand: Hand) -> None:
 
 
 @contract
+async def test_it_is_called_by_its_address_unless_it_was_given_a_name(where: str) -> None:
+    async with bench(where) as here:
+        hand = here.make()
+        assert hand.name == hand.address
+        assert hand.name in repr(hand)
+
+
+@contract
 async def test_before_the_start_nothing_is_known(where: str) -> None:
     async with bench(where) as here:
         hand = here.make()

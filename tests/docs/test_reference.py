@@ -23,6 +23,7 @@ from robotiq_async import (
     ReconnectPolicy,
     RobotiqHand,
     RobotiqStatus,
+    SentRequest,
     Severity,
     State,
     Statistics,
@@ -33,7 +34,9 @@ from robotiq_async import (
     simulator,
 )
 from robotiq_async.cli.app import COMMANDS
+from robotiq_async.wire.request import Request
 from tests.docs.pages import DOCS
+from tests.register_words import status_of
 
 REFERENCE = (DOCS / "reference.md").read_text(encoding="utf-8")
 WORDS = set(re.findall(r"\w+", REFERENCE))
@@ -64,6 +67,7 @@ def test_every_public_name_is_there(name: str) -> None:
         Statistics,
         ReconnectPolicy,
         Transition,
+        SentRequest,
         fleet.RemoteHand,
         fleet.Fleet,
         fleet.Member,
@@ -72,6 +76,11 @@ def test_every_public_name_is_there(name: str) -> None:
 )
 def test_every_public_attribute_is_there(kind: type) -> None:
     assert {*public(kind)} - WORDS == set()
+
+
+def test_every_key_of_what_is_told_is_there() -> None:
+    told = status_of(0xB9, 0xEA).as_dict() | SentRequest(Request(), 0.0, acknowledged=True).as_dict()
+    assert {*told, *told["A"]} - WORDS == set()
 
 
 def test_what_a_stream_is_for_is_there() -> None:

@@ -7,7 +7,9 @@ import stat
 from datetime import UTC, datetime, timedelta
 from ipaddress import ip_address
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from cryptography import x509
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
@@ -75,6 +77,12 @@ def test_no_certificate_makes_others(authority: Path) -> None:
     assert not bob.extensions.get_extension_for_class(x509.KeyUsage).value.key_cert_sign
     above = certificate(authority / "ca.pem").extensions.get_extension_for_class(x509.BasicConstraints)
     assert above.value == x509.BasicConstraints(ca=True, path_length=0)
+
+
+def test_days_of_numpy(authority: Path) -> None:
+    days: Any = np.int64(3)
+    bob = certificate(issue(authority, "bob", Role.READ, days=days) / "cert.pem")
+    assert bob.not_valid_after_utc - datetime.now(UTC) < timedelta(days=4)
 
 
 def test_how_long_they_are_valid(authority: Path, tmp_path: Path) -> None:

@@ -80,6 +80,14 @@ def test_errors(kind: type[RobotiqError]) -> None:
     assert vars(read) == vars(error) | ({"status": LATER} if kind is MoveTimeoutError else {})
 
 
+def test_the_name_of_the_agents_hand_stays_with_the_agent() -> None:
+    error = GripperFaultError(Fault.SCISSOR_BLOCKED)
+    error.hand = "left"
+    again = values.read_error(carried(values.error_fields(error)), five_later)
+    assert isinstance(again, GripperFaultError)
+    assert (str(again), again.hand) == (error.message, "")
+
+
 @pytest.mark.parametrize("kind", [TypeError, ValueError])
 def test_bad_arguments(kind: type[Exception]) -> None:
     read = values.read_error(carried(values.error_fields(kind("value must be an int"))), five_later)

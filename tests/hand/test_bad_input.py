@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 
-from robotiq_async import RobotiqHand, State
+from robotiq_async import ReconnectPolicy, RobotiqHand, State
 from robotiq_async.simulator import SimulatorServer
 
 pytestmark = pytest.mark.virtual_time
@@ -106,6 +107,31 @@ def test_options(option: str, value: Any) -> None:
     with pytest.raises((TypeError, ValueError), match=option) as caught:
         RobotiqHand("sim://", **{option: value})
     assert repr(value) in str(caught.value)
+
+
+def test_options_that_are_numbers_of_numpy() -> None:
+    byte: Any = np.uint8(3)
+    seconds: Any = np.float32(0.25)
+    hand = RobotiqHand(
+        "tcp://192.168.1.11",
+        device_id=byte,
+        poll_interval=np.float64(0.01),
+        connect_timeout=seconds,
+        response_timeout=seconds,
+        activation_timeout=byte,
+        reconnect=ReconnectPolicy(first_delay=seconds, max_delay=byte, give_up_after=byte),
+        speed=byte,
+        force=byte,
+        request_address=byte,
+        status_address=byte,
+    )
+    options = hand._options
+    policy = options.policy
+    assert policy is not None
+    assert policy == ReconnectPolicy(first_delay=0.25, max_delay=3.0, give_up_after=3.0)
+    kept = [options.poll_interval, options.activation_timeout, policy.first_delay, policy.give_up_after]
+    assert {type(each) for each in kept} == {float}
+    assert type(options.speed) is type(options.force) is int
 
 
 @pytest.mark.parametrize(

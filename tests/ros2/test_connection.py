@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-from robotiq_async import Fault, Finger, RobotiqError, RobotiqHand, State
+from robotiq_async import Fault, Finger, RobotiqError, RobotiqHand, RobotiqStatus, State
 from robotiq_async.ros2.gripper.connection import COMMANDS, MOST_CALLS, Connection, RefusedError
 from robotiq_async.ros2.gripper.goals import Ending
 from robotiq_async.ros2.translation.diagnosis import Level, diagnose, status_text
@@ -140,7 +140,16 @@ async def test_diagnoses_of_a_fault(
     await hand.wait_for_state(State.FAULT)
     _, told = diagnose(hand, now())
     assert (told.level, told.message) == (level, fault.description)
-    assert json.loads(status_text(hand, takes_commands=True))["fault_name"] == fault.name
+    text = json.loads(status_text(hand, takes_commands=True))
+    node = {"state": "FAULT", "connected": True, "takes_commands": True}
+    assert (
+        text
+        == node
+        | RobotiqStatus.from_registers(
+            text["registers"], timestamp=text["timestamp"], sequence=text["sequence"]
+        ).as_dict()
+    )
+    assert text["fault"] == fault.name
 
 
 async def test_without_a_link_nothing_is_known(hand: RobotiqHand, server: SimulatorServer) -> None:

@@ -2,15 +2,38 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 
 from robotiq_async.enums import AXES, Fault, Finger, Initialization, Mode, ObjectStatus
+from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.wire.request import AxisRequest
 
 if TYPE_CHECKING:
     from tests.simulator.conftest import Bench
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    byte: Any = np.uint8(100)
+    seconds: Any = np.float32(0.5)
+    number: Any = np.int64(1)
+    words: Any = np.array([1, 2], np.uint16)
+    gripper = SimulatedGripper(
+        lambda: 0.0,
+        device_cycle=seconds,
+        speedup=seconds,
+        scissor_limit=(byte, byte),
+        seed=number,
+    )
+    gripper.write(number, words)
+    assert gripper.request_registers == (0, 1, 2, 0, 0, 0, 0, 0)
+    assert {type(each) for each in gripper.request_registers} == {int}
+    gripper.place_object(number, byte, soft=byte)
+    gripper.inject_fault(Fault.ACTIVATION_FAULT, seconds)
+    gripper.power_cycle(number)
+    assert gripper.position(number) == gripper.position(Finger.A)
 
 
 def test_simple_control_lets_a_drive_all_fingers(active: Bench) -> None:

@@ -74,6 +74,22 @@ async def test_the_figures_are_the_hands(hand: RobotiqHand, gripper: SimulatedGr
     assert len(states) == len(State) - 1
 
 
+async def test_each_hand_has_its_name() -> None:
+    left, right = RobotiqHand(name="left"), RobotiqHand()
+    async with serve_metrics(left, right, port=0) as where:
+        families = list(text_string_to_metric_families(await page(where)))
+    labels = {sample.labels["hand"] for family in families for sample in family.samples}
+    assert labels == {"left", right.address}
+    samples = [sample for family in families for sample in family.samples]
+    assert len({(each.name, *each.labels.items()) for each in samples}) == len(samples)
+
+
+async def test_two_hands_of_one_name_are_refused() -> None:
+    with pytest.raises(ValueError, match="names that tell them apart, got 'left' twice"):
+        async with serve_metrics(RobotiqHand(name="left"), RobotiqHand(name="left"), port=0):
+            pass
+
+
 async def test_it_ends_with_the_block(hand: RobotiqHand) -> None:
     async with serve_metrics(hand, port=0) as where:
         await asked(where)

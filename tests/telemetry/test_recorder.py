@@ -75,12 +75,21 @@ async def test_commands_transitions_and_faults(
         write.registers for write in list(gripper.writes)[-len(commands) :]
     ]
     events = [entry.fields for entry in entries if entry.topic == "/gripper/event"]
-    faults = [event["code"] for event in events if event["kind"] == "fault"]
+    faults = [event["fault_code"] for event in events if event["kind"] == "fault"]
     assert faults == [9, 0]
     moves = [(event["source"], event["target"]) for event in events if event["kind"] == "transition"]
     assert ("RUNNING_IDLE", "FAULT") in moves
     assert ("FAULT", "RUNNING_IDLE") in moves
     assert all(before[1] == after[0] for before, after in pairwise(moves))
+
+
+async def test_it_tells_which_hand_it_is_of(file: Path) -> None:
+    hand = RobotiqHand(name="left")
+    async with Recorder(hand, file):
+        pass
+    with file.open("rb") as stream:
+        (metadata,) = make_reader(stream).iter_metadata()
+    assert (metadata.metadata["name"], metadata.metadata["address"]) == ("left", hand.address)
 
 
 async def test_a_request_tells_whether_it_was_acknowledged(gripper: SimulatedGripper) -> None:

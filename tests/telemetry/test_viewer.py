@@ -139,7 +139,7 @@ async def test_events_commands_and_faults(operator: Operator, gripper: Simulated
         await client.subscribe("/gripper/event", "/gripper/command")
         assert (await client.call("move", position=77, fingers="B")).startswith("B at 77; ")
         gripper.inject_fault(Fault.SCISSOR_BLOCKED)
-        while not any(each.get("code") == 14 for each in client.objects("/gripper/event")):
+        while not any(each.get("fault_code") == 14 for each in client.objects("/gripper/event")):
             await client.read()
         while not any(each.get("target") == "FAULT" for each in client.objects("/gripper/event")):
             await client.read()
@@ -457,7 +457,7 @@ async def test_the_state_is_told_when_it_changes(operator: Operator, gripper: Si
         gripper.inject_fault(Fault.SCISSOR_BLOCKED)
         await operator.hand.wait_for_state(State.FAULT)
         told = asyncio.get_running_loop().time()
-        while one.objects("/gripper/state")[-1].get("fault") != 14:
+        while one.objects("/gripper/state")[-1].get("fault_code") != 14:
             await one.read()
         assert asyncio.get_running_loop().time() - told < 0.5
         assert one.objects("/gripper/state")[-1]["description"] == Fault.SCISSOR_BLOCKED.description

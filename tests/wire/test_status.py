@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from robotiq_async import Fault, Finger, Initialization, Mode, ObjectStatus, RobotiqStatus
 from robotiq_async.enums import AXES
+from robotiq_async.wire.status import NO_REQUEST
 from tests.register_words import bytes_of, registers_of, status_of
 
 A, B, C, S = AXES
@@ -19,6 +20,7 @@ BLOCKS = st.tuples(*[st.integers(0, 0xFFFF)] * 8)
 
 PER_AXIS: list[Callable[[RobotiqStatus, Finger], object]] = [
     RobotiqStatus.finger_status,
+    RobotiqStatus.axis_state,
     RobotiqStatus.position,
     RobotiqStatus.requested_position,
     RobotiqStatus.current,
@@ -48,6 +50,17 @@ def test_a_ready_gripper_that_was_never_told_to_go_does_not_move_although_every_
     assert [status.finger_status(axis) for axis in AXES] == [ObjectStatus.IN_MOTION] * 4
     assert not status.is_moving
     assert status.moving == Finger(0)
+
+
+@given(BLOCKS, st.sampled_from(AXES))
+def test_an_axis_is_in_motion_exactly_when_it_moves(block: tuple[int, ...], axis: Finger) -> None:
+    status = RobotiqStatus.from_registers(block)
+    state, reported = status.axis_state(axis), status.finger_status(axis)
+    assert (state == "IN_MOTION") == (axis in status.moving)
+    if reported is not ObjectStatus.IN_MOTION:
+        assert state == reported.name
+    elif not (status.go_echo and status.is_activated):
+        assert state == NO_REQUEST
 
 
 def test_a_closing_gripper_moves_its_fingers_and_not_the_scissor() -> None:

@@ -91,7 +91,7 @@ async def _screen(address: str, link: Link, speed: int, force: int) -> None:
         screen = Monitor(operator)
         forget_keys()
         showing = asyncio.ensure_future(screen.run_async())
-        with forwarded_warnings(screen.write_log):
+        with forwarded_warnings(screen.write_log, of=operator.hand.name):
             await asyncio.wait({showing})
     finally:
         # First the fingers: a screen whose terminal is gone may take its time, or not come back at all.

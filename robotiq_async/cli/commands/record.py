@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ...telemetry.payloads import printable
+from ...telemetry.payloads import printable, title
 from ..arguments import USUAL, Address, Link, need
 from ..failures import CommandError, UsageError
 from ..text import FORMATTERS, clock
@@ -66,7 +66,7 @@ async def record(
             recorder = Recorder(hand, file, ros2=ros2)
             try:
                 async with recorder:
-                    print(f"Recording {hand.address} in {file}; Ctrl-C ends it.", flush=True)
+                    print(f"Recording {title(hand)} in {file}; Ctrl-C ends it.", flush=True)
                     with suppress(TimeoutError):
                         async with asyncio.timeout(seconds):
                             await _watch(recorder)

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
-from ...enums import AXES
+from ...telemetry.payloads import reading_fields
 from ..arguments import USUAL, Address, Link
-
-if TYPE_CHECKING:
-    from ...protocol import Hand
 
 
 async def status(
@@ -26,7 +23,7 @@ async def status(
     For example:
 
         robotiq-async status tcp://192.168.1.11
-        robotiq-async status --json 192.168.1.11 | jq .axes.A.position
+        robotiq-async status --json 192.168.1.11 | jq .A.position
 
     Args:
         as_json: Print one JSON object in place of the table.
@@ -36,33 +33,6 @@ async def status(
 
     async with connected(address, link, halt=False) as hand:
         if as_json:
-            print(json.dumps(as_dict(hand), indent=2))
+            print(json.dumps(reading_fields(hand), indent=2))
         else:
             print_status(hand)
-
-
-def as_dict(hand: Hand) -> dict[str, object]:
-    """The hand's state and its last status, in types that JSON knows."""
-    last = hand.status
-    return {
-        "state": hand.state.name,
-        "fault": {
-            "code": int(last.fault),
-            "name": last.fault.name,
-            "severity": last.fault.severity.value,
-            "description": last.fault.description,
-        },
-        "activated": last.is_activated,
-        "reset": last.is_reset,
-        "moving": last.is_moving,
-        "mode": last.mode.name,
-        "axes": {
-            str(axis.name): {
-                "position": last.position(axis),
-                "requested": last.requested_position(axis),
-                "object": last.finger_status(axis).name,
-                "current_ma": last.current_ma(axis),
-            }
-            for axis in AXES
-        },
-    }

@@ -19,7 +19,7 @@ from ...actions import ACTIONS, Operator
 from ...enums import AXES, Fault, State
 from ...errors import RobotiqError
 from ...session.clock import now
-from ...telemetry.payloads import fault_fields, transition_fields
+from ...telemetry.payloads import fault_fields, title, transition_fields
 from ...wire.status import RobotiqStatus
 from ..text import clock, event_line
 from .widgets import Axes, Line, Question, link_text, state_text
@@ -153,7 +153,7 @@ class Monitor(App[None]):
 
     def _paint_state(self) -> None:
         state, age = self._hand.state, now() - self._newest.timestamp
-        self._top.show(state_text(self._hand.address, state, self._newest, age))
+        self._top.show(state_text(title(self._hand), state, self._newest, age))
         self._axes.show_stale(state is State.DISCONNECTED)
 
     def _paint_figures(self) -> None:

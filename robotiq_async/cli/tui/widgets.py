@@ -15,8 +15,8 @@ from textual.widgets import Static
 
 from ...enums import AXES, Fault, Finger, ObjectStatus, Severity, State
 from ...session.statistics import Statistics
-from ...wire.status import RobotiqStatus
-from ..text import NOTHING, object_status
+from ...wire.status import NO_REQUEST, RobotiqStatus
+from ..text import NOTHING
 
 HISTORY: Final = 60
 """Currents kept, one per paint: five seconds."""
@@ -106,12 +106,10 @@ class Axes(Widget):
         return line
 
     def _does(self, axis: Finger) -> Text:
-        reported = self._status.finger_status(axis)
-        shown = object_status(reported.name, is_moving=axis in self._status.moving)
-        # In an activation and in a release axes move of which the status as a whole says that they do not.
-        if shown == NOTHING and self._still[axis] >= STILL:
+        # In an activation and in a release axes move of which the gripper says nothing.
+        if self._status.axis_state(axis) == NO_REQUEST and self._still[axis] >= STILL:
             return Text(f"{NOTHING:15}", "dim")
-        words, style = _OBJECT[reported]
+        words, style = _OBJECT[self._status.finger_status(axis)]
         return Text(f"{words:15}", style)
 
 

@@ -10,7 +10,7 @@ from typing import Final
 
 from ...errors import AgentError
 from ...hand import RobotiqHand
-from ...log import log
+from ...log import Log, log
 from ...session.clock import now
 from ..control.lease import WINDOW_S
 from ..network.bus import Bus, Question, Undo
@@ -145,7 +145,7 @@ class Agent:
         other = self._other(key)
         if is_there and other is not None:
             _, name = other
-            log.error("%s: one of them has to go", self._said_of(name))
+            Log(str(name)).error("%s: one of them has to go", self._said_of(name))
             if name.gripper in self.hands:
                 self.hands[name.gripper].news.add({"kind": "conflict", "key": key})
 

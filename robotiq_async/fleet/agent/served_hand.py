@@ -14,7 +14,7 @@ from ...control.state_machine import RUNNING
 from ...enums import Finger
 from ...errors import AgentError, ControlLostError, RobotiqConnectionError, RobotiqError
 from ...hand import RobotiqHand
-from ...log import log
+from ...log import Log
 from ...session.clock import now
 from ...version import __version__
 from ...wire.checks import check_byte, check_mask
@@ -73,6 +73,7 @@ class ServedHand:
     def __init__(self, name: GripperName, hand: RobotiqHand, bus: Bus, *, epoch: int, window: float) -> None:
         """Serve a hand that is not started."""
         self.name = name
+        self._log = Log(str(name))
         self._hand = hand
         self._epoch = epoch
         self._lease = Lease(window)
@@ -114,7 +115,7 @@ class ServedHand:
                     await self._hold(self._owed)
         except RobotiqError as error:
             if str(error) != self.news.problem:
-                log.warning("%s: %s", self.name, error)
+                self._log.warning("%s", error)
             self.news.problem = str(error)
             await self._hand.stop(halt=False)
             await asyncio.sleep(RETRY_S)
@@ -122,7 +123,7 @@ class ServedHand:
     async def _hold_what_moves(self) -> None:
         """Whoever set going what moves now is not there any more: an agent that was killed, perhaps."""
         if self._hand.state in RUNNING and self._hand.is_moving:
-            log.warning("%s: the fingers moved when the agent started; they are held", self.name)
+            self._log.warning("the fingers moved when the agent started; they are held")
             with suppress(RobotiqConnectionError):
                 await self._hand.hold(Finger.ALL)
 
@@ -141,7 +142,7 @@ class ServedHand:
             self._expire()
             value = self._answer(verb, call, question)
         except (RobotiqError, TypeError, ValueError, OverflowError) as error:  # JSON may hold infinity
-            log.info("%s: %s refused: %s", self.name, verb, error)
+            self._log.info("%s refused: %s", verb, error)
             self._reply(question, failure(call, self._epoch, error))
         else:
             if value is not None:
@@ -205,7 +206,7 @@ class ServedHand:
             # Of the same client: it has lost the thread, and what it asked before is not to go on.
             self.end_lease("expired" if holder.client == call.client else "taken", label)
         number = self._admission.acquire(call, label)
-        log.info("%s: %s commands the gripper", self.name, label)
+        self._log.info("%s commands the gripper", label)
         self.news.add({"kind": "lease", "number": number, "holder": label, "reason": "granted"})
         self._watch_expiry()
 
@@ -241,10 +242,9 @@ class ServedHand:
         holder = self._lease.end(reason)
         if holder is None:
             return
-        log.log(
+        self._log.log(
             logging.INFO if reason == "released" else logging.WARNING,
-            "%s: %s commands the gripper no longer: %s%s",
-            self.name,
+            "%s commands the gripper no longer: %s%s",
             holder.label,
             reason,
             f" by {by}" if by else "",
@@ -263,13 +263,13 @@ class ServedHand:
             await self._hand.hold(axes)
         except RobotiqConnectionError as error:
             self._owed |= axes
-            log.warning("%s: the fingers are held when the gripper is reached: %s", self.name, error)
+            self._log.warning("the fingers are held when the gripper is reached: %s", error)
         except RobotiqError as error:
-            log.warning("%s: the fingers could not be held: %s", self.name, error)
+            self._log.warning("the fingers could not be held: %s", error)
 
     def wake(self) -> None:
         """The machine was suspended: nobody has proven anything since."""
-        log.warning("%s: this machine was suspended", self.name)
+        self._log.warning("this machine was suspended")
         self._lease.wake(now())
         self.end_lease("expired")
 
@@ -335,7 +335,7 @@ class ServedHand:
             self._hand.command(mask, **changes)
 
     def _repeat(self, request: _Request, question: Question) -> None:
-        log.info("%s: request %d came again", self.name, request.call.number)
+        self._log.info("request %d came again", request.call.number)
         if request.answer is None:
             request.questions.append(question)
         else:
@@ -363,7 +363,7 @@ class ServedHand:
             reason = request.reason or "released"
             error = ControlLostError(f"called off: {request.reason or 'by the caller'}", reason)
         elif isinstance(error, Exception) and not isinstance(error, RobotiqError | TypeError | ValueError):
-            log.error("%s: %s failed", self.name, request.name, exc_info=error)
+            self._log.error("%s failed", request.name, exc_info=error)
             error = AgentError(f"the agent failed: {error!r}")
         if isinstance(error, Exception):
             answer = failure(call, self._epoch, error)

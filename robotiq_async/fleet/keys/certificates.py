@@ -48,7 +48,7 @@ def make_authority(folder: Path, *, days: int = AUTHORITY_DAYS) -> Path:
         OSError: the folder cannot be written.
         TypeError, ValueError: days are not in 1..36500.
     """
-    check_int("days", days, 1, DAYS_MAX)
+    days = check_int("days", days, 1, DAYS_MAX)
     if has_authority(folder):
         raise FileExistsError(f"there is an authority in {folder} already")
     pair = Authority.make(days).pair()
@@ -79,7 +79,7 @@ def issue(folder: Path, name: str, role: Role, *, hosts: Sequence[str] = (), day
             authority's; a client is given hosts; a file of the authority is malformed.
     """
     check_subject(name)
-    check_int("days", days, 1, DAYS_MAX)
+    days = check_int("days", days, 1, DAYS_MAX)
     if hosts and role is not Role.AGENT:
         raise ValueError(f"hosts are for agents, and {name!r} is to be a client")
     own = subject_folder(folder, name, role)

@@ -125,15 +125,15 @@ class RemoteCommands(RemoteObservation):
             ControlLostError: this hand does not hold the lease, or lost it on the way.
             RobotiqError: as for a hand of this process, or the agent fell silent.
         """
+        limit = check_timeout("timeout", timeout)
         arguments: Fields = {
             "position": check_byte("position", position),
             "fingers": int(check_mask(fingers)),
             "speed": check_optional_byte("speed", speed),
             "force": check_optional_byte("force", force),
-            "timeout": check_timeout("timeout", timeout),
+            "timeout": limit,
         }
-        limit = MOVE_S if timeout is None else timeout + SLACK_S
-        value = await self._ask("move", arguments, limit)
+        value = await self._ask("move", arguments, MOVE_S if limit is None else limit + SLACK_S)
         session = self._session
         assert session is not None
         with reading("a result"):

@@ -7,7 +7,7 @@ from collections.abc import Coroutine
 from typing import Any, Final, Protocol
 
 from ...errors import ControlLostError, RobotiqError
-from ...log import log
+from ...log import Log
 from ...session.clock import now
 from ..wire.envelope import Call
 from ..wire.names import GripperName
@@ -63,6 +63,7 @@ class LeaseKeeper:
         self.lease = 0
         self.lost: ControlLostError | None = None
         self._run = run
+        self._log = Log(str(run.name))
         self._wants_control = wants_control
         self._may_return = True
         self._lease_run = 0
@@ -158,7 +159,7 @@ class LeaseKeeper:
         self._wants_control = self._wants_control and reason not in (*BY_OTHERS, "released")
         self.lost = ControlLostError(f"{self._run.name} is not commanded from here any more: {why}", reason)
         if reason != "released":
-            log.warning("%s", self.lost)
+            self._log.warning("not commanded from here any more: %s", why)
 
     def check(self) -> None:
         """Refuse commands without a lease.

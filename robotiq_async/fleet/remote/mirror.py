@@ -8,7 +8,7 @@ from typing import Final
 
 from ...control.triggers import Trigger
 from ...enums import State
-from ...log import log
+from ...log import Log, log
 from ...session.streams import Channels, Transition
 from ...wire.status import RobotiqStatus
 from ..control.lease import WINDOW_S
@@ -84,6 +84,7 @@ class Mirror:
         channels: Channels,
         entered: Callable[[State], None],
         before: Mirror | None = None,
+        log: Log = log,
     ) -> None:
         """Mirror the gripper with this mark.
 
@@ -92,7 +93,9 @@ class Mirror:
             channels: what happens is handed on there.
             entered: is told of each state.
             before: of the run before this one, if there was one: states and sequences go on from there.
+            log: of the hand.
         """
+        self.log = log
         self.clock = AgentClock()
         self.newest: StatusMessage | None = None
         self.status: RobotiqStatus | None = None
@@ -138,7 +141,7 @@ class Mirror:
         if mark == self._mark:
             return False
         self.misrouted += 1
-        log.warning("a message about another gripper was dropped (%d so far)", self.misrouted)
+        self.log.warning("a message about another gripper was dropped (%d so far)", self.misrouted)
         return True
 
     def is_of_another_run(self, message: StatusMessage, arrival: float, window: float = WINDOW_S) -> bool:

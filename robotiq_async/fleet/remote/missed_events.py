@@ -7,7 +7,6 @@ from collections.abc import Callable, Coroutine
 from typing import Any, Final
 
 from ...errors import RobotiqError
-from ...log import log
 from ..wire.values import reading
 from .mirror import Mirror
 
@@ -48,6 +47,6 @@ class MissedEvents:
                         mirror.hear_events(events)
                 await asyncio.sleep(PAUSE_S)
         except RobotiqError as error:
-            log.info("missed events could not be fetched: %s", error)
+            mirror.log.info("missed events could not be fetched: %s", error)
         finally:
             self._is_fetching = False

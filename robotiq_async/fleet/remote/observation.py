@@ -31,6 +31,11 @@ class RemoteObservation:
     _outbox: Outbox | None
 
     @property
+    def name(self) -> str:
+        """What the hand is called: its address."""
+        return self.address
+
+    @property
     def address(self) -> str:
         """The gripper's address, without how to get there."""
         return str(self._name)

@@ -10,7 +10,6 @@ from typing import Any, Final
 
 from ...enums import AXES, Finger
 from ...errors import ControlLostError, NotStartedError, RobotiqError
-from ...log import log
 from ..network.bus import Urgency
 from ..wire.envelope import Call
 from .requests import Posted
@@ -100,7 +99,7 @@ class Outbox:
         try:
             self._send_next()
         except RobotiqError as error:
-            log.warning("%s: a command was not sent: %s", self._session.name, error)
+            self._session.log.warning("a command was not sent: %s", error)
 
     async def _await(self, posted: Posted) -> None:
         try:
@@ -109,6 +108,6 @@ class Outbox:
             pass  # the next command() raises it
         except ControlLostError as error:
             if error.reason == "late":  # any other is raised by the next command()
-                log.warning("%s: a command was not carried out: %s", self._session.name, error)
+                self._session.log.warning("a command was not carried out: %s", error)
         except (RobotiqError, TypeError, ValueError) as error:
-            log.warning("%s: a command was not carried out: %s", self._session.name, error)
+            self._session.log.warning("a command was not carried out: %s", error)

@@ -9,6 +9,7 @@ from ...calibration import ForceCalibration, SpeedCalibration
 from ...enums import State
 from ...errors import InvalidStateError, NotStartedError
 from ...hand.grasping import Grasping
+from ...log import Log
 from ...session.event_loop import running_loop
 from ...session.options import check_units
 from ...session.streams import Channels
@@ -75,7 +76,7 @@ class RemoteHand(RemoteCommands, Grasping):
         self._shared = bus
         self._opening: object = None
         """Stands for the start that opens a session; None if there is none, or if it is to end."""
-        self._channels = Channels()
+        self._channels = Channels(Log(str(self._name)))
         self._session: RemoteSession | None = None
         self._outbox: Outbox | None = None
 

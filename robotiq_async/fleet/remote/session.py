@@ -21,7 +21,7 @@ from ...errors import (
     NotStartedError,
     RobotiqError,
 )
-from ...log import log
+from ...log import Log
 from ...session.clock import now
 from ...session.event_loop import check_loop
 from ...session.state_waiters import StateWaiters
@@ -50,6 +50,7 @@ class RemoteSession:
     """One run. Everything happens in the event loop it was made in.
 
     Attributes:
+        log: for what happens to the hand.
         mirror: what has been heard.
         keeper: the lease.
         waiters: who waits for a state.
@@ -79,9 +80,10 @@ class RemoteSession:
             before: what the run before this one has heard.
         """
         self.name = name
+        self.log = Log(str(name))
         self.loop = asyncio.get_running_loop()
         self.waiters = StateWaiters()
-        self.mirror = Mirror(name.mark, channels, self.waiters.reached, before)
+        self.mirror = Mirror(name.mark, channels, self.waiters.reached, before, self.log)
         self.is_over = False
         self.has_ended = False
         self.statistics: Statistics = Counters().snapshot(0)
@@ -181,7 +183,7 @@ class RemoteSession:
         try:
             await self.keeper.end(halt=halt, keep_grip=keep_grip)
         except RobotiqError as error:
-            log.warning("%s: the end was not acknowledged (%s): the agent holds what moves", self.name, error)
+            self.log.warning("the end was not acknowledged (%s): the agent holds what moves", error)
         finally:
             for undo in self._undo:
                 undo()
@@ -206,7 +208,7 @@ class RemoteSession:
 
     def abandon(self) -> None:
         """Count as over when the loop was closed under it; the agent holds what moves by itself."""
-        log.warning("%s: the event loop was closed before stop()", self.name)
+        self.log.warning("the event loop was closed before stop()")
         self.keeper.abandon()
         self.waiters = StateWaiters()
         self._end()
@@ -240,7 +242,7 @@ class RemoteSession:
                 else:
                     self._hear_status(payload, in_turn=True)
         except RobotiqError as error:
-            log.warning("%s: %s", self.name, error)
+            self.log.warning("%s", error)
         if self.mirror.has_missed() and not self.is_over:
             self._missed.fetch()  # an event was dropped on the way
 
@@ -276,7 +278,7 @@ class RemoteSession:
         before = len(self._tokens)
         (self._tokens.add if is_there else self._tokens.discard)(token)
         if before < 2 <= len(self._tokens):
-            log.error("%s: %s", self.name, TWO_AGENTS)
+            self.log.error("%s", TWO_AGENTS)
             self.keeper.stay_away()
 
     async def check_one_agent(self) -> None:
@@ -313,7 +315,7 @@ class RemoteSession:
     def _fall_silent(self, at: float) -> None:
         if self.mirror.is_silent:
             return
-        log.warning("%s: the agent is silent", self.name)
+        self.log.warning("the agent is silent")
         self.mirror.fall_silent(at)
         self.keeper.lose("expired", "the agent is silent")
         self._requests.fall_silent()

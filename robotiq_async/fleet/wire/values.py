@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict
 from typing import Any, Final
 
 from ... import errors
@@ -75,8 +74,11 @@ def read_status(fields: Mapping[str, Any], clock: Clock) -> RobotiqStatus:
 
 
 def error_fields(error: Exception) -> Fields:
-    """The object for an error: its kind, its message, and what it knows."""
-    fields: Fields = {"kind": type(error).__name__, "message": str(error)}
+    """The object for an error: its kind, its message without the name of the agent's hand, what it knows."""
+    fields: Fields = {
+        "kind": type(error).__name__,
+        "message": error.message if isinstance(error, RobotiqError) else str(error),
+    }
     state: State | None = getattr(error, "state", None)
     fault: Fault | None = getattr(error, "fault", None)
     status: RobotiqStatus | None = getattr(error, "status", None)
@@ -210,7 +212,7 @@ def read_request(fields: Mapping[str, Any], clock: Clock) -> SentRequest:
 
 def statistics_fields(statistics: Statistics) -> Fields:
     """The object for a snapshot of the polling."""
-    return asdict(statistics)
+    return statistics.as_dict()
 
 
 def read_statistics(fields: Mapping[str, Any]) -> Statistics:

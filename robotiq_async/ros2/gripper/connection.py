@@ -8,7 +8,7 @@ from typing import Final
 
 from ...actions import ACTIONS, Operator
 from ...errors import NotStartedError, RobotiqConnectionError, RobotiqError
-from ...log import log
+from ...log import Log
 from ...protocol import Hand
 from ..translation.joints import Targets
 from ..translation.readiness import why_not
@@ -89,7 +89,7 @@ class Connection:
         except NotStartedError:
             pass  # stopped by the end of the hand
         except RobotiqError as error:
-            log.error("no halt, the fingers MAY STILL MOVE: %s", error)
+            Log(self.hand.name).error("no halt, the fingers MAY STILL MOVE: %s", error)
             if isinstance(error, RobotiqConnectionError):
                 self._owed.owe(self.hand.halt)
 

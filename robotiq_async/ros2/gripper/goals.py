@@ -11,7 +11,7 @@ from typing import Final
 from ...control.motion import MoveResult
 from ...enums import Finger
 from ...errors import RobotiqConnectionError, RobotiqError
-from ...log import log
+from ...log import Log
 from ...protocol import Hand
 from ..translation.joints import Targets
 
@@ -169,7 +169,7 @@ class GoalRunner:
         except RobotiqError as error:
             if self._newest is goal:  # or else the next goal has them
                 problem = f"the hold was not acknowledged: {error}"
-                log.error("a goal was canceled, and %s", problem)
+                Log(self._hand.name).error("a goal was canceled, and %s", problem)
                 return problem
         return ""
 

@@ -14,7 +14,7 @@ from ...errors import (
     RobotiqError,
     StateTimeoutError,
 )
-from ...log import log
+from ...log import Log
 from ...protocol import Hand
 from ...session.clock import now
 
@@ -64,8 +64,8 @@ class OwedStop:
             except (NotStartedError, StateTimeoutError, ControlLostError):
                 return  # the end of the hand stops it, as does the end of a lease; or it is too late
             except RobotiqError as error:
-                log.error("the link is back, and the fingers MAY STILL MOVE: %s", error)
+                Log(self._hand.name).error("the link is back, and the fingers MAY STILL MOVE: %s", error)
                 return
             else:
-                log.warning("the link is back, and what still moved has been stopped")
+                Log(self._hand.name).warning("the link is back, and what still moved has been stopped")
                 return

@@ -10,7 +10,6 @@ from enum import IntEnum
 from ...enums import AXES, Severity
 from ...errors import NotStartedError
 from ...protocol import Hand
-from ...telemetry.payloads import status_fields
 from ...wire.status import RobotiqStatus
 from .readiness import is_connected
 
@@ -84,7 +83,7 @@ def _gripper(hand: Hand) -> Diagnosis:
     values = {"state": hand.state.name, "fault": f"0x{int(status.fault):02X}"}
     for axis in AXES:
         values[f"{axis.name} position"] = str(status.position(axis))
-        values[f"{axis.name} status"] = status.finger_status(axis).name
+        values[f"{axis.name} state"] = status.axis_state(axis)
         values[f"{axis.name} current [mA]"] = str(status.current_ma(axis))
     level = _LEVELS[status.fault.severity]
     return Diagnosis(
@@ -106,9 +105,7 @@ def status_text(hand: Hand, *, takes_commands: bool) -> str:
     }
     status = _newest(hand)
     if status is not None and is_connected(hand):
-        fields["contacts"] = [axis.name for axis in AXES if axis in status.contacts]
-        fields["fault_name"] = status.fault.name
-        fields |= status_fields(status)
+        fields |= status.as_dict()
     return json.dumps(fields)
 
 

@@ -96,8 +96,8 @@ class SimulatedGripper:
         """
         self._cycle = check_seconds("device_cycle", device_cycle, 0, _LONGEST)
         self._speedup = _check_speedup(speedup)
-        check_int("seed", seed, 0, sys.maxsize)
-        self._controller = Controller(_check_limit(scissor_limit), seed if spread else None)
+        number = check_int("seed", seed, 0, sys.maxsize)
+        self._controller = Controller(_check_limit(scissor_limit), number if spread else None)
         self._clock = clock
         self._began = clock()
         self._time = 0.0
@@ -121,14 +121,12 @@ class SimulatedGripper:
             TypeError: the offset or a register is not an int.
             ValueError: the registers do not lie within the block, or one is outside 0..65535.
         """
-        check_int("address_offset", address_offset, 0, reg.REGISTER_COUNT - 1)
-        room = reg.REGISTER_COUNT - address_offset
+        offset = check_int("address_offset", address_offset, 0, reg.REGISTER_COUNT - 1)
+        room = reg.REGISTER_COUNT - offset
         if not 1 <= len(registers) <= room:
-            raise ValueError(
-                f"registers: expected 1..{room} from offset {address_offset}, got {len(registers)}"
-            )
+            raise ValueError(f"registers: expected 1..{room} from offset {offset}, got {len(registers)}")
         image = list(self._written)
-        image[address_offset : address_offset + len(registers)] = registers
+        image[offset : offset + len(registers)] = registers
         checked = reg.check_registers(image)
         self._catch_up()
         if not self.is_powered:
@@ -219,10 +217,9 @@ class SimulatedGripper:
         fault = Fault(fault)
         if fault is Fault.NONE:
             raise ValueError("fault must be a code in 1..15, got 0; clear_faults() ends faults")
-        if duration is not None:
-            check_seconds("duration", duration, 0, _LONGEST)
+        lasts = None if duration is None else check_seconds("duration", duration, 0, _LONGEST)
         self._catch_up()
-        self._controller.faults.begin(fault, self._time, duration)
+        self._controller.faults.begin(fault, self._time, lasts)
         self._controller.update(self._time)
 
     def interfere(self, duration: float | None = None) -> None:
@@ -279,9 +276,9 @@ class SimulatedGripper:
             TypeError: off_time is not a number.
             ValueError: off_time is negative.
         """
-        check_seconds("off_time", off_time, 0, _LONGEST)
+        seconds = check_seconds("off_time", off_time, 0, _LONGEST)
         self.power_off()
-        self._off_until = self._time + off_time
+        self._off_until = self._time + seconds
 
     # Inspection.
 
@@ -375,13 +372,12 @@ class SimulatedGripper:
 
 
 def _check_speedup(value: float) -> float:
-    if check_seconds("speedup", value, 0, _LONGEST) == 0:
+    factor = check_seconds("speedup", value, 0, _LONGEST)
+    if factor == 0:
         raise ValueError(f"speedup must be above 0, got {value!r}")
-    return float(value)
+    return factor
 
 
 def _check_limit(limit: tuple[int, int]) -> tuple[int, int]:
-    low, high = limit
-    check_int("scissor_limit", low, SCISSOR_LOW, SCISSOR_HIGH)
-    check_int("scissor_limit", high, low, SCISSOR_HIGH)
-    return low, high
+    low = check_int("scissor_limit", limit[0], SCISSOR_LOW, SCISSOR_HIGH)
+    return low, check_int("scissor_limit", limit[1], low, SCISSOR_HIGH)

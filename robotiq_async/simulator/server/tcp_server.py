@@ -117,10 +117,10 @@ class SimulatorServer(SimulatorEndpoint):
             TypeError: off_time is not a number.
             ValueError: off_time is negative or above an hour.
         """
-        check_seconds("off_time", off_time, 0, _LONGEST_OFF)
+        seconds = check_seconds("off_time", off_time, 0, _LONGEST_OFF)
         self.cut()
         async with self.fault_injector.making(Trouble("power-cut")):
-            await asyncio.sleep(off_time / self.gripper.speedup)
+            await asyncio.sleep(seconds / self.gripper.speedup)
 
     def take(self, inbox: bytearray) -> Frame | None:
         """Cut the next request out of what has arrived."""

@@ -16,7 +16,7 @@ import math
 from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple, get_args
 
-from robotiq_async.wire.checks import check_seconds
+from robotiq_async.wire.checks import as_float, as_int, check_seconds
 
 from . import corruption
 from .corruption import Corruption, Parts, Reply
@@ -137,7 +137,7 @@ class Trouble:
     every: float | None = None
 
     def __post_init__(self) -> None:
-        """Check that all of it fits together.
+        """Check that all of it fits together, and keep plain numbers.
 
         Raises:
             TypeError: not a number.
@@ -147,18 +147,23 @@ class Trouble:
         if known is None:
             raise ValueError(f"no trouble is called {self.kind!r}; known are: {', '.join(KINDS)}")
         if self.value is not None:
-            _check_value(self.kind, known, self.value)
+            self._keep("value", _checked_value(self.kind, known, self.value))
         if self.on not in get_args(On):
             raise ValueError(f"on must be read, write or any, got {self.on!r}")
         if self.on != "any" and (known.corruption is None or known.on not in ("any", self.on)):
             raise ValueError(f"'on {self.on}' means nothing for {self.kind}")
-        check_seconds("at", self.at, 0, LONGEST)
-        if self.duration != math.inf:
-            check_seconds("for", self.duration, 0, LONGEST)
+        self._keep("at", check_seconds("at", self.at, 0, LONGEST))
+        if self.lasts is not None and self.lasts != math.inf:
+            self._keep("lasts", check_seconds("for", self.lasts, 0, LONGEST))
         if self.duration == 0 and not known.can_hit_once:
             raise ValueError(f"{self.kind} is a condition: say for how long, or leave that out for ever")
-        if self.every is not None and check_seconds("every", self.every, 0.001, LONGEST) <= self.duration:
-            raise ValueError(f"{self.kind} cannot come again after {self.every:g} s: it lasts as long")
+        if self.every is not None:
+            self._keep("every", check_seconds("every", self.every, 0.001, LONGEST))
+            if self.every <= self.duration:
+                raise ValueError(f"{self.kind} cannot come again after {self.every:g} s: it lasts as long")
+
+    def _keep(self, name: str, number: float) -> None:
+        object.__setattr__(self, name, number)
 
     @property
     def duration(self) -> float:
@@ -202,16 +207,20 @@ def _digits(number: float) -> str:
     return repr(int(number) if number == int(number) else number)
 
 
-def _check_value(name: str, kind: Kind, value: object) -> None:
+def _checked_value(name: str, kind: Kind, value: object) -> float:
     if kind.value is None:
         raise ValueError(f"{name} takes no value, got {value!r}")
     whole = isinstance(kind.value, int)
     form = "a whole number" if whole else "seconds"
     what = f"the value of {name} must be {form} in {kind.low:g}..{kind.high:g}"
-    if not isinstance(value, int | float) or isinstance(value, bool):
+    number: float | None = as_int(value)
+    if number is None:
+        number = as_float(value)
+    if number is None:
         raise TypeError(f"{what}, got {value!r}")
-    if not kind.low <= value <= kind.high or (whole and value != int(value)):
+    if not kind.low <= number <= kind.high or (whole and number != int(number)):
         raise ValueError(f"{what}, got {value!r}")
+    return number
 
 
 def parse_troubles(text: str) -> list[Trouble]:

@@ -7,6 +7,7 @@ from time import time
 from typing import Any, Final
 
 from ...enums import AXES, Fault, Finger, ObjectStatus, Severity, State
+from ...wire.status import NO_REQUEST
 from .mirror import HandMirror
 
 NAMES: Final = tuple("scissor" if axis is Finger.SCISSOR else str(axis.name) for axis in AXES)
@@ -28,6 +29,13 @@ _STATES: Final = {
     State.RESET: "reset: not active",
     State.DO_SHUTDOWN: "stopping",
     State.SHUTDOWN: "stopped",
+}
+_AXIS_STATES: Final = {
+    NO_REQUEST: "-",
+    ObjectStatus.IN_MOTION.name: "moving",
+    ObjectStatus.CONTACT_OPENING.name: "contact while opening",
+    ObjectStatus.CONTACT_CLOSING.name: "contact while closing",
+    ObjectStatus.AT_POSITION.name: "there",
 }
 
 
@@ -68,20 +76,13 @@ def axis_words(hand: HandMirror, axis: Finger) -> str:
     status = hand.status
     if hand.is_lost or status is None or hand.state is State.RESET:
         return "-"
-    reported = status.finger_status(axis)
-    if reported is ObjectStatus.IN_MOTION:
-        return "moving" if status.is_moving else "-"
-    return {
-        ObjectStatus.CONTACT_OPENING: "contact while opening",
-        ObjectStatus.CONTACT_CLOSING: "contact while closing",
-        ObjectStatus.AT_POSITION: "there",
-    }[reported]
+    return _AXIS_STATES[status.axis_state(axis)]
 
 
 def event_words(event: dict[str, Any]) -> str:
     """An event as a line."""
     if event["kind"] == "fault":
-        return timed(f"fault 0x{event['code']:02X}: {event['description']}", event["time"])
+        return timed(f"fault 0x{event['fault_code']:02X}: {event['description']}", event["time"])
     words = _STATES[State[event["target"]]]
     return timed(f"{words}  ({event['source']} to {event['target']})", event["time"])
 

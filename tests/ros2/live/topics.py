@@ -69,4 +69,4 @@ def test_topics(simulator: Simulator, tmp_path_factory: pytest.TempPathFactory) 
         client.move(2.8).ends()
         fields = json.loads(status.wait().data)
         assert fields["contacts"] == ["B"]
-        assert fields["B"]["status"] == "CONTACT_CLOSING"
+        assert fields["B"]["axis_state"] == "CONTACT_CLOSING"
