@@ -57,8 +57,8 @@ class RobotiqHand(Commands):
         that matters to what it holds.
 
         Args:
-            address: ``tcp://HOST[:502]`` (or HOST, HOST:PORT), ``rtu:///dev/ttyUSB0``, ``sim://``, or a
-                transport object.
+            address: ``tcp://HOST[:502]`` (or HOST, HOST:PORT), ``rtu:///dev/ttyUSB0``, ``sim://`` (or
+                ``sim://?speedup=10&object=150``), or a transport object.
             device_id: Modbus unit id, 1..247; by default 2 over TCP and 9 over RTU. Two hands on one TCP
                 address need one each: that of their gripper behind the gateway.
             poll_interval: seconds between polls, 0.001..0.1.
