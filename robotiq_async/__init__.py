@@ -12,6 +12,7 @@ What a program needs is imported from here. Where it comes from, and what stands
     actions, telemetry       operating a hand; recordings, viewers and metrics of one
     web                      a page in the browser
     measure, doctor          measurements of a gripper; what is wrong with a connection
+    sync                     blocking hands, for scripts and notebooks
     fleet                    hands on other hosts: agents that serve them, remote hands
     ros2                     a lifecycle node of ROS 2 around a hand
     simulator, cli           a simulated gripper with its servers; the command line

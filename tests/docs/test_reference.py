@@ -26,6 +26,7 @@ from robotiq_async import (
     Transition,
     fleet,
     simulator,
+    sync,
 )
 from robotiq_async.cli.app import COMMANDS
 from tests.docs.pages import DOCS
@@ -63,6 +64,10 @@ def test_every_public_name_is_there(name: str) -> None:
 )
 def test_every_public_attribute_is_there(kind: type) -> None:
     assert {*public(kind)} - WORDS == set()
+
+
+def test_what_a_blocking_stream_is_for_is_there() -> None:
+    assert {*public(sync.Stream)} <= WORDS
 
 
 def test_what_a_stream_is_for_is_there() -> None:
