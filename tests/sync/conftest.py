@@ -16,7 +16,7 @@ from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.sync import RobotiqHand
 from robotiq_async.sync.loop_thread import NAME
 from robotiq_async.wire.registers import Registers
-from robotiq_async.wire.request import Request
+from robotiq_async.wire.request import AxisRequest, Request
 
 T = TypeVar("T")
 PATIENCE = 5.0
@@ -60,6 +60,11 @@ class Wire:
         """Let it be active already."""
         self.look(lambda gripper: gripper.write(0, Request(activate=True).registers))
         self.ahead += 10
+
+    def command(self, position: int) -> None:
+        """Let another client send all axes somewhere, slowly."""
+        axes = (AxisRequest(position, 0, 0),) * 4
+        self.look(lambda gripper: gripper.write(0, Request(activate=True, go=True, axes=axes).registers))
 
     def targets(self) -> list[int]:
         """Where the fingers A, B and C are driven to."""

@@ -13,7 +13,6 @@ import pytest
 
 from robotiq_async import Fault, Finger, State
 from robotiq_async.sync import RobotiqHand
-from robotiq_async.wire.request import AxisRequest, Request
 from tests.sync.conftest import PATIENCE, Interrupt, Striker, Wire, in_a_thread, until
 
 A, B = Finger.A, Finger.B
@@ -66,8 +65,7 @@ def test_a_grip_is_kept(hand: RobotiqHand, wire: Wire, interrupt: Striker) -> No
 
 
 def test_who_only_looks_writes_nothing(wire: Wire, interrupt: Striker) -> None:
-    axes = (AxisRequest(255, 0, 0),) * 4
-    wire.look(lambda gripper: gripper.write(0, Request(activate=True, go=True, axes=axes).registers))
+    wire.command(255)
     hand = RobotiqHand(wire)
     hand.start(activate=False)
     until(wire.is_moving)
