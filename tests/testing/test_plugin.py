@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import pytest
 
-from tests.docs.pages import ROOT
+from tests.docs.pages import DOCS, ROOT, blocks
 
 pytest_plugins = ["pytester"]
 
@@ -75,6 +75,17 @@ def run(pytester: pytest.Pytester) -> Run:
 )
 def test_the_fixtures_live_in_the_loop_of_the_test(run: Run, marks: str, ini: str) -> None:
     run(TESTS.format(marks=marks), ini=ini).assert_outcomes(passed=3)
+
+
+def test_the_page_about_it(run: Run, pytester: pytest.Pytester) -> None:
+    page = blocks((DOCS / "how-to" / "testing.md").read_text(encoding="utf-8"))
+    (settings,) = [block for block in page if block.language == "toml"]
+    options = tomllib.loads(settings.text)["tool"]["pytest"]["ini_options"]
+    tests = [block.text for block in page if block.language == "python"]
+    others = {f"test_{number}": text for number, text in enumerate(tests[1:])}
+    pytester.makepyfile(**others)
+    result = run(tests[0], ini=f"asyncio_mode = {options['asyncio_mode']}")
+    result.assert_outcomes(passed=sum(text.count("def test_") for text in tests))
 
 
 def test_anyios_plugin_alone_is_enough(run: Run) -> None:
