@@ -13,8 +13,10 @@ What a program needs is imported from here. Where it comes from, and what stands
     actions, telemetry       operating a hand; recordings, viewers and metrics of one
     web                      a page in the browser
     measure, doctor          measurements of a gripper; what is wrong with a connection
+    sync                     blocking hands, for scripts and notebooks
     fleet                    hands on other hosts: agents that serve them, remote hands
     ros2                     a lifecycle node of ROS 2 around a hand
+    testing                  fixtures for pytest: a simulated gripper in the tests of applications
     simulator, cli           a simulated gripper with its servers; the command line
 
 Nothing of this has run on real hardware yet.

@@ -16,7 +16,7 @@ from types import FunctionType
 import pytest
 
 import robotiq_async
-from robotiq_async import enums, fleet, simulator
+from robotiq_async import enums, fleet, simulator, sync
 
 CONTRACT = {
     # The hand and what it hands out.
@@ -95,7 +95,7 @@ def public_members(owner: type) -> Iterator[tuple[str, object]]:
 
 METHODS = [
     pytest.param(member, id=f"{module.__name__.rpartition('.')[2]}.{owner}.{name}")
-    for module in (robotiq_async, simulator, fleet)
+    for module in (robotiq_async, simulator, fleet, sync)
     for owner in module.__all__
     if isinstance(getattr(module, owner), type)
     for name, member in public_members(getattr(module, owner))

@@ -151,9 +151,8 @@ def _candidates(address: Address, usual: RegisterMap) -> list[RegisterMap]:
 
 def _link(address: Address, registers: RegisterMap) -> Transport:
     if address.kind == "sim":
-        return SimulatedTransport(
-            new_gripper(), registers, connect_timeout=REACH_S, response_timeout=ANSWER_S
-        )
+        gripper = new_gripper(address.simulation)
+        return SimulatedTransport(gripper, registers, connect_timeout=REACH_S, response_timeout=ANSWER_S)
     return ModbusTransport(address, registers, connect_timeout=REACH_S, response_timeout=ANSWER_S)
 
 

@@ -63,8 +63,8 @@ class RobotiqHand(Commands, Grasping):
         that matters to what it holds.
 
         Args:
-            address: ``tcp://HOST[:502]`` (or HOST, HOST:PORT), ``rtu:///dev/ttyUSB0``, ``sim://``, or a
-                transport object.
+            address: ``tcp://HOST[:502]`` (or HOST, HOST:PORT), ``rtu:///dev/ttyUSB0``, ``sim://`` (or
+                ``sim://?speedup=10&object=150``), or a transport object.
             name: what to call this hand, in 1..64 printable characters: errors and the log begin with it,
                 metrics and recordings have it. None calls it by its address.
             device_id: Modbus unit id, 1..247; by default 2 over TCP and 9 over RTU. Two hands on one TCP

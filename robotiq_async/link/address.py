@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from ipaddress import IPv4Address, IPv6Address
 from typing import Final, Literal
 
+from .simulation import NOTHING_SPECIAL, Simulation, parse_simulation
+
 TCP_PORT: Final = 502
 """The port of Modbus TCP, and the gripper's."""
 
 FORMS: Final = (
     "tcp://HOST[:PORT] (or bare HOST or HOST:PORT), "
-    "rtu:///dev/ttyUSB0 (a serial port; rtu://COM3 on Windows), sim://"
+    "rtu:///dev/ttyUSB0 (a serial port; rtu://COM3 on Windows), sim:// (or sim://?speedup=10&object=150)"
 )
 
 
@@ -24,18 +26,20 @@ class Address:
         kind: "tcp", "rtu" or "sim".
         host: host name or IP address (tcp), device of the serial port (rtu), empty (sim).
         port: TCP port; 0 for the others.
+        simulation: what the gripper is like (sim); nothing special for the others.
     """
 
     kind: Literal["tcp", "rtu", "sim"]
     host: str = ""
     port: int = 0
+    simulation: Simulation = NOTHING_SPECIAL
 
     def __str__(self) -> str:
         """The address in its full form."""
         if self.kind == "tcp":
             host = f"[{self.host}]" if ":" in self.host else self.host
             return f"tcp://{host}:{self.port}"
-        return f"{self.kind}://{self.host}"
+        return f"{self.kind}://{self.host}{self.simulation}"
 
 
 def parse_address(address: object) -> Address:
@@ -50,8 +54,11 @@ def parse_address(address: object) -> Address:
     scheme, separator, rest = address.partition("://")
     if not separator:
         scheme, rest = "tcp", address
-    if scheme == "sim" and not rest:
-        return Address("sim")
+    if scheme == "sim" and rest[:1] in ("", "?"):
+        try:
+            return Address("sim", simulation=parse_simulation(rest))
+        except ValueError as error:
+            raise ValueError(f"malformed address {address!r}: {error}; accepted: {FORMS}") from None
     if scheme == "rtu" and rest.strip("/") and rest == rest.strip() and "\0" not in rest:
         return Address("rtu", rest)
     if scheme == "tcp":

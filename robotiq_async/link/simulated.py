@@ -5,24 +5,29 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from ..enums import Finger
 from ..errors import ConnectFailedError
 from ..wire.registers import RegisterMap, Registers
 from .address import parse_address
 from .modbus import ModbusTransport
+from .simulation import Simulation
 
 if TYPE_CHECKING:
     from ..simulator import SimulatedGripper
 
 
-def new_gripper() -> SimulatedGripper:
-    """A gripper for a hand at ``sim://``.
+def new_gripper(simulation: Simulation) -> SimulatedGripper:
+    """A gripper for a hand at ``sim://``, as the address has it.
 
     The simulator is imported here, and so only for sim:// and when the hand is made: it takes tens of
     milliseconds, for which a loop that runs already would be held up.
     """
     from ..simulator import SimulatedGripper  # noqa: PLC0415
 
-    return SimulatedGripper()
+    gripper = SimulatedGripper(speedup=simulation.speedup)
+    if simulation.object is not None:
+        gripper.place_object(Finger.ABC, simulation.object)
+    return gripper
 
 
 class SimulatedTransport:

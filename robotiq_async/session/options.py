@@ -110,9 +110,9 @@ def check_options(
         make: Callable[..., Transport]
         gripper: Callable[[], Gripper]
         if parsed.kind == "sim":
-            simulated = new_gripper()
+            simulated = new_gripper(parsed.simulation)
             make = partial(SimulatedTransport, simulated, registers)
-            place = f"sim://#{id(simulated):x}"  # every sim:// is a gripper of its own
+            place = f"{parsed}#{id(simulated):x}"  # every sim:// is a gripper of its own
             gripper = partial(Gripper, place)
         else:
             make = partial(ModbusTransport, parsed, registers)

@@ -52,6 +52,10 @@ LATE_S: Final = 0.05
 """Later than this a poll is worth a warning; on a busy machine a few milliseconds are usual."""
 LATE_WARNING_S: Final = 1.0
 """At most one warning about late polls in this time."""
+STOOD_STILL: Final = (
+    "nobody ran the event loop meanwhile, and nothing watched the fingers (as between the prompts of "
+    "IPython's terminal: use robotiq_async.sync there)"
+)
 
 
 class Poller:
@@ -269,8 +273,12 @@ class Poller:
         if now - self._warned < LATE_WARNING_S:
             return
         self._warned = now
-        held = self._tick.late >= late / 2
-        why = "something holds up the event loop" if held else "the gripper answers slowly"
+        if self._tick.late < late / 2:
+            why = "the gripper answers slowly"
+        elif self._tick.stood_still:
+            why = STOOD_STILL
+        else:
+            why = "something holds up the event loop"
         missed = self._counters.overruns
         self._log.warning("polling is %.0f ms late: %s (%d polls missed so far)", 1000 * late, why, missed)
 

@@ -215,6 +215,8 @@ class Channel(Generic[T]):
         self._listeners = listeners
         # Plain references: going through a WeakSet takes several times as long, at every poll.
         self._streams: list[weakref.ref[Stream[T]]] = []
+        self._has_dropped = False
+        """Whether some of them are held by nobody any more."""
         self._waited_for: set[Stream[T]] = set()
         self._failure: Callable[[], RobotiqError] | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -227,6 +229,7 @@ class Channel(Generic[T]):
         else:
             if self._loop is not None:
                 stream.belong_to(self._loop)
+            self._let_go()
             self._streams.append(weakref.ref(stream, self._forget))
         return stream
 
@@ -244,6 +247,8 @@ class Channel(Generic[T]):
             stream = reference()
             if stream is not None:
                 stream.push(item)
+        if self._has_dropped:
+            self._let_go()
         self._listeners.tell(item)
 
     def end(self, failure: Callable[[], RobotiqError] | None = None) -> None:
@@ -255,9 +260,14 @@ class Channel(Generic[T]):
             if stream is not None:
                 stream.end(failure)
 
-    def _forget(self, reference: weakref.ref[Stream[T]]) -> None:
-        # A new list: this may happen while somebody goes through the old one.
-        self._streams = [each for each in self._streams if each is not reference]
+    def _let_go(self) -> None:
+        """Keep the streams that somebody still holds."""
+        self._has_dropped = False
+        self._streams = [each for each in self._streams if each() is not None]
+
+    def _forget(self, _: weakref.ref[Stream[T]]) -> None:
+        # In whatever thread drops the last reference: another stream may be opened at this moment.
+        self._has_dropped = True
 
 
 class Channels:

@@ -15,6 +15,7 @@ import asyncio
 import contextlib
 import heapq
 import math
+import sys
 import time
 from typing import ClassVar, Final, Literal
 
@@ -46,6 +47,8 @@ class Tick:
         """How late a tick came, in seconds: the worst since somebody set this to 0."""
         self.longest_late = 0.0
         """The worst of all."""
+        self.stood_still = False
+        """Whether nobody ran the loop when it came so late, as IPython's terminal between two prompts."""
         self._passed = 0
         self._hurried = False
         self._waiter: asyncio.Future[None] | None = None
@@ -56,7 +59,7 @@ class Tick:
         self._bell = bell = _Bell.of(self._loop)
         phase = self.interval * bell.next_phase()
         self.due = math.ceil((self.time() - phase) / self.interval) * self.interval + phase
-        self._passed, self._hurried, self.late = 0, False, 0.0
+        self._passed, self._hurried, self.late, self.stood_still = 0, False, 0.0, False
         bell.add(self)
 
     def close(self) -> None:
@@ -86,11 +89,16 @@ class Tick:
         passed, self._passed, self._hurried = self._passed, 0, False
         return passed
 
-    def strike(self, now: float) -> None:
-        """The deadline has passed, and perhaps some more have."""
+    def strike(self, now: float, *, stood_still: bool) -> None:
+        """The deadline has passed, and perhaps some more have.
+
+        Args:
+            now: the time.
+            stood_still: whether the loop was stopped and run again since the last tick.
+        """
         late = now - self.due
         if late > self.late:
-            self.late = late
+            self.late, self.stood_still = late, stood_still
             self.longest_late = max(self.longest_late, late)
         count = 1 + int(late / self.interval)
         self.due += count * self.interval
@@ -125,6 +133,7 @@ class _Bell:
         self._heap: list[tuple[float, int, Tick]] = []
         self._handle: asyncio.TimerHandle | None = None
         self._clock = clock_of(loop)
+        self._run = _this_run()
         self._timerfd = self._watched_timerfd()
 
     @property
@@ -151,10 +160,11 @@ class _Bell:
 
     def _ring(self) -> None:
         """Strike whoever is due."""
-        heap, now = self._heap, self._clock()
+        heap, now, run = self._heap, self._clock(), _this_run()
+        stood_still, self._run = run is not self._run, run
         while heap and heap[0][0] <= now:
             _, number, tick = heap[0]
-            tick.strike(now)
+            tick.strike(now, stood_still=stood_still)
             heapq.heapreplace(heap, (tick.due, number, tick))
         self._arm()
 
@@ -195,3 +205,12 @@ class _Bell:
         """Close the descriptor; the loop does not watch it any more."""
         if self._timerfd is not None:
             self._timerfd.close()
+
+
+def _this_run() -> object:
+    """Something that stands for the present ``run_forever()`` of the loop that runs here.
+
+    Each of them sets hooks for async generators that are bound to the loop anew: another one, another object.
+    Both asyncio and uvloop do.
+    """
+    return sys.get_asyncgen_hooks().firstiter

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from itertools import pairwise
 
 import pytest
 
-from robotiq_async import Fault, Finger, NotActivatedError, State
+from robotiq_async import Fault, Finger, NotActivatedError, RobotiqHand, State
 from robotiq_async.simulator import Trouble
 from robotiq_async.wire.request import Request
 from tests.adversity.world import world
-from tests.virtual import run
+from tests.virtual import VirtualLoop, run
 
 A = Finger.A
 POLL_S = 0.01
@@ -212,3 +213,56 @@ def test_a_move_cancelled_while_the_loop_was_held_up_stops_where_it_is_by_then()
             assert abs(here.gripper.position(A) - at) < 10
 
     run(main)
+
+
+# -- a loop that nobody runs, as between the prompts of IPython's terminal ---------------------------------
+
+
+@pytest.mark.parametrize("kind", ["asyncio", "uvloop"])
+def test_a_loop_that_stood_still_is_told_from_one_that_was_held_up(
+    kind: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    factory = pytest.importorskip(kind).new_event_loop
+    with asyncio.Runner(loop_factory=factory) as runner:
+        hand = RobotiqHand("sim://?speedup=100")
+        runner.run(hand.start())
+        runner.run(hand.move(100, A, speed=255))
+        for _ in range(3):  # prompts that are answered at once
+            runner.run(asyncio.sleep(0.01))
+        assert caplog.messages == []
+        time.sleep(0.2)  # nothing is waited for: that nobody runs the loop is what is tried
+        runner.run(asyncio.sleep(0.02))
+        (warning,) = caplog.messages
+        assert "nobody ran the event loop meanwhile" in warning
+        assert "robotiq_async.sync" in warning
+        stall = hand.statistics.longest_stall
+        assert 0.15 < stall < 0.6
+        # It goes on as if nothing had been.
+        assert hand.state is State.RUNNING_IDLE
+        assert runner.run(hand.move(200, A)).positions[A] == pytest.approx(200, abs=3)
+        assert hand.statistics.reconnects == 0
+        runner.run(hand.stop())
+
+
+def test_one_that_is_run_again_and_then_held_up_is_told_so(caplog: pytest.LogCaptureFixture) -> None:
+    with asyncio.Runner(loop_factory=VirtualLoop) as runner:
+        loop = runner.get_loop()
+        assert isinstance(loop, VirtualLoop)
+        hand = RobotiqHand("sim://?speedup=100")
+        runner.run(hand.start())
+        runner.run(asyncio.sleep(0.02))
+
+        async def hold_up() -> None:
+            await asyncio.sleep(0.02)
+            loop.hold_up(0.5)
+            await asyncio.sleep(0.02)
+
+        runner.run(hold_up())
+        (warning,) = caplog.messages
+        assert "something holds up the event loop" in warning
+        runner.run(asyncio.sleep(1))
+        loop.hold_up(3.0)
+        runner.run(asyncio.sleep(0.02))
+        assert "nobody ran the event loop" in caplog.messages[-1]
+        assert hand.statistics.longest_stall == pytest.approx(3.0, abs=0.01)
+        runner.run(hand.stop())

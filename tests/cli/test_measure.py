@@ -173,6 +173,7 @@ def test_without_matplotlib_nothing_is_begun(
         (["speed", "--step", "0"], "--step must be an integer in 1..255, got 0"),
         (["speed", "--speedup", "51"], "--speedup must be a number in 1..50, got 51"),
         (["speed", "192.168.1.11", "--speedup", "2"], "--speedup is for sim:// only"),
+        (["speed", "sim://?speedup=2"], "takes no options, but there is --speedup"),
         (["speed", "tcp://"], "malformed address"),
         (["speed", "--output", "mine.png"], "--output must be a file named .csv, got 'mine.png'"),
         (["speed", "--output", "mine"], "--output must be a file named .csv"),

@@ -57,6 +57,18 @@ def test_it_keeps_the_gripper_between_two_clients(call: Call, beside: Callable[.
     assert "Activating" not in call("move", "0", "--yes", address).out
 
 
+def test_something_may_be_in_the_way(call: Call, beside: Callable[..., Beside]) -> None:
+    address = beside("simulate", "--port", "0", "--speedup", "20", "--object", "150", "--exact").read_line()
+    assert call("move", "255", "--yes", address).code == 0
+    axes = json.loads(call("status", "--json", address).out)["axes"]
+    assert [axes[name]["position"] for name in ("A", "B", "C")] == [150] * 3
+
+
+@pytest.mark.parametrize("position", ["256", "-1", "1.5"])
+def test_an_object_that_is_nowhere(call: Call, position: str) -> None:
+    call("simulate", "--object", position).assert_failed(2, "--object must be an integer in 0..255")
+
+
 def test_a_port_in_use(call: Call) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]

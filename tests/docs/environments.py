@@ -119,7 +119,16 @@ async def test_what_is_for_pytest(page: Path, tmp_path: Path) -> None:
     (settings,) = [block for block in blocks(text_of(page)) if block.language == "toml"]
     (tmp_path / "pyproject.toml").write_text(settings.text, encoding="utf-8")
     printed = await run(environment(requirements(text_of(page))), "-m", "pytest", folder=tmp_path)
-    assert re.search(rf"\b{len(tests)} passed in ", printed), printed
+    count = sum(block.text.count("def test_") for block in tests)
+    assert re.search(rf"\b{count} passed in ", printed), printed
+
+
+async def test_the_notebook(tmp_path: Path) -> None:
+    """Executed by a kernel of Jupyter, it shows what it shows."""
+    python = environment(f"{requirements(text_of(DOCS / 'how-to' / 'notebooks.md'))} ipykernel nbclient")
+    command = (python, str(DOCS / "make_notebook.py"), "--check")
+    # Jupyter keeps things at home.
+    await run(*command, folder=tmp_path, variables={"HOME": str(tmp_path)})
 
 
 async def test_the_readme(tmp_path: Path) -> None:

@@ -25,6 +25,8 @@ from tests.docs.test_tutorial import agree
 FRONT = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")]
 TUTORIAL = DOCS / "tutorial.md"
 """Has a test of its own: its blocks belong together."""
+FIXTURES = DOCS / "how-to" / "testing.md"
+"""Is for pytest, which runs it in tests/testing/."""
 
 
 def name(page: object) -> str:
@@ -107,7 +109,7 @@ def test_what_the_notes_of_the_picture_say_of_stop_and_a_lost_link_is_so() -> No
 CODE = [
     (page, block)
     for page in PAGES
-    if page != TUTORIAL
+    if page not in (TUTORIAL, FIXTURES)
     for block in blocks(read(page))
     if block.language == "python"
 ]
@@ -144,7 +146,7 @@ async def test_code_runs(
             await function()
 
 
-@pytest.mark.parametrize("page", dict.fromkeys(page for page, _ in CODE), ids=name)
+@pytest.mark.parametrize("page", dict.fromkeys([*(page for page, _ in CODE), FIXTURES]), ids=name)
 def test_a_page_with_code_names_its_environment(page: Path) -> None:
     text = read(page)
     assert requirements(text).startswith((".", "'.["))

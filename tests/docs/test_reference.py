@@ -32,6 +32,7 @@ from robotiq_async import (
     Units,
     fleet,
     simulator,
+    sync,
 )
 from robotiq_async.cli.app import COMMANDS
 from robotiq_async.wire.request import Request
@@ -81,6 +82,10 @@ def test_every_public_attribute_is_there(kind: type) -> None:
 def test_every_key_of_what_is_told_is_there() -> None:
     told = status_of(0xB9, 0xEA).as_dict() | SentRequest(Request(), 0.0, acknowledged=True).as_dict()
     assert {*told, *told["A"]} - WORDS == set()
+
+
+def test_what_a_blocking_stream_is_for_is_there() -> None:
+    assert {*public(sync.Stream)} <= WORDS
 
 
 def test_what_a_stream_is_for_is_there() -> None:

@@ -71,6 +71,16 @@ def few_files(request: pytest.FixtureRequest) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_NOFILE, limits)
 
 
+async def test_an_address_may_say_how_fast_its_gripper_is_and_what_is_in_its_way() -> None:
+    async with RobotiqHand("sim://?speedup=50&object=150") as hand:
+        result = await hand.close(speed=255)
+        assert result.contacts == Finger.ABC
+        assert result.duration < 1
+        for axis in (Finger.A, Finger.B, Finger.C):
+            assert result.positions[axis] == pytest.approx(150, abs=5)
+        assert hand.address.startswith("sim://?speedup=50&object=150#")
+
+
 async def test_without_a_free_descriptor_a_simulated_gripper_says_so(few_files: None) -> None:
     hand = RobotiqHand("sim://")
     with pytest.raises(ConnectFailedError, match=r"cannot connect to .*: .*Too many open files") as caught:

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async.link.address import FORMS, Address, parse_address
+from robotiq_async.link.simulation import Simulation
 
 NAMES = st.from_regex(r"[a-z0-9_][a-z0-9_-]{0,62}", fullmatch=True).filter(
     lambda name: not re.fullmatch("[0-9]+|0x[0-9a-f]*", name)
@@ -63,6 +64,22 @@ def test_the_simulated_gripper_needs_nothing_more() -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "simulation"),
+    [
+        ("sim://?speedup=10&object=150", Simulation(10.0, 150)),
+        ("sim://?object=0", Simulation(object=0)),
+        ("sim://?speedup=0.25", Simulation(0.25)),
+        ("sim://?speedup=1000", Simulation(1000.0)),
+    ],
+)
+def test_the_address_of_a_simulated_gripper_may_say_what_it_is_like(
+    text: str, simulation: Simulation
+) -> None:
+    assert parse_address(text) == Address("sim", simulation=simulation)
+    assert str(parse_address(text)) == text
+
+
+@pytest.mark.parametrize(
     ("text", "full"),
     [
         ("192.168.1.11", "tcp://192.168.1.11:502"),
@@ -71,6 +88,8 @@ def test_the_simulated_gripper_needs_nothing_more() -> None:
         ("rtu:///dev/ttyUSB0", "rtu:///dev/ttyUSB0"),
         ("rtu://COM3", "rtu://COM3"),
         ("sim://", "sim://"),
+        ("sim://?object=150&speedup=010.0", "sim://?speedup=10&object=150"),
+        ("sim://?speedup=1.0", "sim://"),
     ],
 )
 def test_an_address_prints_in_its_full_form(text: str, full: str) -> None:
@@ -94,7 +113,13 @@ def test_any_ipv6_address_is_found_again_in_the_full_form(host: object, port: in
     assert parse_address(str(address)) == address
 
 
-@given(st.text())
+@given(st.floats(0.01, 1000).map(lambda value: round(value, 9)), st.none() | st.integers(0, 255))
+def test_any_simulated_gripper_is_found_again_in_the_full_form(speedup: float, position: int | None) -> None:
+    address = Address("sim", simulation=Simulation(speedup, position))
+    assert parse_address(str(address)) == address
+
+
+@given(st.text() | st.text("?&=.0123456789speduobjct").map("sim://".__add__))
 def test_any_text_is_an_address_or_a_value_error_that_shows_the_forms(text: str) -> None:
     try:
         address = parse_address(text)
@@ -242,6 +267,31 @@ def test_a_malformed_ipv6_address_is_a_value_error_that_shows_the_forms(text: st
 def test_a_malformed_serial_or_simulated_address_is_a_value_error_that_shows_the_forms(text: str) -> None:
     with pytest.raises(ValueError, match="malformed address") as caught:
         parse_address(text)
+    assert FORMS in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("query", "words"),
+    [
+        ("speedup=0", "speedup must be a number in 0.01..1000, got '0'"),
+        ("speedup=1001", "speedup must be a number in 0.01..1000, got '1001'"),
+        ("speedup=nan", "speedup must be a number in 0.01..1000, got 'nan'"),
+        ("speedup=1e2", "speedup must be a number in 0.01..1000, got '1e2'"),
+        ("speedup=", "speedup must be a number in 0.01..1000, got ''"),
+        ("object=256", "object must be in 0..255, got 256"),
+        ("object=-1", "object must be an integer in 0..255, got '-1'"),
+        ("object=1.5", "object must be an integer in 0..255, got '1.5'"),
+        ("speedup", "speedup must be given once, as speedup=VALUE"),
+        ("object=1&object=2", "object must be given once, as object=VALUE"),
+        ("speed=10", "no option 'speed'; known are: speedup, object"),
+        ("", "no option ''; known are: speedup, object"),
+        ("object=1&", "no option ''; known are: speedup, object"),
+    ],
+)
+def test_a_malformed_option_of_a_simulated_gripper_is_named_with_its_range(query: str, words: str) -> None:
+    with pytest.raises(ValueError, match="malformed address") as caught:
+        parse_address(f"sim://?{query}")
+    assert words in str(caught.value)
     assert FORMS in str(caught.value)
 
 

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import gc
 from collections.abc import Awaitable, Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import anyio
 import pytest
@@ -489,7 +490,7 @@ async def test_a_stream_that_nobody_holds_is_forgotten_at_once(
 ) -> None:
     kept = [await leave(channel) for _ in range(10)]
     assert len(kept) == 10
-    assert not channel._streams
+    assert held(channel) == 0
     assert not channel._waited_for
 
 
@@ -504,7 +505,23 @@ async def test_an_iteration_that_is_left_leaves_nothing_behind(channel: Channel[
         channel.push(item)
         await task
     gc.collect()
-    assert not channel._streams
+    assert held(channel) == 0
+
+
+def held(channel: Channel[int]) -> int:
+    """How many streams a channel knows of, once another one has been opened."""
+    last = channel.open(None)
+    assert channel._streams.pop()() is last
+    return len(channel._streams)
+
+
+def test_a_stream_that_another_thread_drops_takes_no_other_with_it(channel: Channel[int]) -> None:
+    """The list was made anew in that thread, without what was opened at the same moment in the loop's."""
+    dropped, before = [channel.open(1)], channel._streams
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(dropped.clear).result()
+    assert channel._streams is before
+    assert held(channel) == 0
 
 
 async def test_a_waiting_reader_is_not_forgotten_though_nobody_keeps_its_task(channel: Channel[int]) -> None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ...errors import MeasuringError
-from ..addresses import is_simulated
+from ..addresses import full_address, is_simulated
 from ..arguments import need
 from ..consent import read_line
 from ..failures import CommandError, UsageError
@@ -49,6 +49,8 @@ def check(address: str, output: Path, speedup: float | None, runs: int, step: in
         raise UsageError(f"--step must be an integer in 1..255, got {step}")
     if speedup is not None and not simulated:
         raise UsageError("--speedup is for sim:// only: the time of a real gripper cannot be changed")
+    if simulated and full_address(address) != "sim://":
+        raise UsageError(f"the gripper to measure at {address} takes no options, but there is --speedup")
     if speedup is not None and not 1 <= speedup <= 50:
         raise UsageError(f"--speedup must be a number in 1..50, got {speedup:g}")
     if plot:

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from ...enums import Finger
 from ...errors import RobotiqError
 from ...telemetry.gate import is_loopback
 from ...wire.registers import RTU_REGISTERS
-from ..arguments import Port, Unit
+from ..arguments import Byte, Port, Unit
 from ..failures import usage
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ async def simulate(
     host: str = "127.0.0.1",
     speedup: Annotated[float, Parameter(metavar="FACTOR")] = 1.0,
     exact: Annotated[bool, Parameter(negative=())] = False,
+    object_: Annotated[Byte | None, Parameter(name="--object")] = None,
     serial: Annotated[str | None, Parameter(metavar="DEVICE")] = None,
     device_id: Unit | None = None,
     trouble: Annotated[list[str] | None, Parameter(metavar="WORDS", negative=())] = None,
@@ -44,7 +46,7 @@ async def simulate(
     For example:
 
         robotiq-async simulate
-        robotiq-async simulate --port 5021 --speedup 10
+        robotiq-async simulate --port 5021 --speedup 10 --object 150
         robotiq-async simulate --serial /dev/pts/3
         robotiq-async simulate --serial /dev/pts/3 --device-id 12
         robotiq-async simulate --trouble "drop at 5 every 10" --trouble "delay 0.02"
@@ -55,6 +57,7 @@ async def simulate(
         host: Interface to listen on. Modbus knows no password: whoever reaches the port is in command.
         speedup: How many times faster than the clock the simulated time runs.
         exact: Stop exactly where it is told to, which no real gripper does.
+        object_: Count at which the fingers A, B and C meet something when they close.
         serial: Serve Modbus RTU on this serial device in place of TCP (extra serial).
         device_id: The only Modbus unit id that is answered (default: 9 serial, any on TCP).
         trouble: What goes wrong, and when; may be given again.
@@ -68,6 +71,8 @@ async def simulate(
     with usage():
         plan = parse_troubles("\n".join(trouble or ()))
         gripper = SimulatedGripper(speedup=speedup, spread=not exact)
+        if object_ is not None:
+            gripper.place_object(Finger.ABC, object_)
         server: SimulatorServer | SerialSimulatorServer
         if serial is None:
             server = SimulatorServer(gripper, port=port, host=host, device_id=device_id)

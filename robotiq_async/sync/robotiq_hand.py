@@ -1,0 +1,126 @@
+"""RobotiqHand: its options, its start and its end.
+
+Made from robotiq_async.hand.robotiq_hand by docs/make_sync.py.
+"""
+
+from __future__ import annotations
+
+from ..calibration import SpeedCalibration
+from ..enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ..hand import RobotiqHand as AsyncRobotiqHand
+from ..link.transport import Transport
+from ..session.options import ACTIVATION_TIMEOUT_S, CONNECT_TIMEOUT_S, POLL_INTERVAL_S, RESPONSE_TIMEOUT_S
+from ..session.reconnecting import ReconnectPolicy
+from .caller import Caller
+from .commands import Commands
+
+
+class RobotiqHand(Commands):
+    """A Robotiq 3-Finger gripper behind Modbus TCP, a serial line, or simulated, that blocks.
+
+    Use it as ``with RobotiqHand(address) as hand:``, or call :meth:`start` and :meth:`stop`. The calls, their
+    arguments, results and errors are those of :class:`robotiq_async.RobotiqHand`, and each returns when the
+    async one has ended. All blocking hands share one event loop in a thread of its own, which polls while
+    your code runs. Calls may come from any thread, also from one in which another event loop runs: that one
+    stands still meanwhile.
+
+    What a call does when it is cancelled it does here at Ctrl-C, and whatever moves by then is held. A hand
+    that was not stopped is stopped when the program ends. After a fork it stays with the parent. Listeners
+    are called in the hand's thread, where a call that waits is a RuntimeError.
+
+    Nothing of this has run on real hardware yet.
+    """
+
+    def __init__(
+        self,
+        address: str | Transport = "sim://",
+        *,
+        device_id: int | None = None,
+        poll_interval: float = POLL_INTERVAL_S,
+        connect_timeout: float = CONNECT_TIMEOUT_S,
+        response_timeout: float = RESPONSE_TIMEOUT_S,
+        activation_timeout: float = ACTIVATION_TIMEOUT_S,
+        reconnect: bool | ReconnectPolicy = True,
+        speed: int = DEFAULT_SPEED,
+        force: int = DEFAULT_FORCE,
+        request_address: int | None = None,
+        status_address: int | None = None,
+        calibration: SpeedCalibration | None = None,
+    ) -> None:
+        """Check every option. Opens nothing and needs no running loop.
+
+        Speed and force have no echo. So after adopting an active gripper, ``speed`` and ``force`` are also
+        what the axes get that a first command does not address: pass what the gripper was used with if
+        that matters to what it holds.
+
+        Args:
+            address: ``tcp://HOST[:502]`` (or HOST, HOST:PORT), ``rtu:///dev/ttyUSB0``, ``sim://`` (or
+                ``sim://?speedup=10&object=150``), or a transport object.
+            device_id: Modbus unit id, 1..247; by default 2 over TCP and 9 over RTU. Two hands on one TCP
+                address need one each: that of their gripper behind the gateway.
+            poll_interval: seconds between polls, 0.001..0.1.
+            connect_timeout: seconds for opening the link, 0.01..5.
+            response_timeout: seconds for one answer, 0.005..0.5.
+            activation_timeout: seconds for an activation, 0.01..120.
+            reconnect: whether a lost link is opened again, or a :class:`ReconnectPolicy`.
+            speed: what the axes get until set otherwise, 0..255.
+            force: what the axes get until set otherwise, 0..255.
+            request_address: first request register; by default 0 over TCP and 0x03E8 over RTU.
+            status_address: first status register; by default 0 over TCP and 0x07D0 over RTU.
+            calibration: how fast this gripper is: default timeouts of moves come from it. None for the
+                thesis's gripper.
+
+        Raises:
+            TypeError: an option of the wrong type.
+            ValueError: an option outside its range, or a malformed address.
+        """
+        hand = AsyncRobotiqHand(
+            address,
+            device_id=device_id,
+            poll_interval=poll_interval,
+            connect_timeout=connect_timeout,
+            response_timeout=response_timeout,
+            activation_timeout=activation_timeout,
+            reconnect=reconnect,
+            speed=speed,
+            force=force,
+            request_address=request_address,
+            status_address=status_address,
+            calibration=calibration,
+        )
+        super().__init__(hand, Caller(hand))
+
+    def start(self, activate: bool = True) -> None:
+        """Connect, read the status, activate if the gripper is reset, and poll from then on.
+
+        An activation MOVES the fingers: they open and close to their stops. A gripper that is active
+        already is adopted: nothing is written. One that is in fault already is left there, so that
+        :meth:`atr` and :meth:`recover` can run.
+
+        A failed or cancelled start leaves nothing running; an activation that it began is taken back.
+
+        Args:
+            activate: False leaves a reset gripper in RESET.
+
+        Raises:
+            InvalidStateError: this hand is started already, or another one runs on the same gripper.
+            NotStartedError: stop() was called meanwhile.
+            ConnectFailedError: nobody answers within the connect timeout.
+            RobotiqConnectionError: somebody answers, but not a gripper; or the link went down again.
+            GripperFaultError: the activation that was begun ended in a fault.
+            NotActivatedError: the gripper was reset during the activation that was begun.
+            ActivationTimeoutError: the activation was not finished in time.
+        """
+        self._caller.wait(lambda: self._inner.start(activate))
+
+    def stop(self, *, halt: bool = True) -> None:
+        """Stop the fingers (rGTO = 0), keep the activation, disconnect. Idempotent.
+
+        Ends within 2 s even on a dead link, and also when cancelled meanwhile: the cancellation is
+        raised once the hand has stopped. If the link is down, it is tried once more. What other tasks
+        wait for ends with NotStartedError.
+
+        Args:
+            halt: False disconnects and leaves the fingers to what they do; for programs that only look.
+        """
+        self._caller.wait(lambda: self._inner.stop(halt=halt))

@@ -1,0 +1,25 @@
+"""How long a server and a hand live: as long as the test that they are for."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from ..hand import RobotiqHand
+from ..session.event_loop import running_loop
+from ..simulator import SimulatedGripper, SimulatorServer
+
+
+@asynccontextmanager
+async def served(gripper: SimulatedGripper) -> AsyncIterator[SimulatorServer]:
+    """A gripper behind Modbus TCP."""
+    running_loop()  # says what is needed where it is another framework's
+    async with SimulatorServer(gripper) as server:
+        yield server
+
+
+@asynccontextmanager
+async def started(server: SimulatorServer) -> AsyncIterator[RobotiqHand]:
+    """A hand at it, active."""
+    async with RobotiqHand(server.address) as hand:
+        yield hand

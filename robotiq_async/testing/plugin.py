@@ -1,0 +1,88 @@
+"""The plugin for pytest: a gripper, the server that it stands behind, a hand at it, and what goes wrong.
+
+The fixtures that need an event loop have that of the test, whoever runs it: pytest-asyncio, in either mode,
+or anyio's own plugin, which comes with the library. Each has its own way to mark a fixture, and must not see
+that of the other: :mod:`.with_asyncio`, :mod:`.with_anyio`.
+"""
+
+from __future__ import annotations
+
+import inspect
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from ..hand import RobotiqHand
+    from ..simulator import SimulatedGripper, SimulatorServer
+    from ..simulator.troubles.fault_injector import FaultInjector
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Have the fixtures of whatever runs coroutines here."""
+    for driver in ("anyio", "asyncio"):
+        if config.pluginmanager.has_plugin(driver):
+            config.pluginmanager.import_plugin(f"robotiq_async.testing.with_{driver}")
+
+
+@pytest.fixture
+def robotiq_speedup() -> float:
+    """How many times faster than the clock the simulated gripper is: 20. To be overridden."""
+    return 20.0
+
+
+@pytest.fixture
+def robotiq_gripper(robotiq_speedup: float) -> SimulatedGripper:
+    """A simulated gripper that was just switched on. To be overridden, for one of another kind."""
+    from ..simulator import SimulatedGripper  # noqa: PLC0415  # not for those who do not use it
+
+    return SimulatedGripper(speedup=robotiq_speedup)
+
+
+@pytest.fixture
+def robotiq_server(request: pytest.FixtureRequest, robotiq_gripper: SimulatedGripper) -> SimulatorServer:  # noqa: ARG001
+    """The gripper behind Modbus TCP, on a free port of this machine, in the event loop of the test."""
+    server: SimulatorServer = request.getfixturevalue(f"_robotiq_server_with_{_driver(request)}")
+    return server
+
+
+@pytest.fixture
+def robotiq_address(robotiq_server: SimulatorServer) -> str:
+    """The gripper's address, for an application that makes a hand of its own."""
+    return robotiq_server.address
+
+
+@pytest.fixture
+def robotiq_troubles(robotiq_server: SimulatorServer) -> FaultInjector:
+    """Makes something go wrong: ``async with robotiq_troubles.making(Trouble("drop", on="write")):``."""
+    return robotiq_server.fault_injector
+
+
+@pytest.fixture
+def robotiq_hand(request: pytest.FixtureRequest, robotiq_server: SimulatorServer) -> RobotiqHand:  # noqa: ARG001
+    """A hand at the gripper, started and active; it is stopped after the test."""
+    hand: RobotiqHand = request.getfixturevalue(f"_robotiq_hand_with_{_driver(request)}")
+    return hand
+
+
+def _driver(request: pytest.FixtureRequest) -> str:
+    """Who runs the test: "anyio" or "asyncio", as their plugins are called.
+
+    Raises:
+        pytest.UsageError: nobody does, for it is no coroutine; or not in asyncio's loop.
+    """
+    function = getattr(request.node, "obj", None)
+    function = getattr(getattr(function, "hypothesis", None), "inner_test", function)
+    if not inspect.iscoroutinefunction(function):
+        raise pytest.UsageError(
+            f"{request.fixturename} is for tests that are coroutines (async def): it lives in their event "
+            'loop. In others use robotiq_async.sync.RobotiqHand("sim://?speedup=20")'
+        )
+    if "anyio_backend" in request.fixturenames:
+        return "anyio"
+    if request.config.pluginmanager.has_plugin("asyncio"):
+        return "asyncio"
+    raise pytest.UsageError(
+        f"{request.fixturename} needs somebody who runs the test: mark it with pytest.mark.anyio, or install "
+        "pytest-asyncio"
+    )

@@ -1,0 +1,28 @@
+"""The fixtures that need an event loop, for tests that pytest-asyncio runs, in its strict mode too."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from typing import TYPE_CHECKING
+
+import pytest_asyncio
+
+if TYPE_CHECKING:
+    from ..hand import RobotiqHand
+    from ..simulator import SimulatedGripper, SimulatorServer
+
+
+@pytest_asyncio.fixture
+async def _robotiq_server_with_asyncio(robotiq_gripper: SimulatedGripper) -> AsyncIterator[SimulatorServer]:
+    from .lives import served  # noqa: PLC0415  # not for those who do not use it
+
+    async with served(robotiq_gripper) as server:
+        yield server
+
+
+@pytest_asyncio.fixture
+async def _robotiq_hand_with_asyncio(robotiq_server: SimulatorServer) -> AsyncIterator[RobotiqHand]:
+    from .lives import started  # noqa: PLC0415
+
+    async with started(robotiq_server) as hand:
+        yield hand

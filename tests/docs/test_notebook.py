@@ -1,0 +1,49 @@
+"""The notebook: its cells run and print what they show; make_notebook.py has Jupyter do the same."""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import inspect
+import io
+import json
+import re
+from types import FunctionType
+from typing import Any
+
+from docs import make_notebook
+
+NOTEBOOK: dict[str, Any] = json.loads(make_notebook.FILE.read_text(encoding="utf-8"))
+CELLS: list[dict[str, Any]] = NOTEBOOK["cells"]
+
+
+def shown(cell: dict[str, Any]) -> str:
+    """What a cell has printed; nothing else may be among its outputs."""
+    assert [each["name"] for each in cell["outputs"]] == ["stdout"] * len(cell["outputs"])
+    return "".join(each["text"] for each in cell["outputs"])
+
+
+async def test_its_cells_print_what_they_show() -> None:
+    names: dict[str, Any] = {}
+    for cell in CELLS:
+        if cell["cell_type"] == make_notebook.CODE:
+            source = cell["source"].replace("speedup=10", "speedup=100")
+            code = compile(source, cell["id"], "exec", ast.PyCF_ALLOW_TOP_LEVEL_AWAIT, dont_inherit=True)
+            printed = io.StringIO()
+            with contextlib.redirect_stdout(printed):
+                outcome = FunctionType(code, names)()
+                if inspect.iscoroutine(outcome):
+                    await outcome
+            assert printed.getvalue() == shown(cell), cell["source"]
+
+
+def test_it_is_the_one_that_the_script_makes() -> None:
+    assert tuple((cell["cell_type"], cell["source"]) for cell in CELLS) == make_notebook.CELLS
+    executed = [cell["execution_count"] for cell in CELLS if cell["cell_type"] == make_notebook.CODE]
+    assert executed == [*range(1, len(executed) + 1)]
+
+
+def test_it_holds_nothing_of_the_machine_that_made_it() -> None:
+    assert NOTEBOOK["metadata"].keys() == {"kernelspec", "language_info"}
+    assert all(cell["metadata"] == {} for cell in CELLS)
+    assert not re.search(r"/(home|root|tmp|usr|Users)\b|0x[0-9a-f]{6}", json.dumps(CELLS))

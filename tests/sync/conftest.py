@@ -1,0 +1,159 @@
+"""A blocking hand at a gripper in memory, and Ctrl-C as a signal that pytest does not take for its own."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, TypeVar
+
+import pytest
+
+from robotiq_async.enums import Finger
+from robotiq_async.errors import ConnectionLostError
+from robotiq_async.simulator import SimulatedGripper
+from robotiq_async.sync import RobotiqHand
+from robotiq_async.sync.loop_thread import NAME
+from robotiq_async.wire.registers import Registers
+from robotiq_async.wire.request import AxisRequest, Request
+
+T = TypeVar("T")
+PATIENCE = 5.0
+
+
+class Wire:
+    """A transport without a network; its gripper has a clock that the test moves ahead.
+
+    The hand asks it in its own thread, and the test from another one: one at a time.
+    """
+
+    def __init__(self) -> None:
+        self.ahead = 0.0
+        self._gripper = SimulatedGripper(lambda: time.monotonic() + self.ahead, spread=False)
+        self._asking = threading.Lock()
+        self.is_open = False
+        self.breaks = False
+        """At the next reading, once."""
+
+    async def open(self) -> None:
+        self.is_open = True
+
+    async def read(self) -> Registers:
+        if self.breaks:
+            self.breaks = self.is_open = False
+            raise ConnectionLostError("unplugged")
+        return self.look(lambda gripper: gripper.status_registers())
+
+    async def write(self, registers: Sequence[int]) -> None:
+        self.look(lambda gripper: gripper.write(0, registers))
+
+    async def close(self) -> None:
+        self.is_open = False
+
+    def look(self, what: Callable[[SimulatedGripper], T]) -> T:
+        """Ask the gripper something, or do something to it."""
+        with self._asking:
+            return what(self._gripper)
+
+    def activate(self) -> None:
+        """Let it be active already."""
+        self.look(lambda gripper: gripper.write(0, Request(activate=True).registers))
+        self.ahead += 10
+
+    def command(self, position: int) -> None:
+        """Let another client send all axes somewhere, slowly."""
+        axes = (AxisRequest(position, 0, 0),) * 4
+        self.look(lambda gripper: gripper.write(0, Request(activate=True, go=True, axes=axes).registers))
+
+    def targets(self) -> list[int]:
+        """Where the fingers A, B and C are driven to."""
+        return self.look(lambda gripper: [gripper.target(axis) for axis in (Finger.A, Finger.B, Finger.C)])
+
+    def is_moving(self) -> bool:
+        return self.look(lambda gripper: gripper.is_moving)
+
+    def writes(self) -> int:
+        """How often the hand has written."""
+        return self.look(lambda gripper: len(gripper.writes)) - 1
+
+
+class Interrupt(KeyboardInterrupt):
+    """As Ctrl-C, and of the test's own: pytest ends with the other one."""
+
+
+@pytest.fixture
+def wire() -> Wire:
+    wire = Wire()
+    wire.activate()
+    return wire
+
+
+@pytest.fixture
+def hand(wire: Wire) -> Iterator[RobotiqHand]:
+    """It has adopted a gripper that is active."""
+    with RobotiqHand(wire) as hand:
+        yield hand
+
+
+class Striker:
+    """Strikes the main thread as Ctrl-C does, whatever it does; once, until it is armed again."""
+
+    def __init__(self) -> None:
+        self.is_armed = True
+        self.struck = 0
+
+    def __call__(self) -> None:
+        main = threading.main_thread().ident
+        assert main is not None
+        signal.pthread_kill(main, signal.SIGUSR1)
+
+    def handle(self, *_: Any) -> None:
+        if self.is_armed:
+            self.is_armed = False
+            self.struck += 1
+            raise Interrupt
+
+
+@pytest.fixture
+def interrupt() -> Iterator[Striker]:
+    striker = Striker()
+    before = signal.signal(signal.SIGUSR1, striker.handle)
+    yield striker
+    signal.signal(signal.SIGUSR1, before)
+
+
+@pytest.fixture(autouse=True)
+def no_thread_is_left() -> Iterator[None]:
+    """The thread of the event loop ends with the last hand and the last call."""
+    yield
+    for thread in loop_threads():
+        thread.join(PATIENCE)
+        assert not thread.is_alive()
+
+
+def loop_threads() -> list[threading.Thread]:
+    return [each for each in threading.enumerate() if each.name == NAME]
+
+
+def until(condition: Callable[[], bool]) -> None:
+    """Wait for what happens in another thread."""
+    due = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < due, "it did not happen"
+        time.sleep(0.001)
+
+
+def in_a_thread(work: Callable[[], object]) -> tuple[threading.Thread, list[object]]:
+    """Begin something in another thread; gives what it returned or raised when the thread has ended."""
+    outcome: list[object] = []
+
+    def run() -> None:
+        try:
+            outcome.append(work())
+        except Exception as error:  # noqa: BLE001  # it is looked at in the test
+            outcome.append(error)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    return thread, outcome

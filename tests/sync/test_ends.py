@@ -1,0 +1,137 @@
+"""What becomes of a blocking hand when the program ends without a word, or is forked."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from robotiq_async import Finger, NotStartedError, State
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.sync import RobotiqHand, caller
+from robotiq_async.wire.request import Request
+from tests.conftest import Clock
+from tests.docs.pages import ROOT
+from tests.sync.conftest import Wire, until
+
+SCRIPT = """
+import sys
+from robotiq_async.sync import RobotiqHand
+
+hand = RobotiqHand(sys.argv[1])
+hand.start()
+hand.command(position=255, speed=0)
+for status in hand.statuses():
+    if status.position(1) > 10:
+        break
+"""
+
+
+async def test_a_program_that_ends_without_stopping_stops_the_fingers() -> None:
+    clock = Clock()
+    gripper = SimulatedGripper(clock)
+    gripper.write(0, Request(activate=True).registers)
+    clock.ahead += 10
+    async with SimulatorServer(gripper) as server:
+        program = (sys.executable, "-c", SCRIPT, server.address)
+        process = await asyncio.create_subprocess_exec(
+            *program, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+        )
+        async with asyncio.timeout(30):
+            printed, _ = await process.communicate()
+        assert process.returncode == 0
+        assert b"not stopped before the program ends; it is now" in printed
+        assert not gripper.is_moving
+        assert 10 < gripper.position(Finger.A) < 200
+
+
+def test_hands_that_were_not_stopped_are_stopped_together(caplog: pytest.LogCaptureFixture) -> None:
+    wires = [Wire(), Wire(), Wire()]
+    for wire in wires:
+        wire.activate()
+    moving, looking, stopped = hands = [RobotiqHand(wire) for wire in wires]
+    wires[1].command(255)
+    for hand in hands:
+        hand.start(activate=False)
+    stopped.stop()
+    for hand in (moving, looking):
+        until(lambda hand=hand: hand.is_activated)  # type: ignore[misc]
+    moving.set_speed(0)
+    moving.set_position(255)
+    until(wires[0].is_moving)
+    before = [wire.writes() for wire in wires]
+    caller._stop_all()
+    assert [hand.state for hand in hands] == [State.SHUTDOWN] * 3
+    assert [wire.is_moving() for wire in wires] == [False, True, False]
+    assert [wire.writes() - written for wire, written in zip(wires, before, strict=True)] == [1, 0, 0]
+    told = [record.message for record in caplog.records if "not stopped before the program" in record.message]
+    assert len(told) == 2
+    caller._stop_all()
+
+
+def test_an_event_loop_that_stands_still_does_not_keep_the_program_from_ending(
+    hand: RobotiqHand, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(caller, "EXIT_S", 0.1)
+    goes_on = threading.Event()
+
+    def stand_still(_: object) -> None:
+        goes_on.wait(10)
+
+    remove = hand.add_listener(stand_still)
+    caller._stop_all()
+    remove()
+    goes_on.set()
+
+
+def in_the_child(check: object) -> int:
+    """The exit code of a forked process: 0 when the check passed there."""
+    assert callable(check)
+    pid = os.fork()
+    if pid == 0:
+        code = 1
+        signal.alarm(10)  # one that hangs is killed
+        try:
+            check()
+            code = 0
+        except BaseException as error:  # noqa: BLE001
+            sys.stderr.write(f"{error!r}\n")
+        finally:
+            os._exit(code)
+    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+
+
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+class TestFork:
+    def test_a_hand_that_runs_stays_with_the_parent(self, hand: RobotiqHand, wire: Wire) -> None:
+        def check() -> None:
+            for use in (hand.halt, hand.stop, lambda: hand.status, lambda: hand.state, hand.statuses):
+                with pytest.raises(RuntimeError, match="stays with the parent"):
+                    use()
+            caller._stop_all()
+            assert "RobotiqHand" in repr(hand)
+
+        written = wire.writes()
+        assert in_the_child(check) == 0
+        assert hand.state is State.RUNNING_IDLE
+        assert wire.writes() == written
+        hand.set_position(30)
+
+    def test_one_that_does_not_run_may_be_started_in_the_child(self, hand: RobotiqHand) -> None:
+        assert hand.is_activated
+        other = RobotiqHand(Wire())
+
+        def check() -> None:
+            with pytest.raises(NotStartedError):
+                other.halt()
+            other.start(activate=False)
+            assert other.state is State.RESET
+            other.stop()
+
+        assert in_the_child(check) == 0

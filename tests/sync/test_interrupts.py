@@ -1,0 +1,176 @@
+"""Ctrl-C while a blocking hand waits: nothing goes on moving, and the event loop goes on."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import random
+import threading
+import time
+from collections.abc import Callable
+
+import pytest
+
+from robotiq_async import Fault, Finger, State
+from robotiq_async.sync import RobotiqHand
+from tests.sync.conftest import PATIENCE, Interrupt, Striker, Wire, in_a_thread, until
+
+A, B = Finger.A, Finger.B
+
+
+def when(condition: Callable[[], bool], strike: Striker) -> None:
+    """Strike as soon as something is so."""
+
+    def watch() -> None:
+        until(condition)
+        strike()
+
+    in_a_thread(watch)
+
+
+def test_a_move_is_held_and_the_hand_goes_on(hand: RobotiqHand, wire: Wire, interrupt: Striker) -> None:
+    when(wire.is_moving, interrupt)
+    with pytest.raises(Interrupt):
+        hand.move(255, A, speed=0)
+    until(lambda: not wire.is_moving())
+    assert wire.targets()[0] < 100
+    assert hand.state is State.RUNNING_IDLE
+    assert hand.statistics.moves == {"cancelled": 1}
+    wire.ahead += 1
+    hand.set_position(200, A)
+
+
+def test_what_moves_is_held_whatever_is_waited_for(hand: RobotiqHand, wire: Wire, interrupt: Striker) -> None:
+    hand.set_speed(0)
+    hand.set_position(255, B)
+    when(wire.is_moving, interrupt)
+    with pytest.raises(Interrupt):
+        for _ in hand.statuses():
+            pass
+    until(lambda: not wire.is_moving())
+    assert wire.targets()[1] < 100
+
+
+def test_a_grip_is_kept(hand: RobotiqHand, wire: Wire, interrupt: Striker) -> None:
+    wire.look(lambda gripper: gripper.place_object(A, 50))
+    hand.set_position(255, A)
+    until(wire.is_moving)
+    wire.ahead += 5
+    until(lambda: hand.status.contacts == A)
+    threading.Timer(0.02, interrupt).start()
+    with pytest.raises(Interrupt):
+        hand.wait_for_state(State.FAULT)
+    assert hand.status.contacts == A
+    assert hand.status.requested_position(A) == 255
+
+
+def test_who_only_looks_writes_nothing(wire: Wire, interrupt: Striker) -> None:
+    wire.command(255)
+    hand = RobotiqHand(wire)
+    hand.start(activate=False)
+    until(wire.is_moving)
+    before = wire.writes()
+    threading.Timer(0.02, interrupt).start()
+    with pytest.raises(Interrupt):
+        for _ in hand.statuses():
+            pass
+    hand.stop(halt=False)
+    assert wire.writes() == before
+    assert wire.is_moving()
+
+
+def test_an_activation_is_taken_back(interrupt: Striker) -> None:
+    wire = Wire()
+    hand = RobotiqHand(wire)
+    hand.start(activate=False)
+    when(wire.is_moving, interrupt)
+    with pytest.raises(Interrupt):
+        hand.activate()
+    assert hand.state is State.RESET
+    assert not wire.is_moving()
+    hand.stop()
+
+
+def test_a_start_is_taken_back(interrupt: Striker) -> None:
+    wire = Wire()
+    when(wire.is_moving, interrupt)
+    with pytest.raises(Interrupt), RobotiqHand(wire) as hand:
+        pytest.fail(f"it never began: {hand}")
+    assert not wire.is_moving()
+    assert not wire.is_open
+
+
+def test_a_release_goes_on(hand: RobotiqHand, wire: Wire, interrupt: Striker) -> None:
+    """It frees what may be trapped, and takes its time."""
+    hand.set_position(200)
+    until(wire.is_moving)
+    wire.ahead += 5
+    wire.look(lambda gripper: gripper.inject_fault(Fault.SCISSOR_BLOCKED))
+    until(lambda: hand.state is State.FAULT)
+    when(lambda: hand.state is State.WF_ATR and wire.is_moving(), interrupt)
+    with pytest.raises(Interrupt):
+        hand.atr()
+    assert hand.state is State.WF_ATR
+    assert wire.is_moving()
+    wire.ahead += 60
+    hand.wait_for_state(State.ATR_DONE, timeout=PATIENCE)
+
+
+def test_a_stop_ends_all_the_same(wire: Wire, interrupt: Striker) -> None:
+    hand = RobotiqHand(wire)
+    hand.start()
+    hand.set_speed(0)
+    hand.set_position(255)
+    until(wire.is_moving)
+    when(lambda: hand.state is State.DO_SHUTDOWN, interrupt)
+    try:
+        hand.stop()
+    except Interrupt:
+        pass
+    else:
+        with pytest.raises(Interrupt):  # it came too late
+            time.sleep(PATIENCE)
+    assert hand.state is State.SHUTDOWN
+    assert not wire.is_moving()
+
+
+def test_a_hand_that_had_just_started_is_stopped(wire: Wire) -> None:
+    class Late(RobotiqHand):
+        def start(self, activate: bool = True) -> None:
+            super().start(activate)
+            raise Interrupt
+
+    hand = Late(wire)
+    with pytest.raises(Interrupt), hand:
+        pytest.fail("it never began")
+    assert hand.state is State.SHUTDOWN
+
+
+def test_wherever_it_strikes_the_hand_is_watched_on(
+    hand: RobotiqHand, wire: Wire, interrupt: Striker
+) -> None:
+    """A lock that the main thread holds when it is struck would keep the event loop for ever."""
+    chance, done = random.Random(7), threading.Event()
+
+    def strike_often() -> None:
+        for _ in range(30):
+            until(lambda: interrupt.is_armed)
+            time.sleep(chance.uniform(0, 0.003))
+            interrupt()
+        done.set()
+
+    thread, _ = in_a_thread(strike_often)
+    for number in itertools.count():
+        if done.is_set():
+            break
+        with contextlib.suppress(Interrupt):
+            interrupt.is_armed = True
+            hand.command(A, speed=number % 256)
+            hand.set_force(number % 256)
+            next(hand.statuses())
+            interrupt.is_armed = False
+    thread.join()
+    assert interrupt.struck > 10
+    polls = hand.statistics.polls
+    until(lambda: hand.statistics.polls > polls + 3)
+    assert hand.state is State.RUNNING_IDLE
