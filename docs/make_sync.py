@@ -33,8 +33,8 @@ from robotiq_async.session.streams import Stream  # noqa: E402
 FOLDER: Final = ROOT / PACKAGE / "sync"
 BY_HAND: Final = frozenset({"__init__", "blocking", "caller", "loop_thread", "streams"})
 """Modules there that are not made."""
-LOOKS: Final = frozenset({"add_listener", "start", "stop", "wait_for_state"})
-"""What commands nothing, or takes back by itself what it began; what gives a stream does not either."""
+COMMANDS: Final = {"add_listener": "False", "start": "activate", "stop": "False", "wait_for_state": "False"}
+"""When a call commands the gripper: always, unless it stands here or gives a stream."""
 DOCSTRINGS: Final = {
     "Observation": "A hand that is looked at.",
     "RobotiqHand": """A Robotiq 3-Finger gripper behind Modbus TCP, a serial line, or simulated, that blocks.
@@ -148,10 +148,9 @@ class _Module:
             raise ValueError(f"{kind.__name__}.{node.name}: nobody knows what {decorators} means here")
         result, what = _result(node, kind), f"self._inner.{node.name}"
         if not decorators:
-            looks = node.name in LOOKS or result is Stream
-            waits = isinstance(node, ast.AsyncFunctionDef)
-            way = {(0, 0): "tell", (1, 0): "look", (0, 1): "ask", (1, 1): "wait"}[looks, waits]
-            what = f"self._caller.{way}(lambda: {what}({_arguments(node)}))"
+            way = "wait" if isinstance(node, ast.AsyncFunctionDef) else "tell"
+            commands = COMMANDS.get(node.name, str(result is not Stream))
+            what = f"self._caller.{way}(lambda: {what}({_arguments(node)}), commands={commands})"
         if result is not None:
             what = f"{result.__name__}({what}, self._caller)"
             if result is not Stream:

@@ -6,7 +6,6 @@ import asyncio
 import atexit
 import contextlib
 import os
-import weakref
 from collections.abc import Callable, Coroutine
 from typing import Any, Final, TypeVar
 
@@ -28,56 +27,58 @@ class Caller:
 
     Attributes:
         hand: the hand, in its event loop.
-        has_asked: whether it has been told to do anything. Of one that has only been looked at, nothing is
+        has_commanded: whether it commands the gripper, since its start. Of one that only looks, nothing is
             written when the program is interrupted or ends.
     """
 
     def __init__(self, hand: AsyncRobotiqHand) -> None:
         """Keep the hand; nothing runs yet."""
         self.hand: Final = hand
-        self.has_asked = False
+        self.has_commanded = False
+        self._calls: set[object] = set()
+        """Those that are being made: what they do cannot be told yet."""
         self._is_left_behind = False
-        _CALLERS.add(self)
 
-    def ask(self, function: Function[T]) -> T:
-        """Make a call that commands, and wait for it.
+    def wait(self, function: Function[T], *, commands: bool) -> T:
+        """Make a call, and wait for it.
+
+        Args:
+            function: what to call.
+            commands: whether it commands the gripper.
 
         Raises:
             BaseException: whatever it raises, or strikes this thread meanwhile.
         """
-        self.has_asked = True
-        return self.wait(function)
+        call = object()
+        self._calls.add(call)
+        _IN_USE.add(self)  # also when the program drops it: it runs on
+        self.has_commanded = self.has_commanded or commands
+        try:
+            return LOOP_THREAD.call(function, interrupted=self._hold)
+        finally:
+            self._calls.discard(call)
+            if not self._calls and not self.is_running:
+                self.has_commanded = False
+                _IN_USE.discard(self)
 
-    def wait(self, function: Function[T]) -> T:
-        """Make a call that only waits, and wait for it.
+    def tell(self, function: Callable[[], T], *, commands: bool) -> T:
+        """Make a call that does not wait. Listeners may do so, too.
 
-        Raises:
-            BaseException: as :meth:`ask`.
-        """
-        return LOOP_THREAD.call(function, interrupted=self._hold if self.has_asked else None)
-
-    def tell(self, function: Callable[[], T]) -> T:
-        """Make a call that commands and does not wait. Listeners may do so, too.
-
-        Raises:
-            Exception: whatever it raises.
-        """
-        self.has_asked = True
-        return self.look(function)
-
-    def look(self, function: Callable[[], T]) -> T:
-        """Make a call that neither commands nor waits.
+        Args:
+            function: what to call.
+            commands: whether it commands the gripper.
 
         Raises:
             Exception: whatever it raises.
         """
         if LOOP_THREAD.is_here:
+            self.has_commanded = self.has_commanded or commands
             return function()
 
         async def call() -> T:
             return function()
 
-        return self.wait(call)
+        return self.wait(call, commands=commands)
 
     def check_process(self) -> None:
         """Refuse a hand that runs in the process that this one was forked from.
@@ -94,6 +95,8 @@ class Caller:
     @property
     def is_running(self) -> bool:
         """Whether the hand has been started, and not stopped."""
+        if self._is_left_behind or self.hand.state is State.SHUTDOWN:
+            return False
         try:
             self.hand.is_activated  # noqa: B018  # asked for what it raises
         except NotStartedError:
@@ -103,11 +106,14 @@ class Caller:
         return True
 
     def after_fork(self) -> None:
-        """This is the child; a hand that ran goes on in the parent."""
+        """This is the child; a hand that ran goes on in the parent, and so do the calls of its threads."""
         self._is_left_behind = self._is_left_behind or self.is_running
+        self._calls.clear()
 
     async def _hold(self) -> None:
         """Let nothing move after Ctrl-C. A grip stays. A release goes on: it frees what may be trapped."""
+        if not self.has_commanded:
+            return
         with contextlib.suppress(RobotiqError):
             if self.hand.state in (State.DO_ACTIVATION, State.WF_ACTIVATION):
                 await self.hand.halt()
@@ -115,29 +121,32 @@ class Caller:
                 await self.hand.hold()
 
 
-_CALLERS: Final[weakref.WeakSet[Caller]] = weakref.WeakSet()
+_IN_USE: Final[set[Caller]] = set()
+"""Those of hands that run, and of those that are called at this moment."""
 
 
 def _stop_all() -> None:
     """The program ends: what it has set going must not go on."""
-    running = [each for each in list(_CALLERS) if each.is_running]
-    for each in running:
+    left = list(_IN_USE)
+    for each in left:
         log.warning("%s: not stopped before the program ends; it is now", each.hand.address)
 
     async def stop() -> None:
         await asyncio.gather(
-            *(each.hand.stop(halt=each.has_asked) for each in running), return_exceptions=True
+            *(each.hand.stop(halt=each.has_commanded) for each in left), return_exceptions=True
         )
 
-    if running and LOOP_THREAD.is_running:
+    if left and LOOP_THREAD.is_running:
         with contextlib.suppress(LateError):
             LOOP_THREAD.call(stop, limit=EXIT_S)
+    _IN_USE.difference_update(left)
 
 
 def _after_fork() -> None:
     LOOP_THREAD.forget()
-    for each in list(_CALLERS):
+    for each in _IN_USE:
         each.after_fork()
+    _IN_USE.clear()
 
 
 # Threads that are daemons still run then: it comes before the interpreter ends.

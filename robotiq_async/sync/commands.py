@@ -28,7 +28,7 @@ class Commands(Recovery):
             RobotiqError: the hand takes no commands now, or the link went down before the
                 acknowledgement (the request is not sent again).
         """
-        self._caller.ask(lambda: self._inner.set_position(value, fingers))
+        self._caller.wait(lambda: self._inner.set_position(value, fingers), commands=True)
 
     def set_speed(self, value: int, fingers: Finger | int = Finger.ALL) -> None:
         """Set the speed of axes, also of a motion under way; never starts one.
@@ -40,7 +40,7 @@ class Commands(Recovery):
         Raises:
             TypeError, ValueError, RobotiqError: as :meth:`set_position`.
         """
-        self._caller.ask(lambda: self._inner.set_speed(value, fingers))
+        self._caller.wait(lambda: self._inner.set_speed(value, fingers), commands=True)
 
     def set_force(self, value: int, fingers: Finger | int = Finger.ALL) -> None:
         """Set the force of axes; never starts a motion. More force tightens a grip.
@@ -52,7 +52,7 @@ class Commands(Recovery):
         Raises:
             TypeError, ValueError, RobotiqError: as :meth:`set_position`.
         """
-        self._caller.ask(lambda: self._inner.set_force(value, fingers))
+        self._caller.wait(lambda: self._inner.set_force(value, fingers), commands=True)
 
     def command(
         self,
@@ -78,7 +78,9 @@ class Commands(Recovery):
             ValueError: an argument outside its range, or none of position, speed and force.
             RobotiqError: the hand takes no commands now.
         """
-        self._caller.tell(lambda: self._inner.command(fingers, position=position, speed=speed, force=force))
+        self._caller.tell(
+            lambda: self._inner.command(fingers, position=position, speed=speed, force=force), commands=True
+        )
 
     def move(
         self,
@@ -114,8 +116,9 @@ class Commands(Recovery):
             ConnectionLostError: the link went down; the gripper may still be moving.
             RobotiqStateError: the hand takes no commands now, or was stopped.
         """
-        return self._caller.ask(
-            lambda: self._inner.move(position, fingers, speed=speed, force=force, timeout=timeout)
+        return self._caller.wait(
+            lambda: self._inner.move(position, fingers, speed=speed, force=force, timeout=timeout),
+            commands=True,
         )
 
     def open(
@@ -127,7 +130,9 @@ class Commands(Recovery):
         timeout: float | None = None,
     ) -> MoveResult:
         """Open fingers: :meth:`move` to 0. Returns and raises what it does."""
-        return self._caller.ask(lambda: self._inner.open(fingers, speed=speed, force=force, timeout=timeout))
+        return self._caller.wait(
+            lambda: self._inner.open(fingers, speed=speed, force=force, timeout=timeout), commands=True
+        )
 
     def close(
         self,
@@ -138,7 +143,9 @@ class Commands(Recovery):
         timeout: float | None = None,
     ) -> MoveResult:
         """Close the fingers, not the connection (that is :meth:`stop`): :meth:`move` to 255."""
-        return self._caller.ask(lambda: self._inner.close(fingers, speed=speed, force=force, timeout=timeout))
+        return self._caller.wait(
+            lambda: self._inner.close(fingers, speed=speed, force=force, timeout=timeout), commands=True
+        )
 
     def hold(self, fingers: Finger | int = Finger.ALL) -> None:
         """Ask axes that move to stay where they are, whoever moves them; returns when it is acknowledged.
@@ -161,7 +168,7 @@ class Commands(Recovery):
             NotActivatedError: the gripper lost its activation before it was sent.
             RobotiqError: not connected, or the link went down before the acknowledgement.
         """
-        self._caller.ask(lambda: self._inner.hold(fingers))
+        self._caller.wait(lambda: self._inner.hold(fingers), commands=True)
 
     def halt(self) -> None:
         """Stop every axis now (rGTO = 0); the next command goes again, and moves only what it addresses.
@@ -178,4 +185,4 @@ class Commands(Recovery):
             StateTimeoutError: an activation or a release was not seen to end within 5 s.
             RobotiqError: not connected, or the link went down before the acknowledgement.
         """
-        self._caller.ask(lambda: self._inner.halt())
+        self._caller.wait(lambda: self._inner.halt(), commands=True)

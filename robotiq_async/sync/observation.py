@@ -83,11 +83,11 @@ class Observation(BlockingHand):
             TypeError: buffer is not an int.
             ValueError: buffer is outside its range.
         """
-        return Stream(self._caller.look(lambda: self._inner.statuses(buffer)), self._caller)
+        return Stream(self._caller.tell(lambda: self._inner.statuses(buffer), commands=False), self._caller)
 
     def transitions(self) -> Stream[Transition]:
         """Every change of state from now on, for one reader, none lost. Ends after :meth:`stop`."""
-        return Stream(self._caller.look(lambda: self._inner.transitions()), self._caller)
+        return Stream(self._caller.tell(lambda: self._inner.transitions(), commands=False), self._caller)
 
     def requests(self, buffer: int | None = None) -> Stream[SentRequest]:
         """Every request written from now on, for one reader. Ends after :meth:`stop`.
@@ -99,7 +99,7 @@ class Observation(BlockingHand):
             TypeError: buffer is not an int.
             ValueError: buffer is outside its range.
         """
-        return Stream(self._caller.look(lambda: self._inner.requests(buffer)), self._caller)
+        return Stream(self._caller.tell(lambda: self._inner.requests(buffer), commands=False), self._caller)
 
     def add_listener(
         self, callback: Callable[[RobotiqStatus | Transition | SentRequest], None]
@@ -123,7 +123,7 @@ class Observation(BlockingHand):
         Raises:
             TypeError: callback cannot be called, or is a coroutine function.
         """
-        return self._caller.look(lambda: self._inner.add_listener(callback))
+        return self._caller.tell(lambda: self._inner.add_listener(callback), commands=False)
 
     def wait_for_state(self, *states: State, timeout: float | None = None) -> State:
         """Wait until the hand is, if only for a moment, in one of these states, and return it.
@@ -139,4 +139,4 @@ class Observation(BlockingHand):
             NotStartedError: the hand is not started, or was stopped meanwhile.
             RobotiqConnectionError: the hand gave up on its link.
         """
-        return self._caller.wait(lambda: self._inner.wait_for_state(*states, timeout=timeout))
+        return self._caller.wait(lambda: self._inner.wait_for_state(*states, timeout=timeout), commands=False)

@@ -111,7 +111,7 @@ class RobotiqHand(Commands):
             NotActivatedError: the gripper was reset during the activation that was begun.
             ActivationTimeoutError: the activation was not finished in time.
         """
-        self._caller.wait(lambda: self._inner.start(activate))
+        self._caller.wait(lambda: self._inner.start(activate), commands=activate)
 
     def stop(self, *, halt: bool = True) -> None:
         """Stop the fingers (rGTO = 0), keep the activation, disconnect. Idempotent.
@@ -123,4 +123,4 @@ class RobotiqHand(Commands):
         Args:
             halt: False disconnects and leaves the fingers to what they do; for programs that only look.
         """
-        self._caller.wait(lambda: self._inner.stop(halt=halt))
+        self._caller.wait(lambda: self._inner.stop(halt=halt), commands=False)

@@ -13,7 +13,7 @@ import pytest
 from robotiq_async.enums import Finger
 from robotiq_async.errors import ConnectionLostError
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.sync import RobotiqHand
+from robotiq_async.sync import RobotiqHand, caller
 from robotiq_async.sync.loop_thread import NAME
 from robotiq_async.wire.registers import Registers
 from robotiq_async.wire.request import AxisRequest, Request
@@ -130,6 +130,7 @@ def no_thread_is_left() -> Iterator[None]:
     for thread in loop_threads():
         thread.join(PATIENCE)
         assert not thread.is_alive()
+    assert not caller._IN_USE
 
 
 def loop_threads() -> list[threading.Thread]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import gc
 import os
 import signal
 import subprocess
@@ -74,6 +76,33 @@ def test_hands_that_were_not_stopped_are_stopped_together(caplog: pytest.LogCapt
     caller._stop_all()
 
 
+def test_a_hand_that_the_program_has_dropped_is_stopped_too(wire: Wire) -> None:
+    """It runs on, and nobody could stop it any more."""
+
+    def begin() -> None:
+        hand = RobotiqHand(wire)
+        hand.start()
+        hand.set_speed(0)
+        hand.set_position(255)
+
+    begin()
+    gc.collect()
+    until(wire.is_moving)
+    caller._stop_all()
+    assert not wire.is_moving()
+    assert not caller._IN_USE
+
+
+def test_what_is_in_use_is_forgotten_when_it_ends(wire: Wire) -> None:
+    hand = RobotiqHand(wire)
+    for begin in (lambda: hand.start(activate=False), hand.halt, lambda: hand.move(256)):
+        with contextlib.suppress(NotStartedError, ValueError):
+            begin()
+        hand.stop()
+        assert not caller._IN_USE
+        assert not hand._caller.has_commanded
+
+
 def test_an_event_loop_that_stands_still_does_not_keep_the_program_from_ending(
     hand: RobotiqHand, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -114,7 +143,7 @@ class TestFork:
             for use in (hand.halt, hand.stop, lambda: hand.status, lambda: hand.state, hand.statuses):
                 with pytest.raises(RuntimeError, match="stays with the parent"):
                     use()
-            caller._stop_all()
+            assert not caller._IN_USE, "it is not ours to stop"
             assert "RobotiqHand" in repr(hand)
 
         written = wire.writes()
