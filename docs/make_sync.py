@@ -28,11 +28,16 @@ if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
 
 from robotiq_async import RobotiqHand  # noqa: E402
+from robotiq_async.hand.grasping import GripEvents  # noqa: E402
 from robotiq_async.session.streams import Stream  # noqa: E402
 
 FOLDER: Final = ROOT / PACKAGE / "sync"
 BY_HAND: Final = frozenset({"__init__", "blocking", "caller", "loop_thread", "streams"})
 """Modules there that are not made."""
+STREAMS: Final = (Stream, GripEvents)
+"""Their blocking ones are not made either."""
+ABOUT_ERRORS: Final = "tells_its_hand"
+"""A decorator that changes nothing of what a method gives: what it raises has been told its hand by then."""
 COMMANDS: Final = {"add_listener": "False", "start": "activate", "stop": "False", "wait_for_state": "False"}
 """When a call commands the gripper: always, unless it stands here or gives a stream."""
 DOCSTRINGS: Final = {
@@ -127,9 +132,9 @@ class _Module:
 
     def _base(self, kind: type, root: str) -> str:
         if kind.__bases__ != (object,):
-            (base,) = kind.__bases__
-            self._import(f".{_module_name(base)}", base.__name__)
-            return base.__name__
+            for base in kind.__bases__:
+                self._import(f".{_module_name(base)}", base.__name__)
+            return ", ".join(base.__name__ for base in kind.__bases__)
         self._import(".blocking", root)
         if root == "BlockingHand":
             return root
@@ -143,23 +148,25 @@ class _Module:
         return self._function(node, f"{made}\nsuper().__init__(hand, Caller(hand))")
 
     def _method(self, node: _Function, kind: type, parts: list[type]) -> ast.stmt:
+        node.decorator_list = [each for each in node.decorator_list if ast.unparse(each) != ABOUT_ERRORS]
         decorators = [ast.unparse(each) for each in node.decorator_list]
         if decorators not in ([], ["property"]):
             raise ValueError(f"{kind.__name__}.{node.name}: nobody knows what {decorators} means here")
         result, what = _result(node, kind), f"self._inner.{node.name}"
         if not decorators:
             way = "wait" if isinstance(node, ast.AsyncFunctionDef) else "tell"
-            commands = COMMANDS.get(node.name, str(result is not Stream))
+            commands = COMMANDS.get(node.name, str(result not in STREAMS))
             what = f"self._caller.{way}(lambda: {what}({_arguments(node)}), commands={commands})"
         if result is not None:
             what = f"{result.__name__}({what}, self._caller)"
-            if result is not Stream:
+            if result not in STREAMS:
                 parts.append(result)
         is_none = isinstance(node.returns, ast.Constant) and node.returns.value is None
         return self._function(node, what if is_none else f"return {what}", result)
 
     def _function(self, node: _Function, body: str, result: type | None = None) -> ast.stmt:
         """A function with the parameters and the docstring of another, and another body."""
+        node.args.args[0].annotation = None  # what the async method asks of its hand
         for each in (*ast.walk(node.args), *(ast.walk(node.returns) if node.returns else ())):
             if isinstance(each, ast.Name):
                 self._import_as_there(each.id, result)
@@ -172,7 +179,7 @@ class _Module:
     def _import_as_there(self, name: str, result: type | None) -> None:
         """Import a name from where the async module has it; of a blocking class from where that is."""
         if result is not None and name == result.__name__:
-            self._import(".streams" if result is Stream else f".{_module_name(result)}", name)
+            self._import(".streams" if result in STREAMS else f".{_module_name(result)}", name)
             return
         for node in ast.walk(self._tree):
             if isinstance(node, ast.ImportFrom) and name in (each.asname or each.name for each in node.names):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from ..calibration import Units
 from ..enums import State
 from ..session.statistics import Statistics
 from ..session.streams import SentRequest, Transition
@@ -19,9 +20,22 @@ class Observation(BlockingHand):
     """A hand that is looked at."""
 
     @property
+    def name(self) -> str:
+        """What the hand is called: what its constructor was given, or else its address."""
+        return self._inner.name
+
+    @property
     def address(self) -> str:
         """The gripper's address in its full form; for a transport object, what messages call it."""
         return self._inner.address
+
+    @property
+    def units(self) -> Units:
+        """Converts mm, mm/s, seconds and newton labels to what commands take, and back.
+
+        By the calibrations that the hand was made with; there before the start.
+        """
+        return self._inner.units
 
     @property
     def state(self) -> State:

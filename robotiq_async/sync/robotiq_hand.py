@@ -5,7 +5,7 @@ Made from robotiq_async.hand.robotiq_hand by docs/make_sync.py.
 
 from __future__ import annotations
 
-from ..calibration import SpeedCalibration
+from ..calibration import ForceCalibration, SpeedCalibration
 from ..enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..hand import RobotiqHand as AsyncRobotiqHand
 from ..link.transport import Transport
@@ -13,9 +13,10 @@ from ..session.options import ACTIVATION_TIMEOUT_S, CONNECT_TIMEOUT_S, POLL_INTE
 from ..session.reconnecting import ReconnectPolicy
 from .caller import Caller
 from .commands import Commands
+from .grasping import Grasping
 
 
-class RobotiqHand(Commands):
+class RobotiqHand(Commands, Grasping):
     """A Robotiq 3-Finger gripper behind Modbus TCP, a serial line, or simulated, that blocks.
 
     Use it as ``with RobotiqHand(address) as hand:``, or call :meth:`start` and :meth:`stop`. The calls, their
@@ -35,6 +36,7 @@ class RobotiqHand(Commands):
         self,
         address: str | Transport = "sim://",
         *,
+        name: str | None = None,
         device_id: int | None = None,
         poll_interval: float = POLL_INTERVAL_S,
         connect_timeout: float = CONNECT_TIMEOUT_S,
@@ -46,6 +48,8 @@ class RobotiqHand(Commands):
         request_address: int | None = None,
         status_address: int | None = None,
         calibration: SpeedCalibration | None = None,
+        force_calibration: ForceCalibration | None = None,
+        keep_grip: bool = False,
     ) -> None:
         """Check every option. Opens nothing and needs no running loop.
 
@@ -56,6 +60,8 @@ class RobotiqHand(Commands):
         Args:
             address: ``tcp://HOST[:502]`` (or HOST, HOST:PORT), ``rtu:///dev/ttyUSB0``, ``sim://`` (or
                 ``sim://?speedup=10&object=150``), or a transport object.
+            name: what to call this hand, in 1..64 printable characters: errors and the log begin with it,
+                metrics and recordings have it. None calls it by its address.
             device_id: Modbus unit id, 1..247; by default 2 over TCP and 9 over RTU. Two hands on one TCP
                 address need one each: that of their gripper behind the gateway.
             poll_interval: seconds between polls, 0.001..0.1.
@@ -67,8 +73,11 @@ class RobotiqHand(Commands):
             force: what the axes get until set otherwise, 0..255.
             request_address: first request register; by default 0 over TCP and 0x03E8 over RTU.
             status_address: first status register; by default 0 over TCP and 0x07D0 over RTU.
-            calibration: how fast this gripper is: default timeouts of moves come from it. None for the
-                thesis's gripper.
+            calibration: how fast this gripper is: default timeouts of moves come from it, and the speeds of
+                :attr:`units`. None for the thesis's gripper.
+            force_calibration: what :attr:`units` labels force values with. None for the manual's figures.
+            keep_grip: what :meth:`stop` does unless told: False stops the fingers for certain (rGTO = 0),
+                True holds what moves and lets a grip stay in force. It is also what leaving the block does.
 
         Raises:
             TypeError: an option of the wrong type.
@@ -76,6 +85,7 @@ class RobotiqHand(Commands):
         """
         hand = AsyncRobotiqHand(
             address,
+            name=name,
             device_id=device_id,
             poll_interval=poll_interval,
             connect_timeout=connect_timeout,
@@ -87,6 +97,8 @@ class RobotiqHand(Commands):
             request_address=request_address,
             status_address=status_address,
             calibration=calibration,
+            force_calibration=force_calibration,
+            keep_grip=keep_grip,
         )
         super().__init__(hand, Caller(hand))
 
@@ -113,14 +125,21 @@ class RobotiqHand(Commands):
         """
         self._caller.wait(lambda: self._inner.start(activate), commands=activate)
 
-    def stop(self, *, halt: bool = True) -> None:
+    def stop(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:
         """Stop the fingers (rGTO = 0), keep the activation, disconnect. Idempotent.
 
         Ends within 2 s even on a dead link, and also when cancelled meanwhile: the cancellation is
         raised once the hand has stopped. If the link is down, it is tried once more. What other tasks
         wait for ends with NotStartedError.
 
+        With ``keep_grip`` axes that move are held where they are, and rGTO stays set, so that what grips
+        goes on gripping while nobody is connected. But only when every axis has been seen at rest: on any
+        doubt (within half a second one has not come to rest; the link is or goes down; a fault; a sequence;
+        another client commands the gripper; ``halt()`` was asked) rGTO is cleared as ever, and the log says
+        why. What a real gripper does with either is not known.
+
         Args:
             halt: False disconnects and leaves the fingers to what they do; for programs that only look.
+            keep_grip: whether a grip stays in force; None for what the hand was made with.
         """
-        self._caller.wait(lambda: self._inner.stop(halt=halt), commands=False)
+        self._caller.wait(lambda: self._inner.stop(halt=halt, keep_grip=keep_grip), commands=False)
