@@ -47,5 +47,6 @@ for distro in "$@"; do
     # shellcheck disable=SC2086
     .venv-ros2/"$distro"/bin/python -m pytest -p tests.ros2.live.fixtures --numprocesses 3 --dist loadfile \
         ${TESTS:-tests/ros2/live/goals.py tests/ros2/live/lifecycle.py tests/ros2/live/topics.py \
-        tests/ros2/live/failures.py tests/ros2/live/bridge.py tests/ros2/live/messages.py}
+        tests/ros2/live/failures.py tests/ros2/live/bridge.py tests/ros2/live/messages.py \
+        tests/ros2/live/installed.py tests/ros2/live/other_host.py}
 done

@@ -82,3 +82,30 @@ async def test_a_silent_agent_is_a_link_that_is_down() -> None:
         with pytest.raises(RefusedError, match="the link to the gripper is down"):
             await connection.check_goal()
         await connection.close("the end")
+
+
+@virtual
+async def test_after_a_halt_from_elsewhere_the_node_has_to_be_configured_anew() -> None:
+    async with lab() as here:
+        connection = Connection(here.client(control=None), SETTINGS)
+        await connection.open()
+        await connection.permit()
+        goal = asyncio.create_task(connection.run_goal(b"1", CLOSE, SETTINGS, lambda: None, 0))
+        async for status in connection.hand.statuses():
+            if status.position(Finger.A) > 40:
+                break
+        other = here.client("other", control=False)
+        await other.start(activate=False)
+        await other.halt()
+        assert (await goal).ending is Ending.ABORTED
+        again = await connection.run_goal(b"2", CLOSE, SETTINGS, lambda: None, 0)
+        assert again.ending is Ending.ABORTED
+        assert "is not commanded from here any more" in again.reason
+        assert not here.gripper.is_moving
+        await connection.close("the node was cleaned up")
+        anew = Connection(here.client("anew", control=None), SETTINGS)
+        await anew.open()
+        await anew.permit()
+        assert (await anew.run_goal(b"3", CLOSE, SETTINGS, lambda: None, 0)).ending is Ending.SUCCEEDED
+        await anew.close("the end")
+        await other.stop()

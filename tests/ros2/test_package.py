@@ -5,11 +5,14 @@ from __future__ import annotations
 import ast
 import os
 import re
+import subprocess
+import sys
 import tomllib
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import robotiq_async
+from robotiq_async.description import HandModel, hand_model
 from robotiq_async.ros2.gripper.connection import COMMANDS
 from robotiq_async.ros2.translation.settings import PARAMETERS
 
@@ -58,3 +61,9 @@ def test_the_page_has_every_parameter_and_service() -> None:
     rows = set(re.findall(r"`([^`]+)`", "".join(re.findall(r"^\| `[^|]*\|", PAGE, re.MULTILINE))))
     assert set(PARAMETERS) <= rows
     assert {f"~/{name}" for name in COMMANDS} <= rows
+
+
+def test_the_description_for_robot_state_publisher_is_one() -> None:
+    (script,) = re.findall(r'^python -c "(.*)" > hand\.urdf$', PAGE, re.MULTILINE)
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert HandModel.parse(done.stdout) == hand_model()

@@ -28,11 +28,11 @@ def isolate() -> None:
 class Process:
     """A child of the tests, and what it prints."""
 
-    def __init__(self, *arguments: str) -> None:
-        """Start this interpreter with arguments."""
+    def __init__(self, *arguments: str, program: str = sys.executable) -> None:
+        """Start a program with arguments: this interpreter, unless another one is named."""
         environment = {name: value for name, value in os.environ.items() if name not in BOOTSTRAP}
         self._child = subprocess.Popen(
-            [sys.executable, *arguments],
+            [program, *arguments],
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
