@@ -145,7 +145,7 @@ class PageServer:
 
     async def _tell(self) -> None:
         assert self._process.stdin is not None
-        while True:
+        while not self._over.is_set():  # then nobody reads it
             for news in self.news:
                 news.gather()
             if self._commands.under_way and now() - self._heard_at > SILENCE_S:

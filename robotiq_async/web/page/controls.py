@@ -73,7 +73,7 @@ class Controls:
 
         with ui.dialog() as dialog, ui.card():
             ui.label(f"{action.name.capitalize()}: {action.what}").classes("text-lg")
-            ui.label(action.warning).classes("text-negative")
+            ui.label(action.warning).classes("rq-red")
             with ui.row().classes("w-full justify-end"):
                 ui.button("no", on_click=dialog.close).props("flat no-caps")
                 sure = ui.button(f"yes, {action.name}", color="negative").props("no-caps")
@@ -107,5 +107,5 @@ class Controls:
         if self._outcome.is_deleted:
             return
         self._outcome.set_text(f"{name}: {words}")
-        self._outcome.classes(add="" if ok else "text-negative", remove="text-negative" if ok else "")
+        self._outcome.classes(add="" if ok else "rq-red", remove="rq-red" if ok else "")
         self._told(f"{name}: {words}")

@@ -43,13 +43,14 @@ STYLE: Final = """
 .rq-halt { min-height: 4rem; font-size: 1.5rem !important; font-weight: 700; letter-spacing: .1em; }
 .rq-stage { border-radius: 4px; overflow: hidden; }
 .body--dark .rq-stage { filter: brightness(.8); }
-.body--dark .text-negative { color: #ff7b72 !important; }
+.rq-red { color: #c10015; }
+.body--dark .rq-red { color: #ff7b72; }
 .rq-cut-words { display: none; position: fixed; top: 3.5rem; left: 50%; translate: -50%; z-index: 7000;
   width: max-content; max-width: calc(100vw - 1.5rem); padding: .6rem 1rem; border-radius: 4px;
   background: #b00020; color: #fff; font-weight: 600; box-shadow: 0 2px 8px #0008; }
 .rq-cut .rq-cut-words { display: block; }
 .rq-cut .nicegui-content { opacity: .4; filter: grayscale(1); }
-.rq-cut .rq-halt { opacity: .4; }
+.rq-cut .rq-halt { filter: grayscale(1); }
 #popup { display: none; }
 .nicegui-content { padding: .75rem; padding-bottom: 6rem; }
 </style>

@@ -34,9 +34,7 @@ class StatePanel:
         self._state.props(f"color={color}")
         words, is_serious = fault_words(hand)
         self._fault.set_text(words)
-        self._fault.classes(
-            add="text-negative" if is_serious else "", remove="" if is_serious else "text-negative"
-        )
+        self._fault.classes(add="rq-red" if is_serious else "", remove="" if is_serious else "rq-red")
 
 
 class AxesPanel:
