@@ -53,10 +53,11 @@ def demo(
 @asynccontextmanager
 async def _shown(hand: Hand) -> AsyncIterator[None]:
     """Show a hand on a page, and begin when somebody looks."""
+    from ...telemetry.payloads import title
     from ...web.server import PageServer
     from ...web.settings import PageSettings
 
-    async with PageServer([hand], PageSettings(port=0, addresses=(hand.address,))) as page:
+    async with PageServer([hand], PageSettings(port=0, addresses=(title(hand),))) as page:
         print(f"Watch it move: {page.url}", flush=True)
         if not await open_page(page.url):
             print(f"No screen here: open it yourself. It begins then, or in {PATIENCE_S:g} s.", flush=True)

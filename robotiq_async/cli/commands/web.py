@@ -14,7 +14,7 @@ from cyclopts import Parameter
 from ...actions import Operator
 from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...errors import RobotiqError
-from ...telemetry.payloads import printable
+from ...telemetry.payloads import printable, title
 from ..arguments import USUAL, Address, Byte, Link, Port, is_loopback, need
 from ..browser import open_page
 from ..failures import CommandError, UsageError, usage
@@ -81,7 +81,7 @@ async def web(
             port=port,
             control=control,
             loopback=is_loopback(host),
-            addresses=tuple(operator.hand.address for operator in operators),
+            addresses=tuple(title(operator.hand) for operator in operators),
             speed=speed,
             force=force,
             password=_password(password_file),
