@@ -82,10 +82,11 @@ class Mode(IntEnum):
 
 
 class ObjectStatus(IntEnum):
-    """gDTA, gDTB, gDTC, gDTS: what an axis does.
+    """gDTA, gDTB, gDTC, gDTS: what an axis does, as the gripper says it.
 
-    The thesis's table swaps 1 and 2; the hardware reports 1 for a contact while opening
-    (see docs/thesis-map.md).
+    It says IN_MOTION of an axis at rest, too, if that was never asked to go: what people read is
+    :meth:`RobotiqStatus.axis_state`. The thesis's table swaps 1 and 2; the hardware reports 1 for a contact
+    while opening (see docs/thesis-map.md).
     """
 
     IN_MOTION = 0

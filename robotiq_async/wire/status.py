@@ -15,6 +15,7 @@ NO_REQUEST: Final = "NO_REQUEST"
 
 _set = object.__setattr__
 _INDEX = {axis: index for index, axis in enumerate(AXES)}
+_NAMES = names_of(Finger.ALL)
 
 
 def _masks(wanted: Callable[[ObjectStatus], bool]) -> tuple[Finger, ...]:
@@ -33,6 +34,9 @@ def _masks(wanted: Callable[[ObjectStatus], bool]) -> tuple[Finger, ...]:
 
 _MOVING = _masks(lambda what: what is ObjectStatus.IN_MOTION)
 _CONTACTS = _masks(lambda what: what.is_contact)
+_CONTACT_NAMES = tuple(names_of(axes) for axes in _CONTACTS)
+_STATES = tuple(what.name for what in ObjectStatus)
+_STATES_WITHOUT_REQUEST = (NO_REQUEST, *_STATES[1:])
 
 
 class RobotiqStatus:
@@ -112,9 +116,7 @@ class RobotiqStatus:
         Raises:
             TypeError, ValueError: as :meth:`finger_status`.
         """
-        axis = check_axis(finger)
-        what = self.finger_status(axis)
-        return NO_REQUEST if what is ObjectStatus.IN_MOTION and axis not in self.moving else what.name
+        return self._states[reg.gDT[_INDEX[check_axis(finger)]].read(self._registers)]
 
     def position(self, finger: Finger | int) -> int:
         """Position in counts, 0..255: open reads 6-7, closed 240 or more (gPO)."""
@@ -200,7 +202,16 @@ class RobotiqStatus:
     @property
     def moving(self) -> Finger:
         """The axes that move (empty when none does)."""
-        return _MOVING[self._registers[0] & 0xFF] if self.go_echo and self.is_activated else Finger(0)
+        return _MOVING[self._registers[0] & 0xFF] if self._is_under_request else Finger(0)
+
+    @property
+    def _is_under_request(self) -> bool:
+        return self.go_echo and self.is_activated
+
+    @property
+    def _states(self) -> tuple[str, ...]:
+        """What :meth:`axis_state` says for each gDT."""
+        return _STATES if self._is_under_request else _STATES_WITHOUT_REQUEST
 
     @property
     def contacts(self) -> Finger:
@@ -214,12 +225,14 @@ class RobotiqStatus:
         below its name (``A``, ``B``, ``C``, ``SCISSOR``), and ``fault_code`` is the fault's number.
         :meth:`from_registers` makes the same status of the first three again.
         """
+        # By register and not by property where there are many: a recorder does this at every poll.
+        words, fault, states = self._registers, self.fault, self._states
         return {
-            "registers": list(self._registers),
+            "registers": list(words),
             "timestamp": self._timestamp,
             "sequence": self._sequence,
-            "fault": self.fault.name,
-            "fault_code": int(self.fault),
+            "fault": fault.name,
+            "fault_code": int(fault),
             "is_activated": self.is_activated,
             "is_reset": self.is_reset,
             "is_moving": self.is_moving,
@@ -227,15 +240,15 @@ class RobotiqStatus:
             "mode": self.mode.name,
             "activation_echo": self.activation_echo,
             "go_echo": self.go_echo,
-            "contacts": names_of(self.contacts),
+            "contacts": list(_CONTACT_NAMES[words[0] & 0xFF]),
             **{
-                str(axis.name): {
-                    "position": self.position(axis),
-                    "requested_position": self.requested_position(axis),
-                    "current_ma": self.current_ma(axis),
-                    "axis_state": self.axis_state(axis),
+                name: {
+                    "position": reg.gPO[n].read(words),
+                    "requested_position": reg.gPR[n].read(words),
+                    "current_ma": reg.gCU[n].read(words) * reg.MILLIAMPERE_PER_COUNT,
+                    "axis_state": states[reg.gDT[n].read(words)],
                 }
-                for axis in AXES
+                for n, name in enumerate(_NAMES)
             },
         }
 

@@ -53,11 +53,12 @@ def demo(
 @asynccontextmanager
 async def _shown(hand: Hand) -> AsyncIterator[None]:
     """Show a hand on a page, and begin when somebody looks."""
+    from ...telemetry.payloads import title
     from ...web.server import PageServer
     from ...web.settings import PageSettings
 
     async with (
-        PageServer([hand], PageSettings(port=0, addresses=(hand.address,))) as page,
+        PageServer([hand], PageSettings(port=0, addresses=(title(hand),))) as page,
         opened(page.url) as is_opened,
     ):
         print(f"Watch it move: {page.url}")

@@ -14,7 +14,7 @@ from cyclopts import Parameter
 from ...actions import Operator
 from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...errors import RobotiqError
-from ...telemetry.payloads import printable
+from ...telemetry.payloads import printable, title
 from ..arguments import USUAL, Address, Byte, Link, Port, need
 from ..browser import opened
 from ..failures import CommandError, UsageError, usage
@@ -81,7 +81,7 @@ async def web(
             host=host,
             port=port,
             control=control,
-            addresses=tuple(operator.hand.address for operator in operators),
+            addresses=tuple(title(operator.hand) for operator in operators),
             speed=speed,
             force=force,
             password=_password(password_file),
