@@ -25,7 +25,7 @@ from ..log import log
 from ..wire.request import Request
 from ..wire.status import RobotiqStatus
 from .callers import Callers
-from .keeping import Keeping
+from .keeping import Keeping, tell_of_lost_grips
 from .merging import merged
 from .motion import Move
 from .pending import Command
@@ -165,9 +165,7 @@ class Controller:
 
     def stop(self) -> None:
         """The hand is being stopped: nothing more is taken, and whoever waits is told."""
-        is_running, halts = self.machine.state in RUNNING, self._callers.pending.halting is not None
-        running = "" if is_running else f"the hand was in {self.machine.state.name}"
-        self._keeping.doubt = "halt() was asked for" if halts else running
+        self._keeping.begin(self.machine.state, halts=self._callers.pending.halting is not None)
         self.machine.fire(Trigger.ASK_STOP)
         self._callers.fail(NotStartedError("the hand was stopped"))
         self.machine.drop_sequence()
@@ -272,7 +270,7 @@ class Controller:
             return None
         sent = self._callers.take()
         if image.go and not shadow.base.go:
-            _tell_of_lost_grips(status.contacts & ~shadow.gripping(status) & ~sent.moved)
+            tell_of_lost_grips(shadow, status, sent.moved)
         number = shadow.writing(image, sent.moved, now)
         if sent.positions:
             self._callers.moves.written(number)
@@ -390,9 +388,3 @@ class Controller:
             # Which axes drift is decided when the hold is written: a command that was sent just before
             # may not act yet, and its motion would begin when the fault clears.
             self._callers.hold(self._shadow.ours, "the fingers are held")
-
-
-def _tell_of_lost_grips(axes: Finger) -> None:
-    """Setting rGTO drives every axis; those that were adopted without it have no request but their place."""
-    if axes:
-        log.warning("%s touched something while rGTO was clear: asked to stay there, and grip no more", axes)

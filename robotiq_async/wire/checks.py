@@ -134,9 +134,6 @@ def check_timeout(name: str, value: object) -> float | None:
     return float(value)
 
 
-_SINGLE: Final = frozenset(_BY_VALUE.values())
-
-
 def check_flag(name: str, value: object) -> bool:
     """True or False.
 
@@ -146,3 +143,6 @@ def check_flag(name: str, value: object) -> bool:
     if not isinstance(value, bool):
         raise TypeError(f"{name} must be True or False, got {value!r}")
     return value
+
+
+_SINGLE: Final = frozenset(_BY_VALUE.values())
