@@ -164,9 +164,7 @@ class Controller:
 
     def stop(self) -> None:
         """The hand is being stopped: nothing more is taken, and whoever waits is told."""
-        is_running, halts = self.machine.state in RUNNING, self._callers.pending.halting is not None
-        running = "" if is_running else f"the hand was in {self.machine.state.name}"
-        self._keeping.doubt = "halt() was asked for" if halts else running
+        self._keeping.begin(self.machine.state, halts=self._callers.pending.halting is not None)
         self.machine.fire(Trigger.ASK_STOP)
         self._callers.fail(NotStartedError("the hand was stopped"))
         self.machine.drop_sequence()
@@ -271,7 +269,7 @@ class Controller:
             return None
         sent = self._callers.take()
         if image.go and not shadow.base.go:
-            self._tell_of_lost_grips(status.contacts & ~shadow.gripping(status) & ~sent.moved)
+            self._keeping.tell_of_lost_grips(status, sent.moved)
         number = shadow.writing(image, sent.moved, now)
         if sent.positions:
             self._callers.moves.written(number)
@@ -376,13 +374,6 @@ class Controller:
             MoveSupersededError("another client commands the gripper"),
             lambda move: move.write is not None and not move.is_under(status),
         )
-
-    def _tell_of_lost_grips(self, axes: Finger) -> None:
-        """Setting rGTO drives every axis; those adopted without it have no request but their place."""
-        if axes:
-            self.machine.log.warning(
-                "%s touched something while rGTO was clear: asked to stay there, and grip no more", axes
-            )
 
     def _leave(self, after: State, status: RobotiqStatus) -> None:
         """The gripper is not active any more, or reports a fault: nothing asked before may resume."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ..enums import NO_AXES, Fault, Finger
+from ..enums import NO_AXES, Fault, Finger, State
 from ..log import Log, log
 from ..wire.request import Request
 from ..wire.status import RobotiqStatus
@@ -19,6 +19,7 @@ from .merging import merged
 from .pending import PendingCommand
 from .sequences import Sequence, stop_fingers
 from .shadow import RequestShadow
+from .state_machine import RUNNING
 from .triggers import Trigger, classify
 
 KEEP_S: Final = 0.5
@@ -32,17 +33,17 @@ no motion left unseen."""
 class Keeping:
     """Judges the statuses of a hand that is being stopped and is to keep its grip."""
 
-    def __init__(self, shadow: RequestShadow, doubt: str = "", *, log: Log = log) -> None:
-        """Judge by what the gripper was asked.
-
-        Args:
-            shadow: what it was asked.
-            doubt: why rGTO is to be cleared, if that is known already.
-            log: that of the hand.
-        """
+    def __init__(self, shadow: RequestShadow, *, log: Log = log) -> None:
+        """Judge by what the gripper was asked; ``log`` is that of the hand."""
         self._shadow = shadow
-        self.doubt = doubt
         self._log = log
+        self.doubt = ""
+        """Why rGTO is to be cleared, whatever the statuses show."""
+
+    def begin(self, state: State, *, halts: bool) -> None:
+        """The hand is being stopped in a state, perhaps with a halt that has not been sent."""
+        running = "" if state in RUNNING else f"the hand was in {state.name}"
+        self.doubt = "halt() was asked for" if halts else running
 
     def rests(self, status: RobotiqStatus) -> bool:
         """Whether a status shows every axis at rest under what it was asked last, and no fault."""
@@ -95,3 +96,16 @@ class Keeping:
         held = PendingCommand(hold=Finger.ALL)
         image = merged(shadow.base, held, status, gripping=NO_AXES, arrived=shadow.arrived)
         return None if image == shadow.base else image
+
+    def tell_of_lost_grips(self, status: RobotiqStatus, moved: Finger) -> None:
+        """The next image sets rGTO, which drives every axis; one that was adopted without it has but its place.
+
+        Args:
+            status: the newest one.
+            moved: the axes that get a position.
+        """
+        axes = status.contacts & ~self._shadow.gripping(status) & ~moved
+        if axes:
+            self._log.warning(
+                "%s touched something while rGTO was clear: asked to stay there, and grip no more", axes
+            )

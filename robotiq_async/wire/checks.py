@@ -170,9 +170,6 @@ def check_timeout(name: str, value: object) -> float | None:
     return number
 
 
-_SINGLE: Final = frozenset(_BY_VALUE.values())
-
-
 def check_flag(name: str, value: object) -> bool:
     """True or False.
 
@@ -182,3 +179,6 @@ def check_flag(name: str, value: object) -> bool:
     if not isinstance(value, bool):
         raise TypeError(f"{name} must be True or False, got {value!r}")
     return value
+
+
+_SINGLE: Final = frozenset(_BY_VALUE.values())

@@ -95,6 +95,8 @@ async def test_states_and_buffers(hand: RobotiqHand) -> None:
         ("activation_timeout", 0),
         ("reconnect", "yes"),
         ("reconnect", 1),
+        ("keep_grip", 1),
+        ("keep_grip", None),
         ("speed", 256),
         ("force", -1),
         ("force", 1.0),

@@ -16,8 +16,9 @@ from ..failures import usage
 WARNING = """this MOVES {fingers} to {position}.
 If it is not active yet ALL its fingers open and close to their stops first, and what they hold drops."""
 
-IN_FORCE = "rGTO stays set: the grip is in force, and nobody is connected."
-LET_GO = "rGTO is clear now: what is held may fall. With --keep it stays set."
+IN_FORCE = "rGTO stays set: the grip is in force."
+LET_GO = "rGTO is clear now: what is held may fall."
+HINT = " With --keep it stays set."
 
 
 def move(
@@ -89,4 +90,4 @@ async def _move(
         result = await hand.move(position, fingers, speed=speed, force=force, timeout=timeout)
     print_outcomes(result)
     if result.object_detected:
-        print(IN_FORCE if hand.status.go_echo else LET_GO)
+        print(IN_FORCE if hand.status.go_echo else LET_GO + HINT * (not keep))
