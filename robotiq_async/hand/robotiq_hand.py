@@ -21,10 +21,9 @@ from ..session.reconnecting import ReconnectPolicy
 from ..session.session import Session
 from ..session.streams import Channels
 from .commands import Commands
-from .grasping import Grasping
 
 
-class RobotiqHand(Commands, Grasping):
+class RobotiqHand(Commands):
     """A Robotiq 3-Finger gripper behind Modbus TCP, a serial line, or simulated.
 
     Use it as ``async with RobotiqHand(address) as hand:``, or call :meth:`start` and :meth:`stop`. One
