@@ -28,14 +28,11 @@ if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
 
 from robotiq_async import RobotiqHand  # noqa: E402
-from robotiq_async.hand.grasping import GripEvents  # noqa: E402
 from robotiq_async.session.streams import Stream  # noqa: E402
 
 FOLDER: Final = ROOT / PACKAGE / "sync"
 BY_HAND: Final = frozenset({"__init__", "blocking", "caller", "loop_thread", "streams"})
 """Modules there that are not made."""
-STREAMS: Final = (Stream, GripEvents)
-"""Their blocking ones are not made either."""
 ABOUT_ERRORS: Final = "tells_its_hand"
 """A decorator that changes nothing of what a method gives: what it raises has been told its hand by then."""
 COMMANDS: Final = {"add_listener": "False", "start": "activate", "stop": "False", "wait_for_state": "False"}
@@ -132,9 +129,9 @@ class _Module:
 
     def _base(self, kind: type, root: str) -> str:
         if kind.__bases__ != (object,):
-            for base in kind.__bases__:
-                self._import(f".{_module_name(base)}", base.__name__)
-            return ", ".join(base.__name__ for base in kind.__bases__)
+            (base,) = kind.__bases__
+            self._import(f".{_module_name(base)}", base.__name__)
+            return base.__name__
         self._import(".blocking", root)
         if root == "BlockingHand":
             return root
@@ -155,18 +152,17 @@ class _Module:
         result, what = _result(node, kind), f"self._inner.{node.name}"
         if not decorators:
             way = "wait" if isinstance(node, ast.AsyncFunctionDef) else "tell"
-            commands = COMMANDS.get(node.name, str(result not in STREAMS))
+            commands = COMMANDS.get(node.name, str(result is not Stream))
             what = f"self._caller.{way}(lambda: {what}({_arguments(node)}), commands={commands})"
         if result is not None:
             what = f"{result.__name__}({what}, self._caller)"
-            if result not in STREAMS:
+            if result is not Stream:
                 parts.append(result)
         is_none = isinstance(node.returns, ast.Constant) and node.returns.value is None
         return self._function(node, what if is_none else f"return {what}", result)
 
     def _function(self, node: _Function, body: str, result: type | None = None) -> ast.stmt:
         """A function with the parameters and the docstring of another, and another body."""
-        node.args.args[0].annotation = None  # what the async method asks of its hand
         for each in (*ast.walk(node.args), *(ast.walk(node.returns) if node.returns else ())):
             if isinstance(each, ast.Name):
                 self._import_as_there(each.id, result)
@@ -179,7 +175,7 @@ class _Module:
     def _import_as_there(self, name: str, result: type | None) -> None:
         """Import a name from where the async module has it; of a blocking class from where that is."""
         if result is not None and name == result.__name__:
-            self._import(".streams" if result in STREAMS else f".{_module_name(result)}", name)
+            self._import(".streams" if result is Stream else f".{_module_name(result)}", name)
             return
         for node in ast.walk(self._tree):
             if isinstance(node, ast.ImportFrom) and name in (each.asname or each.name for each in node.names):

@@ -62,7 +62,6 @@ from .errors import (
 )
 from .grasping import GraspResult, GripChange, GripEvent
 from .hand import RobotiqHand
-from .hand.grasping import GripEvents
 from .link.transport import Transport
 from .session.reconnecting import ReconnectPolicy
 from .session.statistics import Statistics
@@ -88,7 +87,6 @@ __all__ = [
     "GraspResult",
     "GripChange",
     "GripEvent",
-    "GripEvents",
     "GripperFaultError",
     "Initialization",
     "InvalidStateError",

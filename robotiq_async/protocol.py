@@ -341,16 +341,16 @@ class Hand(Protocol):
     ) -> HandStream[GripEvent]:
         """What becomes of the grips from now on: contacts gained and lost, parts that slip.
 
-        For one reader, made of :meth:`statuses`, and ends as these do. Nothing is told while the link is
-        down; what has become of a grip meanwhile is told when it is back.
+        For one reader, none lost. Nothing is told while the link is down; what has become of a grip meanwhile
+        is told when it is back.
 
         It tells what the gripper reports. A contact latches: a part that is pulled out is noticed when its
         finger closes on, which it does when more force is asked for, and by the manual not before.
 
         Args:
             fingers: the axes that are watched.
-            since: the status to begin with, ``result.status`` of a grasp or a move: what changes between that
-                and the first status that is read is told, too. None for the newest one.
+            since: the status to begin with, ``result.status`` of a grasp or a move: what has changed between
+                that and the next status is told, too. None for the newest one.
             slip: counts that an axis in contact may move without being told, 1..255.
 
         Raises:

@@ -29,7 +29,7 @@ from robotiq_async import (
 )
 from robotiq_async.calibration import Units
 from robotiq_async.enums import AXES, ObjectStatus
-from robotiq_async.hand.grasping import Grasping
+from robotiq_async.grasping import SLIP_COUNTS, GraspResult, GripEvent, GripWatch, check_at_least
 from robotiq_async.wire import registers as reg
 from robotiq_async.wire.request import AxisRequest, Request
 
@@ -75,7 +75,7 @@ class FakeStream(Generic[T]):
         self.end()
 
 
-class FakeHand(Grasping):
+class FakeHand:
     """An active gripper whose axes are where they are sent as soon as they are sent there.
 
     Attributes:
@@ -93,6 +93,7 @@ class FakeHand(Grasping):
         self._fault = Fault.NONE
         self._last: RobotiqStatus | None = None
         self._streams: list[tuple[type, FakeStream[Any]]] = []
+        self._watch: GripWatch | None = None
 
     async def __aenter__(self) -> Self:
         await self.start()
@@ -154,6 +155,11 @@ class FakeHand(Grasping):
     async def close(self, fingers: Finger | int = Finger.ABC, **options: Any) -> MoveResult:
         return await self.move(CLOSED, fingers, **options)
 
+    async def grasp(
+        self, fingers: Finger | int = Finger.ABC, *, at_least: int | None = None, **options: Any
+    ) -> GraspResult:
+        return GraspResult(await self.close(fingers, **options), check_at_least(at_least, Finger(fingers)))
+
     async def hold(self, fingers: Finger | int = Finger.ALL) -> None:  # noqa: ARG002
         if self.state in (State.DISCONNECTED, State.SHUTDOWN):
             raise NotStartedError("the fake hand does not run")
@@ -213,6 +219,16 @@ class FakeHand(Grasping):
     def requests(self, buffer: int | None = None) -> FakeStream[SentRequest]:
         return self._open(SentRequest, buffer)
 
+    def grip_events(
+        self,
+        fingers: Finger | int = Finger.ABC,
+        *,
+        since: RobotiqStatus | None = None,
+        slip: int = SLIP_COUNTS,
+    ) -> FakeStream[GripEvent]:
+        self._watch = GripWatch(fingers, since=since, slip=slip)
+        return self._open(GripEvent, None)
+
     async def wait_for_state(self, *states: State, timeout: float | None = None) -> State:  # noqa: ARG002
         if self.state not in states:
             raise StateTimeoutError("nothing happens later here")
@@ -253,6 +269,8 @@ class FakeHand(Grasping):
         sequence = 0 if self._last is None else self._last.sequence + 1
         self._last = RobotiqStatus.from_registers(block, timestamp=_now(), sequence=sequence)
         self._push(self._last)
+        for event in self._watch.see(self._last) if self._watch else []:
+            self._push(event)
 
 
 def _now() -> float:

@@ -98,7 +98,7 @@ class Keeping:
         return None if image == shadow.base else image
 
     def tell_of_lost_grips(self, status: RobotiqStatus, moved: Finger) -> None:
-        """The next image sets rGTO, which drives every axis; one that was adopted without it has but its place.
+        """The next image sets rGTO, which drives every axis; one adopted without it has but its place.
 
         Args:
             status: the newest one.

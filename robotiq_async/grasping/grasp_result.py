@@ -7,7 +7,19 @@ from dataclasses import dataclass
 
 from ..control.motion import MoveResult
 from ..enums import Finger, ObjectStatus
+from ..wire.checks import check_int
 from ..wire.status import RobotiqStatus
+
+
+def check_at_least(at_least: object, fingers: Finger) -> int:
+    """The contacts that make a grasp: 1..as many as there are axes; None for all of them.
+
+    Raises:
+        TypeError: neither None nor an int.
+        ValueError: outside the range.
+    """
+    every = fingers.bit_count()
+    return every if at_least is None else check_int("at_least", at_least, 1, every)
 
 
 @dataclass(frozen=True, slots=True, repr=False)

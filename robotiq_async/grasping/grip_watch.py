@@ -51,11 +51,19 @@ class GripWatch:
     than a slip.
     """
 
-    def __init__(self, fingers: Finger | int = Finger.ABC, *, slip: int = SLIP_COUNTS) -> None:
-        """Watch some axes; the contacts of the first status are where it begins, and no events.
+    def __init__(
+        self,
+        fingers: Finger | int = Finger.ABC,
+        *,
+        since: RobotiqStatus | None = None,
+        slip: int = SLIP_COUNTS,
+    ) -> None:
+        """Watch some axes.
 
         Args:
             fingers: the axes.
+            since: the status to begin with: its contacts are there already, and no events. None for the first
+                one that is seen.
             slip: counts that an axis in contact may move without being told, 1..255.
 
         Raises:
@@ -63,8 +71,12 @@ class GripWatch:
         """
         self._axes = tuple(check_mask(fingers))
         self._slip = check_int("slip", slip, 1, 255)
+        if since is not None and not isinstance(since, RobotiqStatus):
+            raise TypeError(f"since must be None or a RobotiqStatus, got {since!r}")
         self._grips: dict[Finger, _Grip] = {}
         self._last: RobotiqStatus | None = None
+        if since is not None:
+            self.see(since)
 
     @property
     def holds(self) -> Finger:

@@ -12,6 +12,7 @@ from ..control.state_machine import SEQUENCES
 from ..control.triggers import Trigger
 from ..enums import CLOSED, OPEN, Finger
 from ..errors import MoveTimeoutError
+from ..grasping import GraspResult, check_at_least
 from ..session.clock import now
 from ..wire.checks import check_byte, check_mask, check_optional_byte, check_timeout
 from .naming import tells_its_hand
@@ -177,6 +178,46 @@ class Commands(Recovery):
     ) -> MoveResult:
         """Close the fingers, not the connection (that is :meth:`stop`): :meth:`move` to 255."""
         return await self.move(CLOSED, fingers, speed=speed, force=force, timeout=timeout)
+
+    async def grasp(
+        self,
+        fingers: Finger | int = Finger.ABC,
+        *,
+        at_least: int | None = None,
+        speed: int | None = None,
+        force: int | None = None,
+        timeout: float | None = None,
+    ) -> GraspResult:
+        """Close fingers until each of them has met something or is closed, and say which of them hold it.
+
+        Too few contacts are a result and not an error: the result is false, and the fingers stay as they are.
+        Cancelled or timed out, those that still move are held; a finger in contact keeps its grip.
+
+        What holds is what the gripper calls a contact while closing. A thin object between fingertips may
+        never be called one; and a contact latches: a finger that stood in one before still counts, also when
+        the part has been taken out meanwhile. Open first, or ask for more force.
+
+        Args:
+            fingers: mask of the axes that close; the others stay as they are.
+            at_least: contacts that make a grasp, 1..as many as there are axes; None for all of them.
+            speed: new speed of these axes, 0..255; None leaves it.
+            force: new force of these axes, 0..255; None leaves it.
+            timeout: seconds; None for twice the expected time plus 2 s.
+
+        Returns:
+            Who holds it, and how each axis ended.
+
+        Raises:
+            TypeError: an argument of the wrong type; nothing is sent.
+            ValueError: an argument outside its range; nothing is sent.
+            MoveTimeoutError: an axis still moved when the time was over.
+            MoveSupersededError: another command, halt(), reset() or another client took over an axis.
+            GripperFaultError: the gripper reports a minor or a major fault.
+            RobotiqError: as :meth:`move`.
+        """
+        axes = check_mask(fingers)
+        needed = check_at_least(at_least, axes)
+        return GraspResult(await self.close(axes, speed=speed, force=force, timeout=timeout), needed)
 
     @tells_its_hand
     async def hold(self, fingers: Finger | int = Finger.ALL) -> None:

@@ -8,8 +8,9 @@ from typing import TypeVar
 
 from ..calibration import Units
 from ..control.state_machine import StateMachine
-from ..enums import State
+from ..enums import Finger, State
 from ..errors import ConnectionLostError, NotStartedError
+from ..grasping import SLIP_COUNTS, GripEvent, GripWatch
 from ..session.options import Options
 from ..session.session import Session
 from ..session.statistics import Counters, Statistics
@@ -134,6 +135,38 @@ class Observation:
         """
         kept = None if buffer is None else check_int("buffer", buffer, 1, 1_000_000)
         return self._open(self._channels.requests, kept)
+
+    def grip_events(
+        self,
+        fingers: Finger | int = Finger.ABC,
+        *,
+        since: RobotiqStatus | None = None,
+        slip: int = SLIP_COUNTS,
+    ) -> Stream[GripEvent]:
+        """What becomes of the grips from now on: contacts gained and lost, parts that slip.
+
+        For one reader, none lost. It waits out a lost link, tells nothing meanwhile, and when the link is
+        back what has become of the grips. Ends after :meth:`stop`, as :meth:`statuses` does.
+
+        It tells what the gripper reports. A contact latches: a part that is pulled out is noticed when its
+        finger closes on, which it does when more force is asked for, and by the manual not before.
+
+        Args:
+            fingers: mask of the axes that are watched.
+            since: the status to begin with, ``result.status`` of a grasp or a move: what has changed between
+                that and the next status is told, too. None for the newest one.
+            slip: counts that an axis in contact may move without being told, 1..255.
+
+        Raises:
+            TypeError: an argument of the wrong type.
+            ValueError: an argument outside its range.
+        """
+        watch = GripWatch(fingers, since=since, slip=slip)
+        self._check_owner()
+        newest = None if self._session is None else self._session.controller.status
+        if since is None and newest is not None:
+            watch.see(newest)
+        return self._channels.statuses.derive(watch.see)
 
     def add_listener(
         self, callback: Callable[[RobotiqStatus | Transition | SentRequest], None]

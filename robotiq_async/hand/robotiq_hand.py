@@ -22,11 +22,10 @@ from ..session.session import Session
 from ..session.streams import Channels
 from ..wire.checks import check_flag
 from .commands import Commands
-from .grasping import Grasping
 from .naming import tells_its_hand
 
 
-class RobotiqHand(Commands, Grasping):
+class RobotiqHand(Commands):
     """A Robotiq 3-Finger gripper behind Modbus TCP, a serial line, or simulated.
 
     Use it as ``async with RobotiqHand(address) as hand:``, or call :meth:`start` and :meth:`stop`. One

@@ -11,7 +11,7 @@ import contextlib
 import itertools
 import weakref
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass
 from typing import Any, Generic, Self, TypeVar
 
@@ -25,6 +25,7 @@ from .event_loop import check_loop
 from .listeners import Listeners
 
 T = TypeVar("T")
+U = TypeVar("U")
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +95,7 @@ class Stream(Generic[T]):
         missed: items that were dropped because the reader was slow.
     """
 
-    def __init__(self, buffer: int | None, kept: set[Stream[T]]) -> None:
+    def __init__(self, buffer: int | None, kept: set[Stream[Any]]) -> None:
         """Keep up to ``buffer`` items, the newest ones; None keeps all.
 
         While somebody waits the stream is in ``kept``: the task of that reader may be held by nothing else.
@@ -198,6 +199,21 @@ class Stream(Generic[T]):
                 loop.call_soon_threadsafe(_wake, waiting)
 
 
+class DerivedStream(Stream[T]):
+    """A stream of what is made of the items of a channel; none of that is dropped."""
+
+    def __init__(self, make: Callable[[Any], Iterable[T]], kept: set[Stream[Any]]) -> None:
+        """Make something of every item, in the turn in which it is pushed: it must be quick, and not fail."""
+        super().__init__(None, kept)
+        self._make = make
+
+    def push(self, item: Any) -> None:  # noqa: ANN401  # whatever the channel spreads
+        """Hand on what is made of an item."""
+        if not self._ended:
+            for made in self._make(item):
+                super().push(made)
+
+
 def _wake(waiting: asyncio.Future[None]) -> None:
     if not waiting.done():
         waiting.set_result(None)
@@ -214,16 +230,22 @@ class Channel(Generic[T]):
         """
         self._listeners = listeners
         # Plain references: going through a WeakSet takes several times as long, at every poll.
-        self._streams: list[weakref.ref[Stream[T]]] = []
+        self._streams: list[weakref.ref[Stream[Any]]] = []
         self._has_dropped = False
         """Whether some of them are held by nobody any more."""
-        self._waited_for: set[Stream[T]] = set()
+        self._waited_for: set[Stream[Any]] = set()
         self._failure: Callable[[], RobotiqError] | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
 
     def open(self, buffer: int | None) -> Stream[T]:
         """A new stream. Before a start it waits; after the hand gave up it raises the reason."""
-        stream: Stream[T] = Stream(buffer, self._waited_for)
+        return self._begin(Stream(buffer, self._waited_for))
+
+    def derive(self, make: Callable[[T], Iterable[U]]) -> Stream[U]:
+        """A new stream of what is made of each item from now on; as :meth:`open` for the rest."""
+        return self._begin(DerivedStream(make, self._waited_for))
+
+    def _begin(self, stream: Stream[U]) -> Stream[U]:
         if self._failure is not None:
             stream.end(self._failure)
         else:
@@ -265,7 +287,7 @@ class Channel(Generic[T]):
         self._has_dropped = False
         self._streams = [each for each in self._streams if each() is not None]
 
-    def _forget(self, _: weakref.ref[Stream[T]]) -> None:
+    def _forget(self, _: weakref.ref[Stream[Any]]) -> None:
         # In whatever thread drops the last reference: another stream may be opened at this moment.
         self._has_dropped = True
 

@@ -11,6 +11,6 @@ module                  what it holds
 """
 
 from .robotiq_hand import RobotiqHand
-from .streams import GripEvents, Stream
+from .streams import Stream
 
-__all__ = ["GripEvents", "RobotiqHand", "Stream"]
+__all__ = ["RobotiqHand", "Stream"]

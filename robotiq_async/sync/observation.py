@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..calibration import Units
-from ..enums import State
+from ..enums import Finger, State
+from ..grasping import SLIP_COUNTS, GripEvent
 from ..session.statistics import Statistics
 from ..session.streams import SentRequest, Transition
 from ..wire.status import RobotiqStatus
@@ -114,6 +115,38 @@ class Observation(BlockingHand):
             ValueError: buffer is outside its range.
         """
         return Stream(self._caller.tell(lambda: self._inner.requests(buffer), commands=False), self._caller)
+
+    def grip_events(
+        self,
+        fingers: Finger | int = Finger.ABC,
+        *,
+        since: RobotiqStatus | None = None,
+        slip: int = SLIP_COUNTS,
+    ) -> Stream[GripEvent]:
+        """What becomes of the grips from now on: contacts gained and lost, parts that slip.
+
+        For one reader, none lost. It waits out a lost link, tells nothing meanwhile, and when the link is
+        back what has become of the grips. Ends after :meth:`stop`, as :meth:`statuses` does.
+
+        It tells what the gripper reports. A contact latches: a part that is pulled out is noticed when its
+        finger closes on, which it does when more force is asked for, and by the manual not before.
+
+        Args:
+            fingers: mask of the axes that are watched.
+            since: the status to begin with, ``result.status`` of a grasp or a move: what has changed between
+                that and the next status is told, too. None for the newest one.
+            slip: counts that an axis in contact may move without being told, 1..255.
+
+        Raises:
+            TypeError: an argument of the wrong type.
+            ValueError: an argument outside its range.
+        """
+        return Stream(
+            self._caller.tell(
+                lambda: self._inner.grip_events(fingers, since=since, slip=slip), commands=False
+            ),
+            self._caller,
+        )
 
     def add_listener(
         self, callback: Callable[[RobotiqStatus | Transition | SentRequest], None]

@@ -13,10 +13,9 @@ from ..session.options import ACTIVATION_TIMEOUT_S, CONNECT_TIMEOUT_S, POLL_INTE
 from ..session.reconnecting import ReconnectPolicy
 from .caller import Caller
 from .commands import Commands
-from .grasping import Grasping
 
 
-class RobotiqHand(Commands, Grasping):
+class RobotiqHand(Commands):
     """A Robotiq 3-Finger gripper behind Modbus TCP, a serial line, or simulated, that blocks.
 
     Use it as ``with RobotiqHand(address) as hand:``, or call :meth:`start` and :meth:`stop`. The calls, their
@@ -136,7 +135,8 @@ class RobotiqHand(Commands, Grasping):
         goes on gripping while nobody is connected. But only when every axis has been seen at rest: on any
         doubt (within half a second one has not come to rest; the link is or goes down; a fault; a sequence;
         another client commands the gripper; ``halt()`` was asked) rGTO is cleared as ever, and the log says
-        why. What a real gripper does with either is not known.
+        why. Who sets the fingers going between the last look at them and the end of the connection is not
+        seen. What a real gripper does with a part, either way, is not known.
 
         Args:
             halt: False disconnects and leaves the fingers to what they do; for programs that only look.

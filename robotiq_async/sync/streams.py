@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Generic, Self, TypeVar
 
-from ..enums import Finger
-from ..grasping import GripEvent
-from ..hand.grasping import GripEvents as AsyncGripEvents
-from ..protocol import HandStream
+from ..session.streams import Stream as AsyncStream
 from .caller import Caller
 
 T = TypeVar("T")
@@ -17,7 +14,7 @@ T = TypeVar("T")
 class Stream(Generic[T]):
     """An iterator with one reader; dropping it ends it. Made by a hand."""
 
-    def __init__(self, stream: HandStream[T], caller: Caller) -> None:
+    def __init__(self, stream: AsyncStream[T], caller: Caller) -> None:
         """Read from a stream of the hand."""
         self._stream = stream
         self._caller = caller
@@ -61,17 +58,3 @@ class Stream(Generic[T]):
     def close(self) -> None:
         """End the stream; a waiting reader ends too. Idempotent."""
         self._caller.wait(self._stream.aclose, commands=False)
-
-
-class GripEvents(Stream[GripEvent]):
-    """An iterator over what becomes of grips; made by ``hand.grip_events()``."""
-
-    def __init__(self, events: AsyncGripEvents, caller: Caller) -> None:
-        """Read from those of the hand."""
-        super().__init__(events, caller)
-        self._grips = events
-
-    @property
-    def holds(self) -> Finger:
-        """The watched axes that are in contact after the newest event."""
-        return self._grips.holds

@@ -19,6 +19,7 @@ CALLS: dict[str, Callable[[Any], Any]] = {
     "move": lambda hand: hand.move(3),
     "open": lambda hand: hand.open(),
     "close": lambda hand: hand.close(),
+    "grasp": lambda hand: hand.grasp(),
     "set_position": lambda hand: hand.set_position(3),
     "set_speed": lambda hand: hand.set_speed(3),
     "set_force": lambda hand: hand.set_force(3),
@@ -34,6 +35,7 @@ CALLS: dict[str, Callable[[Any], Any]] = {
     "statuses": lambda hand: hand.statuses(),
     "transitions": lambda hand: hand.transitions(),
     "requests": lambda hand: hand.requests(),
+    "grip_events": lambda hand: hand.grip_events(),
 }
 
 

@@ -100,7 +100,7 @@ async def test_a_closed_stream_ends_and_a_dropped_one_is_forgotten(where: str) -
         await waited_for.aclose()
         assert await waiting is None
         for _ in range(100):
-            for opened in (hand.statuses, hand.transitions, hand.requests):
+            for opened in (hand.statuses, hand.transitions, hand.requests, hand.grip_events):
                 opened()
         gc.collect()
         channels: Channels = hand._channels  # type: ignore[attr-defined]

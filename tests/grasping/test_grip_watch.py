@@ -170,6 +170,13 @@ def test_a_status_of_another_clock_is_believed() -> None:
     assert told(seen(CLOSING, 150, at=5000.0), seen(REACHED, 241, at=7.0)) == [(LOST, 91)]
 
 
+def test_it_may_begin_with_a_status_from_before() -> None:
+    watch = GripWatch(since=seen(CLOSING, 150))
+    assert watch.holds == A
+    assert told(seen(REACHED, 241), watch=watch) == [(LOST, 91)]
+    assert told(seen(CLOSING, 150), watch=GripWatch(since=seen(REACHED, 6, 6))) == [(GAINED, 0)]
+
+
 def test_only_the_axes_that_are_watched_tell() -> None:
     nothing, all_hold = status_of(0x39, 0x00, echo=255), status_of(0x39, 0xAA, echo=255, position=150)
     for fingers in (A, B | C, Finger.ABC, Finger.ALL):
@@ -245,6 +252,16 @@ def test_the_same_status_again_tells_nothing_new(statuses: list[RobotiqStatus]) 
     for status in statuses:
         watch.see(status)
         assert watch.see(status) == []
+
+
+@given(st.lists(st.lists(st.integers(0, 0xFFFF), min_size=8, max_size=8), max_size=8))
+def test_no_reading_is_too_much_for_it(readings: list[list[int]]) -> None:
+    """It works in the turn of the poll: what it raised would end that."""
+    watch = GripWatch(Finger.ALL, slip=1)
+    for registers in readings:
+        status = RobotiqStatus.from_registers(registers)
+        assert all(event.status is status for event in watch.see(status))
+        assert watch.holds in Finger.ALL
 
 
 @given(STATUSES, st.integers(0, 30))

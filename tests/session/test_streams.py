@@ -582,3 +582,71 @@ def test_a_transition_is_a_frozen_value() -> None:
     assert len({transition, transition}) == 1
     with pytest.raises(AttributeError):
         transition.source = State.FAULT  # type: ignore[misc]
+
+
+# -- what is made of items ---------------------------------------------------------------------------------
+
+
+def letters(count: int) -> list[str]:
+    """So many of them."""
+    return list("abcdefghij"[:count])
+
+
+def noting(seen: list[int]) -> Callable[[int], list[int]]:
+    """Make an item of itself, and note it."""
+
+    def make(item: int) -> list[int]:
+        seen.append(item)
+        return [item]
+
+    return make
+
+
+async def test_a_derived_stream_gives_what_is_made_of_each_item(channel: Channel[int]) -> None:
+    stream, plain = channel.derive(letters), channel.open(1)
+    waiting = asyncio.create_task(stream.__anext__())
+    await steps()
+    channel.push(0)
+    await steps()
+    assert not waiting.done(), "nothing was made of it"
+    for item in (2, 0, 1):
+        channel.push(item)
+    channel.end()
+    assert [await waiting, *[made async for made in stream]] == ["a", "b", "a"]
+    assert stream.missed == 0
+    assert await rest(plain) == [1]
+
+
+async def test_a_derived_stream_loses_nothing_however_slow_its_reader(channel: Channel[int]) -> None:
+    stream = channel.derive(lambda item: [item] * 2)
+    for item in range(5000):
+        channel.push(item)
+    assert list(stream.drain()) == [item // 2 for item in range(10_000)]
+
+
+async def test_a_derived_stream_that_was_closed_makes_nothing_any_more(channel: Channel[int]) -> None:
+    seen: list[int] = []
+    stream = channel.derive(noting(seen))
+    channel.push(1)
+    await stream.aclose()
+    channel.push(2)
+    assert seen == [1]
+    assert await rest(stream) == []
+
+
+async def test_a_derived_stream_that_nobody_holds_is_forgotten(
+    no_collector: None, channel: Channel[int]
+) -> None:
+    seen: list[int] = []
+    stream = channel.derive(noting(seen))
+    channel.push(1)
+    del stream
+    channel.push(2)
+    assert seen == [1]
+
+
+async def test_a_derived_stream_ends_with_the_failure(channel: Channel[int]) -> None:
+    stream = channel.derive(letters)
+    channel.end(lost)
+    with pytest.raises(ConnectionLostError):
+        await anext(stream)

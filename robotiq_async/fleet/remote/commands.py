@@ -12,6 +12,7 @@ from ...control.state_machine import RUNNING, refusal
 from ...control.triggers import Trigger
 from ...enums import CLOSED, OPEN, Finger
 from ...errors import NotAllowedError, NotStartedError, RobotiqConnectionError
+from ...grasping import GraspResult, check_at_least
 from ...wire.checks import check_byte, check_mask, check_optional_byte, check_timeout
 from ..network.bus import Urgency
 from ..wire.values import Fields, read_result, reading
@@ -161,6 +162,34 @@ class RemoteCommands(RemoteObservation):
     ) -> MoveResult:
         """Close the fingers, not the connection: :meth:`move` to 255."""
         return await self.move(CLOSED, fingers, speed=speed, force=force, timeout=timeout)
+
+    async def grasp(
+        self,
+        fingers: Finger | int = Finger.ABC,
+        *,
+        at_least: int | None = None,
+        speed: int | None = None,
+        force: int | None = None,
+        timeout: float | None = None,
+    ) -> GraspResult:
+        """Close fingers until each of them has met something or is closed, and say which of them hold it.
+
+        Too few contacts are a result and not an error. For the rest see :meth:`RobotiqHand.grasp`.
+
+        Args:
+            fingers: mask of the axes that close.
+            at_least: contacts that make a grasp, 1..as many as there are axes; None for all of them.
+            speed: new speed of these axes; None leaves it.
+            force: new force of these axes; None leaves it.
+            timeout: seconds; None for twice the expected time plus 2 s.
+
+        Raises:
+            TypeError, ValueError: an argument of the wrong type or outside its range; nothing is sent.
+            RobotiqError: as :meth:`move`.
+        """
+        axes = check_mask(fingers)
+        needed = check_at_least(at_least, axes)
+        return GraspResult(await self.close(axes, speed=speed, force=force, timeout=timeout), needed)
 
     async def hold(self, fingers: Finger | int = Finger.ALL) -> None:
         """Have axes that move stay where they are; grips stay. Returns when it is acknowledged.

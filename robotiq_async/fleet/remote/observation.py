@@ -6,8 +6,9 @@ import asyncio
 from typing import TypeVar
 
 from ...calibration import Units
-from ...enums import State
+from ...enums import Finger, State
 from ...errors import ConnectionLostError, NotStartedError, StateTimeoutError
+from ...grasping import SLIP_COUNTS, GripEvent, GripWatch
 from ...session.event_loop import check_loop
 from ...session.statistics import Counters, Statistics
 from ...session.streams import Channel, Channels, SentRequest, Stream, Transition
@@ -118,6 +119,32 @@ class RemoteObservation:
         kept = None if buffer is None else check_int("buffer", buffer, 1, 1_000_000)
         return self._open_stream(self._channels.requests, kept)
 
+    def grip_events(
+        self,
+        fingers: Finger | int = Finger.ABC,
+        *,
+        since: RobotiqStatus | None = None,
+        slip: int = SLIP_COUNTS,
+    ) -> Stream[GripEvent]:
+        """What becomes of the grips, by the statuses that are heard; see :meth:`RobotiqHand.grip_events`.
+
+        Of what happened in statuses that were lost on the way, it tells what is left of it.
+
+        Args:
+            fingers: mask of the axes that are watched.
+            since: the status to begin with, ``result.status`` of a grasp or a move; None for the newest one.
+            slip: counts that an axis in contact may move without being told, 1..255.
+
+        Raises:
+            TypeError, ValueError: an argument of the wrong type or outside its range.
+        """
+        watch = GripWatch(fingers, since=since, slip=slip)
+        self._check_owner()
+        newest = None if self._session is None else self._session.mirror.status
+        if since is None and newest is not None:
+            watch.see(newest)
+        return self._channels.statuses.derive(watch.see)
+
     async def wait_for_state(self, *states: State, timeout: float | None = None) -> State:
         """Wait until the hand is, if only for a moment, in one of these states, and return it.
 
@@ -168,8 +195,11 @@ class RemoteObservation:
         return status
 
     def _open_stream(self, channel: Channel[T], buffer: int | None) -> Stream[T]:
-        """A stream; not from another thread while the hand runs, for the streams are not locked."""
+        self._check_owner()
+        return channel.open(buffer)
+
+    def _check_owner(self) -> None:
+        """Refuse another thread while the hand runs: the streams are not locked."""
         session = self._session
         if session is not None and not session.is_over and not session.lost_its_loop:
             check_loop(session.loop, "a stream of the hand")
-        return channel.open(buffer)

@@ -8,7 +8,6 @@ from typing import Self
 from ...calibration import ForceCalibration, SpeedCalibration
 from ...enums import State
 from ...errors import InvalidStateError, NotStartedError
-from ...hand.grasping import Grasping
 from ...log import Log
 from ...session.event_loop import running_loop
 from ...session.options import check_units
@@ -22,7 +21,7 @@ from .requests import plainly
 from .session import CONNECT_S, RemoteSession
 
 
-class RemoteHand(RemoteCommands, Grasping):
+class RemoteHand(RemoteCommands):
     """A Robotiq 3-Finger gripper on another host, served by ``robotiq-async agent`` there.
 
     A :class:`~robotiq_async.protocol.Hand`: the names, errors and promises are those of
