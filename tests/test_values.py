@@ -105,7 +105,7 @@ VALUES: list[object] = [
     Trouble("late", at=1.0),
     LEFT,
     Route(("tls/cell-1:7447",), Path("keys")),
-    Member(LEFT, is_there=True, state=State.FAULT, fault=Fault.SCISSOR_BLOCKED, heard_at=12.5),
+    Member(LEFT, is_there=True, state=State.FAULT, fault=Fault.SCISSOR_BLOCKED, seen_at=12.5),
     Holder("5f0c3a9e", "bob@desk"),
     Endpoint("tls/[::1]:7447", "tls", "::1"),
     AccessList(read=("alice",)),

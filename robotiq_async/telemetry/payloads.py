@@ -84,11 +84,6 @@ SCHEMAS: Final = {
 """A JSON Schema for each kind of object."""
 
 
-def printable(text: str) -> str:
-    """A text of others with what steers a terminal written out, as Python does it."""
-    return "".join(each if each.isprintable() else ascii(each)[1:-1] for each in text)
-
-
 def status_fields(status: RobotiqStatus) -> Fields:
     """The object for a status."""
     return {

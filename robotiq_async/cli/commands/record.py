@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ...telemetry.payloads import printable
+from ...log import printable
 from ..arguments import USUAL, Address, Link, need
 from ..failures import CommandError, UsageError
 from ..text import FORMATTERS, clock

@@ -11,7 +11,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
-from ...telemetry.payloads import printable
+from ...log import printable
 from ..arguments import USUAL, Address, Byte, Link, Port, is_loopback, need
 from ..failures import CommandError, UsageError
 

@@ -14,7 +14,7 @@ from cyclopts import Parameter
 from ...actions import Operator
 from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...errors import RobotiqError
-from ...telemetry.payloads import printable
+from ...log import printable
 from ..arguments import USUAL, Address, Byte, Link, Port, is_loopback, need
 from ..browser import open_page
 from ..failures import CommandError, UsageError, usage

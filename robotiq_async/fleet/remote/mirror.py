@@ -8,7 +8,6 @@ from typing import Final
 
 from ...control.triggers import Trigger
 from ...enums import State
-from ...log import log
 from ...session.streams import Channels, Transition
 from ...wire.status import RobotiqStatus
 from ..control.lease import WINDOW_S
@@ -138,7 +137,6 @@ class Mirror:
         if mark == self._mark:
             return False
         self.misrouted += 1
-        log.warning("a message about another gripper was dropped (%d so far)", self.misrouted)
         return True
 
     def is_of_another_run(self, message: StatusMessage, arrival: float, window: float = WINDOW_S) -> bool:
