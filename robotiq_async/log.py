@@ -1,7 +1,8 @@
-"""The library's logger, ``robotiq_async``, which never fails, and tells which hand a record is about.
+"""The library's logger: it never fails, and its messages are one line each and tell which hand it is.
 
 A handler of the application that raises (a full disk, a closed stream) must not end the task that owns the
-link, or keep it from stopping the fingers.
+link, or keep it from stopping the fingers. Some of the words are others': a gripper's, or of clients on the
+network. They neither begin a line that looks like one of ours nor steer a terminal.
 """
 
 from __future__ import annotations
@@ -38,5 +39,23 @@ class Log(logging.LoggerAdapter[logging.Logger]):
                 traceback.print_exc()
 
 
+def printable(text: str) -> str:
+    """A text of others with what steers a terminal written out, as Python does it."""
+    return text if text.isprintable() else "".join(map(_printable, text))
+
+
+def _printable(character: str) -> str:
+    return character if character.isprintable() else ascii(character)[1:-1]
+
+
+def _in_one_line(record: logging.LogRecord) -> bool:
+    """A filter that lets everything pass, in one line."""
+    message = record.getMessage()
+    if not message.isprintable():
+        record.msg, record.args = printable(message), None
+    return True
+
+
 log: Final = Log()
 """For what is about no hand in particular."""
+logging.getLogger("robotiq_async").addFilter(_in_one_line)

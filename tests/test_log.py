@@ -1,4 +1,4 @@
-"""The log: which hand a record is about, and that nothing a handler does comes through."""
+"""The log: which hand a record is about, and that what others say stays within its line."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from robotiq_async.cli.log_capture import collected_warnings, forwarded_warnings
-from robotiq_async.log import Log, log
+from robotiq_async.log import Log, log, printable
 
 FORMAT = logging.Formatter("[%(hand)s] %(message)s")
 
@@ -64,3 +64,21 @@ def test_where_one_hand_is_shown_its_name_is_left_out() -> None:
         Log("right").warning("link lost")
     assert told == ["link lost", "right: link lost"]
     assert outside == []
+
+
+@pytest.mark.parametrize("words", ["two\nlines", "\x1b[2Jgone", "bell\a", "back\b\rover", "\u2028", "\x9b1m"])
+def test_what_others_say_neither_begins_a_line_nor_steers_a_terminal(
+    words: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    log.warning("%s says: %s", "somebody", words)
+    log.warning("refused: %s", ValueError(words))
+    for record in caplog.records:
+        assert record.getMessage().isprintable()
+        assert printable(words) in record.getMessage()
+
+
+def test_what_is_harmless_stays_as_it_is(caplog: pytest.LogCaptureFixture) -> None:
+    log.warning("%s: %d of %d", "Grüße", 3, 4)
+    (record,) = caplog.records
+    assert record.args == ("Grüße", 3, 4), "for those who look at the arguments"
+    assert record.getMessage() == "Grüße: 3 of 4"

@@ -54,6 +54,7 @@ from robotiq_async.fleet.keys.access_list import AccessList
 from robotiq_async.fleet.keys.credentials import Credentials
 from robotiq_async.fleet.network.endpoints import Endpoint
 from robotiq_async.link.address import parse_address
+from robotiq_async.link.simulation import Simulation
 from robotiq_async.session.statistics import Counters
 from robotiq_async.simulator import Trouble
 from robotiq_async.values import FrozenMapping
@@ -101,6 +102,7 @@ VALUES: list[object] = [
     SentRequest(Request(activate=True, axes=(AxisRequest(1, 2, 3),) * 4), 12.5, acknowledged=True),
     AxisRequest(1, 2, 3),
     ReconnectPolicy(give_up_after=3.0),
+    Simulation(speedup=10.0, object=150),
     SpeedCalibration.thesis(),
     SpeedCalibration("mine", [[0, 9.0], [255, 2.0]]),  # type: ignore[arg-type]
     ForceCalibration.nominal(),
@@ -116,7 +118,7 @@ VALUES: list[object] = [
     Trouble("late", at=1.0),
     LEFT,
     Route(("tls/cell-1:7447",), Path("keys")),
-    Member(LEFT, is_there=True, state=State.FAULT, fault=Fault.SCISSOR_BLOCKED, heard_at=12.5),
+    Member(LEFT, is_there=True, state=State.FAULT, fault=Fault.SCISSOR_BLOCKED, seen_at=12.5),
     Holder("5f0c3a9e", "bob@desk"),
     Endpoint("tls/[::1]:7447", "tls", "::1"),
     AccessList(read=("alice",)),

@@ -17,7 +17,7 @@ from typing import Self
 from cyclopts import CycloptsError
 
 from ..errors import RobotiqError
-from ..telemetry.payloads import printable
+from ..log import printable
 from .app import build
 from .failures import CommandError, UsageError
 from .log_capture import collected_warnings, forget

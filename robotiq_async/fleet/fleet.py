@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 import asyncio
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Any, Final, Self
 
 from ..enums import Fault, State
-from ..errors import NotAllStoppedError
-from ..log import log
+from ..errors import NotAllStoppedError, ProtocolError
 from ..session.clock import now
 from ..session.event_loop import running_loop
 from ..session.listeners import Listeners
 from ..session.streams import Channel, Stream
+from .complaints import Complaints
 from .halting import STOPPED, halt
 from .network.bus import Bus, Undo
 from .network.route import Route, default_route
 from .remote.remote_hand import RemoteHand
+from .summaries import Summaries
 from .wire.names import ROOT, GripperName, check_name
 
 LOOK_S: Final = 0.5
@@ -42,7 +42,9 @@ class Member:
         holder: who commands it; None for nobody.
         problem: why the agent cannot reach the gripper; empty if it can.
         address: of the gripper, as its agent reaches it.
-        heard_at: monotonic seconds at which the summary came.
+        seen_at: monotonic seconds, of this process, at which the agent had last read the gripper; None if it
+            has not. Clocks of hosts differ: it was then or, by the time that the quickest summary took,
+            before.
     """
 
     name: GripperName
@@ -54,7 +56,7 @@ class Member:
     holder: str | None = None
     problem: str = ""
     address: str = ""
-    heard_at: float = field(default=0.0, compare=False)
+    seen_at: float | None = field(default=None, compare=False)
 
 
 class Fleet:
@@ -87,6 +89,8 @@ class Fleet:
         self._undo: list[Undo] = []
         self._members: dict[GripperName, Member] = {}
         self._tokens: dict[GripperName, set[str]] = {}
+        self._summaries = Summaries()
+        self._unreadable = Complaints()
         self._changes: Channel[Member] = Channel(Listeners())
 
     async def __aenter__(self) -> Self:
@@ -96,9 +100,10 @@ class Fleet:
             RuntimeError: not in a running asyncio event loop.
             RobotiqError: no session could be opened.
         """
-        self._changes.reopen(running_loop())
-        self._entered_at = now()
+        loop = running_loop()
         self._bus = bus = self._shared or await self._open()
+        self._changes.reopen(loop)
+        self._entered_at = now()
         base = f"{ROOT}/{self._site}/*/*"
         self._undo = [
             bus.subscribe(f"{base}/summary", self._hear),
@@ -201,24 +206,14 @@ class Fleet:
         self._change(name, is_there=bool(tokens), agents=len(tokens))
 
     def _hear(self, _key: str, payload: bytes) -> None:
-        """A summary: the payload says which gripper it is about, for the key may be a wrong one."""
+        """A summary has arrived."""
         try:
-            summary = json.loads(payload)
-            name = GripperName.of_key(f"{summary['to']}/summary")
-            fault = summary["fault"]
-            what: dict[str, Any] = {
-                "state": State(summary["state"]),
-                "fault": None if fault is None else Fault(fault),
-                "is_moving": bool(summary["is_moving"]),
-                "holder": summary["holder"],
-                "problem": str(summary["problem"]),
-                "address": str(summary["address"]),
-            }
-        except (KeyError, TypeError, ValueError) as error:
-            log.warning("a summary that cannot be read was dropped: %s: %r", error, payload[:100])
+            read = self._summaries.read(payload, now())
+        except ProtocolError as error:
+            self._unreadable.warn("a summary was dropped: %s", error)
             return
-        if self._site in ("*", name.site):
-            self._change(name, heard_at=now(), **what)
+        if read is not None and self._site in ("*", read[0].site):
+            self._change(read[0], **read[1])
 
     def _change(self, name: GripperName, **what: Any) -> None:  # noqa: ANN401
         before = self._members.get(name) or Member(name)

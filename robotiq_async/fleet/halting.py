@@ -8,12 +8,11 @@ from typing import Final
 
 from ..errors import AgentError, RobotiqError
 from .network.bus import Bus, Reply, Urgency
-from .remote.persistence import until_answered
+from .remote.persistence import HALT_S, until_answered
 from .remote.requests import NoAnswerError, is_refusal, label
 from .wire.envelope import Call, unpack_answer
 from .wire.names import GripperName
 
-HALT_S: Final = 2.0
 STOPPED: Final = "stopped"
 
 

@@ -17,7 +17,7 @@ except ModuleNotFoundError as error:
 
 from ..calibration.csv_tables import Table
 from ..calibration.scales import ForceCalibration, SpeedCalibration, mean, newton
-from ..telemetry.payloads import printable
+from ..log import printable
 from .campaigns import Currents, peak_currents
 
 if TYPE_CHECKING:

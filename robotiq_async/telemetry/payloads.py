@@ -105,11 +105,6 @@ def title(hand: Hand) -> str:
     return hand.address if hand.name == hand.address else f"{hand.name} ({hand.address})"
 
 
-def printable(text: str) -> str:
-    """A text of others with what steers a terminal written out, as Python does it."""
-    return "".join(each if each.isprintable() else ascii(each)[1:-1] for each in text)
-
-
 def initial_state_fields(state: State, now: float) -> Fields:
     """The event that opens a feed: the state the hand is in."""
     return {"kind": "state", "timestamp": now, "target": state.name}

@@ -269,6 +269,7 @@ def summary(of: GripperName) -> Figures:
         "epoch": 1,
         "to": of.base,
         "stamp": time.monotonic(),
+        "age": 0.001,
         "address": "tcp://192.168.1.11:502",
         "state": State.RUNNING_IDLE.value,
         "fault": 0,

@@ -7,6 +7,7 @@ import json
 import os
 import signal
 import socket
+import time
 from asyncio.subprocess import Process
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ import pytest
 
 from robotiq_async import Finger
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from tests.cli.conftest import Beside, Call, Shell
+from tests.cli.conftest import PATIENCE, Beside, Call, Shell
 
 pytest.importorskip("zenoh")
 
@@ -56,21 +57,21 @@ class Served:
 
     gripper: SimulatedGripper
     address: str
-    time: Brake
+    brake: Brake
 
     async def moves(self) -> None:
         """Wait until finger A is on its way, and let it take long."""
         async with asyncio.timeout(20):
             while self.gripper.position(Finger.A) < 20:  # noqa: ASYNC110  # it tells nobody
                 await asyncio.sleep(0.01)
-        self.time.slow_down()
+        self.brake.slow_down()
 
 
 @pytest.fixture
 async def gripper() -> AsyncIterator[Served]:
-    time = Brake()
-    async with SimulatorServer(SimulatedGripper(time, speedup=20, spread=False)) as server:
-        yield Served(server.gripper, server.address, time)
+    brake = Brake()
+    async with SimulatorServer(SimulatedGripper(brake, speedup=20, spread=False)) as server:
+        yield Served(server.gripper, server.address, brake)
 
 
 def fleet_file(folder: Path, endpoint: str, gripper: str) -> Path:
@@ -101,6 +102,22 @@ def test_status_move_and_the_demo(
     outcome.assert_succeeded()
     assert f"async with RemoteHand('{ADDRESS}') as hand:" in outcome.out
     agent.finish(signal.SIGINT).assert_succeeded()
+
+
+def test_an_agent_whose_list_nobody_reads_serves_all_the_same(
+    call: Call, beside: Callable[..., Beside], endpoint: str, there: SimulatorServer, tmp_path: Path
+) -> None:
+    """``robotiq-async agent FLEET.toml | true``: it ended, and stopped the fingers."""
+    process = beside("agent", str(fleet_file(tmp_path, endpoint, there.address))).process
+    assert process.stdout is not None
+    assert process.stderr is not None
+    process.stdout.close()
+    ends = time.monotonic() + PATIENCE
+    while call("status", ADDRESS).code and time.monotonic() < ends:
+        assert process.poll() is None
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(PATIENCE) == 0
+    assert "Error" not in process.stderr.read()
 
 
 def test_a_move_asks_first(call: Call, endpoint: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -10,7 +11,8 @@ import pytest
 from robotiq_async import Finger, RobotiqError, State
 from robotiq_async.errors import AgentError, ControlLostError
 from robotiq_async.fleet.network.bus import Reply, Urgency
-from robotiq_async.fleet.wire.envelope import Answer, Call
+from robotiq_async.fleet.wire.envelope import Answer, Call, unpack_answer
+from robotiq_async.fleet.wire.values import error_fields
 from tests.fleet.lab import lab
 from tests.fleet.network import MemoryBus
 from tests.restless import Restless
@@ -21,9 +23,16 @@ class Spoiling:
     """A bus whose answers to one kind of request are spoiled: lost once, or another's."""
 
     def __init__(
-        self, bus: MemoryBus, verb: str, *, times: int = 1_000_000, answer: bytes | None = None
+        self,
+        bus: MemoryBus,
+        verb: str,
+        *,
+        times: int = 1_000_000,
+        answer: bytes | None = None,
+        is_sent: bool = True,
     ) -> None:
-        self._bus, self._verb, self._answer, self._left = bus, verb, answer, times
+        self._bus, self._verb, self._answer, self.left = bus, verb, answer, times
+        self._is_sent = is_sent
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._bus, name)
@@ -31,19 +40,42 @@ class Spoiling:
     def ask(
         self, key: str, payload: bytes, *, timeout: float, urgency: Urgency, **how: Any
     ) -> asyncio.Future[Reply | None]:
-        if not key.endswith(self._verb) or not self._left:
+        if not key.endswith(self._verb) or not self.left:
             return self._bus.ask(key, payload, timeout=timeout, urgency=urgency, **how)
-        self._left -= 1
+        self.left -= 1
         if self._answer is None:  # never sent
             return asyncio.ensure_future(_nothing(timeout))
         return asyncio.ensure_future(self._another(key, payload, timeout, urgency))
 
     async def _another(self, key: str, payload: bytes, timeout: float, urgency: Urgency) -> Reply | None:
-        asking = self._bus.ask(key, payload, timeout=timeout, urgency=urgency)
-        await asyncio.sleep(0.1)
-        asking.cancel()
+        if self._is_sent:
+            asking = self._bus.ask(key, payload, timeout=timeout, urgency=urgency)
+            await asyncio.sleep(0.1)
+            asking.cancel()
         assert self._answer is not None
         return _Answered(self._answer)
+
+
+class Garbling:
+    """A bus whose answers to one kind of request are those of an agent that does not understand it."""
+
+    def __init__(self, bus: MemoryBus) -> None:
+        self._bus = bus
+        self.verb = "nothing yet"
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._bus, name)
+
+    def ask(self, key: str, payload: bytes, **how: Any) -> asyncio.Future[Reply | None]:
+        asking = self._bus.ask(key, payload, **how)
+        return asyncio.ensure_future(self._garbled(asking)) if key.endswith(self.verb) else asking
+
+    async def _garbled(self, asking: asyncio.Future[Reply | None]) -> Reply | None:
+        reply = await asking
+        if reply is None:
+            return None
+        answer = replace(unpack_answer(reply.payload), value=None, error=error_fields(TypeError("what?")))
+        return _Answered(answer.pack())
 
 
 class _Answered:
@@ -82,6 +114,21 @@ async def test_a_cancelled_move_is_called_off_although_that_was_lost(lost: int) 
             await asyncio.sleep(2.5)
             assert not here.gripper.is_moving
             assert here.gripper.position(Finger.A) < 220
+
+
+@virtual
+async def test_a_cancelled_move_is_called_off_although_that_was_misrouted() -> None:
+    """Any refusal counted as the end of the lease, and the fingers ran on under one that was renewed."""
+    async with lab() as here:
+        answer = Answer("robotiq/v1/lab/cell/right", 3, 1, {}).pack()
+        bus = Spoiling(here.network.bus("client"), "cmd/cancel", times=1, answer=answer, is_sent=False)
+        async with here.client_over(bus) as hand:
+            with pytest.raises(TimeoutError):
+                async with asyncio.timeout(0.3):
+                    await hand.move(255, Finger.A, speed=0)
+            await asyncio.sleep(0.2)
+            assert not here.gripper.is_moving
+            assert hand.is_in_control
 
 
 @virtual
@@ -165,6 +212,77 @@ async def test_of_a_command_for_several_axes_all_is_carried_out_or_nothing() -> 
             await session.ask("cmd/command", {"axes": axes}, timeout=1.0)
         await asyncio.sleep(1)
         assert here.gripper.position(Finger.A) < 10
+
+
+@virtual
+@pytest.mark.parametrize(("lost", "keeps"), [(1, True), (100, False)])
+async def test_one_lost_renewal_does_not_lose_the_lease(lost: int, keeps: bool) -> None:
+    async with lab() as here:
+        bus = Spoiling(here.network.bus("client"), "/lease", times=0)
+        async with here.client_over(bus) as hand:
+            bus.left = lost
+            moving = asyncio.create_task(hand.move(215, Finger.A, speed=0))
+            for _ in range(300):
+                await asyncio.sleep(0.01)
+                if not hand.is_in_control:
+                    break
+            assert hand.is_in_control is keeps
+            bus.left = 0
+            if keeps:
+                assert (await moving).positions[Finger.A] == pytest.approx(215, abs=2)
+            else:
+                with pytest.raises(ControlLostError):
+                    await moving
+
+
+@virtual
+async def test_whoever_lost_the_lease_notices_although_the_agent_does_not_understand_the_question() -> None:
+    """The question ended in a TypeError, and the hand took itself for the one that commands."""
+    async with lab() as here, here.client("other", control=False) as other:
+        bus = Garbling(here.network.bus("client"))
+        async with here.client_over(bus) as hand:
+            bus.verb = "/lease"
+            await other.take()
+            await asyncio.sleep(1)
+            assert not hand.is_in_control
+            with pytest.raises(AgentError, match="does not understand lease"):
+                await hand.acquire()
+            bus.verb = "nothing"
+
+
+@virtual
+async def test_arguments_that_do_not_fit_leave_nothing_behind() -> None:
+    """The axes counted as commanded, and what others had set going was held at the end of the lease."""
+    async with lab() as here, here.client() as hand:
+        session = hand._session
+        assert session is not None
+        await here.local.set_speed(0)
+        await here.local.set_position(250, Finger.B)
+        for arguments in ({"position": 9, "fingers": 2, "more": 1}, {"position": 9, "fingers": float("inf")}):
+            with pytest.raises((TypeError, ValueError, OverflowError, AgentError)):
+                await session.ask("cmd/move", arguments, timeout=1.0)
+        async with here.client("other", control=False) as other:
+            await other.take()
+            await asyncio.sleep(0.2)
+            assert here.gripper.is_moving
+            await other.release()
+        assert not here.gripper.is_moving
+
+
+@virtual
+async def test_an_agent_that_is_ending_refuses_and_says_so() -> None:
+    """It acknowledged what it did not do any more."""
+    async with lab() as here, here.client("reader", control=False) as reader:
+        await here.local.set_speed(0)
+        await here.local.set_position(250, Finger.A)
+        writes = len(here.gripper.writes)
+        here.serving.cancel()
+        with pytest.raises(ControlLostError, match="the agent is ending; nothing was done") as refused:
+            await reader.acquire()
+        assert refused.value.reason == "closed"
+        await asyncio.gather(here.serving, return_exceptions=True)
+        assert not here.gripper.is_moving
+        assert len(here.gripper.writes) == writes + 1, "the halt, and nothing else"
 
 
 # -- grips -------------------------------------------------------------------------------------------------

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import struct
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,7 +14,7 @@ from robotiq_async.errors import ProtocolError
 from robotiq_async.fleet.wire.status_message import SIZE, StatusMessage, unpack
 
 U32, U64 = st.integers(0, 2**32 - 1), st.integers(0, 2**64 - 1)
-TIME = st.floats(allow_nan=False, width=64)
+TIME = st.floats(allow_nan=False, allow_infinity=False, width=64)
 MESSAGES = st.builds(
     StatusMessage,
     mark=U32,
@@ -23,7 +26,7 @@ MESSAGES = st.builds(
     events=U32,
     is_moving=st.booleans(),
     sequence=U64,
-    age=st.floats(allow_nan=False, width=32),
+    age=st.floats(allow_nan=False, allow_infinity=False, width=32),
     registers=st.none() | st.tuples(*[st.integers(0, 65535)] * 8),
 )
 
@@ -37,7 +40,7 @@ def test_what_is_packed_is_unpacked(message: StatusMessage) -> None:
 
 @given(st.binary(max_size=200))
 def test_anything_else_is_refused(data: bytes) -> None:
-    if len(data) != SIZE or data[0] != 1 or data[1] >= len(State):
+    if not is_one(data):
         with pytest.raises(ProtocolError):
             unpack(data)
     else:
@@ -50,9 +53,25 @@ def test_any_bytes_of_the_right_size_are_a_message_or_refused(data: bytes) -> No
         try:
             message = unpack(version + data[1:])
         except ProtocolError:
-            assert version != b"\x01" or data[1] >= len(State)
+            assert not is_one(version + data[1:])
         else:
             assert isinstance(message.state, State)
+
+
+def is_one(data: bytes) -> bool:
+    if len(data) != SIZE or data[0] != 1 or data[1] >= len(State):
+        return False
+    return all(map(math.isfinite, struct.unpack("<df", data[32:44])))
+
+
+@pytest.mark.parametrize("value", [math.inf, -math.inf, math.nan])
+def test_a_time_that_is_none_is_refused(value: float) -> None:
+    """Nothing would be newer than it ever after."""
+    message = StatusMessage(1, 2, 3.0, State.RUNNING_IDLE, 4, False, 5, False, 6, 0.5, None)
+    assert unpack(message.pack()) == message
+    for other in (message._replace(stamp=value), message._replace(age=value)):
+        with pytest.raises(ProtocolError, match="no time"):
+            unpack(other.pack())
 
 
 @given(MESSAGES, st.integers(0, SIZE - 1))

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ...log import log
-from ...telemetry.payloads import printable
+from ...log import log, printable
 from ..arguments import need
 from ..failures import UsageError
 from ..log_capture import forget, forwarded_warnings

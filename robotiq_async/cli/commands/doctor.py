@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ...fleet.network.route import is_remote
 from ...link.address import parse_address
-from ...telemetry.payloads import printable
+from ...log import printable
 from ..addresses import full_address
 from ..arguments import Address, Unit, need
 from ..failures import CommandError, UsageError

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from ...log import printable
 from ...session.clock import now
-from ...telemetry.payloads import printable
 from ..arguments import need
 from ..failures import CommandError, usage
 
@@ -30,7 +30,9 @@ async def fleet(
     watch: Annotated[bool, Parameter(negative=())] = False,
     as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
 ) -> None:
-    """List the grippers that agents serve: state, fault, who commands, age. Nothing moves.
+    """List the grippers that agents serve: state, fault, who commands. Nothing moves.
+
+    The age is the time since the agent last read the gripper.
 
     It looks on this machine; ROBOTIQ_ASYNC_CONNECT=tls/HOST:7447 names another, and
     ROBOTIQ_ASYNC_KEYS a folder of keys.
@@ -125,10 +127,10 @@ def _print_object(member: Member) -> None:
         "holder": member.holder,
         "problem": member.problem,
         "gripper": member.address,
-        "age": round(now() - member.heard_at, 3) if member.heard_at else None,
+        "age": None if member.seen_at is None else round(now() - member.seen_at, 3),
     }
     print(json.dumps(fields), flush=True)
 
 
 def _age(member: Member) -> str:
-    return f"{now() - member.heard_at:.1f} s" if member.heard_at else "-"
+    return "-" if member.seen_at is None else f"{now() - member.seen_at:.1f} s"

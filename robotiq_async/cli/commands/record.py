@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ...telemetry.payloads import printable, title
+from ...log import printable
+from ...telemetry.payloads import title
 from ..arguments import USUAL, Address, Link, need
 from ..failures import CommandError, UsageError
 from ..text import FORMATTERS, clock

@@ -11,8 +11,8 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ...log import printable
 from ...telemetry.gate import is_loopback
-from ...telemetry.payloads import printable
 from ..arguments import USUAL, Address, Byte, Link, Port, need
 from ..failures import CommandError, UsageError
 

@@ -14,7 +14,8 @@ from cyclopts import Parameter
 from ...actions import Operator
 from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...errors import RobotiqError
-from ...telemetry.payloads import printable, title
+from ...log import printable
+from ...telemetry.payloads import title
 from ..arguments import USUAL, Address, Byte, Link, Port, need
 from ..browser import opened
 from ..failures import CommandError, UsageError, usage

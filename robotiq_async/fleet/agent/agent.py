@@ -10,8 +10,9 @@ from typing import Final
 
 from ...errors import AgentError
 from ...hand import RobotiqHand
-from ...log import Log, log
+from ...log import Log
 from ...session.clock import now
+from ..complaints import Complaints
 from ..control.lease import WINDOW_S
 from ..network.bus import Bus, Question, Undo
 from ..wire.envelope import Answer
@@ -61,6 +62,7 @@ class Agent:
         self.epoch = secrets.randbits(EPOCH_BITS)
         self._bus = bus
         self._window = window
+        self._strange = Complaints()
         self._prefix = f"{ROOT}/{site}/{host}"
         self.hands = {
             name: ServedHand(GripperName(site, host, name), hand, bus, epoch=self.epoch, window=window)
@@ -137,7 +139,7 @@ class Agent:
         try:
             epoch, name = int(key.rpartition("/")[2]), GripperName.of_key(key)
         except ValueError:
-            log.warning("a token that no agent makes: %r", key)
+            self._strange.warn("a token that no agent makes: %r", key)
             return None
         return (epoch, name) if epoch != self.epoch else None
 

@@ -105,11 +105,12 @@ class News:
 
     def summary(self) -> Fields:
         """What an overview shows."""
-        holder, status = self._lease.holder, self._status()
+        stamp, holder, status = now(), self._lease.holder, self._status()
         return {
             **self._head(),
             "to": self._name.base,
-            "stamp": now(),
+            "stamp": stamp,
+            "age": None if status is None else stamp - status.timestamp,
             "address": self._hand.address,
             "state": self._hand.state.value,
             "fault": None if status is None else int(status.fault),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine
 from contextlib import suppress
 from typing import Any, Final, TypeVar
 
@@ -14,7 +14,7 @@ from ...control.state_machine import RUNNING
 from ...enums import Finger
 from ...errors import AgentError, ControlLostError, RobotiqConnectionError, RobotiqError
 from ...hand import RobotiqHand
-from ...log import Log
+from ...log import Log, printable
 from ...session.clock import now
 from ...version import __version__
 from ...wire.checks import check_byte, check_mask
@@ -32,12 +32,10 @@ COMMANDS: Final = frozenset(
     {"set_position", "set_speed", "set_force", "move", "hold", "activate", "reset", "atr", "recover"}
 )
 """What a holder may ask for: the method of a hand of that name. Beside them there are command and cancel."""
+LABEL_MAX: Final = 200
 T = TypeVar("T")
 _REMEMBERED: Final = 256
 """Requests whose answers are kept for repetitions."""
-
-
-_Work = Callable[[], Coroutine[Any, Any, MoveResult | None]]
 
 
 class _Request:
@@ -199,7 +197,7 @@ class ServedHand:
         if self._admission.is_repeated(call):
             return
         holder = self._lease.holder
-        label = str(call.arguments.get("label", "somebody"))[:200]
+        label = _label(call)
         if take:
             self._lease.intervene(call.client, "taken")
         if holder is not None and (take or holder.client == call.client):
@@ -296,7 +294,7 @@ class ServedHand:
             self._admission.bar(call)
         else:
             # Or a control loop would undo it in ten milliseconds.
-            self.end_lease("halted", str(call.arguments.get("label", "somebody"))[:200])
+            self.end_lease("halted", _label(call))
         self._start(_Request("halt", call, question), self._hand.halt())
 
     def _command(self, name: str, call: Call, question: Question) -> None:
@@ -307,31 +305,33 @@ class ServedHand:
         if name == "cancel":
             self._cancel(call, question)
             return
-        work = self._work(name, call)
+        self._check_known(name)
         self._admission.admit(call, now())
         axes = _axes(name, call.arguments)
-        coroutine = work()  # arguments that do not fit end here, before anything is kept
+        work = self._work(name, call.arguments)  # arguments that do not fit end here, before anything is kept
         self._commanded |= axes
         request = self._requests[call.number] = _Request(name, call, question)
         if len(self._requests) > _REMEMBERED:
             self._forget()
-        self._start(request, coroutine)
+        self._start(request, work)
 
-    def _work(self, name: str, call: Call) -> _Work:
-        if name == "command":
-            return lambda: self._set(call.arguments)
-        if name not in COMMANDS:
+    def _check_known(self, name: str) -> None:
+        if name != "command" and name not in COMMANDS:
             raise AgentError(f"no command of the name {name!r}")
-        method = getattr(self._hand, name)
-        return lambda: method(**call.arguments)
 
-    async def _set(self, arguments: Fields) -> None:
+    def _work(self, name: str, arguments: Fields) -> Coroutine[Any, Any, MoveResult | None]:
+        if name == "command":
+            return self._set(**arguments)
+        work: Coroutine[Any, Any, MoveResult | None] = getattr(self._hand, name)(**arguments)
+        return work
+
+    async def _set(self, axes: Fields) -> None:
         """What :meth:`RobotiqHand.command` does, for several axes at once."""
-        axes = {check_mask(int(mask)): changes for mask, changes in arguments["axes"].items()}
-        for changes in axes.values():  # all of them before the first is asked for
+        asked = {check_mask(int(mask)): changes for mask, changes in axes.items()}
+        for changes in asked.values():  # all of them before the first is asked for
             for name, value in changes.items():
                 check_byte(name, value)
-        for mask, changes in axes.items():
+        for mask, changes in asked.items():
             self._hand.command(mask, **changes)
 
     def _repeat(self, request: _Request, question: Question) -> None:
@@ -387,6 +387,11 @@ class ServedHand:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
         return task
+
+
+def _label(call: Call) -> str:
+    """What a client calls itself; it is shown to others."""
+    return printable(str(call.arguments.get("label", "somebody"))[:LABEL_MAX])
 
 
 def _axes(name: str, arguments: Fields) -> Finger:

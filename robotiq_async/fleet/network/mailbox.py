@@ -11,6 +11,7 @@ from enum import Enum
 from typing import Final
 
 from ...log import log
+from ..complaints import EVERY_S, Complaints
 
 GATHER_S: Final = 0.001
 """For so long news are gathered where they come thick and fast."""
@@ -48,6 +49,8 @@ class Mailbox:
         self._gathering: asyncio.TimerHandle | None = None
         self._opened_at = 0.0
         self._dropped = 0
+        self._report_due = 0.0
+        self._failed = Complaints()
 
     def put(self, letter: Callable[[], None], kind: Kind) -> None:
         """Have something called in the loop. From any thread."""
@@ -75,7 +78,7 @@ class Mailbox:
             try:
                 letter()
             except Exception:  # noqa: BLE001  # the next letter is another's
-                log.exception("a message of the fleet could not be handled")
+                self._failed.warn("a message of the fleet could not be handled", exc_info=True)
             if time.perf_counter() > until:
                 break
         if (self._halts or self._letters) and not self._is_due:
@@ -86,6 +89,7 @@ class Mailbox:
             self._gathering = self._loop.call_later(GATHER_S, self._open)
 
     def _report_dropped(self) -> None:
-        dropped, self._dropped = self._dropped, 0
-        if dropped:
+        if self._dropped and self._loop.time() >= self._report_due:
+            dropped, self._dropped = self._dropped, 0
+            self._report_due = self._loop.time() + EVERY_S
             log.warning("%d messages of the fleet were dropped: more came than can be handled", dropped)

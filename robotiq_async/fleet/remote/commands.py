@@ -17,9 +17,9 @@ from ...wire.checks import check_byte, check_mask, check_optional_byte, check_ti
 from ..network.bus import Urgency
 from ..wire.values import Fields, read_result, reading
 from .observation import RemoteObservation
-from .persistence import until_answered
+from .persistence import HALT_S, until_answered
 from .requests import label, plainly
-from .session import HALT_S, RemoteSession
+from .session import RemoteSession
 
 COMMAND_S: Final = 5.0
 """For what ends when the gripper acknowledges it."""
@@ -279,7 +279,7 @@ class RemoteCommands(RemoteObservation):
         """Have the agent's hand do something; when nobody waits for it any more, the agent calls it off."""
         session, outbox = self._asked(), self._outbox
         assert outbox is not None
-        if self._control is None and not session.is_in_control and session.lost is None:
+        if self._control is None and not session.keeper.is_in_control and session.keeper.lost is None:
             with plainly():
                 await session.keeper.acquire()
         session.check_control()

@@ -12,6 +12,7 @@ from ...session.clock import now
 from ..wire.envelope import Call
 from ..wire.names import GripperName
 from ..wire.values import Fields, reading
+from .agents import Agents
 from .mirror import Mirror
 from .requests import NoAnswerError, label
 
@@ -30,6 +31,7 @@ class Asking(Protocol):
 
     name: GripperName
     mirror: Mirror
+    agents: Agents
     window: float
 
     def call(self, arguments: Fields | None = None) -> Call:
@@ -40,9 +42,6 @@ class Asking(Protocol):
 
     async def ask_quietly(self, verb: str, arguments: Fields, timeout: float) -> None:
         """Ask for what the answer does by itself."""
-
-    async def check_one_agent(self) -> None:
-        """Refuse to begin to command while two agents serve the gripper."""
 
     def spawn(self, work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
         """Do something beside; it ends with the run."""
@@ -175,7 +174,7 @@ class LeaseKeeper:
     # -- inside ----------------------------------------------------------------------------------------
 
     async def _acquire(self, what: Fields) -> None:
-        await self._run.check_one_agent()
+        await self._run.agents.check_one()
         call = self._run.call({**what, "label": label()})
         value = await self._run.send(call, "lease", timeout=ANSWER_S)
         with reading("a lease"):

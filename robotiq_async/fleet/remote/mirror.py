@@ -141,7 +141,6 @@ class Mirror:
         if mark == self._mark:
             return False
         self.misrouted += 1
-        self.log.warning("a message about another gripper was dropped (%d so far)", self.misrouted)
         return True
 
     def is_of_another_run(self, message: StatusMessage, arrival: float, window: float = WINDOW_S) -> bool:

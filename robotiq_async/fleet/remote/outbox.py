@@ -70,7 +70,7 @@ class Outbox:
 
     def _is_under_this_lease(self, asked: Call) -> bool:
         now = self._session
-        return now.is_in_control and (asked.epoch, asked.lease) == (now.mirror.epoch, now.lease)
+        return now.keeper.is_in_control and (asked.epoch, asked.lease) == (now.mirror.epoch, now.keeper.lease)
 
     def count_motion(self, asking: asyncio.Task[Any]) -> None:
         """Something is under way that may set axes going."""

@@ -10,6 +10,8 @@ from ...errors import AgentError, NotAllowedError, ProtocolError
 from ...session.clock import now
 from .requests import NoAnswerError
 
+HALT_S: Final = 2.0
+"""So long a halt is asked for."""
 ATTEMPT_S: Final = 0.3
 """From one attempt to the next."""
 AGAIN_S: Final = 0.05

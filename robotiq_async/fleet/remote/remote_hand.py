@@ -197,7 +197,7 @@ class RemoteHand(RemoteCommands):
     @property
     def is_in_control(self) -> bool:
         """Whether this hand holds the lease, as far as it knows."""
-        return self._session is not None and not self._session.is_over and self._session.is_in_control
+        return self._session is not None and not self._session.is_over and self._session.keeper.is_in_control
 
     async def acquire(self) -> None:
         """Get the lease, if nobody else has it.

@@ -28,20 +28,22 @@ from ...session.state_waiters import StateWaiters
 from ...session.statistics import Counters, Statistics
 from ...session.streams import Channels
 from ...wire.checks import check_seconds
+from ..complaints import Complaints
 from ..control.lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
 from ..network.bus import Bus, Undo
 from ..wire.envelope import Call
 from ..wire.names import GripperName
 from ..wire.status_message import unpack
 from ..wire.values import Fields, read_statistics, reading
+from .agents import Agents
 from .lease_keeper import ANSWER_S, RENEWALS, LeaseKeeper
 from .mirror import Mirror
 from .missed_events import MissedEvents
 from .requests import NoAnswerError, Posted, Requests
 
 CONNECT_S: Final = 5.0
-HALT_S: Final = 2.0
-TWO_AGENTS: Final = "two agents serve it, each perhaps another gripper under the same name: stop one of them"
+OWN: Final = ("info", "lease", "halt", "cmd/cancel")
+"""Requests whose arguments no user has chosen: they are nobody's TypeError."""
 TRIES: Final = 2
 """So often a request is called off in a window."""
 
@@ -53,6 +55,7 @@ class RemoteSession:
         log: for what happens to the hand.
         mirror: what has been heard.
         keeper: the lease.
+        agents: which ones serve the gripper.
         waiters: who waits for a state.
         is_over: whether the run has ended, or is about to.
         has_ended: whether nothing of it is left.
@@ -103,13 +106,10 @@ class RemoteSession:
         self._looking: asyncio.Task[Any] | None = None
         channels.reopen(self.loop)
         self.mirror.begin(now())
-        self._tokens: set[str] = set()
-        """Of the agents that say that they serve the gripper."""
-        self._undo: list[Undo] = [
-            # One wildcard, and every payload says what it is about: samples may come under the wrong key.
-            bus.subscribe(name.key("*"), self._hear),
-            bus.watch(name.key("alive", "*"), self._see_agent),
-        ]
+        self._unreadable, self._misrouted = Complaints(), Complaints()
+        # One wildcard, and every payload says what it is about: samples may come under the wrong key.
+        self._undo: Undo = bus.subscribe(name.key("*"), self._hear)
+        self.agents = Agents(name, bus, self.keeper.stay_away)
 
     # -- start and end ---------------------------------------------------------------------------------
 
@@ -185,8 +185,8 @@ class RemoteSession:
         except RobotiqError as error:
             self.log.warning("the end was not acknowledged (%s): the agent holds what moves", error)
         finally:
-            for undo in self._undo:
-                undo()
+            self._undo()
+            self.agents.end()
             for task in self._tasks:
                 task.cancel()
             await self._requests.close()
@@ -242,14 +242,20 @@ class RemoteSession:
                 else:
                     self._hear_status(payload, in_turn=True)
         except RobotiqError as error:
-            self.log.warning("%s", error)
+            self._unreadable.warn("%s: a message was dropped: %s", self.name, error)
         if self.mirror.has_missed() and not self.is_over:
             self._missed.fetch()  # an event was dropped on the way
+
+    def _is_about_another(self, mark: object) -> bool:
+        if not self.mirror.is_about_another(mark):
+            return False
+        self._misrouted.warn("%s: a message about another gripper was dropped", self.name)
+        return True
 
     def _hear_status(self, payload: bytes, *, in_turn: bool, asked: float | None = None) -> bool:
         """A status has arrived; returns whether it is about the gripper as it is."""
         message, arrival = unpack(payload), now()
-        if self.mirror.is_about_another(message.mark):
+        if self._is_about_another(message.mark):
             return False
         if self.mirror.is_of_another_run(message, arrival, self.window):
             return False
@@ -265,32 +271,13 @@ class RemoteSession:
         return True
 
     def _hear_fields(self, fields: Mapping[str, Any]) -> None:
-        if self.mirror.is_about_another(fields["mark"]):
+        if self._is_about_another(fields["mark"]):
             return
         if "statistics" in fields:
             self.statistics = read_statistics(fields["statistics"])
             return
         if self._hear_status(bytes.fromhex(fields["status"]), in_turn=True):
             self.mirror.hear_events(fields["events"])
-
-    def _see_agent(self, token: str, is_there: bool) -> None:
-        """An agent has come or gone. Of two one is a mistake, and which one it is people know."""
-        before = len(self._tokens)
-        (self._tokens.add if is_there else self._tokens.discard)(token)
-        if before < 2 <= len(self._tokens):
-            self.log.error("%s", TWO_AGENTS)
-            self.keeper.stay_away()
-
-    async def check_one_agent(self) -> None:
-        """Refuse to begin to command while two agents say that they serve the gripper.
-
-        Raises:
-            AgentError: they do.
-        """
-        if len(self._tokens) > 1:  # one may have gone without a word
-            self._tokens = set(await self._bus.announced(self.name.key("alive", "*"), timeout=ANSWER_S))
-        if len(self._tokens) > 1:
-            raise AgentError(f"{self.name}: {TWO_AGENTS}; nothing was done")
 
     async def _keep(self) -> None:
         """Look for silence, renew the lease, and acquire it again when that is due."""
@@ -299,9 +286,8 @@ class RemoteSession:
             due = now() + interval
             await asyncio.sleep(interval)
             woken = now()
-            late = woken - due
             # After a hold-up of this loop, what has arrived meanwhile is heard first.
-            if late < interval and woken - self.mirror.heard_at > self.window:
+            if woken - due < interval and woken - self.mirror.heard_at > self.window:
                 self._fall_silent(woken)
             if self.mirror.is_silent and woken - self._arrived_at < interval:
                 self._look_again()
@@ -322,21 +308,6 @@ class RemoteSession:
 
     # -- control ---------------------------------------------------------------------------------------
 
-    @property
-    def is_in_control(self) -> bool:
-        """Whether this hand holds the lease, as far as it knows."""
-        return self.keeper.is_in_control
-
-    @property
-    def lease(self) -> int:
-        """Number of the lease it holds, or held last."""
-        return self.keeper.lease
-
-    @property
-    def lost(self) -> ControlLostError | None:
-        """Why control was lost; None while it is held, or was never asked for."""
-        return self.keeper.lost
-
     def check_control(self) -> None:
         """Refuse commands of a hand that only reads, or has lost the lease.
 
@@ -356,7 +327,7 @@ class RemoteSession:
 
     def call(self, arguments: Fields | None = None) -> Call:
         """The next request, under the present lease."""
-        return self._requests.make(self.mirror, self.lease, arguments or {})
+        return self._requests.make(self.mirror, self.keeper.lease, arguments or {})
 
     def post(self, call: Call, verb: str, **how: Any) -> Posted:  # noqa: ANN401
         """Send a request; see :meth:`Requests.post`."""
@@ -381,13 +352,17 @@ class RemoteSession:
             self._hear_status(news, in_turn=False, asked=posted.asked_at)
         try:
             return answer.outcome(self.mirror.clock)
+        except (TypeError, ValueError) as error:
+            if posted.verb not in OWN:
+                raise
+            raise AgentError(f"{self.name}: its agent does not understand {posted.verb}: {error}") from error
         except MoveTimeoutError as error:
             error.status = self.mirror.renumbered(error.status)
             raise
         except ControlLostError as error:
             if posted.verb != "lease":
                 self.check_running()  # the lease was given back at the end of the run
-            if posted.verb != "halt" and error.reason != "late" and posted.call.lease == self.lease:
+            if posted.verb != "halt" and error.reason != "late" and posted.call.lease == self.keeper.lease:
                 self.keeper.lose(error.reason, str(error))
             raise
 
@@ -398,20 +373,18 @@ class RemoteSession:
 
     def call_off(self, call: Call) -> asyncio.Task[Any] | None:
         """Nobody waits for a request any more: what it set going is to be held."""
-        if not self.is_in_control or self.is_over:
+        if not self.keeper.is_in_control or self.is_over:
             return None
-
         return self.spawn(self._call_off(call))
 
     async def _call_off(self, call: Call) -> None:
         for _ in range(TRIES):
             try:
                 await self.ask("cmd/cancel", {"number": call.number}, timeout=self.window / TRIES)
-            except (NoAnswerError, NotAllowedError):
-                continue
-            except RobotiqError:
-                pass  # the lease has ended, or the agent: nothing is left to call off
-            return
+            except RobotiqError as error:
+                if getattr(error, "reason", "late") == "late":
+                    continue
+            return  # or the lease has ended: nothing is left to call off
         # Without renewals the lease ends, and the agent holds what moves by itself.
         self.keeper.lose("expired", "a request could not be called off")
 
@@ -421,7 +394,3 @@ class RemoteSession:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
         return task
-
-    def current_state(self) -> State:
-        """Where the hand is."""
-        return self.mirror.state

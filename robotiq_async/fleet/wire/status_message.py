@@ -19,6 +19,7 @@
 from __future__ import annotations
 
 import struct
+from math import isfinite
 from typing import Final, NamedTuple
 
 from ...enums import State
@@ -93,6 +94,9 @@ def unpack(data: bytes) -> StatusMessage:
     _, place, flags, mark, lease, events, epoch, sequence, stamp, age, *registers = _LAYOUT.unpack(data)
     if place >= len(_STATES):
         raise ProtocolError(f"a status in a state that does not exist: {place}")
+    if not (isfinite(stamp) and isfinite(age)):
+        # What has been heard is told back with every request, and no older one counts after it.
+        raise ProtocolError(f"a status at no time: {stamp}, {age} s old")
     return StatusMessage(
         mark=mark,
         epoch=epoch,

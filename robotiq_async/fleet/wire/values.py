@@ -20,6 +20,7 @@ from ...errors import (
     ProtocolError,
     RobotiqError,
 )
+from ...log import printable
 from ...session.statistics import Statistics
 from ...session.streams import SentRequest, Transition
 from ...wire.request import Request
@@ -47,8 +48,19 @@ def reading(what: str) -> Iterator[None]:
     """
     try:
         yield
-    except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
         raise ProtocolError(f"the agent sent {what} that cannot be read: {error!r:.200}") from error
+
+
+def words(text: object) -> str:
+    """What somebody on the network calls something, fit to be shown.
+
+    Raises:
+        TypeError: no string.
+    """
+    if not isinstance(text, str):
+        raise TypeError(f"words must be a string, got {text!r}")
+    return printable(text)
 
 
 # -- statuses ----------------------------------------------------------------------------------------------
@@ -105,9 +117,9 @@ def read_error(fields: Fields, clock: Clock) -> Exception:
 
 
 def _error(fields: Fields, clock: Clock) -> Exception:
-    kind, message = _KINDS.get(fields["kind"]), str(fields["message"])
+    kind, message = _KINDS.get(fields["kind"]), words(fields["message"])
     if kind is None:
-        return AgentError(f"{fields['kind']}: {message}")
+        return AgentError(f"{words(fields['kind'])}: {message}")
     error: Exception = kind.__new__(kind)
     error.args = (message,)
     known: dict[str, object] = {}
@@ -119,9 +131,9 @@ def _error(fields: Fields, clock: Clock) -> Exception:
     if issubclass(kind, MoveTimeoutError):
         known["status"] = read_status(fields["status"], clock)
     if issubclass(kind, ConnectFailedError):
-        known["address"] = str(fields["address"])
+        known["address"] = words(fields["address"])
     if issubclass(kind, ControlLostError):
-        known["reason"] = str(fields["reason"])
+        known["reason"] = words(fields["reason"])
     vars(error).update(known)
     return error
 

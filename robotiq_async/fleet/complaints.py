@@ -1,0 +1,37 @@
+"""Complaints: what strangers, or a bad network, may cause thousands of times does not fill the log."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from ..log import log
+from ..session.clock import now
+
+EVERY_S: Final = 10.0
+
+
+class Complaints:
+    """Of one kind, about one source: the first at once, then one in ten seconds, with how many there were."""
+
+    def __init__(self) -> None:
+        """Nothing to complain about yet."""
+        self._next = -math.inf
+        self._count = 0
+
+    def warn(self, message: str, *arguments: object, exc_info: bool = False) -> None:
+        """Log a warning, or count it.
+
+        Args:
+            message: for the logger.
+            arguments: for the logger.
+            exc_info: whether with the traceback of what is being handled.
+        """
+        self._count += 1
+        if now() < self._next:
+            return
+        if self._count > 1:
+            message += " (%d like it since the last word of them)"
+            arguments += (self._count,)
+        self._next, self._count = now() + EVERY_S, 0
+        log.warning(message, *arguments, exc_info=exc_info)

@@ -1,0 +1,44 @@
+"""Which agents say that they serve a gripper. There must be one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from ...errors import AgentError
+from ...log import log
+from ..network.bus import Bus, Undo
+from ..wire.names import GripperName
+
+LOOK_S: Final = 0.5
+TWO_AGENTS: Final = "two agents serve it, each perhaps another gripper under the same name: stop one of them"
+
+
+class Agents:
+    """Those that are seen to serve one gripper. Of two one is a mistake, and which one it is people know."""
+
+    def __init__(self, name: GripperName, bus: Bus, two: Callable[[], None]) -> None:
+        """Begin to look; ``two`` is called when there are two of them from now on."""
+        self._name = name
+        self._bus = bus
+        self._two = two
+        self._tokens: set[str] = set()
+        self.end: Undo = bus.watch(name.key("alive", "*"), self._see)
+
+    async def check_one(self) -> None:
+        """Refuse to begin to command while two serve the gripper.
+
+        Raises:
+            AgentError: they do.
+        """
+        if len(self._tokens) > 1:  # one may have gone without a word
+            self._tokens = set(await self._bus.announced(self._name.key("alive", "*"), timeout=LOOK_S))
+        if len(self._tokens) > 1:
+            raise AgentError(f"{self._name}: {TWO_AGENTS}; nothing was done")
+
+    def _see(self, token: str, is_there: bool) -> None:
+        before = len(self._tokens)
+        (self._tokens.add if is_there else self._tokens.discard)(token)
+        if before < 2 <= len(self._tokens):
+            log.error("%s: %s", self._name, TWO_AGENTS)
+            self._two()
