@@ -190,6 +190,12 @@ def test_what_a_goal_cannot_ask(names: Sequence[str], angles: Sequence[float], r
     assert reason in str(refused.value)
 
 
+def test_a_name_without_end_is_not_repeated_without_end() -> None:
+    with pytest.raises(GoalError) as refused:
+        targets(["x" * 1_000_000], [0.0])
+    assert len(str(refused.value)) < 500
+
+
 @given(st.lists(st.tuples(st.sampled_from([*JOINTS, "fingers", "", "x"]), st.floats()), max_size=5))
 def test_any_goal_is_either_refused_or_within_the_range(pairs: list[tuple[str, float]]) -> None:
     try:

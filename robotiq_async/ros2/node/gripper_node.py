@@ -155,6 +155,7 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
     async def _disconnect(self, connection: Connection, reason: str) -> None:
         await self._publishing.stop()
         await connection.close(reason)
+        self._publishing.tell_status(connection)  # the newest one is kept for whoever comes later
 
     # -- services --------------------------------------------------------------------------------------
 

@@ -59,7 +59,7 @@ class Publishing:
     async def start(self, connection: Connection, joint_states: JointStates, rate: float) -> None:
         """Publish what the hand of a connection shows."""
         works = (
-            (STATUS_RATE_HZ, lambda: self._publish_status(connection)),
+            (STATUS_RATE_HZ, lambda: self.tell_status(connection)),
             (DIAGNOSTICS_RATE_HZ, lambda: self._publish_diagnoses(connection)),
         )
         self._timers = [Timer(1 / frequency, work, self._failed) for frequency, work in works]
@@ -91,11 +91,12 @@ class Publishing:
 
     async def _publish_transitions(self, connection: Connection, joints: JointStates) -> None:
         async for _ in connection.hand.transitions():
-            self._publish_status(connection)
+            self.tell_status(connection)
             if not is_connected(connection.hand):
                 joints.forget()
 
-    def _publish_status(self, connection: Connection) -> None:
+    def tell_status(self, connection: Connection) -> None:
+        """Publish the status as it is now."""
         text = status_text(connection.hand, takes_commands=connection.takes_commands)
         self._status.publish(String(data=text))
 

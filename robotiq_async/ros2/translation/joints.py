@@ -50,6 +50,9 @@ TOLERANCE: Final = 1e-3
 _STOP_TOLERANCE: Final = 0.1
 """Radians that the base joint may be asked to stand off its stop while the middle one bends."""
 
+LONGEST_NAME: Final = 80
+"""So much of a wrong name is told."""
+
 VELOCITY_S: Final = 0.04
 """Velocities are taken over at least this time: a count is half a degree."""
 
@@ -174,7 +177,8 @@ def _plain_name(name: str, prefix: str) -> str:
     commanded = ", ".join(prefix + each for each in _COMMANDED)
     if name.startswith(prefix) and plain in JOINTS:
         raise GoalError(f"{name!r} follows other joints and takes no goal; these do: {commanded}")
-    raise GoalError(f"there is no joint {name!r}; these take goals: {commanded}")
+    shown = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."  # anybody can send anything
+    raise GoalError(f"there is no joint {shown!r}; these take goals: {commanded}")
 
 
 def _finger_counts(name: str, base: float | None, middle: float | None) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 
 import pytest
@@ -48,6 +49,8 @@ def test_a_life(simulator: Simulator) -> None:
         assert client.change("deactivate")
         assert client.change("cleanup")
         assert client.state() == "unconfigured"
+        told = json.loads(client.status().wait(new=False).data)  # what is kept for whoever comes now
+        assert told == {"state": "SHUTDOWN", "connected": False, "takes_commands": False}
         assert client.change("configure")
         process.prints("connected to", times=2)
         assert client.change("shutdown")
