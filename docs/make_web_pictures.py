@@ -13,6 +13,7 @@ import io
 import sys
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from time import monotonic
 from typing import Final
 
 from PIL import Image
@@ -29,14 +30,40 @@ from robotiq_async.web.settings import PageSettings  # noqa: E402
 from tests.web.browser import Browser  # noqa: E402
 
 FOLDER: Final = ROOT / "docs" / "measured"
-FRAME_S: Final = 0.15
+FRAME_S: Final = 0.3
+SLOWER: Final = 4
+"""So many times slower is the gripper that is filmed: without a graphics card drawing takes its time."""
+PATIENCE_S: Final = 60.0
+"""For a slow move."""
 WIDTH: Final = 760
 """Of the animation, in pixels."""
 
 
+class Pace:
+    """The clock of the gripper, which can be slowed down."""
+
+    def __init__(self) -> None:
+        """As fast as ours."""
+        self._rate = 1.0
+        self._at = self._now = monotonic()
+
+    def __call__(self) -> float:
+        """The time there."""
+        at = monotonic()
+        self._now += self._rate * (at - self._at)
+        self._at = at
+        return self._now
+
+    def set(self, rate: float) -> None:
+        """From now on it runs so many times as fast as ours."""
+        self()
+        self._rate = rate
+
+
 async def main() -> None:
     """All of them."""
-    gripper, browser = SimulatedGripper(), Browser()
+    pace = Pace()
+    gripper, browser = SimulatedGripper(pace), Browser()
     try:
         async with SimulatorServer(gripper, port=5020) as server, RobotiqHand(server.address) as hand:
             settings = PageSettings(port=0, control=True, addresses=(hand.address,), speed=128, force=64)
@@ -44,7 +71,9 @@ async def main() -> None:
                 await resize(browser, 1040, 600)
                 await browser.open(page.url)
                 await browser.says("statistics", "polls")
+                pace.set(1 / SLOWER)
                 await animation(browser, hand, gripper)
+                pace.set(1)
                 await stills(browser, hand, gripper, server)
     finally:
         browser.quit()
@@ -54,12 +83,12 @@ async def animation(browser: Browser, hand: RobotiqHand, gripper: SimulatedGripp
     """Wide, normal, a grasp, and open again."""
 
     async def play() -> None:
-        await hand.move(WIDTH_WIDE, Finger.SCISSOR, speed=255)
-        await hand.move(WIDTH_NORMAL, Finger.SCISSOR, speed=255)
+        await hand.move(WIDTH_WIDE, Finger.SCISSOR, speed=255, timeout=PATIENCE_S)
+        await hand.move(WIDTH_NORMAL, Finger.SCISSOR, speed=255, timeout=PATIENCE_S)
         gripper.place_object(Finger.ABC, position=85)
-        await hand.close(speed=60)
-        await asyncio.sleep(1)
-        await hand.open(speed=60)
+        await hand.close(speed=60, timeout=PATIENCE_S)
+        await asyncio.sleep(SLOWER)
+        await hand.open(speed=60, timeout=PATIENCE_S)
         gripper.remove_object()
 
     await light(browser, dark=False)
@@ -86,7 +115,7 @@ async def stills(
     browser: Browser, hand: RobotiqHand, gripper: SimulatedGripper, server: SimulatorServer
 ) -> None:
     """Closing, holding something in the dark, on a phone, and lost."""
-    await resize(browser, 1200, 1040)
+    await resize(browser, 1200, 900)
     closing = asyncio.create_task(hand.close(speed=100))
     await asyncio.sleep(1.2)
     await keep(browser, "web_closing")
@@ -119,7 +148,7 @@ async def film(browser: Browser, play: Callable[[], Awaitable[None]]) -> tuple[l
         began = loop.time()
         frames.append(await shot(browser))
         await asyncio.sleep(max(FRAME_S - (loop.time() - began), 0))
-        durations.append(round(1000 * (loop.time() - began)))
+        durations.append(round(1000 * (loop.time() - began) / SLOWER))
     await playing
     return frames, durations
 

@@ -27,6 +27,7 @@ from tests.fake_hand import FakeHand
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 
 WORD = "correct horse"
+HANDS = 13
 
 
 def settings(**options: object) -> PageSettings:
@@ -35,8 +36,9 @@ def settings(**options: object) -> PageSettings:
 
 @pytest_asyncio.fixture(loop_scope="module", scope="module")
 async def page() -> AsyncIterator[PageServer]:
-    """One for all who try."""
-    async with PageServer([FakeHand()], settings()) as page:
+    """One for all who try, of more hands than a browser has scenes for."""
+    many = PageSettings(port=0, addresses=tuple(f"fake://{number}" for number in range(HANDS)))
+    async with PageServer([FakeHand() for _ in many.addresses], many) as page:
         yield page
 
 
@@ -106,11 +108,21 @@ async def test_a_websocket_of_another_site_is_refused(page: PageServer) -> None:
 
 async def test_a_page_that_only_looks_has_nothing_to_press(page: PageServer) -> None:
     folder, cookie = await let_in(page)
-    text = (await ask(page.url, folder, Cookie=cookie)).text
+    text = (await ask(page.url, f"{folder}hand/3", Cookie=cookie)).text
     assert "read-only" in text
     for name in (*ACTIONS, "speed", "force"):
         assert f'"data-testid":"{name}"' not in text
     assert '"data-testid":"state"' in text
+
+
+async def test_of_many_hands_no_tile_has_a_scene(page: PageServer) -> None:
+    """A browser takes the first scenes away again when there are more than some sixteen."""
+    folder, cookie = await let_in(page)
+    tiles = (await ask(page.url, folder, Cookie=cookie)).text
+    assert f'"data-testid":"tile-{HANDS - 1}"' in tiles
+    one = (await ask(page.url, f"{folder}hand/{HANDS - 1}", Cookie=cookie)).text
+    assert [text.count('"rq-stage"') for text in (tiles, one)] == [0, 1]
+    assert "There is no hand 99" in (await ask(page.url, f"{folder}hand/99", Cookie=cookie)).text
 
 
 async def test_headers_without_end_are_not_kept(page: PageServer) -> None:
