@@ -128,7 +128,13 @@ def test_a_grip_is_kept_from_one_move_to_the_next(call: Call, there: SimulatorSe
     outcome = call("move", "60", "--fingers", "A", "--keep", "--yes", there.address)
     outcome.assert_succeeded()
     assert "rGTO" not in outcome.err
+    assert "the grip is in force" in outcome.out
     assert there.gripper.grips == held
+    assert (
+        "what is held may fall. With --keep"
+        in call("move", "9", "--fingers", "A", "--yes", there.address).out
+    )
+    assert not there.gripper.grips
 
 
 def test_a_grip_that_was_let_go_is_not_taken_up_again_without_a_word(

@@ -89,5 +89,5 @@ async def _move(
             await hand.activate()
         result = await hand.move(position, fingers, speed=speed, force=force, timeout=timeout)
     print_outcomes(result)
-    if result.object_detected:
+    if result.status.contacts:  # also of axes that did not move
         print(IN_FORCE if hand.status.go_echo else LET_GO + HINT * (not keep))
