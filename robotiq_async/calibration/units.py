@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
+from math import ceil, floor
 from typing import overload
 
+from ..wire.checks import check_number
 from .scales import (
     STROKE_MM,
     ForceCalibration,
@@ -59,7 +61,7 @@ class Units:
             TypeError: not a number.
             ValueError: outside 0..155 mm.
         """
-        return position_of_opening(_check("mm", mm, 0.0, STROKE_MM, "mm"))
+        return position_of_opening(check_number("mm", mm, 0.0, STROKE_MM, "millimetres"))
 
     @overload
     def speed(self, *, mm_per_s: float) -> int: ...
@@ -81,8 +83,8 @@ class Units:
         if (mm_per_s is None) == (closing_s is None):
             raise TypeError("speed() takes one of mm_per_s and closing_s")
         if closing_s is not None:
-            return _closest("closing_s", closing_s, _closing_times(self.speeds), "s")
-        return _closest("mm_per_s", mm_per_s, _mm_per_s(self.speeds), "mm/s")
+            return _closest("closing_s", closing_s, _closing_times(self.speeds), "seconds")
+        return _closest("mm_per_s", mm_per_s, _mm_per_s(self.speeds), "millimetres a second")
 
     def force(self, *, label_n: float) -> int:
         """The force value, 0..255, whose label comes closest; the lowest of several.
@@ -94,7 +96,7 @@ class Units:
             TypeError: not a number.
             ValueError: no value has such a label; told in newton.
         """
-        return _closest("label_n", label_n, _labels(self.forces), "N (a label, not a measured force)")
+        return _closest("label_n", label_n, _labels(self.forces), "newton of a label (no measured force)")
 
     # -- from counts -----------------------------------------------------------------------------------
 
@@ -139,11 +141,10 @@ class Units:
 
     def __repr__(self) -> str:
         """Ranges and sources."""
-        speeds, labels = _mm_per_s(self.speeds).values(), _labels(self.forces).values()
         return (
-            f"<Units {_words(0, STROKE_MM)} mm (nominal), "
-            f"{_words(min(speeds), max(speeds))} mm/s ({self.speeds.source}), "
-            f"labels {_words(min(labels), max(labels))} N ({self.forces.source})>"
+            f"<Units 0..{STROKE_MM:g} mm (nominal), "
+            f"{_words(_mm_per_s(self.speeds))} mm/s ({self.speeds.source}), "
+            f"labels {_words(_labels(self.forces))} N ({self.forces.source})>"
         )
 
 
@@ -166,22 +167,14 @@ def _labels(forces: ForceCalibration) -> Mapping[int, float]:
 
 
 def _closest(name: str, wanted: object, figures: Mapping[int, float], unit: str) -> int:
-    low, high = min(figures.values()), max(figures.values())
-    return nearest(_check(name, wanted, low, high, unit), figures)
+    return nearest(check_number(name, wanted, *_limits(figures), unit), figures)
 
 
-def _check(name: str, value: object, low: float, high: float, unit: str) -> float:
-    if not isinstance(value, int | float) or isinstance(value, bool):
-        raise TypeError(f"{name} must be a number in {_words(low, high)} {unit}, got {value!r}")
-    # Whoever asks for a limit as it was told gets it.
-    if not min(low, _told(low)) <= value <= max(high, _told(high)):
-        raise ValueError(f"{name} must be in {_words(low, high)} {unit}, got {value!r}")
-    return float(value)
+def _limits(figures: Mapping[int, float]) -> tuple[float, float]:
+    """To two digits, outwards: whoever asks for a limit as it was told gets it."""
+    return floor(min(figures.values()) * 100) / 100, ceil(max(figures.values()) * 100) / 100
 
 
-def _words(low: float, high: float) -> str:
-    return f"{_told(low):g}..{_told(high):g}"
-
-
-def _told(limit: float) -> float:
-    return round(limit, 2)
+def _words(figures: Mapping[int, float]) -> str:
+    low, high = _limits(figures)
+    return f"{low:g}..{high:g}"
