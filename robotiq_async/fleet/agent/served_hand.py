@@ -14,7 +14,7 @@ from ...control.state_machine import RUNNING
 from ...enums import Finger
 from ...errors import AgentError, ControlLostError, RobotiqConnectionError, RobotiqError
 from ...hand import RobotiqHand
-from ...log import Log, printable
+from ...log import Log
 from ...session.clock import now
 from ...version import __version__
 from ...wire.checks import check_byte, check_mask
@@ -24,6 +24,7 @@ from ..network.bus import Bus, Question
 from ..wire.envelope import Answer, Call, failure, unpack_call
 from ..wire.names import GripperName
 from ..wire.values import Fields, result_fields
+from .arguments import axes_of, label_of
 from .news import News
 
 RETRY_S: Final = 1.0
@@ -32,7 +33,6 @@ COMMANDS: Final = frozenset(
     {"set_position", "set_speed", "set_force", "move", "hold", "activate", "reset", "atr", "recover"}
 )
 """What a holder may ask for: the method of a hand of that name. Beside them there are command and cancel."""
-LABEL_MAX: Final = 200
 T = TypeVar("T")
 _REMEMBERED: Final = 256
 """Requests whose answers are kept for repetitions."""
@@ -197,7 +197,7 @@ class ServedHand:
         if self._admission.is_repeated(call):
             return
         holder = self._lease.holder
-        label = _label(call)
+        label = label_of(call)
         if take:
             self._lease.intervene(call.client, "taken")
         if holder is not None and (take or holder.client == call.client):
@@ -294,7 +294,7 @@ class ServedHand:
             self._admission.bar(call)
         else:
             # Or a control loop would undo it in ten milliseconds.
-            self.end_lease("halted", _label(call))
+            self.end_lease("halted", label_of(call))
         self._start(_Request("halt", call, question), self._hand.halt())
 
     def _command(self, name: str, call: Call, question: Question) -> None:
@@ -307,7 +307,7 @@ class ServedHand:
             return
         self._check_known(name)
         self._admission.admit(call, now())
-        axes = _axes(name, call.arguments)
+        axes = axes_of(name, call.arguments)
         work = self._work(name, call.arguments)  # arguments that do not fit end here, before anything is kept
         self._commanded |= axes
         request = self._requests[call.number] = _Request(name, call, question)
@@ -370,7 +370,7 @@ class ServedHand:
         else:
             answer = Answer(call.to, call.number, self._epoch, result_fields(task.result()) or {})
             if request.name in ("move", "set_position", "command"):
-                self._owed &= ~_axes(request.name, call.arguments)
+                self._owed &= ~axes_of(request.name, call.arguments)
         request.answer = answer.pack()
         for question in request.questions:
             question.reply(request.answer, self.news.status_message())
@@ -387,18 +387,3 @@ class ServedHand:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
         return task
-
-
-def _label(call: Call) -> str:
-    """What a client calls itself; it is shown to others."""
-    return printable(str(call.arguments.get("label", "somebody"))[:LABEL_MAX])
-
-
-def _axes(name: str, arguments: Fields) -> Finger:
-    """The axes that a command addresses; all of them if it does not say."""
-    masks = arguments.get("axes", {}) if name == "command" else [arguments.get("fingers", 15)]
-    axes = Finger(0)
-    for mask in masks:
-        with suppress(TypeError, ValueError):
-            axes |= Finger(int(mask) & 15)
-    return axes

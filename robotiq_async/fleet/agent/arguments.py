@@ -1,0 +1,28 @@
+"""What the arguments of a call say, whatever a client has put into them."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import Final
+
+from ...enums import NO_AXES, Finger
+from ...log import printable
+from ..wire.envelope import Call
+from ..wire.values import Fields
+
+LABEL_MAX: Final = 200
+
+
+def label_of(call: Call) -> str:
+    """What a client calls itself; it is shown to others."""
+    return printable(str(call.arguments.get("label", "somebody"))[:LABEL_MAX])
+
+
+def axes_of(name: str, arguments: Fields) -> Finger:
+    """The axes that a command addresses; all of them if it does not say."""
+    masks = arguments.get("axes", {}) if name == "command" else [arguments.get("fingers", 15)]
+    axes = NO_AXES
+    for mask in masks:
+        with suppress(TypeError, ValueError):
+            axes |= Finger(int(mask) & 15)
+    return axes
