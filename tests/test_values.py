@@ -98,6 +98,7 @@ VALUES: list[object] = [
     ForceCalibration.nominal(),
     Request(activate=True, mode=Mode.PINCH),
     parse_address("tcp://gripper"),
+    parse_address("sim://?speedup=10&object=150").simulation,
     TCP_REGISTERS,
     gDT[0],
     SPEED,
