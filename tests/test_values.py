@@ -111,6 +111,7 @@ VALUES: list[object] = [
     GripEvent(GripChange.SLIPPED, A, 5, A | B, status_of(0xB9, 0xEA, at=12.5, sequence=7)),
     Request(activate=True, mode=Mode.PINCH),
     parse_address("tcp://gripper"),
+    parse_address("sim://?speedup=10&object=150").simulation,
     TCP_REGISTERS,
     gDT[0],
     SPEED,

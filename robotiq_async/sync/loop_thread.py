@@ -91,7 +91,10 @@ class LoopThread:
         except BaseException:
             self._give_up(call, interrupted)
             raise
-        return task.result()
+        try:
+            return task.result()
+        finally:
+            del call, task  # whoever keeps what it raises is not to keep the call with it
 
     def _made(self, call: _Call[T], limit: float | None) -> asyncio.Task[T]:
         """Have a call made; again if the loop came to its end before it had begun with it."""
@@ -147,9 +150,10 @@ class LoopThread:
             return
         try:
             server.loop.call_soon_threadsafe(server.give_up, call, interrupted, settled)
-            settled.get(timeout=GIVE_UP_S)
         except RuntimeError:
             return  # the loop has ended, and the call with it
+        try:
+            settled.get(timeout=GIVE_UP_S)
         except Empty:
             log.warning("a call that was interrupted did not end within %g s, and goes on", GIVE_UP_S)
 
@@ -256,4 +260,4 @@ class _Call(Generic[T]):
 
 
 LOOP_THREAD: Final = LoopThread()
-"""The one of this process: two hands that share a line must share a loop."""
+"""That of all hands of this process."""

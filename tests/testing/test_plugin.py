@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import tomllib
 from collections.abc import Callable
+from importlib.metadata import entry_points
 
 import pytest
 
@@ -13,6 +14,8 @@ from tests.docs.pages import DOCS, ROOT, blocks
 pytest_plugins = ["pytester"]
 
 PLUGIN = "robotiq_async.testing.plugin"
+IS_FOUND = any(each.name == "robotiq_async" for each in entry_points(group="pytest11"))
+"""Whether the library is installed here as it is now; else the tests name the plugin."""
 OTHERS = ("hypothesispytest", "xdist", "xdist.looponfail", "cacheprovider", "faulthandler", "rosbags")
 """Plugins that only take time here."""
 TESTS = """
@@ -59,7 +62,7 @@ def run(pytester: pytest.Pytester) -> Run:
         pytester.makeini(f"[pytest]\nfilterwarnings = error\n{ini}\n")
         pytester.makepyfile(tests)
         without = [word for name in OTHERS for word in ("-p", f"no:{name}")]
-        return pytester.runpytest_inprocess("-p", PLUGIN, *without, *options)
+        return pytester.runpytest_inprocess(*(() if IS_FOUND else ("-p", PLUGIN)), *without, *options)
 
     return run
 
@@ -94,6 +97,7 @@ def test_anyios_plugin_alone_is_enough(run: Run) -> None:
 
 
 def test_the_wrong_places_are_told(run: Run) -> None:
+    pytest.importorskip("trio")
     result = run(
         """
         import pytest
