@@ -9,14 +9,10 @@ is so for all. Needs gcc; the C thread also needs libmodbus (Debian: libmodbus-d
 
 from __future__ import annotations
 
-import argparse
 import json
-import platform
 import subprocess
 import sys
-import tempfile
-from collections.abc import Callable, Iterator
-from importlib.metadata import version
+from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 from statistics import median
@@ -25,12 +21,12 @@ from typing import Any
 from robotiq_async.session.statistics import percentile
 from tests.benchmarks.contenders import INTERVAL_S, Figures, periods
 from tests.benchmarks.native import MissingToolError, build, grippers
+from tests.benchmarks.program import Row, main, say
 
 PARTS = ("steady", "many", "latency", "readers", "import", "memory")
 ROOT = Path(__file__).parents[2]
 LOOPS = ["asyncio", "uvloop"] if find_spec("uvloop") else ["asyncio"]
 HANDS = {"asyncio": (64, 96, 128), "uvloop": (96, 128, 160, 192)}
-Row = dict[str, str]
 
 
 def jitter(measured: list[float]) -> dict[str, float]:
@@ -182,50 +178,5 @@ class Benchmarks:
         }
 
 
-def say(what: str) -> None:
-    """Progress, for whoever waits."""
-    print(what, file=sys.stderr, flush=True)  # noqa: T201
-
-
-def table(rows: list[Row]) -> str:
-    """Rows as a Markdown table."""
-    names = list(rows[0])
-    lines = [names, ["--"] * len(names), *([row[name] for name in names] for row in rows)]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
-def main() -> int:
-    """Read the options and run."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("parts", nargs="*", metavar="PART", help=f"which: {', '.join(PARTS)} (default: all)")
-    parser.add_argument("--rounds", type=int, default=3, help="how often each takes its turn (default: 3)")
-    parser.add_argument("--seconds", type=float, default=20.0, help="how long each turn is (default: 20)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="also write all figures there")
-    options = parser.parse_args()
-    unknown = set(options.parts) - set(PARTS)
-    if unknown:
-        parser.error(f"no such part: {', '.join(sorted(unknown))}; there are {', '.join(PARTS)}")
-    with tempfile.TemporaryDirectory() as folder:
-        try:
-            it = Benchmarks(Path(folder), options.rounds, options.seconds)
-        except MissingToolError as why:
-            print(f"the benchmarks cannot run: {why}", file=sys.stderr)  # noqa: T201
-            return 1
-        for part in options.parts or PARTS:
-            measure: Callable[[], Iterator[Row]] = getattr(it, f"{part}_" if part == "import" else part)
-            print(f"\n{measure.__doc__}\n\n{table(list(measure()))}", flush=True)  # noqa: T201
-    it.results["of"] = {
-        "python": platform.python_version(),
-        **{name: version(name) for name in ("pymodbus", "anyio", *LOOPS[1:])},
-        "rounds": options.rounds,
-        "seconds": options.seconds,
-    }
-    if options.json is not None:
-        options.json.write_text(json.dumps(it.results), encoding="utf-8")
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(Benchmarks, __doc__ or "", PARTS, ["pymodbus", "anyio", *LOOPS[1:]], 20.0))

@@ -8,23 +8,19 @@ What is compared takes turns, round after round, and medians of the rounds are s
 
 from __future__ import annotations
 
-import argparse
 import json
-import platform
 import socket
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from importlib.metadata import version
 from pathlib import Path
 from statistics import median
 from typing import Any
 
-from tests.benchmarks.__main__ import Row, say, table
-from tests.benchmarks.native import MissingToolError, build, grippers
+from tests.benchmarks.native import build, grippers
+from tests.benchmarks.program import Row, main, say
 
 PARTS = ("commands", "agents", "overview")
 ROOT = Path(__file__).parents[2]
@@ -203,38 +199,5 @@ def reader_cells(rounds: list[list[Figures]], count: int) -> Row:
     return dict(zip(names, values, strict=True))
 
 
-def main() -> int:
-    """Read the options and run."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("parts", nargs="*", metavar="PART", help=f"which: {', '.join(PARTS)} (default: all)")
-    parser.add_argument("--rounds", type=int, default=3, help="how often each takes its turn (default: 3)")
-    parser.add_argument("--seconds", type=float, default=10.0, help="how long each turn is (default: 10)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="also write all figures there")
-    options = parser.parse_args()
-    unknown = set(options.parts) - set(PARTS)
-    if unknown:
-        parser.error(f"no such part: {', '.join(sorted(unknown))}; there are {', '.join(PARTS)}")
-    with tempfile.TemporaryDirectory() as folder:
-        try:
-            it = Benchmarks(Path(folder), options.rounds, options.seconds)
-        except MissingToolError as why:
-            print(f"the benchmarks cannot run: {why}", file=sys.stderr)  # noqa: T201
-            return 1
-        for part in options.parts or PARTS:
-            measure = getattr(it, part)
-            print(f"\n{measure.__doc__}\n\n{table(list(measure()))}", flush=True)  # noqa: T201
-    it.results["of"] = {
-        "python": platform.python_version(),
-        **{each: version(each) for each in ("eclipse-zenoh", "pymodbus")},
-        "rounds": options.rounds,
-        "seconds": options.seconds,
-    }
-    if options.json is not None:
-        options.json.write_text(json.dumps(it.results), encoding="utf-8")
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(Benchmarks, __doc__ or "", PARTS, ["eclipse-zenoh", "pymodbus"], 10.0))

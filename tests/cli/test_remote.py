@@ -176,10 +176,19 @@ async def test_an_agent_that_is_told_to_end_stops_the_fingers(
 async def test_a_second_agent_is_refused(shell: Shell, agent: Process, endpoint: str, tmp_path: Path) -> None:
     file = tmp_path / "second.toml"
     file.write_text(
-        f'site = "lab"\nhost = "cell"\nlisten = ["{free_endpoint()}"]\nconnect = ["{endpoint}"]\n'
-        '[grippers.left]\naddress = "sim://"\n'
+        f'site = "lab"\nhost = "cell"\nconnect = ["{endpoint}"]\n[grippers.left]\naddress = "sim://"\n'
     )
     (await shell.run("agent", str(file))).assert_failed(1, "another agent serves zenoh://lab/cell/left")
+
+
+def test_an_agent_that_waits_for_its_router_says_so_and_can_be_told_to_end(
+    beside: Callable[..., Beside], tmp_path: Path
+) -> None:
+    file, router = tmp_path / "FLEET.toml", free_endpoint()
+    file.write_text(f'site = "lab"\nconnect = ["{router}"]\n[grippers.left]\naddress = "sim://"\n')
+    agent = beside("agent", str(file))
+    assert agent.read_error() == f"robotiq-async: {router} is not there yet: waiting"
+    assert agent.finish(signal.SIGTERM).code == 0
 
 
 def test_a_file_is_checked(call: Call, tmp_path: Path) -> None:

@@ -16,7 +16,11 @@ from typing import Any
 
 from robotiq_async import Finger, RobotiqError, RobotiqHand
 from robotiq_async.fleet.agent.agent import Agent
-from robotiq_async.fleet.network.configuration import agent_configuration, client_configuration
+from robotiq_async.fleet.network.configuration import (
+    agent_configuration,
+    client_configuration,
+    session_configuration,
+)
 from robotiq_async.fleet.network.zenoh_bus import open_bus
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
@@ -35,10 +39,11 @@ def say(*words: object) -> None:
     sys.stdout.flush()
 
 
-async def agent(endpoint: str, *addresses: str) -> None:
-    """Serve grippers until SIGTERM."""
+async def agent(endpoint: str, *addresses: str, router: str = "") -> None:
+    """Serve grippers until SIGTERM, where clients come in or by a router."""
     hands = {name: RobotiqHand(address) for name, address in zip(NAMES, addresses, strict=False)}
-    bus = await open_bus(agent_configuration("lab", "cell", [endpoint], insecure=True), endpoint)
+    listen, connect = ([], [router]) if router else ([endpoint], [])
+    bus = await open_bus(agent_configuration("lab", "cell", listen, connect, insecure=True), endpoint)
     serving = asyncio.ensure_future(Agent("lab", "cell", hands, bus).run(lambda: say("ready")))
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, serving.cancel)
     try:
@@ -47,6 +52,19 @@ async def agent(endpoint: str, *addresses: str) -> None:
     finally:
         await bus.close()
     say("ended")
+
+
+async def behind(endpoint: str, *addresses: str) -> None:
+    """An agent behind a router."""
+    await agent("", *addresses, router=endpoint)
+
+
+async def router(endpoint: str) -> None:
+    """A router, which is a session in that mode, until it is killed."""
+    bus = await open_bus(session_configuration([endpoint], []) | {"mode": "router"}, endpoint)
+    say("ready")
+    await asyncio.Event().wait()
+    await bus.close()
 
 
 async def served(endpoint: str) -> None:
@@ -140,6 +158,8 @@ async def compare(endpoint: str) -> None:
 
 PROGRAMS: dict[str, Callable[..., Coroutine[Any, Any, None]]] = {
     "agent": agent,
+    "behind": behind,
+    "router": router,
     "served": served,
     "compare": compare,
     "move": move,

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from robotiq_async.fleet.agent.agent_file import AgentFileError, AgentSettings, machine_name, read_agent_file
-from robotiq_async.fleet.network.configuration import LOOPBACK, LOOPBACK_TLS
+from robotiq_async.fleet.network.configuration import LOOPBACK, LOOPBACK_TLS, agent_configuration
 from robotiq_async.fleet.wire.names import check_name
 
 LEFT = '[grippers.left]\naddress = "tcp://192.168.1.11"\n'
@@ -43,7 +43,6 @@ def test_everything(tmp_path: Path) -> None:
         site = "lab"
         host = "cell-1"
         listen = ["tls/0.0.0.0:7447", "quic/[::]:7447"]
-        connect = ["tls/router.lab:7447"]
         keys = "cell-1"
         window = 2
 
@@ -71,6 +70,17 @@ def test_everything(tmp_path: Path) -> None:
 def test_with_keys_it_listens_encrypted(tmp_path: Path) -> None:
     put_keys(tmp_path)
     assert read(tmp_path, f'keys = "cell-1"\n{GOOD}').listen == (LOOPBACK_TLS,)
+
+
+def test_behind_a_router_it_does_not_listen(tmp_path: Path) -> None:
+    """Zenoh's routers carry nothing between two who may listen: it was heard of by nobody."""
+    settings = read(tmp_path, f'connect = ["tcp/127.0.0.1:7447"]\n{GOOD}')
+    assert (settings.listen, settings.connect) == ((), ("tcp/127.0.0.1:7447",))
+    assert agent_configuration("lab", "cell", settings.listen, settings.connect)["mode"] == "client"
+    assert agent_configuration("lab", "cell")["mode"] == "peer"
+    both = 'connect = ["tcp/127.0.0.1:7447"]\nlisten = ["tcp/127.0.0.1:7448"]\n'
+    with pytest.raises(AgentFileError, match=r"line 2: listen must be left out .*by a router.*7448"):
+        read(tmp_path, both + GOOD)
 
 
 def test_two_grippers_behind_one_gateway_and_any_number_of_simulated_ones(tmp_path: Path) -> None:

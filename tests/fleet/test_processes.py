@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from robotiq_async import ConnectionLostError, Finger
+from robotiq_async import ConnectionLostError, Finger, State
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.wire.request import AxisRequest, Request
@@ -70,6 +70,11 @@ class Site:
         agent = await self.start("agent", self.endpoint, self.server.address)
         await agent.says("ready")
         return agent
+
+    async def start_router(self) -> Program:
+        router = await self.start("router", self.endpoint)
+        await router.says("ready")
+        return router
 
     async def start_mover(self) -> Program:
         mover = await self.start("move", self.endpoint)
@@ -200,3 +205,27 @@ async def test_a_frozen_reader_holds_up_nobody(site: Site) -> None:
         await hand.set_speed(200)
         reader.signal(signal.SIGCONT)
         await hand.set_speed(100)
+
+
+async def test_a_router_is_killed_and_comes_back(site: Site) -> None:
+    """Agent and client know the router and nothing of each other."""
+    router = await site.start_router()
+    await (await site.start("behind", site.endpoint, site.server.address)).says("ready")
+    async with site.hand() as hand:
+        moving = asyncio.ensure_future(hand.move(255, Finger.A, speed=0))
+        await site.until(lambda: site.gripper.position(Finger.A) > 15)
+        router.signal(signal.SIGKILL)
+        assert await site.until(lambda: not site.gripper.is_moving) < 3
+        with pytest.raises(ConnectionLostError):
+            async with asyncio.timeout(LIMIT_S):
+                await moving
+        await site.until(lambda: hand.state is State.DISCONNECTED)
+        assert not hand.is_in_control
+        stood, writes = site.gripper.position(Finger.A), len(site.gripper.writes)
+        await site.start_router()
+        await site.until(lambda: hand.is_in_control)
+        sequence = hand.status.sequence
+        await site.until(lambda: hand.status.sequence > sequence + 20)
+        assert hand.state is State.RUNNING_IDLE
+        assert (site.gripper.position(Finger.A), len(site.gripper.writes)) == (stood, writes)
+        await hand.move(0, Finger.A, speed=255)

@@ -17,6 +17,10 @@ from ..log_capture import forget, forwarded_warnings
 if TYPE_CHECKING:
     from ...fleet.agent.agent import Agent
     from ...fleet.agent.agent_file import AgentSettings
+    from ...fleet.network.zenoh_bus import ZenohBus
+
+WAITING_S = 2.0
+"""Opening a session takes a tenth of that, or until there is a router."""
 
 
 async def agent(
@@ -72,7 +76,6 @@ def _settings(file: Path) -> AgentSettings:
 async def _serve(settings: AgentSettings) -> None:
     from ...fleet.agent.agent import Agent
     from ...fleet.network.configuration import agent_configuration
-    from ...fleet.network.zenoh_bus import open_bus
 
     configuration = agent_configuration(
         settings.site,
@@ -85,15 +88,26 @@ async def _serve(settings: AgentSettings) -> None:
     if settings.insecure:
         _tell("anyone who reaches this host can command its grippers: there are no keys")
     hands = {name: gripper.make_hand() for name, gripper in settings.grippers.items()}
-    bus = await open_bus(configuration, ", ".join(settings.listen))
     try:
-        with forwarded_warnings(_tell):
-            served = Agent(settings.site, settings.host, hands, bus, window=settings.window)
-            await served.run(lambda: _announce(served))
+        bus = await _open(configuration, ", ".join(settings.listen or settings.connect))
+        try:
+            with forwarded_warnings(_tell):
+                served = Agent(settings.site, settings.host, hands, bus, window=settings.window)
+                await served.run(lambda: _announce(served))
+        finally:
+            await bus.close()
     except asyncio.CancelledError:
         log.info("the agent was told to end")  # and that is how this command ends well
+
+
+async def _open(configuration: dict[str, object], where: str) -> ZenohBus:
+    from ...fleet.network.zenoh_bus import open_bus
+
+    saying = asyncio.get_running_loop().call_later(WAITING_S, _tell, f"{where} is not there yet: waiting")
+    try:
+        return await open_bus(configuration, where)
     finally:
-        await bus.close()
+        saying.cancel()
 
 
 def _announce(served: Agent) -> None:

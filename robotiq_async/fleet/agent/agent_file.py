@@ -72,8 +72,8 @@ class AgentSettings:
         site: the site's name.
         grippers: by name.
         host: the host's name; by default this machine's.
-        listen: endpoints of zenoh where clients come in.
-        connect: endpoints of zenoh to connect to: routers.
+        listen: endpoints of zenoh where clients come in; none with a router.
+        connect: endpoints of a router, by which clients come in.
         keys: folder with the agent's certificate and key; None for no encryption.
         insecure: whether other machines may come in without.
         window: seconds for which a lease holds without being renewed.
@@ -138,13 +138,16 @@ class _Reader:
             insecure = _check_bool("insecure", table.get("insecure", False))
         with self._blaming("keys"):
             keys = self._keys(table.get("keys"))
-        default = [LOOPBACK if keys is None else LOOPBACK_TLS]
-        with self._blaming("listen"):
-            wanted = _check_list("listen", table.get("listen", default))
-            listen = check_listen(wanted, has_keys=keys is not None, insecure=insecure)
         with self._blaming("connect"):
             wanted = _check_list("connect", table.get("connect", []))
             connect = check_connect(wanted, has_keys=keys is not None, insecure=insecure)
+        default = [] if connect else [LOOPBACK if keys is None else LOOPBACK_TLS]
+        with self._blaming("listen"):
+            wanted = _check_list("listen", table.get("listen", default))
+            listen = check_listen(wanted, has_keys=keys is not None, insecure=insecure)
+            if listen and connect:
+                why = "clients come in there, or by a router"
+                raise ValueError(f"listen must be left out where there is connect: {why}, got {wanted!r}")
         return AgentSettings(
             site, self._grippers(table[_GRIPPERS]), host, listen, connect, keys, insecure, window
         )

@@ -35,7 +35,7 @@ def agent_configuration(
         site: the site's name.
         host: the host's name.
         listen: endpoints where clients come in.
-        connect: endpoints to connect to.
+        connect: endpoints of routers; with none to listen on, the agent is reached through the router alone.
         keys: the agent's folder of keys; clients may then do what its access list says, and nothing else.
         insecure: see :func:`~robotiq_async.fleet.network.endpoints.check_listen`.
 
@@ -44,11 +44,13 @@ def agent_configuration(
     """
     listen = check_listen(listen, has_keys=keys is not None, insecure=insecure)
     connect = check_connect(connect, has_keys=keys is not None, insecure=insecure)
+    # A router carries nothing from peer to peer; one of the two has to be its client, and clients are peers.
+    mode = "client" if connect and not listen else "peer"
+    session = session_configuration(listen, connect, keys) | {"mode": mode}
     if keys is None:
-        return session_configuration(listen, connect)
+        return session
     clients = AccessList.read_file(keys / ACCESS)
-    rules = access_control(site, host, clients)
-    return session_configuration(listen, connect, keys) | {"access_control": rules}
+    return session | {"access_control": access_control(site, host, clients)}
 
 
 def client_configuration(

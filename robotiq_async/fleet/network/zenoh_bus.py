@@ -16,6 +16,7 @@ from typing import Any, Final
 import zenoh
 from zenoh.handlers import Callback
 
+from ...concurrency import in_a_thread
 from ...errors import ConnectFailedError
 from .asking import Asking
 from .bus import Question, Reply, Undo, Urgency, is_any
@@ -51,7 +52,7 @@ async def open_bus(configuration: Mapping[str, object], what: str) -> ZenohBus:
     def open_session() -> zenoh.Session:
         return zenoh.open(zenoh.Config.from_json5(json.dumps(configuration)))
 
-    opening = asyncio.ensure_future(asyncio.to_thread(open_session))
+    opening = in_a_thread(open_session)  # which waits for a router that is not there
     try:
         session = await asyncio.shield(opening)
     except zenoh.ZError as error:
