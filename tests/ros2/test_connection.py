@@ -76,7 +76,7 @@ async def test_forbidding_aborts_the_goal_and_halts(
     connection = await connected(server)
     goal = begin_goal(connection)
     await connection.hand.wait_for_state(State.RUNNING_CC)
-    await connection.forbid("the node was deactivated")
+    assert await connection.forbid("the node was deactivated")
     outcome = await goal
     assert getattr(outcome, "ending", None) is Ending.ABORTED
     assert not gripper.request_registers[0] >> 8 & 0x08, "rGTO"
@@ -91,7 +91,7 @@ async def test_a_halt_that_does_not_arrive_is_an_error_in_the_log(
     server.cut()
     await connection.hand.wait_for_state(State.DISCONNECTED)
     with caplog.at_level(logging.ERROR, "robotiq_async"):
-        await connection.forbid("the node was deactivated")
+        assert not await connection.forbid("the node was deactivated")
     assert "no halt, the fingers MAY STILL MOVE" in caplog.text
     assert not connection.takes_commands
     await connection.close("the end")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 
 import pytest
 
@@ -81,6 +82,29 @@ async def test_a_silent_agent_is_a_link_that_is_down() -> None:
         assert diagnose(hand, now())[0].level is Level.ERROR
         with pytest.raises(RefusedError, match="the link to the gripper is down"):
             await connection.check_goal()
+        await connection.close("the end")
+
+
+@virtual
+async def test_what_a_goal_moved_is_held_when_the_agent_has_its_gripper_back() -> None:
+    async with lab() as here:
+        connection = Connection(here.client(control=None), SETTINGS)
+        await connection.open()
+        await connection.permit()
+        slow = replace(SETTINGS, speed=0)
+        goal = asyncio.create_task(connection.run_goal(b"1", CLOSE, slow, lambda: None, 0))
+        async for status in connection.hand.statuses():
+            if status.position(Finger.A) > 40:
+                break
+        here.server.refuse()
+        here.server.cut()
+        assert (await goal).ending is Ending.ABORTED
+        assert here.gripper.is_moving
+        await here.server.accept()
+        await connection.hand.wait_for_state(State.RUNNING_IDLE)
+        await asyncio.sleep(0.3)
+        assert not here.gripper.is_moving
+        assert here.gripper.position(Finger.A) < 200
         await connection.close("the end")
 
 

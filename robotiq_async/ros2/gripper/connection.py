@@ -77,8 +77,8 @@ class Connection:
         self._check_open()
         self.takes_commands = self._took_commands = True
 
-    async def forbid(self, reason: str) -> None:
-        """Take no commands any more, and halt.
+    async def forbid(self, reason: str) -> bool:
+        """Take no commands any more, and halt; returns whether the gripper has shown that it stands.
 
         A halt that does not reach the gripper is an error in the log and no failure: what matters is that
         nothing else is commanded. If the link comes back soon, the gripper is halted then.
@@ -87,11 +87,13 @@ class Connection:
         try:
             await self._stop(reason)
         except NotStartedError:
-            pass  # stopped by the end of the hand
+            return False  # the end of the hand stops them
         except RobotiqError as error:
             Log(self.hand.name).error("no halt, the fingers MAY STILL MOVE: %s", error)
             if isinstance(error, RobotiqConnectionError):
                 self._owed.owe(self.hand.halt)
+            return False
+        return True
 
     async def close(self, reason: str) -> None:
         """Disconnect; the fingers are stopped if commands were ever taken. Idempotent."""

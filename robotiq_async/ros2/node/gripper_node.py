@@ -133,8 +133,8 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
 
     def _deactivate(self) -> str:
         connection, _, _ = self._configured()
-        self._bridge.wait(connection.forbid("the node was deactivated"))
-        return "halted; no commands are taken"
+        is_halted = self._bridge.wait(connection.forbid("the node was deactivated"))
+        return f"no commands are taken; {'halted' if is_halted else 'NOT halted'}"
 
     def _clean_up(self) -> str:
         if self._now is None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from contextlib import suppress
 from typing import Final
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -17,7 +16,6 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from ...errors import NotStartedError
 from ...protocol import Hand
 from ...session.clock import now
 from ..gripper.connection import Connection
@@ -25,6 +23,7 @@ from ..translation.diagnosis import diagnose, status_text
 from ..translation.pace import Pace
 from ..translation.readiness import is_connected
 from .messages import JointStates, diagnostic_array
+from .timer import Timer
 
 STATUS_RATE_HZ: Final = 10.0
 """Of the status; a change of state is published at once."""
@@ -110,36 +109,3 @@ class Publishing:
                 diagnose(hand, now()),
             )
         )
-
-
-class Timer:
-    """Does something at a rate, from now on; what is missed is missed."""
-
-    def __init__(
-        self, period: float, work: Callable[[], object], failed: Callable[[BaseException], object]
-    ) -> None:
-        """Begin at once, in the running loop.
-
-        Args:
-            period: seconds.
-            work: is done; a hand that was stopped in this moment does not matter.
-            failed: is called with what else it raises, and then it ends.
-        """
-        self._loop = asyncio.get_running_loop()
-        self._period, self._work, self._failed = period, work, failed
-        self._due = self._loop.time()
-        self._next = self._loop.call_soon(self._tick)
-
-    def cancel(self) -> None:
-        """End it."""
-        self._next.cancel()
-
-    def _tick(self) -> None:
-        try:
-            with suppress(NotStartedError):
-                self._work()
-        except Exception as error:  # noqa: BLE001  # whatever it is: nobody else would hear of it
-            self._failed(error)
-            return
-        self._due = max(self._due + self._period, self._loop.time())
-        self._next = self._loop.call_at(self._due, self._tick)

@@ -57,5 +57,6 @@ def test_a_deactivation_without_a_link_is_told(simulator: Simulator) -> None:
         client.status().wait(lambda it: not json.loads(it.data)["connected"], new=False)
         assert client.change("deactivate")
         process.prints("no halt, the fingers MAY STILL MOVE")
+        process.prints("no commands are taken; NOT halted")
         process.send(signal.SIGINT)
         assert process.ends() == 0

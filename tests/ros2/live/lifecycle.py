@@ -6,6 +6,8 @@ import json
 import signal
 
 import pytest
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 
 from robotiq_async.ros2.translation.settings import PARAMETERS
 from robotiq_async.wire.request import Request
@@ -124,6 +126,23 @@ def test_a_gripper_that_is_not_there(simulator: Simulator) -> None:
         assert client.state() == "unconfigured"
         assert client.set("address", simulator.address).successful
         assert client.change("configure")
+
+
+def test_a_signal_while_the_node_shuts_down(simulator: Simulator) -> None:
+    """As a launch ends its nodes: the transition and the signal at once, in a goal."""
+    with node(address=simulator.address, autostart=True) as process, Client() as client:
+        process.prints("commands are taken")
+        assert client.call("activate").success
+        goal = begun(client.move(2.8))
+        client.begin(
+            "change_state", ChangeState, ChangeState.Request(transition=Transition(label="shutdown"))
+        )
+        process.send(signal.SIGINT)
+        assert goal.ends()[0] == ABORTED
+        assert process.ends() == 0
+        assert not simulator.do(lambda gripper: gripper.request_registers[0] >> 8 & 0x08), "rGTO"
+        assert position(simulator) < 230
+        assert "Traceback" not in process.text
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
