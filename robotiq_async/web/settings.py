@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 import secrets
 from dataclasses import asdict, dataclass, field
+from socket import gethostname
 from typing import Final, Self
 
 from ..telemetry.gate import is_loopback
 from ..wire.checks import check_int
 
 LOOPBACK: Final = "127.0.0.1"
+EVERYWHERE: Final = ("0.0.0.0", "::", "")
+"""Every interface of this machine: to be opened by its name."""
 PORT: Final = 8766
 """Beside that of the viewers."""
 
@@ -75,7 +78,8 @@ class PageSettings:
 
     def url(self, port: int) -> str:
         """The address to open; it lets in whoever has it, unless a password is asked for."""
-        host = f"[{self.host}]" if ":" in self.host else self.host
+        host = gethostname() if self.host in EVERYWHERE else self.host
+        host = f"[{host}]" if ":" in host else host
         return f"{self.scheme}://{host}:{port}/" + ("" if self.password else f"?token={self.token}")
 
     def line(self) -> bytes:

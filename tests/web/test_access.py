@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import MutableMapping
+from socket import gethostname
 
 import pytest
 
@@ -143,6 +144,8 @@ def test_settings_travel_as_a_line_and_show_no_secret() -> None:
     assert "horse" not in repr(settings)
     assert settings.url(80) == "http://127.0.0.1:80/"
     assert PageSettings(host="::1").url(80).startswith("http://[::1]:80/?token=")
+    for everywhere in ("0.0.0.0", "::"):
+        assert access(host=everywhere, password="x").settings.url(80) == f"http://{gethostname()}:80/"
 
 
 # -- the guard, without a server -------------------------------------------------------------------------

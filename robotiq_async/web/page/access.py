@@ -100,8 +100,8 @@ class Access:
     def cookie(self) -> str:
         """The header that lets a browser in. No script reads it, and no page of another site makes use of it.
 
-        Lax, not Strict: with that a browser that came by a link of another page (a terminal in the browser,
-        a chat) would leave it at home. What it guards from looks at Origin.
+        Lax, not Strict: a strict one stays at home when somebody comes by a link of another page (a terminal
+        in the browser, a chat). What it would guard against is refused by its Origin.
         """
         secure = "; Secure" if self.settings.certificate else ""
         path = self.settings.folder
