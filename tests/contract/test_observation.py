@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import logging
 
 import pytest
 
@@ -26,6 +27,24 @@ async def test_it_is_called_by_its_address_unless_it_was_given_a_name(where: str
         hand = here.make()
         assert hand.name == hand.address
         assert hand.name in repr(hand)
+
+
+@contract
+async def test_every_line_of_the_log_tells_its_hand(where: str, caplog: pytest.LogCaptureFixture) -> None:
+    async with bench(where) as here:
+        with caplog.at_level(logging.DEBUG, "robotiq_async"):
+            async with here.make() as hand:
+                hand.command(position=50)
+                await lose_the_gripper(here, hand)
+                await here.server.accept()
+                await hand.wait_for_state(State.RUNNING_IDLE)
+        known = {hand.name, here.server.address}
+    records = [each for each in caplog.records if each.name == "robotiq_async"]
+    assert len(records) > 5
+    for record in records:
+        assert record.__dict__["hand"] in known
+        assert record.getMessage().startswith(f"{record.__dict__['hand']}: ")
+    assert {record.__dict__["hand"] for record in records} == known
 
 
 @contract

@@ -20,7 +20,7 @@ from robotiq_async.errors import RecordingError
 from robotiq_async.telemetry.recordings import LARGEST, Entry, read_recording, recover
 
 MAGIC = b"\x89MCAP0\r\n"
-EVENT = {"monotonic": 1.0, "kind": "state", "target": "RESET"}
+EVENT = {"timestamp": 1.0, "kind": "state", "target": "RESET"}
 CHANNEL = Channel(id=1, topic="/gripper/event", message_encoding="json", metadata={}, schema_id=0)
 BOMB = 2**28
 """Bytes that a small chunk becomes."""
