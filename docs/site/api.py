@@ -73,6 +73,11 @@ def parts() -> dict[str, Part]:
         "hand.md": Part(
             "The hand", "One gripper, for the program that moves it.", (*hand, f"{PACKAGE}.protocol.Hand")
         ),
+        "sync.md": Part(
+            "The hand without await",
+            "For scripts and notebooks: made from the async one, with the same names.",
+            tuple(exports(f"{PACKAGE}.sync")),
+        ),
         "values.md": Part(
             "Readings, results, options",
             "What a hand hands out, and what it takes beside numbers.",

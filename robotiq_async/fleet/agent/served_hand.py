@@ -6,6 +6,7 @@ import asyncio
 import logging
 from collections.abc import Coroutine
 from contextlib import suppress
+from inspect import signature
 from typing import Any, Final, TypeVar
 
 from ...control.keeping import KEEP_S
@@ -322,7 +323,9 @@ class ServedHand:
     def _work(self, name: str, arguments: Fields) -> Coroutine[Any, Any, MoveResult | None]:
         if name == "command":
             return self._set(**arguments)
-        work: Coroutine[Any, Any, MoveResult | None] = getattr(self._hand, name)(**arguments)
+        method = getattr(self._hand, name)
+        signature(method).bind(**arguments)  # called with anything, it would say so when it is awaited
+        work: Coroutine[Any, Any, MoveResult | None] = method(**arguments)
         return work
 
     async def _set(self, axes: Fields) -> None:
