@@ -100,6 +100,20 @@ async def test_who_is_not_in_the_list_gets_in_and_gets_nothing(keys: Path) -> No
         assert not any(event.is_set() for event in (heard, seen))
 
 
+async def test_wildcards_open_nothing(keys: Path) -> None:
+    """A request whose key includes what is another role's."""
+    async with line() as here:
+        await here.agent(keys / "agent-cell-1")
+        alice, bob = await here.client(keys / "read-alice"), await here.client(keys / "operate-bob")
+        for client in (alice, bob):
+            await client.watch(LEFT.key("alive", "*")).wait()
+            assert await client.may("info")
+        for parts in (("*",), ("**",), ("h$*",), ("h*lt",), ("cmd", "*"), ("cmd", "mov$*"), ("lea$*",)):
+            assert not await alice.may(*parts), parts
+        for key in ("**", "robotiq/**", "robotiq/v1/lab/*/left/halt", "robotiq/v1/*/cell-1/left/cmd/move"):
+            assert await bob.bus.ask(key, b"?", timeout=1.0, urgency=Urgency.COMMAND) is None, key
+
+
 async def test_nobody_publishes_answers_or_is_present_in_place_of_an_agent(keys: Path) -> None:
     """Not even for clients in zenoh's sense, for whom the agent would carry on what others say."""
     async with line() as here:
