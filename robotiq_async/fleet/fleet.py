@@ -158,18 +158,24 @@ class Fleet:
             RuntimeError: the fleet is not entered.
         """
         bus = self._entered()
-        halting: dict[GripperName, asyncio.Task[str]] = {}
+        halting: dict[tuple[GripperName, int], asyncio.Task[str]] = {}
+        """For each gripper and number of its agents: to one that comes later it is said once more."""
         try:
             # Links come up one after the other: whoever is there is halted at once, and looking goes on.
             while True:
                 await self._look()
                 for name, member in self._members.items():
-                    if name not in halting:
-                        halting[name] = asyncio.ensure_future(halt(bus, name, member.agents))
+                    if (name, member.agents) not in halting:
+                        work = halt(bus, name, member.agents)
+                        halting[name, member.agents] = asyncio.ensure_future(work)
                 if now() - self._entered_at >= SETTLE_S:
                     break
                 await asyncio.sleep(LOOK_AGAIN_S)
-            outcomes = {name: await task for name, task in sorted(halting.items())}
+            outcomes: dict[GripperName, str] = {}
+            for (name, _), task in sorted(halting.items()):
+                how = await task
+                if outcomes.setdefault(name, how) == STOPPED:
+                    outcomes[name] = how
         finally:
             for task in halting.values():
                 task.cancel()

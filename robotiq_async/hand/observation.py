@@ -13,6 +13,7 @@ from ..errors import ConnectionLostError, NotStartedError
 from ..grasping import SLIP_COUNTS, GripEvent, GripWatch
 from ..session.options import Options
 from ..session.session import Session
+from ..session.state_waiters import check_states
 from ..session.statistics import Counters, Statistics
 from ..session.streams import Channel, Channels, SentRequest, Stream, Transition
 from ..wire.checks import check_int, check_timeout
@@ -211,11 +212,7 @@ class Observation:
             NotStartedError: the hand is not started, or was stopped meanwhile.
             RobotiqConnectionError: the hand gave up on its link.
         """
-        if not states:
-            raise ValueError("states must name at least one State, got none")
-        for state in states:
-            if not isinstance(state, State):
-                raise TypeError(f"states must be State members, got {state!r}")
+        check_states(states)
         limit = check_timeout("timeout", timeout)
         if self.state in states:
             return self.state

@@ -12,6 +12,20 @@ from ..errors import RobotiqError
 _Waiter = tuple[Collection[State], Mapping[State, Callable[[], RobotiqError]], asyncio.Future[State]]
 
 
+def check_states(states: Collection[object]) -> None:
+    """Refuse what cannot be waited for.
+
+    Raises:
+        TypeError: not a State.
+        ValueError: no state.
+    """
+    if not states:
+        raise ValueError("states must name at least one State, got none")
+    for state in states:
+        if not isinstance(state, State):
+            raise TypeError(f"states must be State members, got {state!r}")
+
+
 class StateWaiters:
     """Tells callers of the states they wait for, however short these last."""
 

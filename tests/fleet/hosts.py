@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from tests.virtual import LATENCY_S, MemoryTransport, VirtualLoop
 
 T = TypeVar("T")
+EARLY_S = 1e-6
 
 if TYPE_CHECKING:
     _Loop = asyncio.SelectorEventLoop  # of which only a part is here, and needed
@@ -33,6 +34,8 @@ class Host(_Loop):
         self.name = name
         self.is_frozen = False
         self.is_dead = False
+        self.slept = 0.0
+        """Seconds for which its clock has stood still."""
         self._outer = outer
         self._due: deque[asyncio.Handle] = deque()
         self._transports: list[MemoryTransport] = []
@@ -49,6 +52,11 @@ class Host(_Loop):
         # In one go, with no turn of anybody else's in between: they are all due.
         for _ in range(len(self._due)):
             self._run(self._due.popleft())
+
+    def wake(self, seconds: float) -> None:
+        """It was suspended for so long and not only frozen: its clock knows nothing of that time."""
+        self.slept += seconds
+        self.thaw()
 
     def kill(self) -> None:
         """SIGKILL: nothing of it runs any more, and its connections are closed."""
@@ -101,6 +109,10 @@ class Host(_Loop):
     def _run(self, handle: asyncio.Handle) -> None:
         if self.is_frozen:
             self._due.append(handle)
+        elif isinstance(handle, asyncio.TimerHandle) and handle.when() > self.time() + EARLY_S:
+            self._outer.call_at(
+                handle.when() + self.slept, self._run, handle
+            )  # by its clock it is not due yet
         elif not handle.cancelled():
             with self._entered(self):
                 handle._run()
@@ -108,7 +120,7 @@ class Host(_Loop):
     # -- what programs ask of a loop -------------------------------------------------------------------
 
     def time(self) -> float:
-        return self._outer.time()
+        return self._outer.time() - self.slept
 
     def call_soon(  # type: ignore[override]
         self, callback: Callable[..., object], *args: Any, context: Context | None = None
@@ -123,7 +135,7 @@ class Host(_Loop):
         self, when: float, callback: Callable[..., object], *args: Any, context: Context | None = None
     ) -> asyncio.TimerHandle:
         handle = asyncio.TimerHandle(when, callback, args, self, context)
-        self._outer.call_at(when, self._run, handle)
+        self._outer.call_at(when + self.slept, self._run, handle)
         return handle
 
     def call_later(  # type: ignore[override]

@@ -114,6 +114,7 @@ async def test_wildcards_open_nothing(keys: Path) -> None:
             "**",
             "robotiq/**",
             "robotiq/v1/lab/*/left/halt",
+            "robotiq/v1/*/cell-1/left/cmd/move",
             "@/**",
             "@/*/peer",
             "@/*/peer/config/**",

@@ -305,6 +305,42 @@ async def test_nothing_from_before_a_suspension_is_carried_out() -> None:
         await here.until(lambda: here.holder.hand.is_in_control)
 
 
+@pytest.mark.parametrize("seconds", [0.8, 3.0])
+@pytest.mark.parametrize("keeps_links", [True, False])
+@virtual
+async def test_a_suspended_laptop_commands_nothing_from_before(keeps_links: bool, seconds: float) -> None:
+    """Its clock stood still: to itself its loop is in time, and so is what lay in its sockets."""
+    async with world() as here:
+        here.network.keeps_links = keeps_links
+        hand, host, stopped = here.holder.hand, here.holder.host, False
+
+        async def loop() -> None:
+            number = 0
+            while not stopped:
+                hand.command(Finger.A, position=100 + number % 100, speed=0)
+                number += 1
+                await asyncio.sleep(0.01)
+
+        looping = host.start(told(loop()))
+        await asyncio.sleep(0.5)
+        (host.freeze if keeps_links else lambda: here.freeze(host))()
+        await asyncio.sleep(seconds)
+        stood, writes = here.gripper.position(Finger.A), len(here.gripper.writes)
+        assert here.gripper.is_moving is (seconds < 1.0)
+        host.wake(seconds)
+        for bus in here.network.buses:
+            here.network.join(host.name, bus.name)
+        await asyncio.sleep(3)
+        if seconds > 1.0:
+            assert looping.result().startswith(("ControlLost", "ConnectionLost"))
+            assert here.gripper.position(Finger.A) == stood
+            assert not motions(here, writes)
+        await here.until(lambda: hand.is_in_control)
+        stopped = True
+        await here.until(looping.done)
+        await here.holder.do(hand.move(30, Finger.A, speed=255))
+
+
 # -- names and numbers -------------------------------------------------------------------------------------
 
 

@@ -133,6 +133,23 @@ async def test_the_halt_of_all_counts_agents_and_not_names() -> None:
 
 
 @virtual
+async def test_the_halt_of_all_stops_a_second_one_whose_link_comes_up_late() -> None:
+    """The name had been halted already, at the first one."""
+    async with lab() as here, another(here) as other:
+        here.network.part("other agent", "console")
+        here.network.loop.call_later(1.0, here.network.join, "other agent", "console")
+        await other.local.set_speed(0)
+        await other.local.set_position(255, Finger.A)
+        async with Fleet("lab", bus=here.network.bus("console")) as fleet:
+            halting = asyncio.create_task(fleet.halt_all())
+            await asyncio.sleep(0.5)
+            assert other.gripper.is_moving
+            assert await halting == {LEFT: "stopped"}
+            assert not other.gripper.is_moving
+            assert other.gripper.position(Finger.A) < 230
+
+
+@virtual
 async def test_a_second_agent_of_a_host_is_refused_whatever_it_serves() -> None:
     async with lab() as here:
         for name, words in (("left", "serves zenoh://lab/cell/left already"), ("right", "a host of its own")):

@@ -209,7 +209,7 @@ class Client:
                 self.states.append(state)
             if not self.had_control or self.had_control[-1] is not self.hand.is_in_control:
                 self.had_control.append(self.hand.is_in_control)
-            if state is not State.DISCONNECTED:
+            if state is not State.DISCONNECTED and not self.host.slept:  # else its clock is another
                 self._check_current(self.hand.status)
             await asyncio.sleep(LOOK_S)
 

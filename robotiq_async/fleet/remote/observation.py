@@ -10,6 +10,7 @@ from ...enums import Finger, State
 from ...errors import ConnectionLostError, NotStartedError, StateTimeoutError
 from ...grasping import SLIP_COUNTS, GripEvent, GripWatch
 from ...session.event_loop import check_loop
+from ...session.state_waiters import check_states
 from ...session.statistics import Counters, Statistics
 from ...session.streams import Channel, Channels, SentRequest, Stream, Transition
 from ...wire.checks import check_int, check_timeout
@@ -154,11 +155,7 @@ class RemoteObservation:
             StateTimeoutError: not reached in time.
             NotStartedError: the hand is not started, or was stopped meanwhile.
         """
-        if not states:
-            raise ValueError("states must name at least one State, got none")
-        for state in states:
-            if not isinstance(state, State):
-                raise TypeError(f"states must be State members, got {state!r}")
+        check_states(states)
         limit = check_timeout("timeout", timeout)
         if self.state in states:
             return self.state
