@@ -25,7 +25,7 @@ class Bridge:
 
     def __init__(self, loop: asyncio.AbstractEventLoop, executor: Executor) -> None:
         """Connect a running loop with an executor of another thread."""
-        self.loop = loop
+        self._loop = loop
         self._executor = executor
         self._is_closed = False
         self._under_way: set[concurrent.futures.Future[Any]] = set()
@@ -80,7 +80,7 @@ class Bridge:
         if self._is_closed:
             work.close()
             raise ClosedError("the node is shutting down")
-        future = asyncio.run_coroutine_threadsafe(work, self.loop)
+        future = asyncio.run_coroutine_threadsafe(work, self._loop)
         self._under_way.add(future)
         future.add_done_callback(self._under_way.discard)
         return future

@@ -57,10 +57,6 @@ class GripperAction:
             callback_group=group,
         )
 
-    def destroy(self) -> None:
-        """Offer it no more."""
-        self._server.destroy()
-
     async def _check(self, request: ParallelGripperCommand.Goal) -> GoalResponse:
         """Accept a goal that can be begun now; else the log says why not, for the answer has no words."""
         try:

@@ -1,6 +1,6 @@
 """What the node publishes while it is configured: joint states, its status, diagnoses.
 
-Published from the event loop, and joint states in the turn of the poll that they are of: to wake the executor
+Published from the event loop, and what a poll has shown in the turn of that poll: to wake the executor
 or the loop for it would cost more than the messages do.
 """
 
@@ -16,7 +16,6 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from ...protocol import Hand
 from ...session.clock import now
 from ..gripper.connection import Connection
 from ..translation.diagnosis import diagnose, status_text
@@ -26,7 +25,7 @@ from .messages import JointStates, diagnostic_array
 from .timer import Timer
 
 STATUS_RATE_HZ: Final = 10.0
-"""Of the status; a change of state is published at once."""
+"""Of the status while the gripper is heard, else the rate below; a change of state is published at once."""
 DIAGNOSTICS_RATE_HZ: Final = 1.0
 _LATEST: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Whoever comes later gets the newest one."""
@@ -48,7 +47,7 @@ class Publishing:
         self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._status = node.create_publisher(String, "~/status", _LATEST)
         self._description = node.create_publisher(String, "robot_description", _LATEST)
-        self._timers: list[Timer] = []
+        self._timer: Timer | None = None
         self._readers: list[asyncio.Task[None]] = []
 
     def describe(self, urdf: str) -> None:
@@ -57,13 +56,9 @@ class Publishing:
 
     async def start(self, connection: Connection, joint_states: JointStates, rate: float) -> None:
         """Publish what the hand of a connection shows."""
-        works = (
-            (STATUS_RATE_HZ, lambda: self.tell_status(connection)),
-            (DIAGNOSTICS_RATE_HZ, lambda: self._publish_diagnoses(connection)),
-        )
-        self._timers = [Timer(1 / frequency, work, self._failed) for frequency, work in works]
+        self._timer = Timer(1 / DIAGNOSTICS_RATE_HZ, lambda: self._publish_rarely(connection), self._failed)
         readers = (
-            self._publish_joints(connection.hand, joint_states, Pace(rate)),
+            self._publish_statuses(connection, joint_states, rate),
             self._publish_transitions(connection, joint_states),
         )
         self._readers = [asyncio.ensure_future(reader) for reader in readers]
@@ -72,8 +67,8 @@ class Publishing:
 
     async def stop(self) -> None:
         """Publish nothing more. Idempotent."""
-        for timer in self._timers:
-            timer.cancel()
+        if self._timer is not None:
+            self._timer.cancel()
         readers, self._readers = self._readers, []
         for reader in readers:
             reader.cancel()
@@ -83,10 +78,13 @@ class Publishing:
         if not reader.cancelled() and (error := reader.exception()) is not None:
             self._failed(error)
 
-    async def _publish_joints(self, hand: Hand, joints: JointStates, pace: Pace) -> None:
-        async for status in hand.statuses():
-            if pace.takes(status.timestamp):
+    async def _publish_statuses(self, connection: Connection, joints: JointStates, rate: float) -> None:
+        joint_states, told = Pace(rate), Pace(STATUS_RATE_HZ)
+        async for status in connection.hand.statuses():
+            if joint_states.takes(status.timestamp):
                 self._joint_states.publish(joints.encoded(status))
+            if told.takes(status.timestamp):
+                self.tell_status(connection)
 
     async def _publish_transitions(self, connection: Connection, joints: JointStates) -> None:
         async for _ in connection.hand.transitions():
@@ -99,7 +97,9 @@ class Publishing:
         text = status_text(connection.hand, takes_commands=connection.takes_commands)
         self._status.publish(String(data=text))
 
-    def _publish_diagnoses(self, connection: Connection) -> None:
+    def _publish_rarely(self, connection: Connection) -> None:
+        """What comes also while nothing is heard of the gripper."""
+        self.tell_status(connection)
         hand = connection.hand
         self._diagnostics.publish(
             diagnostic_array(
