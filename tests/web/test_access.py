@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import MutableMapping
 from socket import gethostname
+from typing import Any
 
 import pytest
 
@@ -161,6 +162,7 @@ async def test_whoever_tries_passwords_holds_up_nobody_who_sits_elsewhere() -> N
     assert asyncio.get_running_loop().time() == began
     answers = await asyncio.gather(*tries)
     assert {answer["status"] for answer in answers} == {403}
+    assert not any(b"set-cookie" in dict(answer["headers"]) for answer in answers)
     assert asyncio.get_running_loop().time() - began >= 49
 
 
@@ -169,9 +171,9 @@ RULES = Access(PageSettings(password=WORD), 80)
 GUARD = Guard(None, RULES)  # type: ignore[arg-type]
 
 
-async def entered(client: str, password: str, *, ends: bool = True) -> dict[str, object]:
+async def entered(client: str, password: str, *, ends: bool = True) -> dict[str, Any]:
     """What is answered to somebody who enters a password."""
-    answers: list[dict[str, object]] = []
+    answers: list[dict[str, Any]] = []
     parts = [{"type": "http.request", "body": f"password={password}".encode(), "more_body": not ends}]
 
     async def receive() -> dict[str, object]:

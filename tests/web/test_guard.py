@@ -142,15 +142,11 @@ async def test_headers_without_end_are_not_kept(page: PageServer) -> None:
         await writer.wait_closed()
 
 
-async def test_a_password_is_asked_for_and_a_wrong_one_takes_its_time() -> None:
+async def test_a_password_is_asked_for() -> None:
     async with PageServer([FakeHand()], settings(password=WORD)) as page:
         assert "token" not in page.url
         here = page.url.removesuffix("/")
         assert "Password" in (await ask(page.url, "/")).text
-        began = asyncio.get_running_loop().time()
-        wrong = await ask(page.url, "/", "POST", "password=guess", Origin=here)
-        assert (wrong.status, "set-cookie" in wrong.headers) == (403, False)
-        assert asyncio.get_running_loop().time() - began >= 1
         assert (await ask(page.url, "/", "POST", f"password={WORD}")).status == 403, "a form of another site"
         right = await ask(page.url, "/", "POST", f"password={WORD.replace(' ', '+')}", Origin=here)
         assert right.status == 303

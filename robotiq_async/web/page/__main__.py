@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import ssl
 import sys
 from contextlib import suppress
 from tempfile import mkdtemp
@@ -34,7 +35,9 @@ def main() -> int:
         pipes.say({"failed": f"{settings.host}:{settings.port}: {error.strerror or error}"})
         return 1
     try:
-        from .serve import run  # noqa: PLC0415  # a second, which a port that is taken need not wait for
+        if settings.certificate:
+            ssl.create_default_context().load_cert_chain(settings.certificate, settings.key)
+        from .serve import run  # noqa: PLC0415  # a second, which what is refused need not wait for
 
         run(settings, listening, pipes)
     except OSError as error:  # a certificate that cannot be read
