@@ -41,7 +41,7 @@ class RemoteObservation:
     @property
     def state(self) -> State:
         """Where the hand is, as far as it is known: DISCONNECTED also while the agent is silent."""
-        return State.DISCONNECTED if self._session is None else self._session.current_state()
+        return State.DISCONNECTED if self._session is None else self._session.mirror.state
 
     @property
     def status(self) -> RobotiqStatus:

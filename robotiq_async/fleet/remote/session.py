@@ -395,7 +395,3 @@ class RemoteSession:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
         return task
-
-    def current_state(self) -> State:
-        """Where the hand is."""
-        return self.mirror.state
