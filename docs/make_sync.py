@@ -114,6 +114,7 @@ class _Module:
         (node,) = (
             each for each in self._tree.body if isinstance(each, ast.ClassDef) and each.name == kind.__name__
         )
+        _refuse_what_is_no_call(node, is_hand=root == "BlockingHand")
         body: list[ast.stmt] = [_docstring(node, DOCSTRINGS.get(node.name))]
         parts: list[type] = []
         for each in node.body:
@@ -188,6 +189,24 @@ class _Module:
     def _import(self, module: str, what: str) -> None:
         if module != f".{self._source.__name__.rpartition('.')[2]}":
             self._imports.add(f"from {re.sub(rf'^{PACKAGE}(?=[.])', '.', module)} import {what}")
+
+
+def _refuse_what_is_no_call(node: ast.ClassDef, *, is_hand: bool) -> None:
+    """Only methods and properties are made; what else a class has would be missing.
+
+    Raises:
+        ValueError: it has public attributes, or (other than a hand) is used with ``async with``.
+    """
+    for each in ast.walk(node):
+        if isinstance(each, ast.Assign | ast.AnnAssign):
+            targets = each.targets if isinstance(each, ast.Assign) else [each.target]
+            for target in targets:
+                is_own = isinstance(target, ast.Attribute) and ast.unparse(target.value) == "self"
+                name = ast.unparse(target).removeprefix("self.")
+                if (is_own or (each in node.body)) and not name.startswith("_"):
+                    raise ValueError(f"{node.name}.{name}: nobody knows it, make it a property")
+        if isinstance(each, ast.AsyncFunctionDef) and each.name.startswith("__") and not is_hand:
+            raise ValueError(f"{node.name}.{each.name}: nobody knows how that is made blocking")
 
 
 def _result(node: _Function, kind: type) -> type | None:

@@ -77,7 +77,10 @@ def test_what_has_coroutines_gets_a_blocking_class_of_its_own() -> None:
     assert text.count("Raises:") == 1
 
 
-@pytest.mark.parametrize("kind", [toy.WithIterator, toy.WithList, toy.WithDecorator])
+@pytest.mark.parametrize(
+    "kind",
+    [toy.WithIterator, toy.WithList, toy.WithDecorator, toy.WithField, toy.WithAttribute, toy.WithContext],
+)
 def test_what_the_script_does_not_know_is_an_error(kind: type) -> None:
     with pytest.raises(ValueError, match="nobody knows"):
         make_sync.modules(kind)

@@ -56,3 +56,22 @@ class WithDecorator:
     @cached_property
     def name(self) -> str:
         return ""
+
+
+class WithField:
+    name: str
+
+
+class WithAttribute:
+    def __init__(self) -> None:
+        self.name = ""
+
+
+class Context:
+    async def __aenter__(self) -> None:
+        raise NotImplementedError
+
+
+class WithContext:
+    def context(self) -> Context:
+        raise NotImplementedError
