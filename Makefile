@@ -86,7 +86,7 @@ constraints: $(STAMP)  ## Take the newest versions of all dependencies into cons
 		docs/site/requirements.in --output-file docs/site/requirements.txt
 
 clean:  ## Remove what the other commands made
-	rm -rf $(VENV) $(SITE) $(RELEASE) .venv-ros2 build dist site .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
+	rm -rf $(VENV) $(SITE) $(RELEASE) .venv-ros2 build dist site .cache .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
 	find robotiq_async tests demo -type d -name __pycache__ -prune -exec rm -rf {} +
 
 # uv is several times quicker than pip, but nothing depends on it. When it fails, whatever the reason, pip does

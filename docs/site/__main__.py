@@ -33,7 +33,7 @@ def main() -> int:
     for line in found:
         print(line, file=sys.stderr)
     if found:
-        print(f"{len(found)} problems", file=sys.stderr)
+        print(f"The site has {len(found)} problem(s).", file=sys.stderr)
         return 1
     folder = collect(BUILT, SITE)
     print(

@@ -6,7 +6,7 @@ like are pages too, and files of the source are not. So one link does for both, 
 
 from __future__ import annotations
 
-import os
+import posixpath
 import re
 import shutil
 from collections.abc import Mapping
@@ -98,11 +98,11 @@ def _link(link: re.Match[str], source: PurePosixPath, known: Mapping[str, str]) 
     here = PurePosixPath(known[str(source)])
     if not path or re.match(r"[a-z]+:", path) or (here.parent / path).as_posix().startswith("api/"):
         return link[0]
-    wanted = os.path.normpath(source.parent / path)
+    wanted = posixpath.normpath(source.parent / path)
     place = known.get(wanted) or known.get(f"{wanted}/README.md")
     if place is not None:
-        return f"{mark}[{words}]({os.path.relpath(place, here.parent)}{hash_sign}{anchor})"
+        return f"{mark}[{words}]({posixpath.relpath(place, here.parent)}{hash_sign}{anchor})"
     if mark:
         raise ValueError(f"{source}: {path} is not on the site")
-    # A file of the source is; what is not there at all is left for the build to find.
+    # What exists is a file of the source, which has no page; what does not is left for the build to find.
     return words if (ROOT / wanted).exists() else link[0]

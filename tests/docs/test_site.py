@@ -30,8 +30,10 @@ NOT_PUBLIC = {
 
 
 def test_every_page_is_in_the_navigation_once() -> None:
-    pages = [place for place in places().values() if place.endswith(".md")] + [*api_pages()]
-    assert sorted(NAVIGATION) == sorted(pages), "mkdocs.yml lists each page of the site, under nav"
+    pages = {place for place in places().values() if place.endswith(".md")} | {*api_pages()}
+    assert pages - {*NAVIGATION} == set(), "not in mkdocs.yml, under nav"
+    assert {*NAVIGATION} - pages == set(), "in mkdocs.yml, under nav, and no page"
+    assert len(NAVIGATION) == len(pages)
 
 
 def test_every_picture_of_the_measurements_is_in_the_gallery() -> None:
@@ -130,6 +132,13 @@ def test_every_room_that_says_what_it_exports_is_described() -> None:
         if "\n__all__ = " in file.read_text(encoding="utf-8") and module not in NOT_PUBLIC:
             names = {name.rpartition(".")[2] for name in exports(module)}
             assert names <= {name.rpartition(".")[2] for name in DESCRIBED}, f"{module}: docs/site/api.py"
+
+
+def test_what_the_reference_names_of_other_rooms_is_described() -> None:
+    text = (DOCS / "reference.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"^(?:\| |#+ )`(robotiq_async\.[\w.]+)`", text, re.MULTILINE))
+    assert len(named) > 8
+    assert [each for each in named if not any(f"{name}.".startswith(f"{each}.") for name in DESCRIBED)] == []
 
 
 def test_the_page_on_stability_names_what_is_described() -> None:

@@ -83,7 +83,9 @@ async def test_an_address_may_say_how_fast_its_gripper_is_and_what_is_in_its_way
 
 async def test_without_a_free_descriptor_a_simulated_gripper_says_so(few_files: None) -> None:
     hand = RobotiqHand("sim://")
-    with pytest.raises(ConnectFailedError, match=r"cannot connect to .*: .*Too many open files") as caught:
+    # From Python 3.13 on asyncio keeps the reason to itself when there is none for its first socket.
+    reason = r"cannot connect to .*: .*(Too many open files|could not bind)"
+    with pytest.raises(ConnectFailedError, match=reason) as caught:
         await hand.start()
     assert caught.value.address
     assert hand.state is State.SHUTDOWN
