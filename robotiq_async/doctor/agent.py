@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from ..errors import AgentError, NotAllowedError, ProtocolError, RobotiqError
 from ..fleet.network.bus import Bus, Urgency
-from ..fleet.remote.requests import NoAnswerError
+from ..fleet.remote.requests import NoAnswerError, of_its_run
 from ..fleet.wire.envelope import Call, unpack_answer
 from ..fleet.wire.names import GripperName
 from ..fleet.wire.status_message import StatusMessage, unpack
@@ -84,7 +84,9 @@ class Asker:
         self._number += 1
         call = Call(self._name.base, self._client, epoch, 0, self._number, seen, arguments or {})
         asked, key = now(), self._name.key(verb)
-        reply = await self._bus.ask(key, call.pack(), timeout=ANSWER_S, urgency=Urgency.COMMAND)
+        reply = await self._bus.ask(
+            key, call.pack(), timeout=ANSWER_S, urgency=Urgency.COMMAND, decides=of_its_run(call)
+        )
         if reply is None and now() - asked < ANSWER_S / 2:
             raise NotAllowedError(f"the agent is there, and does not answer to {verb}: access denied")
         if reply is None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from robotiq_async import Finger, RobotiqError, State
+from robotiq_async import ConnectionLostError, Finger, RobotiqError, State
 from robotiq_async.errors import AgentError, ControlLostError
 from robotiq_async.fleet.network.bus import Reply, Urgency
 from robotiq_async.fleet.wire.envelope import Answer, Call, unpack_answer
@@ -57,10 +57,11 @@ class Spoiling:
 
 
 class Garbling:
-    """A bus whose answers to one kind of request are those of an agent that does not understand it."""
+    """A bus whose answers to one kind of request are others: by default, that it is not understood."""
 
-    def __init__(self, bus: MemoryBus) -> None:
+    def __init__(self, bus: MemoryBus, **others: Any) -> None:
         self._bus = bus
+        self._others = others or {"value": None, "error": error_fields(TypeError("what?"))}
         self.verb = "nothing yet"
 
     def __getattr__(self, name: str) -> Any:
@@ -74,8 +75,7 @@ class Garbling:
         reply = await asking
         if reply is None:
             return None
-        answer = replace(unpack_answer(reply.payload), value=None, error=error_fields(TypeError("what?")))
-        return _Answered(answer.pack())
+        return _Answered(replace(unpack_answer(reply.payload), **self._others).pack())
 
 
 class _Answered:
@@ -283,6 +283,20 @@ async def test_an_agent_that_is_ending_refuses_and_says_so() -> None:
         await asyncio.gather(here.serving, return_exceptions=True)
         assert not here.gripper.is_moving
         assert len(here.gripper.writes) == writes + 1, "the halt, and nothing else"
+
+
+@virtual
+async def test_what_another_run_of_the_agent_says_acknowledges_nothing() -> None:
+    async with lab() as here:
+        bus = Garbling(here.network.bus("client"), epoch=5)
+        async with here.client_over(bus) as hand:
+            for verb, ask in (("cmd/set_speed", hand.set_speed(9)), ("cmd/move", hand.move(30))):
+                bus.verb = verb
+                with pytest.raises(ConnectionLostError, match="another run of its agent answered"):
+                    await ask
+            bus.verb = "/halt"
+            await hand.halt()
+            bus.verb = "nothing"
 
 
 # -- grips -------------------------------------------------------------------------------------------------

@@ -20,6 +20,8 @@ from ..wire.names import GripperName
 from ..wire.values import Fields
 from .mirror import Mirror
 
+IN_ANY_RUN: Final = ("info", "halt")
+"""What any run of the agent may answer."""
 RECENT_S: Final = 0.5
 """So soon the agent must be heard after an empty answer for that to mean that the request is not allowed."""
 AT_ONCE_S: Final = 0.25
@@ -176,7 +178,7 @@ class Requests:
             raise AgentError(
                 f"{self._name}: another answer came to {posted.verb}; it may have been carried out"
             )
-        if answer.error is not None and posted.call.epoch not in (0, answer.epoch) and not posted.is_halt:
+        if posted.call.epoch not in (0, answer.epoch) and posted.verb not in IN_ANY_RUN:
             # That one has done nothing. What became of it where it was meant for nobody says.
             raise NoAnswerError(
                 f"{self._name}: another run of its agent answered; {posted.verb} may have been carried out"
