@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import time
 from array import array
 from collections.abc import Sequence
 from typing import Final
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rclpy.clock import Clock
+from rclpy.clock import Clock, ROSClock
 from sensor_msgs.msg import JointState
 
 from ...kinematics import JOINTS
@@ -23,7 +24,7 @@ from ..translation.joints import Motion, joint_names, positions
 class JointStates:
     """Joint states of one hand. Belongs to the event loop."""
 
-    def __init__(self, clock: Clock, prefix: str, frame_id: str) -> None:
+    def __init__(self, clock: ROSClock, prefix: str, frame_id: str) -> None:
         """Keep what is the same in every message."""
         self._clock = clock
         self._names = joint_names(prefix)
@@ -59,9 +60,11 @@ _UNKNOWN: Final = (math.nan,) * len(JOINTS)
 """Efforts. Currents are known, torques are not: no number is better than a wrong one."""
 
 
-def stamp(clock: Clock, timestamp: float) -> int:
+def stamp(clock: ROSClock, timestamp: float) -> int:
     """The time of ROS in nanoseconds for a timestamp in monotonic seconds: now, less its age."""
-    return max(0, int(clock.now().nanoseconds) - round((now() - timestamp) * 1e9))
+    # Unless somebody simulates it, it is that of the system; asked of ROS it costs as much as the message.
+    ros = int(clock.now().nanoseconds) if clock.ros_time_is_active else time.time_ns()
+    return max(0, ros - round((now() - timestamp) * 1e9))
 
 
 def diagnostic_array(
