@@ -121,10 +121,14 @@ def check_registers(registers: Sequence[int]) -> Registers:
     block = tuple(registers)
     if len(block) != REGISTER_COUNT:
         raise ValueError(f"registers: expected {REGISTER_COUNT} of them, got {len(block)}")
-    return tuple(_register(index, register) for index, register in enumerate(block))
+    # Quickly for what is right already: over a transport object this runs at every poll.
+    return tuple(
+        register if type(register) is int and 0 <= register <= 0xFFFF else _checked(index, register)
+        for index, register in enumerate(block)
+    )
 
 
-def _register(index: int, given: object) -> int:
+def _checked(index: int, given: object) -> int:
     register = as_int(given)
     if register is None:
         raise TypeError(f"registers[{index}] must be an int in 0..65535, got {given!r}")
