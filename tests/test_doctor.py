@@ -262,7 +262,8 @@ async def test_a_serial_line(tmp_path: Any) -> None:
     assert found["unit id"].found == "9"
     found = await findings(f"rtu://{tmp_path}/nothing")
     assert found["open"].level is Level.BAD
-    assert "dialout" in found["open"].advice
+    assert "there is no such device" in found["open"].found
+    assert "ls -l" in found["open"].advice
 
 
 @virtual_time

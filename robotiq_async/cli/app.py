@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
 from cyclopts import App
@@ -21,6 +22,7 @@ from .commands.simulate import simulate
 from .commands.status import status
 from .commands.view import view
 from .commands.web import web
+from .flow import flowing
 
 COMMANDS: Final = (
     *(demo, simulate, status, move, monitor, web, view, doctor),
@@ -43,30 +45,34 @@ Nothing here has run on real hardware yet.
 
 def build() -> App:
     """The command line; whatever is slow to import is imported by the sub-command that needs it."""
-    app = App(name="robotiq-async", help=_HELP, help_format="plaintext", version=__version__)
+    app = _app("robotiq-async", _HELP)
     for command in COMMANDS:
-        app.command(command)
+        _add(app, command)
     app.command(_measure())
     app.command(_fleet())
     return app
 
 
+def _app(name: str, words: str) -> App:
+    return App(name=name, help=flowing(words), help_format="plaintext", version=__version__)
+
+
+def _add(app: App, command: Callable[..., object]) -> None:
+    app.command(command, help=flowing(command.__doc__ or ""))
+
+
 def _fleet() -> App:
     """The sub-command for hands on other hosts."""
-    app = App(name="fleet", help_format="plaintext")
+    app = _app("fleet", fleet.__doc__ or "")
     app.default(fleet)
-    app.command(halt)
-    app.command(fleet_keys)
+    _add(app, halt)
+    _add(app, fleet_keys)
     return app
 
 
 def _measure() -> App:
     """The sub-command that has sub-commands of its own."""
-    app = App(
-        name="measure",
-        help="Measure what the values 0..255 mean on your own gripper. THE FINGERS MOVE.",
-        help_format="plaintext",
-    )
-    app.command(measure_speed)
-    app.command(measure_force)
+    app = _app("measure", "Measure what the values 0..255 mean on your own gripper. THE FINGERS MOVE.")
+    _add(app, measure_speed)
+    _add(app, measure_force)
     return app

@@ -71,7 +71,7 @@ async def _reach(address: Address, report: Report) -> None:
         async with asyncio.timeout(REACH_S):
             found = await addresses_of(address.host, address.port)
     except (OSError, UnicodeError, TimeoutError) as error:
-        why = "no answer" if isinstance(error, TimeoutError) else str(error)
+        why = "no answer" if isinstance(error, TimeoutError) else getattr(error, "strerror", None) or error
         advice = "Check the spelling, or use the IP address (shipped as 192.168.1.11)."
         report(Finding(Level.BAD, "name", f"{address.host} cannot be resolved: {why}", advice))
         raise GiveUpError from error
@@ -193,7 +193,9 @@ def _advice_for_opening(address: Address, why: str) -> str:
     if "pip install" in why:
         return "Install that, and look again."
     if address.kind == "rtu":
-        return "Plugged in (ls /dev/ttyUSB*, dmesg)? May you open it (group dialout)? Does another use it?"
+        return (
+            "ls -l /dev/ttyUSB* /dev/ttyACM* shows the ports and whose they are, dmesg what was plugged in."
+        )
     return "It took a connection before and refuses now: it may serve one client at a time. Stop the other."
 
 

@@ -7,6 +7,8 @@ does not answer keeps one for ten seconds and more, long after whoever asked has
 from __future__ import annotations
 
 import contextlib
+import errno
+import os
 import socket
 from ipaddress import ip_address
 
@@ -27,6 +29,21 @@ async def addresses_of(host: str, port: int) -> list[str]:
         return [host]
     found = await in_a_thread(lambda: socket.getaddrinfo(host, port, type=socket.SOCK_STREAM))
     return list(dict.fromkeys(str(each[4][0]) for each in found))
+
+
+def why_unreachable(error: OSError | None) -> str:
+    """Why there is no connection to a host, from the last attempt; None if nothing is known of it."""
+    match error.errno if error is not None else None:
+        case errno.ECONNREFUSED:
+            return "connection refused: nothing listens there"
+        case errno.EHOSTUNREACH:
+            return "host unreachable: no such address answers in its network"
+        case errno.ENETUNREACH:
+            return "network unreachable: this computer has no way to it"
+        case None:
+            return f"connection refused or host unreachable: {error or 'no reason is known'}"
+        case number:
+            return os.strerror(number)
 
 
 def why_no_socket() -> str:

@@ -42,8 +42,9 @@ from ..errors import (
 from ..wire.registers import REGISTER_COUNT, RegisterMap, Registers
 from .address import Address
 from .frames import Expected, expected_reply, show
-from .host_names import addresses_of, why_no_socket
+from .host_names import addresses_of, why_no_socket, why_unreachable
 from .pdus import ReadRequest, WriteRequest, register
+from .serial_ports import why_no_port
 
 # pymodbus logs its send and receive history at ERROR on every timeout; what matters of it is said in our
 # exceptions. Whoever sets a level on its logger gets what they ask for.
@@ -277,10 +278,12 @@ class ModbusTransport:
 
     async def _connect(self) -> AsyncModbusTcpClient | AsyncModbusSerialClient:
         """A client that is connected, to the first address of the host that can be reached."""
+        reasons: list[OSError] = []
         for host in await self._hosts():
             client, connected = self._make_client(host), False
             # pymodbus drops what does not fit without a word; whatever comes is for reply.py to judge.
             client.ctx.max_buffer_size = sys.maxsize
+            _keep_reasons(client, reasons)
             try:
                 connected = await client.connect()
             except Exception as error:
@@ -290,10 +293,9 @@ class ModbusTransport:
                     client.close()
             if connected:
                 return client
-        # pymodbus keeps the reason to itself.
-        unreachable = why_no_socket() or "connection refused or host unreachable"
-        what = "cannot open the serial port" if self._serial else unreachable
-        raise ConnectFailedError(str(self._address), what)
+        last = reasons[-1] if reasons else None
+        why = why_no_port(last) if self._serial else why_no_socket() or why_unreachable(last)
+        raise ConnectFailedError(str(self._address), why) from last
 
     async def _hosts(self) -> list[str]:
         if self._serial:
@@ -301,7 +303,7 @@ class ModbusTransport:
         try:
             return await addresses_of(self._address.host, self._address.port)
         except (OSError, UnicodeError) as error:
-            why = f"the name cannot be resolved: {error}"
+            why = f"the name cannot be resolved: {getattr(error, 'strerror', None) or error}"
             raise ConnectFailedError(str(self._address), why) from error
 
     def _make_client(self, host: str) -> AsyncModbusTcpClient | AsyncModbusSerialClient:
@@ -359,3 +361,17 @@ class ModbusTransport:
         """
         self._probe = self._probe % (REGISTER_COUNT - 1) + 1
         await self._exchange(ReadRequest(self._map, self._probe))
+
+
+def _keep_reasons(client: AsyncModbusTcpClient | AsyncModbusSerialClient, reasons: list[OSError]) -> None:
+    """Add to a list why a client could not connect, which pymodbus keeps to itself."""
+    create = client.ctx.call_create
+
+    async def created() -> object:
+        try:
+            return await create()
+        except OSError as error:
+            reasons.append(error)
+            raise
+
+    client.ctx.call_create = created

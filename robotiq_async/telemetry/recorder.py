@@ -70,7 +70,8 @@ class Recorder:
 
     Attributes:
         path: the file.
-        recorded: polls in it so far.
+        recorded: polls in it so far; the last half second of them may not have reached the disk.
+        saved: polls that have; 0 once the file has been deleted. Of a write that was cut off none count.
     """
 
     def __init__(self, hand: Hand, path: Path | str, *, ros2: bool = False) -> None:
@@ -83,6 +84,7 @@ class Recorder:
         """
         self.path = Path(path)
         self.recorded = 0
+        self.saved = 0
         self._profile = "ros2" if ros2 else ""
         self._topics: tuple[Topic, ...] = (JOINTS,) if ros2 else TOPICS
         self._hand = hand
@@ -104,6 +106,11 @@ class Recorder:
     def size(self) -> int:
         """Approximate size of the file in bytes."""
         return self._outbox.tell()
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether something could not be written: nothing is recorded any more."""
+        return self._failed.done()
 
     async def __aenter__(self) -> Self:
         """Create the file and start recording.
@@ -195,10 +202,13 @@ class Recorder:
 
     async def _save(self) -> None:
         """Write what waits to the disk; a failure ends the recording."""
-        data = self._outbox.take()
+        data, polls = self._outbox.take(), self.recorded
         try:
             await in_a_thread(lambda: self._write(data))
+            self.saved = polls
         except OSError as error:
+            if isinstance(error, FileNotFoundError):
+                self.saved = 0
             self._fail(error.strerror)
 
     def _fail(self, why: str | None) -> None:

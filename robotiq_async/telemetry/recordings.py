@@ -24,11 +24,16 @@ except ModuleNotFoundError as error:
     raise ImportError("recordings need mcap: pip install 'robotiq-async[record]'") from error
 
 from ..errors import RecordingError
+from ..log import log
 
 LARGEST: Final = 16 * 2**20
 """Bytes of a record, and of an unpacked chunk; the writers of MCAP make chunks of a sixteenth of it."""
 NOT_OURS: Final = (LookupError, TypeError, ValueError, AttributeError, OverflowError)
 """What comes of reading a message that has other fields, or fields of another type."""
+BROKEN: Final = (
+    "%s breaks off after %d messages: its program was killed, or still writes it, or it is damaged there; "
+    "robotiq-async recover makes a whole file of what is before"
+)
 
 T = TypeVar("T")
 
@@ -101,20 +106,25 @@ class Recovered:
 
 
 def read_recording(path: Path | str) -> Iterator[Entry]:
-    """The messages of a recording in their order; of a broken one, those that are there.
+    """The messages of a recording in their order; of a broken one, those that are there, and a warning.
 
     Raises:
         RecordingError: it cannot be read, is no MCAP file, or is one that no recorder writes: a chunk that
             would fill the memory, a message without a channel.
     """
     channels: _Known[Channel] = _Known(path, "channel")
+    count, is_whole = 0, False
     for record in _records(path):
         if isinstance(record, Channel):
             channels[record.id] = record
         elif isinstance(record, Message):
-            channel = channels[record.channel_id]
+            channel, count = channels[record.channel_id], count + 1
             is_json = channel.message_encoding == "json"
             yield Entry(channel.topic, record.log_time, record.sequence, record.data, is_json, str(path))
+        elif isinstance(record, Footer):
+            is_whole = True
+    if not is_whole:
+        log.warning(BROKEN, path, count)
 
 
 def recover(path: Path | str, target: Path | str) -> Recovered:

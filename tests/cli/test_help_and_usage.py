@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import inspect
+import re
+from collections.abc import Callable
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import pytest
 
 import robotiq_async
 from robotiq_async.cli import main
+from robotiq_async.cli.app import COMMANDS as FUNCTIONS
+from robotiq_async.cli.commands.fleet import fleet, halt
+from robotiq_async.cli.commands.fleet_keys import keys
+from robotiq_async.cli.commands.measure_force import force
+from robotiq_async.cli.commands.measure_speed import speed
+from robotiq_async.cli.flow import flowing
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Shell
@@ -48,6 +58,44 @@ def test_help_of_a_command_tells_of_the_address_and_gives_examples(
 def test_help_of_what_moves_says_so(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([command, "--help"]) == 0
     assert "FINGERS MOVE" in " ".join(capsys.readouterr().out.split())
+
+
+EVERY = {each.__name__: each for each in FUNCTIONS} | {
+    "fleet": fleet,
+    "fleet halt": halt,
+    "fleet keys": keys,
+    "measure speed": speed,
+    "measure force": force,
+}
+
+
+@pytest.mark.parametrize("width", [60, 120])
+@pytest.mark.parametrize("command", EVERY)
+def test_a_help_text_is_wrapped_once_at_any_width(
+    command: str, width: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    assert main([*command.split(), "--help"]) == 0
+    words = capsys.readouterr().out.partition("\n\n")[2].partition("For example:")[0]
+    lines = words.splitlines()
+    assert max(map(len, lines)) <= width
+    for line, following in pairwise(lines):
+        if line.strip() and following.strip() and not line.startswith(" "):
+            assert len(f"{line.rstrip()} {following.split()[0]}") > width, f"{line!r} has room"
+
+
+@pytest.mark.parametrize("command", EVERY.values(), ids=EVERY)
+def test_the_help_of_an_option_is_one_line_of_the_source(command: Callable[..., object]) -> None:
+    assert command.__doc__
+    arguments = inspect.cleandoc(command.__doc__).partition("Args:\n")[2].splitlines()
+    for line in arguments:
+        assert re.match(r"    [a-z0-9_]+: ", line), f"it would break there in any terminal: {line}"
+
+
+def test_paragraphs_flow_and_examples_stay() -> None:
+    assert flowing("One\n    two.\n\n        a\n        b\n    Three\n    four.\n") == (
+        "One two.\n\n    a\n    b\nThree four."
+    )
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:

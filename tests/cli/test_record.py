@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import re
 import signal
 import socket
 from collections.abc import Callable
@@ -123,6 +124,22 @@ def test_recover_makes_a_broken_one_whole(grasp: Path, capsys: pytest.CaptureFix
     assert "File exists" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("command", ["replay", "plot"])
+def test_of_a_broken_one_it_is_said_that_it_is(
+    command: str, grasp: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([command, str(grasp)]) == 0
+    assert capsys.readouterr().err == ""
+    whole = grasp.read_bytes()
+    grasp.write_bytes(whole[: len(whole) * 2 // 3])
+    assert main([command, str(grasp)]) == 0
+    out, err = capsys.readouterr()
+    assert out
+    assert err.count("\n") == 1
+    assert "grasp.mcap breaks off after " in err
+    assert "robotiq-async recover" in err
+
+
 def test_plot_draws_it(grasp: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plot", str(grasp)]) == 0
     pictures = [grasp.with_name(f"grasp.{suffix}") for suffix in ("png", "svg")]
@@ -199,7 +216,12 @@ async def test_a_disk_that_is_full_is_one_line(shell: Shell, server: SimulatorSe
     assert (outcome.code, outcome.err.count("\n")) == (1, 1), outcome.err
     assert "it.mcap: File too large" in outcome.err
     assert file.stat().st_size == 12_000
-    assert [entry for entry in read_recording(file) if entry.topic == "/gripper/status"]
+    there = [entry for entry in read_recording(file) if entry.topic == "/gripper/status"]
+    assert there
+    told = re.search(r"ended early: (\d+) of (\d+) polls at least are in the file; .*recover", outcome.out)
+    assert told is not None, outcome.out
+    assert 0 < int(told[1]) <= len(there) <= int(told[2])
+    assert "0 lost" not in outcome.out
 
 
 @pytest.mark.parametrize("command", ["replay", "recover", "plot"])

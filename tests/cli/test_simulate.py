@@ -60,8 +60,15 @@ def test_it_keeps_the_gripper_between_two_clients(call: Call, beside: Callable[.
 def test_something_may_be_in_the_way(call: Call, beside: Callable[..., Beside]) -> None:
     address = beside("simulate", "--port", "0", "--speedup", "20", "--object", "150", "--exact").read_line()
     assert call("move", "255", "--yes", address).code == 0
-    axes = json.loads(call("status", "--json", address).out)["axes"]
-    assert [axes[name]["position"] for name in ("A", "B", "C")] == [150] * 3
+    reading = json.loads(call("status", "--json", address).out)
+    assert [reading[name]["position"] for name in ("A", "B", "C")] == [150] * 3
+
+
+@pytest.mark.parametrize(
+    ("device", "why"), [("/dev/ttyNOWHERE", "no such device"), ("/dev/null", "it is no serial port")]
+)
+def test_a_line_that_cannot_be_opened(call: Call, device: str, why: str) -> None:
+    call("simulate", "--serial", device).assert_failed(1, f"cannot listen on {device}: ", why)
 
 
 @pytest.mark.parametrize("position", ["256", "-1", "1.5"])

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import logging
 import socket
 import threading
@@ -387,14 +388,39 @@ async def test_the_first_address_of_a_name_that_can_be_reached(
 async def test_no_address_of_a_name_can_be_reached(resolved: Callable[..., None]) -> None:
     async with linked() as (transport, _):
         resolved("127.0.0.2", "127.0.0.3")
-        with pytest.raises(ConnectFailedError, match=r"gripper\.example:\d+: connection refused"):
+        with pytest.raises(
+            ConnectFailedError, match=r"gripper\.example:\d+: connection refused: nothing listens"
+        ):
             await to_the_host(transport).open()
 
 
 async def test_a_name_that_nobody_knows_is_told() -> None:
     address = parse_address("nowhere.invalid")
     transport = ModbusTransport(address, TCP_REGISTERS, connect_timeout=5.0, response_timeout=0.1)
-    with pytest.raises(ConnectFailedError, match=r"nowhere\.invalid:502: the name cannot be resolved: "):
+    with pytest.raises(ConnectFailedError, match=r"nowhere\.invalid:502: the name cannot be resolved: \w"):
+        await transport.open()
+
+
+@pytest.mark.parametrize(
+    ("number", "why"),
+    [
+        (errno.ECONNREFUSED, "connection refused: nothing listens there"),
+        (errno.EHOSTUNREACH, "host unreachable"),
+        (errno.ENETUNREACH, "network unreachable"),
+        (errno.EACCES, "Permission denied"),
+    ],
+)
+async def test_each_way_not_to_reach_a_host_has_its_own_sentence(
+    number: int, why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def refuse(*_: object, **__: object) -> None:
+        raise OSError(number, "Connect call failed")
+
+    transport = ModbusTransport(
+        parse_address("192.0.2.1"), TCP_REGISTERS, connect_timeout=5.0, response_timeout=0.1
+    )
+    monkeypatch.setattr(asyncio.get_running_loop(), "create_connection", refuse)
+    with pytest.raises(ConnectFailedError, match=f"^cannot connect to tcp://192.0.2.1:502: {why}"):
         await transport.open()
 
 

@@ -7,16 +7,19 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import os
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
+import serial
 
-from robotiq_async import ProtocolError, ResponseTimeoutError, RobotiqConnectionError
+from robotiq_async import ConnectFailedError, ProtocolError, ResponseTimeoutError, RobotiqConnectionError
 from robotiq_async.link.address import parse_address
 from robotiq_async.link.modbus import ModbusTransport
+from robotiq_async.link.serial_ports import FORBIDDEN, MISSING, NO_PORT, TAKEN
 from robotiq_async.wire.registers import RTU_REGISTERS
 from tests.serial_line import SerialLine
 
@@ -148,3 +151,48 @@ async def test_a_burst_between_two_requests_is_found_out(tmp_path: Path, size: i
         with pytest.raises(ProtocolError, match=r"nobody asked for|not the answer"):  # as it arrives
             await transport.read()
         assert not transport.is_open
+
+
+# -- a port that cannot be opened --------------------------------------------------------------------------
+
+
+def unopened(device: str) -> ModbusTransport:
+    address = parse_address(f"rtu://{device}")
+    return ModbusTransport(address, RTU_REGISTERS, connect_timeout=1.0, response_timeout=0.05)
+
+
+@pytest.mark.parametrize(
+    ("device", "why"),
+    [("/dev/ttyNOWHERE", MISSING), ("/dev/null", NO_PORT), ("/tmp", NO_PORT), (__file__, NO_PORT)],
+)
+async def test_what_is_no_port_is_told_from_what_is_not_there(device: str, why: str) -> None:
+    with pytest.raises(ConnectFailedError) as caught:
+        await unopened(device).open()
+    assert str(caught.value) == f"cannot connect to rtu://{device}: {why}"
+
+
+async def test_a_port_of_another_program_is_told(tmp_path: Path) -> None:
+    async with linked(tmp_path) as (_, _device):
+        with pytest.raises(ConnectFailedError) as caught:
+            await unopened(f"{tmp_path}/ttyNEAR").open()
+    assert TAKEN in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("error", "why"),
+    [
+        (serial.SerialException(errno.EACCES, "could not open port x: Permission denied"), FORBIDDEN),
+        (serial.SerialException(errno.EIO, "no"), "cannot open the serial port: .*no"),
+        (serial.SerialException("could not open port 'COM3'"), "cannot open the serial port: could not open"),
+    ],
+)
+async def test_a_port_that_is_forbidden_and_anything_else(
+    error: OSError, why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise error
+
+    # pyserial is below what is tested; whoever runs this may open everything, perhaps.
+    monkeypatch.setattr(serial, "serial_for_url", refuse)
+    with pytest.raises(ConnectFailedError, match=why if why != FORBIDDEN else "not allowed to open it"):
+        await unopened("/dev/ttyUSB7").open()

@@ -261,7 +261,8 @@ async def test_a_full_disk_ends_the_recording_and_nothing_else(
             assert hand.state is State.RUNNING_IDLE
             assert len(gripper.writes) == writes
             await hand.move(50)
-    assert len(statuses(file)) > 0
+    assert recorder.has_failed
+    assert 0 < recorder.saved == len(statuses(file)) <= recorder.recorded
 
 
 async def test_an_exception_of_the_block_is_not_hidden(hand: RobotiqHand, file: Path) -> None:
@@ -285,6 +286,7 @@ async def test_a_file_that_is_deleted_meanwhile_is_a_failure(hand: RobotiqHand, 
             await asyncio.to_thread(file.unlink)
             async with asyncio.timeout(20):
                 await recorder.failure()
+    assert recorder.saved == 0
 
 
 async def test_threads_that_are_all_busy_do_not_hold_it_up(hand: RobotiqHand, file: Path) -> None:

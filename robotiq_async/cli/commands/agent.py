@@ -53,6 +53,7 @@ async def agent(
         robotiq-async agent --check FLEET.toml
 
     Args:
+        file: The site's name, and the grippers.
         check: Check the file, print what would be served, and end.
     """
     settings = _settings(file)

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ...telemetry.recorder import Recorder
     from ...telemetry.recordings import Entry
 
+WHOLE = "robotiq-async recover makes a whole file of it"
 NEARBY = 100
 """Number of entries that are sorted by time together."""
 
@@ -79,9 +80,17 @@ async def record(
 
 
 def _tell_figures(recorder: Recorder, hand: Hand) -> None:
+    polls, overruns = recorder.recorded, f"{hand.statistics.overruns} not polled in time"
     # What was not polled is not in the file and not missed either: the polling tells of it.
-    figures = f"{recorder.missed} lost, {hand.statistics.overruns} not polled in time, {recorder.size} bytes"
-    print(f"\n{recorder.recorded} polls, {figures}", flush=True)
+    if not recorder.has_failed:
+        words = f"{polls} polls, {recorder.missed} lost, {overruns}, {recorder.size} bytes"
+    elif recorder.saved:
+        words = (
+            f"The recording ended early: {recorder.saved} of {polls} polls at least are in the file; {WHOLE}"
+        )
+    else:
+        words = f"The recording is lost: of its {polls} polls none is in the file for certain"
+    print(f"\n{words}", flush=True)
 
 
 async def _watch(recorder: Recorder) -> None:

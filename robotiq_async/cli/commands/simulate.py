@@ -10,6 +10,7 @@ from cyclopts import Parameter
 
 from ...enums import Finger
 from ...errors import RobotiqError
+from ...link.serial_ports import why_no_port
 from ...telemetry.gate import is_loopback
 from ...wire.registers import RTU_REGISTERS
 from ..arguments import Byte, Port, Unit
@@ -92,8 +93,9 @@ async def simulate(
     except ImportError as error:
         raise RobotiqError(str(error)) from error
     except OSError as error:
-        where = f"{host}:{port}" if serial is None else serial
-        raise RobotiqError(f"cannot listen on {where}: {error.strerror or error}") from error
+        if serial is not None:
+            raise RobotiqError(f"cannot listen on {serial}: {why_no_port(error)}") from error
+        raise RobotiqError(f"cannot listen on {host}:{port}: {error.strerror or error}") from error
 
 
 def _tell(trouble: Trouble) -> None:

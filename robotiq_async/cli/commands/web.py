@@ -62,8 +62,7 @@ async def web(
         control: Let the page command the grippers.
         open_browser: Open the page in a browser.
         port: TCP port; 0 takes a free one.
-        host: Interface to listen on. Another one than 127.0.0.1 lets others in: only with a
-            password or a certificate.
+        host: Interface to listen on. All but 127.0.0.1 need a password or a certificate, as others get in.
         password_file: File whose first line is asked of everybody, in place of the token.
         certificate: Certificate of your own in PEM, for https.
         key: Its private key in PEM.
