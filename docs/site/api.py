@@ -96,8 +96,8 @@ def parts() -> dict[str, Part]:
         ),
         "simulator.md": Part(
             "The simulator",
-            "A gripper in memory, and servers that put it on a wire.",
-            tuple(exports(f"{PACKAGE}.simulator")),
+            "A gripper in memory, servers that put it on a wire, and fixtures for the tests of applications.",
+            (*exports(f"{PACKAGE}.simulator"), f"{PACKAGE}.testing.plugin"),
         ),
         "fleet.md": Part(
             "Hands on other hosts",
