@@ -21,7 +21,7 @@ RELEASE := $(VENV)-release
 unexport VIRTUAL_ENV CONDA_PREFIX PYTHONHOME PYTHONPATH PYTHONSTARTUP PIP_USER PIP_TARGET PIP_PREFIX UV_PYTHON
 
 .DEFAULT_GOAL := help
-.PHONY: help demo show test test-ros2 pages docs dist pythons canary soak fuzz explore bench lint check format constraints clean
+.PHONY: help demo show test test-web test-ros2 pages docs dist pythons canary soak fuzz explore bench lint check format constraints clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -33,8 +33,11 @@ demo: $(STAMP)  ## Run the demo on a simulated gripper (ADDRESS=... for a real o
 show: $(STAMP)  ## Run the demo with the hand in three dimensions on a page in your browser
 	@$(BIN)/python -m robotiq_async demo --show $(ADDRESS)
 
-test: $(STAMP)  ## Run all tests
+test: $(STAMP)  ## Run the tests; those that need a browser, ROS or other environments are test-web, test-ros2 and pages
 	@$(BIN)/python -m pytest -rs --numprocesses auto --dist worksteal
+
+test-web: $(STAMP)  ## Test the page in a real browser (Debian: chromium, chromium-driver); skipped where there is none
+	@$(BIN)/python -m pytest -rs tests/web/in_browser.py
 
 test-ros2:  ## Test the ROS 2 node with real clients, each ROS in an environment of its own (DISTROS="jazzy kilted")
 	@PYTHON="$(PYTHON)" tests/ros2/run.sh $(DISTROS)
@@ -73,7 +76,7 @@ lint: $(STAMP)  ## Check style, types and the directions of the imports
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo --no-cache
 
-check: lint test test-ros2 pages docs dist pythons  ## Everything CI runs, and more of ROS 2
+check: lint test test-web test-ros2 pages docs dist pythons  ## Everything CI runs, and more of ROS 2
 
 format: $(STAMP)  ## Put the sources into shape
 	$(BIN)/ruff check --fix

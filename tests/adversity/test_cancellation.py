@@ -26,11 +26,11 @@ from tests.virtual import run
 
 A, B = Finger.A, Finger.B
 TARGET = 120
-SPEEDUP = 25.0
-"""Slow enough for a move to take dozens of polls, fast enough to walk through all of them."""
+SPEEDUP = 40.0
+"""Slow enough for a move to take a dozen polls, fast enough to walk through all of them."""
 
-AXIS_STOPS_WITHIN = 30
-"""Counts: at this speed an axis moves 6 in a poll of 10 ms, and two polls and a device cycle may pass."""
+AXIS_STOPS_WITHIN = 48
+"""Counts: at this speed an axis moves 10 in a poll of 10 ms, and two polls and a device cycle may pass."""
 
 Way = Literal["task.cancel", "asyncio.timeout", "anyio"]
 WAYS: dict[Way, int] = {"task.cancel": 1, "anyio": 1, "asyncio.timeout": 6}

@@ -20,6 +20,8 @@ A, B = Finger.A, Finger.B
 FAST = 2000.0
 """The gripper does everything within a poll or two: all there is to walk through is what the hand does."""
 MOST_TURNS = 60
+POLL_S = 0.02
+"""What is walked through are turns of the loop, and of those a poll has as many however often it comes."""
 
 Call = Callable[[World], Awaitable[Any]]
 CALLS: dict[str, Call] = {
@@ -65,7 +67,7 @@ def test_a_second_call_in_every_turn(
 
 async def collide(ready: str, first: str, second: str, turn: int) -> bool:
     """Make both calls and look at what is left; False if the first was over before the second came."""
-    async with world(speedup=FAST) as here:
+    async with world(speedup=FAST, poll_interval=POLL_S) as here:
         await READY[ready][0](here)
         one = asyncio.create_task(told(CALLS[first](here)))
         other: asyncio.Future[asyncio.Task[str]] = here.loop.create_future()

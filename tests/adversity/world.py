@@ -187,8 +187,9 @@ async def world(
     else:
         server, address = TcpServer(gripper), ""
     async with server:
-        # 100 Hz over TCP and 200 Hz over a serial line, as the manual says.
-        options = {"poll_interval": 0.005 if link == "rtu" else 0.01} | options
+        options = {
+            "poll_interval": 0.01
+        } | options  # 100 Hz: as the manual has it for TCP, half of it for RTU
         hand = RobotiqHand(address or server.address, **options)  # type: ignore[arg-type]
         here = World(gripper, server, line, hand)
         watching = [asyncio.create_task(here.watch()), asyncio.create_task(here.watch_states())]

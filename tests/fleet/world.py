@@ -25,8 +25,8 @@ WINDOW_S = 1.0
 PROMPT_S = 0.2
 """Allowed beside the window."""
 LOOK_S = 0.01
-POLL_S = 0.02
-"""Seldom enough for a few hundred cells to take no more than a minute."""
+POLL_S = 0.04
+"""Seldom enough for a few hundred cells to take no more than half a minute."""
 NAMES = ("left", "right")
 
 
