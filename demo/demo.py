@@ -35,6 +35,7 @@ from robotiq_async import (
 )
 from robotiq_async.cli.consent import consent
 from robotiq_async.cli.failures import CommandError, UsageError
+from robotiq_async.cli.log_capture import forget
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.protocol import Hand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
@@ -276,6 +277,10 @@ def main() -> int:
         return 2
     except (RobotiqError, CommandError) as error:
         print(f"demo: {error}", file=sys.stderr)
+        return 1
+    except BrokenPipeError:
+        # Whoever read the output has had enough (demo.py | head); the fingers have been stopped.
+        forget(sys.stdout)
         return 1
     except KeyboardInterrupt:
         print("demo: interrupted", file=sys.stderr)

@@ -212,11 +212,11 @@ class Operator:
 
 
 def describe(result: MoveResult) -> str:
-    """Describe how a move ended: ``A at 241, B CONTACT_CLOSING at 130, C at 241; 2.31 s``."""
+    """Describe how a move ended: ``A at 241, B in contact at 130, C at 241; 2.31 s``."""
     ends = []
     for axis in AXES:
         if axis in result.outcomes:
-            how = f" {result.outcomes[axis].name}" if axis in result.contacts else ""
+            how = " in contact" if axis in result.contacts else ""
             ends.append(f"{axis.name}{how} at {result.positions[axis]}")
     return f"{', '.join(ends)}; {result.duration:.2f} s"
 

@@ -44,7 +44,7 @@ async def test_open_close_and_widths(operator: Operator, gripper: SimulatedGripp
     assert await operator.act(ACTIONS["activate"]) == "the gripper is active"
     gripper.place_object(Finger.B, 150)
     closed = await operator.act(ACTIONS["close"])
-    assert "A at 241, B CONTACT_CLOSING at 150, C at 241; " in closed
+    assert "A at 241, B in contact at 150, C at 241; " in closed
     assert "SCISSOR" not in closed
     assert (await operator.act(ACTIONS["open"])).startswith("A at 6, B at 6, C at 6; ")
     for name, width in (("wide", WIDTH_WIDE), ("pinch", WIDTH_PINCH), ("normal", WIDTH_NORMAL)):

@@ -117,7 +117,7 @@ async def test_actions(hand: FakeHand) -> None:
     operator = Operator(hand)
     hand.obstacle = 150
     assert await operator.act(ACTIONS["wide"]) == "SCISSOR at 6; 0.00 s"
-    assert (await operator.act(ACTIONS["close"])).startswith("A CONTACT_CLOSING at 150, B ")
+    assert (await operator.act(ACTIONS["close"])).startswith("A in contact at 150, B ")
     assert await operator.change_speed(16) == "144"
     assert await operator.act(ACTIONS["halt"]) == "every axis stands still"
     with pytest.raises(InvalidStateError):
@@ -185,7 +185,7 @@ async def test_the_monitor(hand: FakeHand) -> None:
         await pilot.press("c")
         log = pilot.app.query_one("#log", RichLog)
         async with asyncio.timeout(20):
-            while not any("close: A CONTACT_CLOSING at 150" in line.text for line in log.lines):
+            while not any("close: A in contact at 150" in line.text for line in log.lines):
                 await pilot.pause(0.02)
         assert f"  {hand.address}" in str(pilot.app.query_one("#state", Static).render())
 

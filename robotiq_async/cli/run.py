@@ -68,6 +68,9 @@ def _outcome(arguments: Sequence[str], signals: _Signals) -> tuple[int, str | No
         # Whoever read the output has had enough (status | head); the flush at exit must not fail over it.
         forget(sys.stdout)
         return FAILURE, None
+    except SystemExit:
+        # So rich ends a program whose output nobody reads; it has forgotten the stream.
+        return FAILURE, None
     except OSError as error:
         # The environment's doing: a full disk behind standard output, say.
         return FAILURE, str(error)

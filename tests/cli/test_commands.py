@@ -9,16 +9,18 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
 from typing import TYPE_CHECKING
 
 import pytest
 
 from robotiq_async import Fault, Finger, RobotiqStatus
+from robotiq_async.cli.commands.demo import _program
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.wire import registers as reg
 from robotiq_async.wire.request import Request
-from tests.cli.conftest import served
+from tests.cli.conftest import Outcome, served
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Call, Shell
@@ -233,6 +235,49 @@ async def test_a_reader_that_has_had_enough(shell: Shell, server: SimulatorServe
     outcome = await shell.finish(process)
     assert outcome.code == 1
     assert "Error" not in outcome.err
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "--help",
+        "move --help",
+        "--version",
+        "move 30",
+        "status",
+        "doctor",
+        "monitor --json",
+        "monitor --watch",
+        "simulate --port 0",
+        "simulate --troubles",
+        "demo",
+    ],
+)
+def test_no_command_complains_when_its_reader_has_gone(command: str, call: Call, virtually: None) -> None:
+    with nobody_reads():
+        assert call(*command.split()) == Outcome(1, "", "")
+
+
+def test_the_demo_without_the_command_line_does_not_either(
+    virtually: None, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["demo.py"])
+    handler = signal.getsignal(signal.SIGTERM)
+    try:
+        with nobody_reads():
+            assert _program().main() == 1
+    finally:
+        signal.signal(signal.SIGTERM, handler)
+    assert capfd.readouterr() == ("", "")
+
+
+@contextmanager
+def nobody_reads() -> Iterator[None]:
+    """Standard output is a pipe whose other end has been closed."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    with os.fdopen(writing, "w") as stream, redirect_stdout(stream):
+        yield
 
 
 @pytest.mark.parametrize("closed", [0, 1, 2])

@@ -11,10 +11,22 @@ import pytest
 from textual.pilot import Pilot
 from textual.widgets import RichLog, Static
 
-from robotiq_async import Fault, Finger, RobotiqHand, RobotiqStatus, State
+from robotiq_async import (
+    Fault,
+    Finger,
+    GripperFaultError,
+    MoveSupersededError,
+    RobotiqError,
+    RobotiqHand,
+    RobotiqStatus,
+    State,
+)
 from robotiq_async.actions import Operator
 from robotiq_async.cli.tui.screen import Monitor
 from robotiq_async.cli.tui.widgets import Axes, Question, position_bar, sparkline
+from robotiq_async.cli.tui.words import refusal_words
+from robotiq_async.control.state_machine import refusal
+from robotiq_async.control.triggers import Trigger
 from robotiq_async.enums import AXES
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
@@ -72,7 +84,7 @@ def axes(pilot: Screen) -> list[str]:
 async def test_it_shows_the_gripper_before_anything_happens(operator: Operator) -> None:
     async with shown(operator) as pilot:
         assert operator.hand.address in text(pilot, "#state")
-        assert "RESET" in text(pilot, "#state")
+        assert "RESET   not active; a activates it" in text(pilot, "#state")
         assert "no fault" in text(pilot, "#state")
         assert [line.split()[0] for line in axes(pilot)] == ["A", "B", "C", "SCISSOR"]
         assert "6 → 0" in axes(pilot)[0]
@@ -104,7 +116,7 @@ async def test_a_fault_is_told_in_words_and_stays_in_the_log(
         await until(pilot, lambda: "major fault 0x0E: interference on the scissor" in text(pilot, "#state"))
         gripper.clear_faults()
         await until(pilot, lambda: "no fault" in text(pilot, "#state"))
-        await until(pilot, lambda: "RUNNING_IDLE -> FAULT" in log(pilot))
+        await until(pilot, lambda: "fault (gripper reports a fault)" in log(pilot))
         assert "SCISSOR_BLOCKED" in log(pilot)
         assert "0x00 NONE" in log(pilot)
 
@@ -113,13 +125,13 @@ async def test_a_lost_gripper_is_a_state_and_comes_back(active: Operator, server
     async with shown(active) as pilot:
         server.refuse()
         server.cut()
-        await until(pilot, lambda: "DISCONNECTED" in text(pilot, "#state"))
+        await until(pilot, lambda: "LOST" in text(pilot, "#state"))
         await until(pilot, lambda: "no gripper answers: what you see is 0.3 s old" in text(pilot, "#state"))
         assert all(span.style == "dim" for span in pilot.app.query_one(Axes).render().spans[-1:])
         await pilot.press("o")
         await until(pilot, lambda: "open: the link is down" in log(pilot))
         await server.accept()
-        await until(pilot, lambda: "RUNNING_IDLE" in text(pilot, "#state"))
+        await until(pilot, lambda: "READY" in text(pilot, "#state"))
         await until(pilot, lambda: "reconnects 1" in text(pilot, "#link"))
         assert pilot.app.is_running
 
@@ -276,8 +288,51 @@ async def test_what_is_refused_is_told(operator: Operator) -> None:
     async with shown(operator) as pilot:
         await pilot.press("c")
         await until(pilot, lambda: "close: " in log(pilot))
-        assert "not activated" in log(pilot)
+        assert "close: the gripper is not activated; a activates it" in log(pilot)
     assert not operator.has_moved
+
+
+async def test_it_speaks_of_keys_and_not_of_methods_and_states(active: Operator) -> None:
+    async with shown(active) as pilot:
+        await pilot.press("c")
+        await until(pilot, lambda: "close: A at" in log(pilot))
+        await confirmed(pilot, "l")
+        await until(pilot, lambda: "release: not now, as it is 'ready'; only when 'fault'" in log(pilot))
+        await confirmed(pilot, "r")
+        await until(pilot, lambda: "reset: not active (gripper is reset)" in log(pilot))
+        shows = log(pilot) + text(pilot, "#state")
+    for name in (*State.__members__, *(f"{each}()" for each in ("reset", "atr", "activate"))):
+        assert name == "RESET" or name not in shows, name
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (MoveSupersededError("atr() took over"), "release took over"),
+        (MoveSupersededError("halt() stopped the fingers"), "halt stopped the fingers"),
+        (GripperFaultError(Fault.SCISSOR_BLOCKED, "major fault"), "major fault; v does what it needs"),
+        (refusal(Trigger.ASK_COMMAND, State.RESET), "the gripper is not activated; a activates it"),
+        (
+            refusal(Trigger.ASK_RELEASE, State.RUNNING_IDLE),
+            "not now, as it is 'ready'; only when 'fault'",
+        ),
+    ],
+)
+def test_a_refusal_names_the_key_that_helps(error: RobotiqError, words: str) -> None:
+    assert refusal_words(error) == words
+
+
+async def test_the_log_keeps_clear_of_its_scroll_bar(operator: Operator) -> None:
+    async with Monitor(operator).run_test(size=(80, 24)) as pilot:
+        assert isinstance(pilot.app, Monitor)
+        history = pilot.app.query_one("#log", RichLog)
+        for number in range(40):
+            pilot.app.write_log(f"{number} " + "x" * 150)
+        await until(pilot, lambda: history.max_scroll_y > 0)
+        assert (
+            max(len(line.text.rstrip()) for line in history.lines) <= history.scrollable_content_region.width
+        )
+        assert history.max_scroll_x == 0
 
 
 @pytest.mark.parametrize("key", ["q", "ctrl+c"])

@@ -31,7 +31,7 @@ async def closing(
         async with RobotiqHand(server.address):
             pass
         terminal = Terminal("-m", "robotiq_async", "monitor", *options, server.address)
-        await terminal.shows(b"RUNNING_IDLE")
+        await terminal.shows(b"READY")
         terminal.press("c")
         await told_to_go(gripper)
         yield terminal, gripper
@@ -44,7 +44,7 @@ async def test_quitting_without_having_moved_leaves_the_fingers_alone(
         await hand.move(100)
         before = gripper.request_registers
         terminal = Terminal("-m", "robotiq_async", "monitor", server.address)
-        await terminal.shows(b"RUNNING_IDLE")
+        await terminal.shows(b"READY")
         terminal.press("q")
         await terminal.shows(b"The fingers were left as they are")
         assert await terminal.end() == 0
@@ -101,7 +101,7 @@ async def test_keys_of_before_the_screen_are_no_commands(server: SimulatorServer
     async with RobotiqHand(server.address) as hand:
         terminal = Terminal("-m", "robotiq_async", "monitor", server.address)
         terminal.press("ryryry")
-        await terminal.shows(b"RUNNING_IDLE")
+        await terminal.shows(b"READY")
         for _ in range(100):
             await anext(hand.statuses())
         assert hand.state is State.RUNNING_IDLE

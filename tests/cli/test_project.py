@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from importlib.metadata import EntryPoint
+from importlib.metadata import EntryPoint, packages_distributions
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -55,6 +55,48 @@ def test_every_dependency_is_pinned() -> None:
     ]
     names = {re.split(r"[\[<>=~! ]", text)[0].lower() for text in wanted}
     assert names - {"robotiq-async"} <= pinned
+
+
+EXTRAS: dict[str, list[str]] = PROJECT["optional-dependencies"]
+NEED = re.compile(r'need\("(\w+)", "(\w+)"')
+"""A command refuses to go on without a module of an extra."""
+ADVICE = re.compile(r"needs? ([a-z-]+): pip install 'robotiq-async\[(\w+)\]'")
+"""A module of the package does."""
+
+
+def packages_of(extra: str) -> set[str]:
+    """The packages that an extra brings, also by another one that it names."""
+    found: set[str] = set()
+    for text in EXTRAS[extra]:
+        name, _, rest = re.split(r"[<>=~! ]", text)[0].partition("[")
+        found |= {name} if not rest else set().union(*map(packages_of, rest.rstrip("]").split(",")))
+    return found
+
+
+def test_whoever_misses_a_module_is_told_the_extra_that_brings_it() -> None:
+    package = {module: names[0] for module, names in packages_distributions().items()}
+    sources = [file.read_text() for file in sorted((ROOT / "robotiq_async").rglob("*.py"))]
+    needs = {found for source in sources for found in NEED.findall(source)}
+    assert {extra for _, extra in needs} == {"fleet", "monitor", "plot", "record", "view", "web"}
+    for module, extra in needs:
+        assert package[module] in packages_of(extra), f"{extra} does not bring {module}"
+    told = {found for source in sources for found in ADVICE.findall(source)}
+    assert {extra for _, extra in told} == {
+        "cli",
+        "fleet",
+        "metrics",
+        "plot",
+        "record",
+        "serial",
+        "view",
+        "web",
+    }
+    for name, extra in told:
+        assert {name, package.get(name, name)} & packages_of(extra), f"{extra} does not bring {name}"
+
+
+def test_the_extra_that_is_a_command_brings_the_command_line() -> None:
+    assert packages_of("monitor") > packages_of("cli") > {"cyclopts"}
 
 
 def test_no_package_index_is_named() -> None:

@@ -92,6 +92,8 @@ async def simulate(
         pass  # Being told to stop is how this command ends well.
     except ImportError as error:
         raise RobotiqError(str(error)) from error
+    except BrokenPipeError:
+        raise  # nobody reads the address
     except OSError as error:
         if serial is not None:
             raise RobotiqError(f"cannot listen on {serial}: {why_no_port(error)}") from error

@@ -19,10 +19,11 @@ from ...actions import ACTIONS, Operator
 from ...enums import AXES, Fault, State
 from ...errors import RobotiqError
 from ...session.clock import now
-from ...telemetry.payloads import fault_fields, title, transition_fields
+from ...telemetry.payloads import fault_fields, title
 from ...wire.status import RobotiqStatus
 from ..text import clock, event_line
 from .widgets import Axes, Line, Question, link_text, state_text
+from .words import KEYS, refusal_words, transition_words
 
 if sys.platform == "win32":
     DRIVER, NONBLOCKING = None, ()
@@ -41,10 +42,6 @@ STEP: Final = 16
 """Change of speed or force for one press of a key."""
 LOG_LINES: Final = 2000
 
-KEYS: Final = """\
-o open  c close  1 wide  2 normal  3 pinch  SPACE halt  + - speed  ] [ force
-a activate  r reset  l release  v recover                             q quit"""
-
 
 class Monitor(App[None]):
     """Shows the hand of an operator, who moves it by keys."""
@@ -56,6 +53,8 @@ class Monitor(App[None]):
     #state, #link, #keys { height: 2; }
     #axes { height: 5; margin: 1 0; }
     #log { height: 1fr; border: round $surface-lighten-2; }
+    /* A scroll bar that came later would lie on what had been wrapped before. */
+    #log { overflow-x: hidden; overflow-y: scroll; scrollbar-size-vertical: 1; }
     #keys { color: $text-muted; }
     Question { align: center middle; background: transparent; }
     #question { width: 60; max-width: 100%; height: auto; padding: 1 2; background: $surface; }
@@ -94,7 +93,7 @@ class Monitor(App[None]):
         self._top = Line(id="state")
         self._axes = Axes()
         self._figures = Line(id="link")
-        self._history = RichLog(id="log", max_lines=LOG_LINES, wrap=True)
+        self._history = RichLog(id="log", max_lines=LOG_LINES, min_width=1, wrap=True)
         self._overruns = 0
         self._polls = (now(), operator.hand.statistics.polls)
 
@@ -132,7 +131,8 @@ class Monitor(App[None]):
             self.refresh(layout=True)
         self._see(self._statuses.drain())
         for each in self._transitions.drain():
-            self.write_log(event_line(transition_fields(each)), "", each.timestamp)
+            if words := transition_words(each):
+                self.write_log(words, "", each.timestamp)
         epoch = time.time() - now()
         for when, text, style in sorted(self._lines):
             self._history.write(Text(f"{clock(epoch + when)} {text}", style), expand=True)
@@ -195,6 +195,6 @@ class Monitor(App[None]):
             try:
                 self.write_log(f"{name}: {await work()}", "bold")
             except RobotiqError as error:
-                self.write_log(f"{name}: {error}", "bold red")
+                self.write_log(f"{name}: {refusal_words(error)}", "bold red")
 
         _: Worker[None] = self.run_worker(carry_out)

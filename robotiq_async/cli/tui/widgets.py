@@ -15,8 +15,10 @@ from textual.widgets import Static
 
 from ...enums import AXES, Fault, Finger, ObjectStatus, Severity, State
 from ...session.statistics import Statistics
+from ...telemetry.state_words import STATE_WORDS
 from ...wire.status import NO_REQUEST, RobotiqStatus
 from ..text import NOTHING
+from .words import HINTS
 
 HISTORY: Final = 60
 """Currents kept, one per paint: five seconds."""
@@ -86,7 +88,7 @@ class Axes(Widget):
         """A heading, and a line for each axis."""
         # What is left of the width is shared by bar and sparkline.
         bar = max((self.size.width - FIXED) // 2, 8)
-        where, current = (f"{words:{bar}.{bar}}" for words in ("position, ▼ request", "current, 5 s"))
+        where, current = (f"{words:{bar}.{bar}}" for words in ("is █, asked ▼", "current, 5 s"))
         head = Text(f"axis     {where}   counts   {'':15} {current}      now", "dim")
         lines = [head, *(self._line(axis, bar) for axis in AXES)]
         text = Text("\n", no_wrap=True, overflow="crop").join(lines)
@@ -148,11 +150,11 @@ def state_text(address: str, state: State, status: RobotiqStatus, age: float) ->
     """
     lost = state is State.DISCONNECTED
     colours = "white on red" if lost else "black on green" if state in _CALM else "black on yellow"
-    text = Text.assemble((f" {state.name} ", f"bold {colours}"))
+    text = Text.assemble((f" {_short(state)} ", f"bold {colours}"))
     if lost:
         text.append(f"  no gripper answers: what you see is {age:.1f} s old")
     else:
-        text.append(f"  {_doing(state, status)}")
+        text.append("; ".join(filter(None, (f"  {_doing(state, status)}", HINTS.get(state)))))
     text.append(f"  {address}\n", "dim")
     fault = status.fault
     if fault is Fault.NONE:
@@ -163,13 +165,18 @@ def state_text(address: str, state: State, status: RobotiqStatus, age: float) ->
     return text
 
 
+def _short(state: State) -> str:
+    """The first of the words for a state; the others follow by what the gripper does."""
+    return STATE_WORDS[state].partition(":")[0].upper()
+
+
 def _doing(state: State, status: RobotiqStatus) -> str:
     if state in (State.DO_ATR, State.WF_ATR) or status.fault is Fault.AUTOMATIC_RELEASE:
         return "releasing: the fingers OPEN"
     if status.is_activated:
         return f"active, {'moving' if status.is_moving else 'not moving'}"
     if status.is_reset:
-        return "reset"
+        return "not active"
     return "activating: the fingers MOVE"
 
 

@@ -7,6 +7,7 @@ from time import time
 from typing import Any, Final
 
 from ...enums import AXES, Fault, Finger, ObjectStatus, Severity, State
+from ...telemetry.state_words import STATE_WORDS
 from ...wire.status import NO_REQUEST
 from .mirror import HandMirror
 
@@ -14,22 +15,6 @@ NAMES: Final = tuple("scissor" if axis is Finger.SCISSOR else str(axis.name) for
 COLORS: Final = ("#3b82f6", "#22a35a", "#e8890c", "#a855f7")
 """Of A, B, C and the scissor, wherever they are drawn: to be told apart on light and on dark."""
 
-_STATES: Final = {
-    State.DISCONNECTED: "lost",
-    State.DO_ACTIVATION: "activating: the fingers move",
-    State.WF_ACTIVATION: "activating: the fingers move",
-    State.RUNNING_IDLE: "ready",
-    State.RUNNING_CC: "ready",
-    State.FAULT: "fault",
-    State.DO_ATR: "releasing: the fingers open",
-    State.WF_ATR: "releasing: the fingers open",
-    State.ATR_DONE: "released: reset it",
-    State.DO_RESET: "resetting",
-    State.WF_RESET: "resetting",
-    State.RESET: "reset: not active",
-    State.DO_SHUTDOWN: "stopping",
-    State.SHUTDOWN: "stopped",
-}
 _AXIS_STATES: Final = {
     NO_REQUEST: "-",
     ObjectStatus.IN_MOTION.name: "moving",
@@ -45,7 +30,7 @@ def state_words(hand: HandMirror, *, is_quiet: bool) -> tuple[str, str]:
         return "the program that watches the gripper is silent", "negative"
     if hand.problem:
         return "not reached", "negative"
-    words = _STATES[hand.state]
+    words = STATE_WORDS[hand.state]
     if hand.state in (State.DISCONNECTED, State.FAULT):
         return words, "negative"
     if hand.state in (State.RUNNING_IDLE, State.RUNNING_CC):
@@ -83,7 +68,7 @@ def event_words(event: dict[str, Any]) -> str:
     """An event as a line."""
     if event["kind"] == "fault":
         return timed(f"fault 0x{event['fault_code']:02X}: {event['description']}", event["time"])
-    words = _STATES[State[event["target"]]]
+    words = STATE_WORDS[State[event["target"]]]
     return timed(f"{words}  ({event['source']} to {event['target']})", event["time"])
 
 
