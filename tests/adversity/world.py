@@ -189,7 +189,7 @@ async def world(
     async with server:
         options = {
             "poll_interval": 0.01
-        } | options  # 100 Hz: as the manual has it for TCP, half of it for RTU
+        } | options  # the manual has 200 for RTU
         hand = RobotiqHand(address or server.address, **options)  # type: ignore[arg-type]
         here = World(gripper, server, line, hand)
         watching = [asyncio.create_task(here.watch()), asyncio.create_task(here.watch_states())]
