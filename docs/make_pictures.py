@@ -41,7 +41,7 @@ async def main() -> None:
         operator = Operator(hand)
         await hand.start()
         screen = Monitor(operator)
-        with forwarded_warnings(screen.write_log):
+        with forwarded_warnings(screen.write_log, of=hand.name):
             async with screen.run_test(size=(100, 28)):
                 await grasp(screen, operator, gripper)
                 await fault(screen, operator, gripper)

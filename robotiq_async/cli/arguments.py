@@ -47,7 +47,10 @@ Address = Annotated[
     str,
     Parameter(help="The gripper: tcp://HOST[:PORT], rtu:///dev/ttyUSB0, zenoh://SITE/HOST/NAME or sim://."),
 ]
-Yes = Annotated[bool, Parameter(name=("--yes", "-y"), negative=())]
+Flag = Annotated[bool, Parameter(negative=(), show_default=False)]
+"""Off, unless it is given: there is no --no- form, and no default to be told."""
+Yes = Annotated[Flag, Parameter(name=("--yes", "-y"))]
+Host = Annotated[str, Parameter(metavar="HOST")]
 Position = Annotated[int, Parameter(converter=_integer("POSITION", 0, 255))]
 Byte = Annotated[int, Parameter(converter=_integer("the value", 0, 255), metavar="0..255")]
 Port = Annotated[int, Parameter(converter=_integer("the port", 0, 65535), metavar="0..65535")]

@@ -34,8 +34,10 @@ WIDTHS: Final = {"A": 4.2, "B": 2.6, "C": 1.1, "SCISSOR": 1.4}
 DRAWN: Final = ("position", "requested_position", "current_ma")
 LABEL: Final = 0.012
 """Width of a label, as a share of the picture's."""
-LONGEST: Final = 80
+LONGEST: Final = 40
 """Characters of a label."""
+STRIP: Final = 0.075
+"""Height of a character of a label, where that of the positions is 3."""
 SHOWN_FORCES: Final = (0, 125, 250)
 """Force values whose currents are drawn over time."""
 
@@ -102,9 +104,13 @@ def plot_peak_currents(path: Path, currents: Currents, surface: str, label: str)
     with _figure(path, f"Highest current of a grasp, {surface} ({label})") as ((axes,), files):
         values = sorted(currents)
         peaks = [peak_currents(currents[value]) for value in values]
-        for finger, colour, of_finger in zip("ABC", COLOURS, zip(*peaks, strict=True), strict=True):
-            style: Any = {"marker": dict(zip("ABC", "o^s", strict=True))[finger], "ms": 5, "mfc": "none"}
-            axes.plot(values, of_finger, color=colour, label=f"finger {finger}", **style)
+        # Fingers that are alike, those of the simulator are, would lie on each other: they are one curve.
+        alike: dict[tuple[int, ...], str] = {}
+        for finger, of_finger in zip("ABC", zip(*peaks, strict=True), strict=True):
+            alike[of_finger] = alike.get(of_finger, "") + finger
+        for (of_fingers, names), colour, marker in zip(alike.items(), COLOURS, "o^s", strict=False):
+            name = f"finger {names}" if len(names) == 1 else f"fingers {', '.join(names)}: the same"
+            axes.plot(values, of_fingers, color=colour, marker=marker, ms=5, mfc="none", label=name)
         axes.set_xlabel("force value")
         axes.set_ylabel("highest current, mA")
         axes.set_ylim(bottom=0)
@@ -165,8 +171,10 @@ def plot_recording(path: Path, entries: Iterable[Entry]) -> list[Path]:
             seconds.append(at)
     if not seconds:
         return []
-    with _figure(path, path.name, rows=2) as (axes, files):
-        positions, currents = axes
+    labels = list(_labels(events, apart=LABEL * seconds[-1]))
+    height = STRIP * max((len(words) for _, words, _ in labels), default=1)
+    with _figure(path, path.name, rows=3, ratios=(height, 3, 3)) as (axes, files):
+        strip, positions, currents = axes
         # Fingers that move together lie on each other: the first is the broadest, and shows at the sides.
         for (name, width), colour in zip(WIDTHS.items(), (*COLOURS, "0.5"), strict=True):
             line: Any = {"color": colour, "lw": width}
@@ -180,14 +188,25 @@ def plot_recording(path: Path, entries: Iterable[Entry]) -> list[Path]:
         currents.set_ylabel("current, mA")
         currents.set_ylim(bottom=0)
         currents.set_xlabel("time, s")
-        for when, words, is_fault in _labels(events, apart=LABEL * seconds[-1]):
-            for each in axes:
-                each.axvline(when, color="crimson" if is_fault else "0.7", lw=0.8, zorder=0)
-            style: Any = {"color": "crimson" if is_fault else "0.4", "fontsize": 7, "rotation": 90}
-            style["in_layout"] = False  # however long it is, it does not push the curves aside
-            style["bbox"] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5}
-            positions.annotate(words[:LONGEST], (when, 258), va="top", ha="right", parse_math=False, **style)
+        _write_labels(strip, labels)
+        for when, _, is_fault in labels:
+            for each in (positions, currents):
+                each.axvline(when, color=_colour(is_fault), lw=0.8, zorder=0)
     return files
+
+
+def _write_labels(strip: Axes, labels: Iterable[Event]) -> None:
+    """Above the curves, where they hide none."""
+    strip.set_axis_off()
+    strip.set_ylim(0, 1)
+    style: Any = {"fontsize": 7, "rotation": 90, "va": "bottom", "ha": "center", "parse_math": False}
+    style["in_layout"] = False  # it does not push the curves aside
+    for when, words, is_fault in labels:
+        strip.annotate(words, (when, 0), color=_colour(is_fault), **style)
+
+
+def _colour(is_fault: bool) -> str:
+    return "crimson" if is_fault else "0.4"
 
 
 def _event(fields: dict[str, Any]) -> tuple[str, bool] | None:
@@ -196,7 +215,7 @@ def _event(fields: dict[str, Any]) -> tuple[str, bool] | None:
     if "RUNNING_CC" in (fields.get("source"), fields.get("target")):
         return None
     is_fault = fields["kind"] == "fault"
-    name = printable(fields["fault"] if is_fault else fields["target"])[:LONGEST]
+    name = _short(printable(fields["fault"] if is_fault else fields["target"]))
     return "fault cleared" if name == "NONE" else name, is_fault
 
 
@@ -205,13 +224,17 @@ def _labels(events: Iterable[Event], apart: float) -> Iterator[Event]:
     began, words, is_fault = 0.0, "", False
     for at, name, of_a_fault in events:
         if words and at - began > apart:
-            yield began, words, is_fault
+            yield began, _short(words), is_fault
             words, is_fault = "", False
         began = began if words else at
         words += (", " if words else "") + name
         is_fault = is_fault or of_a_fault
     if words:
-        yield began, words, is_fault
+        yield began, _short(words), is_fault
+
+
+def _short(words: str) -> str:
+    return words if len(words) <= LONGEST else f"{words[: LONGEST - 3]}..."
 
 
 def _shown(currents: Currents) -> list[int]:
@@ -222,10 +245,11 @@ def _shown(currents: Currents) -> list[int]:
 
 @contextmanager
 def _figure(
-    path: Path, title: str, rows: int = 1, ratios: tuple[int, ...] | None = None
+    path: Path, title: str, rows: int = 1, ratios: tuple[float, ...] | None = None
 ) -> Iterator[tuple[list[Axes], list[Path]]]:
     """A figure with axes one above the other; written at the end, always the same bytes for the same data."""
-    figure = Figure(figsize=(8, 4.6 if rows == 1 else 6.4), layout="constrained")
+    height = 4.6 if rows == 1 else 6.4 + 1.0 * (rows > 2)
+    figure = Figure(figsize=(8, height), layout="constrained")
     FigureCanvasAgg(figure)
     grid = figure.subplots(rows, 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": ratios})
     axes: list[Axes] = list(grid[:, 0])

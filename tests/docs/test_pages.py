@@ -37,6 +37,25 @@ def read(page: Path) -> str:
     return page.read_text(encoding="utf-8")
 
 
+# -- where code runs ------------------------------------------------------------------------------------
+
+
+def awaits_at_the_top(block: Block) -> bool:
+    """Whether it is for a prompt or a notebook; in a program it would be a syntax error."""
+    if block.language != "python":
+        return False
+    code = compile(block.text, "page", "exec", flags=ast.PyCF_ALLOW_TOP_LEVEL_AWAIT, dont_inherit=True)
+    return bool(code.co_flags & inspect.CO_COROUTINE)
+
+
+@pytest.mark.parametrize("page", [*PAGES, *FRONT], ids=name)
+def test_a_page_says_where_code_runs_that_awaits_at_the_top(page: Path) -> None:
+    found = blocks(read(page))
+    if any(map(awaits_at_the_top, found)):
+        said = read(page)[: read(page).index(next(filter(awaits_at_the_top, found)).text)]
+        assert "python -m asyncio" in said, f"{name(page)} has top-level await and does not say where it runs"
+
+
 # -- links ---------------------------------------------------------------------------------------------
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ...log import log, printable
-from ..arguments import need
+from ..arguments import Flag, need
 from ..failures import UsageError
 from ..log_capture import forget, forwarded_warnings
 
@@ -27,7 +27,7 @@ async def agent(
     file: Annotated[Path, Parameter(metavar="FLEET.toml")],
     /,
     *,
-    check: Annotated[bool, Parameter(negative=())] = False,
+    check: Flag = False,
 ) -> None:
     """Serve the grippers of this host to other hosts, until Ctrl-C or SIGTERM.
 

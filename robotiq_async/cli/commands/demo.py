@@ -8,12 +8,10 @@ from contextlib import asynccontextmanager, nullcontext
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
-from typing import Annotated, Final
-
-from cyclopts import Parameter
+from typing import Final
 
 from ...protocol import Hand
-from ..arguments import Address, Yes, need
+from ..arguments import Address, Flag, Yes, need
 from ..browser import opened
 from ..consent import consent
 
@@ -24,7 +22,7 @@ LOOK_S: Final = 2.0
 
 
 def demo(
-    address: Address = "sim://", /, *, yes: Yes = False, show: Annotated[bool, Parameter(negative=())] = False
+    address: Address = "sim://", /, *, yes: Yes = False, show: Flag = False
 ) -> Coroutine[None, None, None]:
     """Show what the library does, call by call. THE FINGERS MOVE.
 

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from ...log import printable
 from ...session.clock import now
-from ..arguments import need
+from ..arguments import Flag, need
 from ..failures import CommandError, usage
 
 if TYPE_CHECKING:
@@ -27,8 +27,8 @@ async def fleet(
     site: Site = None,
     /,
     *,
-    watch: Annotated[bool, Parameter(negative=())] = False,
-    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+    watch: Flag = False,
+    as_json: Annotated[Flag, Parameter(name="--json")] = False,
 ) -> None:
     """List the grippers that agents serve: state, fault, who commands. Nothing moves.
 

@@ -14,7 +14,7 @@ from cyclopts import Parameter
 
 from ...errors import MeasuringError
 from ..addresses import full_address, is_simulated
-from ..arguments import need
+from ..arguments import Flag, need
 from ..consent import read_line
 from ..failures import CommandError, UsageError
 
@@ -30,7 +30,7 @@ POLL_S = 0.001
 
 Runs = Annotated[int, Parameter(metavar="N")]
 Speedup = Annotated[float | None, Parameter(metavar="FACTOR")]
-NoPlot = Annotated[bool, Parameter(name="--no-plot", negative=())]
+NoPlot = Annotated[Flag, Parameter(name="--no-plot")]
 
 
 def check(address: str, output: Path, speedup: float | None, runs: int, step: int, plot: bool) -> float:

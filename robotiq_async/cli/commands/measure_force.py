@@ -43,7 +43,7 @@ def force(
 ) -> Coroutine[None, None, None]:
     """Measure force and current of a grasp at each force value. THE FINGERS MOVE.
 
-    As the thesis did (chapter 6): a scale lies between the fingers, every 25th
+    As the thesis did (Pekonen 2012, chapter 6): a scale lies between the fingers, every 25th
     value is set, up by 50 and down by 50, and its reading in grams is typed in, or
     taken from a table. At sim:// a simulated scale shows what the thesis's showed.
     The currents of the fingers are recorded at every poll. Both files are written

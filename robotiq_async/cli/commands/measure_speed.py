@@ -36,7 +36,7 @@ def speed(
 ) -> Coroutine[None, None, None]:
     """Measure how long a full closing takes at each speed value. THE FINGERS MOVE.
 
-    As the thesis did (table A1.1): every 4th value from 0, and 255, slowest first,
+    As the thesis did (Pekonen 2012, table A1.1): every 4th value from 0, and 255, slowest first,
     three runs, from the command until nothing moves. It takes 20 minutes. The file
     is written after every row; started again, it goes on where it was. Beside it a
     plot is drawn (PNG and SVG) with the thesis's own curve. Unless the gripper is

@@ -10,7 +10,7 @@ from typing import Annotated, Final
 from cyclopts import Parameter
 
 from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
-from ..arguments import USUAL, Address, Byte, Link, need
+from ..arguments import USUAL, Address, Byte, Flag, Link, need
 from ..consent import forget_keys
 from ..failures import CommandError, UsageError
 from ..log_capture import forget, forwarded_warnings
@@ -23,8 +23,8 @@ async def monitor(
     address: Address = "sim://",
     /,
     *,
-    watch: Annotated[bool, Parameter(negative=())] = False,
-    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+    watch: Flag = False,
+    as_json: Annotated[Flag, Parameter(name="--json")] = False,
     speed: Byte = DEFAULT_SPEED,
     force: Byte = DEFAULT_FORCE,
     link: Link = USUAL,
@@ -35,9 +35,17 @@ async def monitor(
     it is asked to go, what it does and its current; how the polling goes; and a log.
     A lost gripper is shown as lost, and comes back by itself.
 
-    Keys: o open, c close, 1 2 3 the widths of the scissor, SPACE halt, + - speed,
-    ] [ force, v recover, a activate, r reset, l release in a fault, q quit. The last
-    four before q ask first. Quitting stops the fingers only if they were moved from here.
+    Keys:
+
+        o c      open, close
+        1 2 3    the scissor wide, normal, pinch
+        SPACE    halt
+        + -      speed
+        ] [      force
+        a r l v  activate, reset, release, recover: ask first
+        q        quit
+
+    Quitting stops the fingers only if they were moved from here.
 
     Without a terminal, in a pipe say, it prints what --json prints.
 

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from ...enums import Finger
 from ...wire.checks import check_timeout
-from ..arguments import USUAL, Address, Byte, Fingers, Link, Position, Yes
+from ..arguments import USUAL, Address, Byte, Fingers, Flag, Link, Position, Yes
 from ..consent import consent
 from ..failures import usage
 
@@ -30,7 +30,7 @@ def move(
     speed: Byte | None = None,
     force: Byte | None = None,
     timeout: Annotated[float | None, Parameter(metavar="SECONDS")] = None,
-    keep: Annotated[bool, Parameter(negative=())] = False,
+    keep: Flag = False,
     yes: Yes = False,
     link: Link = USUAL,
 ) -> Coroutine[None, None, None]:

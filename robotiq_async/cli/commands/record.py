@@ -14,7 +14,7 @@ from cyclopts import Parameter
 
 from ...log import printable
 from ...telemetry.payloads import title
-from ..arguments import USUAL, Address, Link, need
+from ..arguments import USUAL, Address, Flag, Link, need
 from ..failures import CommandError, UsageError
 from ..text import FORMATTERS, clock
 
@@ -34,14 +34,14 @@ async def record(
     /,
     *,
     seconds: Annotated[float | None, Parameter(metavar="SECONDS")] = None,
-    ros2: Annotated[bool, Parameter(negative=())] = False,
+    ros2: Flag = False,
     link: Link = USUAL,
 ) -> None:
     """Record every poll, command, transition and fault in an MCAP file, until Ctrl-C.
 
     It only looks: nothing moves and nothing is written to the gripper. The file is
     for viewers of MCAP (Foxglove, PlotJuggler), and for replay and plot. Tools of
-    ROS 2 refuse it, but for --ros2. Commands are those of this program, so that a
+    ROS 2 open only one made with --ros2. Commands are those of this program, so that a
     recording made by this command has none: record from your own program with
     robotiq_async.telemetry.recorder.Recorder. A killed recording loses at most the last
     second; recover makes its file whole.
@@ -106,9 +106,7 @@ async def _watch(recorder: Recorder) -> None:
         failing.cancel()
 
 
-def replay(
-    file: Path, /, *, as_picture: Annotated[bool, Parameter(name="--plot", negative=())] = False
-) -> None:
+def replay(file: Path, /, *, as_picture: Annotated[Flag, Parameter(name="--plot")] = False) -> None:
     """Print what a recording holds: states, faults, commands, and what the fingers did.
 
     A line for each event and command, and one for each status in which a finger has

@@ -13,7 +13,7 @@ from ...errors import RobotiqError
 from ...link.serial_ports import why_no_port
 from ...telemetry.gate import is_loopback
 from ...wire.registers import RTU_REGISTERS
-from ..arguments import Byte, Port, Unit
+from ..arguments import Byte, Flag, Host, Port, Unit
 from ..failures import usage
 
 if TYPE_CHECKING:
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 async def simulate(
     *,
     port: Port = 5020,
-    host: str = "127.0.0.1",
+    host: Host = "127.0.0.1",
     speedup: Annotated[float, Parameter(metavar="FACTOR")] = 1.0,
-    exact: Annotated[bool, Parameter(negative=())] = False,
+    exact: Flag = False,
     object_: Annotated[Byte | None, Parameter(name="--object")] = None,
     serial: Annotated[str | None, Parameter(metavar="DEVICE")] = None,
     device_id: Unit | None = None,
     trouble: Annotated[list[str] | None, Parameter(metavar="WORDS", negative=())] = None,
-    troubles: Annotated[bool, Parameter(negative=())] = False,
+    troubles: Flag = False,
 ) -> None:
     """Run a simulated gripper until Ctrl-C or SIGTERM.
 

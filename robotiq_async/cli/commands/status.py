@@ -8,14 +8,14 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from ...telemetry.payloads import reading_fields
-from ..arguments import USUAL, Address, Link
+from ..arguments import USUAL, Address, Flag, Link
 
 
 async def status(
     address: Address = "sim://",
     /,
     *,
-    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+    as_json: Annotated[Flag, Parameter(name="--json")] = False,
     link: Link = USUAL,
 ) -> None:
     """Read the gripper once and print what it says. Nothing moves and nothing is written.

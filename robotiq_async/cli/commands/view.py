@@ -13,7 +13,7 @@ from cyclopts import Parameter
 from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...log import printable
 from ...telemetry.gate import is_loopback
-from ..arguments import USUAL, Address, Byte, Link, Port, need
+from ..arguments import USUAL, Address, Byte, Flag, Host, Link, Port, need
 from ..failures import CommandError, UsageError
 
 
@@ -22,9 +22,9 @@ async def view(
     /,
     *,
     port: Port = 8765,
-    host: str = "127.0.0.1",
-    control: Annotated[bool, Parameter(negative=())] = False,
-    origin: Annotated[tuple[str, ...], Parameter(metavar="URL", negative=())] = (),
+    host: Host = "127.0.0.1",
+    control: Flag = False,
+    origin: Annotated[tuple[str, ...], Parameter(metavar="URL", negative=(), show_default=False)] = (),
     layout: Annotated[Path | None, Parameter(metavar="FILE")] = None,
     speed: Byte = DEFAULT_SPEED,
     force: Byte = DEFAULT_FORCE,

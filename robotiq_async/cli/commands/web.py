@@ -16,7 +16,7 @@ from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...errors import RobotiqError
 from ...log import printable
 from ...telemetry.payloads import title
-from ..arguments import USUAL, Address, Byte, Link, Port, need
+from ..arguments import USUAL, Address, Byte, Flag, Host, Link, Port, need
 from ..browser import opened
 from ..failures import CommandError, UsageError, usage
 
@@ -31,10 +31,10 @@ AGAIN_S: Final = 3.0
 
 async def web(
     *addresses: Address,
-    control: Annotated[bool, Parameter(negative=())] = False,
-    open_browser: Annotated[bool, Parameter(name="--open", negative=())] = False,
+    control: Flag = False,
+    open_browser: Annotated[Flag, Parameter(name="--open")] = False,
     port: Port = 8766,
-    host: str = "127.0.0.1",
+    host: Host = "127.0.0.1",
     password_file: Annotated[Path | None, Parameter(metavar="FILE")] = None,
     certificate: Annotated[Path | None, Parameter(metavar="FILE")] = None,
     key: Annotated[Path | None, Parameter(metavar="FILE")] = None,

@@ -1,0 +1,50 @@
+"""What is drawn can be told apart, and the words hide nothing."""
+
+from __future__ import annotations
+
+import json
+import re
+from itertools import pairwise
+from pathlib import Path
+
+from robotiq_async import Finger
+from robotiq_async.enums import AXES
+from robotiq_async.measure.plots import LONGEST, plot_peak_currents, plot_recording
+from robotiq_async.telemetry.recordings import Entry
+
+
+def words(picture: Path) -> list[str]:
+    """What is written in a picture; matplotlib draws glyphs, and puts the words into comments."""
+    return re.findall(r"<!-- (.+?) -->", picture.read_text(encoding="utf-8"))
+
+
+def peaks(tmp_path: Path, *samples: tuple[int, int, int]) -> list[str]:
+    currents = {force: [[(0, *each)]] for force, each in enumerate(samples)}
+    _, picture = plot_peak_currents(tmp_path / "peaks", currents, "foam", "simulated")
+    return [each for each in words(picture) if each.startswith("finger")]
+
+
+def test_fingers_that_are_alike_are_one_curve_that_says_so(tmp_path: Path) -> None:
+    assert peaks(tmp_path, (10, 10, 10), (20, 20, 20)) == ["fingers A, B, C: the same"]
+    assert peaks(tmp_path, (10, 10, 10), (20, 30, 20)) == ["fingers A, C: the same", "finger B"]
+    assert peaks(tmp_path, (10, 20, 30), (20, 30, 40)) == ["finger A", "finger B", "finger C"]
+
+
+def test_what_happens_is_written_above_the_curves(tmp_path: Path) -> None:
+    axis = {"position": 6, "requested_position": 0, "current_ma": 0}
+    status = {str(each.name): axis for each in AXES}
+    long = "X" * 2 * LONGEST
+    events = [{"kind": "state", "target": name} for name in ("FIRST", "SECOND", long)]
+    messages = [("/gripper/status", status), *(("/gripper/event", each) for each in events)]
+    messages.append(("/gripper/status", status))
+    entries = [
+        Entry(topic, second * 10**9, 0, json.dumps(fields).encode(), is_json=True)
+        for second, (topic, fields) in enumerate(messages)
+    ]
+    _, picture = plot_recording(tmp_path / "it", entries)
+    text = picture.read_text(encoding="utf-8")
+    places = [text.index(f'id="{each}"') for each in ("axes_1", "axes_2", "axes_3")]
+    for name in ("FIRST", "SECOND", long[: LONGEST - 3] + "..."):
+        assert places[0] < text.index(f"<!-- {name} -->") < places[1], "not above the positions"
+    assert all(before < after for before, after in pairwise(places))
+    assert Finger.A.name in words(picture)
