@@ -187,9 +187,7 @@ async def world(
     else:
         server, address = TcpServer(gripper), ""
     async with server:
-        options = {
-            "poll_interval": 0.01
-        } | options  # the manual has 200 for RTU
+        options = {"poll_interval": 0.01} | options  # the manual has 200 for RTU
         hand = RobotiqHand(address or server.address, **options)  # type: ignore[arg-type]
         here = World(gripper, server, line, hand)
         watching = [asyncio.create_task(here.watch()), asyncio.create_task(here.watch_states())]
