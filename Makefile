@@ -76,7 +76,7 @@ lint: $(STAMP)  ## Check style, types and the directions of the imports
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo --no-cache
 
-check: lint test test-web test-ros2 pages docs dist pythons  ## Everything CI runs, and more of ROS 2
+check: lint test test-web test-ros2 pages docs dist pythons  ## Everything CI runs
 
 format: $(STAMP)  ## Put the sources into shape
 	$(BIN)/ruff check --fix

@@ -17,7 +17,16 @@ from typing import Final
 from tests.release.environments import CONSTRAINTS, ROOT, FailedError, make, uv
 from tests.release.suites import run_suite
 
-TOOLS: Final = ("hypothesis", "pyModbusTCP", "pyserial", "pytest", "pytest-asyncio", "pytest-xdist", "uvloop")
+TOOLS: Final = (
+    "hypothesis",
+    "numpy",
+    "pyModbusTCP",
+    "pyserial",
+    "pytest",
+    "pytest-asyncio",
+    "pytest-xdist",
+    "uvloop",
+)
 """What the tests of the library need beside it."""
 
 
