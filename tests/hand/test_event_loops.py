@@ -248,10 +248,15 @@ class TestClosedLoop:
 
     def test_a_sequence_of_the_first_start_does_not_go_on_in_the_second(self, address: str) -> None:
         """It activated a gripper that the second start was to leave as it is."""
-        hand = RobotiqHand(address)
+        hand = RobotiqHand(address, poll_interval=0.1)
         loop = asyncio.new_event_loop()
-        loop.run_until_complete(hand.start(activate=False))
-        asking = loop.create_task(hand.activate())
+
+        async def asked() -> asyncio.Task[None]:
+            await hand.start(activate=False)
+            await anext(hand.statuses())  # nothing is read, and so nothing written, before the next tick
+            return asyncio.create_task(hand.activate())
+
+        asking = loop.run_until_complete(asked())
         loop.run_until_complete(asyncio.sleep(0))
         assert hand.state is State.DO_ACTIVATION
         loop.close()
