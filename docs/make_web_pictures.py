@@ -13,7 +13,6 @@ import io
 import sys
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from time import monotonic
 from typing import Final
 
 from PIL import Image
@@ -28,6 +27,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer  # noqa: E
 from robotiq_async.web.server import PageServer  # noqa: E402
 from robotiq_async.web.settings import PageSettings  # noqa: E402
 from tests.web.browser import Browser  # noqa: E402
+from tests.web.pace import Pace  # noqa: E402
 
 FOLDER: Final = ROOT / "docs" / "measured"
 FRAME_S: Final = 0.3
@@ -37,27 +37,6 @@ PATIENCE_S: Final = 60.0
 """For a slow move."""
 WIDTH: Final = 760
 """Of the animation, in pixels."""
-
-
-class Pace:
-    """The clock of the gripper, which can be slowed down."""
-
-    def __init__(self) -> None:
-        """As fast as ours."""
-        self._rate = 1.0
-        self._at = self._now = monotonic()
-
-    def __call__(self) -> float:
-        """The time there."""
-        at = monotonic()
-        self._now += self._rate * (at - self._at)
-        self._at = at
-        return self._now
-
-    def set(self, rate: float) -> None:
-        """From now on it runs so many times as fast as ours."""
-        self()
-        self._rate = rate
 
 
 async def main() -> None:

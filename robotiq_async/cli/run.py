@@ -17,10 +17,10 @@ from typing import Self
 from cyclopts import CycloptsError
 
 from ..errors import RobotiqError
-from ..log import printable
 from .app import build
 from .failures import CommandError, UsageError
 from .log_capture import collected_warnings, forget
+from .notices import tell
 
 _ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 SUCCESS, FAILURE, WRONG_USAGE, SIGNALLED = 0, 1, 2, 128
@@ -35,7 +35,7 @@ def run(arguments: Sequence[str]) -> int:
     lines = warnings if problem is None else ["; ".join((problem, *warnings))]
     try:
         for line in lines:
-            print("robotiq-async:", printable(" ".join(line.split())), file=sys.stderr, flush=True)
+            tell(" ".join(line.split()))
     except OSError:  # the terminal is gone
         forget(sys.stderr)
     return code

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ..log import log
+from ..log import Log, log
 from ..session.clock import now
 
 EVERY_S: Final = 10.0
@@ -14,8 +14,9 @@ EVERY_S: Final = 10.0
 class Complaints:
     """Of one kind, about one source: the first at once, then one in ten seconds, with how many there were."""
 
-    def __init__(self) -> None:
-        """Nothing to complain about yet."""
+    def __init__(self, log: Log = log) -> None:
+        """Nothing to complain about yet; ``log`` is that of the hand that it is about."""
+        self._log = log
         self._next = -math.inf
         self._count = 0
 
@@ -34,4 +35,4 @@ class Complaints:
             message += " (%d like it since the last word of them)"
             arguments += (self._count,)
         self._next, self._count = now() + EVERY_S, 0
-        log.warning(message, *arguments, exc_info=exc_info)
+        self._log.warning(message, *arguments, exc_info=exc_info)

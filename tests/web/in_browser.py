@@ -9,7 +9,6 @@ import signal
 from collections.abc import AsyncIterator, Iterator
 from dataclasses import dataclass
 from functools import partial
-from time import monotonic
 from typing import Literal
 
 import pytest
@@ -32,29 +31,12 @@ from tests.conftest import watched
 from tests.fake_hand import FakeHand
 from tests.virtual import HoldWatch
 from tests.web.browser import BROWSER, COLORS, DRIVER, MISSING, SMALL, VISIBLE, Browser
+from tests.web.pace import Pace
 from tests.web.showing import shown
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 
 FAST, REAL = 20.0, 1.0
-
-
-class Pace:
-    """The clock of a gripper, which may run faster than ours."""
-
-    def __init__(self) -> None:
-        self._rate = FAST
-        self._at = self._now = monotonic()
-
-    def __call__(self) -> float:
-        at = monotonic()
-        self._now += self._rate * (at - self._at)
-        self._at = at
-        return self._now
-
-    def set(self, rate: float) -> None:
-        self()
-        self._rate = rate
 
 
 @dataclass
@@ -89,7 +71,7 @@ class Stage:
 
 @pytest_asyncio.fixture(loop_scope="module", scope="module")
 async def whole_stage() -> AsyncIterator[Stage]:
-    pace = Pace()
+    pace = Pace(FAST)
     gripper = SimulatedGripper(pace, spread=False)
     async with (
         SimulatorServer(gripper) as server,

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ...log import log, printable
+from ...log import log
 from ..arguments import Flag, need
 from ..failures import UsageError
 from ..log_capture import forget, forwarded_warnings
+from ..notices import tell
 
 if TYPE_CHECKING:
     from ...fleet.agent.agent import Agent
@@ -87,12 +88,12 @@ async def _serve(settings: AgentSettings) -> None:
         insecure=settings.insecure,
     )
     if settings.insecure:
-        _tell("anyone who reaches this host can command its grippers: there are no keys")
+        tell("anyone who reaches this host can command its grippers: there are no keys")
     hands = {name: gripper.make_hand() for name, gripper in settings.grippers.items()}
     try:
         bus = await _open(configuration, ", ".join(settings.listen or settings.connect))
         try:
-            with forwarded_warnings(_tell):
+            with forwarded_warnings(tell):
                 served = Agent(settings.site, settings.host, hands, bus, window=settings.window)
                 await served.run(lambda: _announce(served))
         finally:
@@ -104,7 +105,7 @@ async def _serve(settings: AgentSettings) -> None:
 async def _open(configuration: dict[str, object], where: str) -> ZenohBus:
     from ...fleet.network.zenoh_bus import open_bus
 
-    saying = asyncio.get_running_loop().call_later(WAITING_S, _tell, f"{where} is not there yet: waiting")
+    saying = asyncio.get_running_loop().call_later(WAITING_S, tell, f"{where} is not there yet: waiting")
     try:
         return await open_bus(configuration, where)
     finally:
@@ -117,8 +118,3 @@ def _announce(served: Agent) -> None:
             print(each.name, flush=True)
     except BrokenPipeError:  # whoever wanted to know has heard enough; the grippers are served all the same
         forget(sys.stdout)
-
-
-def _tell(words: str) -> None:
-    # Some of the words are others'.
-    print("robotiq-async:", printable(words), file=sys.stderr, flush=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import sys
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
@@ -15,6 +14,7 @@ from ...telemetry.gate import is_loopback
 from ...wire.registers import RTU_REGISTERS
 from ..arguments import Byte, Flag, Host, Port, Unit
 from ..failures import usage
+from ..notices import tell
 
 if TYPE_CHECKING:
     from ...simulator import Trouble
@@ -82,7 +82,7 @@ async def simulate(
             server = SerialSimulatorServer(serial, gripper, device_id=unit)
         server.fault_injector.check(plan)
     if serial is None and not is_loopback(host):
-        print(f"robotiq-async: anyone who reaches {host} can command this gripper", file=sys.stderr)
+        tell(f"anyone who reaches {host} can command this gripper")
     try:
         async with server:
             print(server.address, flush=True)
@@ -101,7 +101,7 @@ async def simulate(
 
 
 def _tell(trouble: Trouble) -> None:
-    print(f"robotiq-async: trouble: {trouble}", file=sys.stderr, flush=True)
+    tell(f"trouble: {trouble}")
 
 
 def _list_troubles() -> None:

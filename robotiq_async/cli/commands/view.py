@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import sys
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated
@@ -11,10 +10,10 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
-from ...log import printable
 from ...telemetry.gate import is_loopback
 from ..arguments import USUAL, Address, Byte, Flag, Host, Link, Port, need
 from ..failures import CommandError, UsageError
+from ..notices import tell
 
 
 async def view(
@@ -69,7 +68,7 @@ async def view(
     if not is_loopback(host):
         if control:
             raise UsageError("--control needs 127.0.0.1, as viewers know no password: use ssh -L")
-        _tell(f"anyone who reaches {host} can see this gripper: there is no password")
+        tell(f"anyone who reaches {host} can see this gripper: there is no password")
     try:
         operator = make_operator(address, link, speed=speed, force=force)
         viewer = Viewer(
@@ -80,17 +79,12 @@ async def view(
             origins=(*ORIGINS, *origin),
         )
         # In this order no viewer delays the stop of the fingers.
-        with forwarded_warnings(_tell):
-            async with viewer, operated(operator, _tell):
+        with forwarded_warnings(tell):
+            async with viewer, operated(operator, tell):
                 print(viewer.url, flush=True)
                 await asyncio.Event().wait()
     except asyncio.CancelledError:
         pass  # Being told to stop is how this command ends well.
-
-
-def _tell(words: str) -> None:
-    # Some of the server's words are its clients'.
-    print("robotiq-async:", printable(words), file=sys.stderr, flush=True)
 
 
 def _write(layout: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import sys
 from collections.abc import Sequence
 from contextlib import AsyncExitStack
 from pathlib import Path
@@ -14,11 +13,11 @@ from cyclopts import Parameter
 from ...actions import Operator
 from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...errors import RobotiqError
-from ...log import printable
 from ...telemetry.payloads import title
 from ..arguments import USUAL, Address, Byte, Flag, Host, Link, Port, need
 from ..browser import opened
 from ..failures import CommandError, UsageError, usage
+from ..notices import tell
 
 if TYPE_CHECKING:
     from ...web.news import HandNews
@@ -93,7 +92,7 @@ async def web(
         [operator.hand for operator in operators], settings, operators=operators if control else ()
     )
     try:
-        with forwarded_warnings(_tell):
+        with forwarded_warnings(tell):
             await _show(page, operators, settings, open_browser=open_browser)
     except asyncio.CancelledError:
         pass  # Being told to stop is how this command ends well.
@@ -110,10 +109,10 @@ async def _show(
         if all(news.problem for news in page.news):
             raise CommandError("; ".join(news.problem for news in page.news))
         if not settings.loopback and not settings.certificate:
-            _tell("without a certificate the password goes through the network for everybody to read")
+            tell("without a certificate the password goes through the network for everybody to read")
         print(page.url, flush=True)
         if open_browser and not await stack.enter_async_context(opened(page.url)):
-            _tell("no browser could be opened here: open the address above yourself")
+            tell("no browser could be opened here: open the address above yourself")
         await page.ended()
         raise CommandError("the process of the page has ended; what it says is above")
 
@@ -155,7 +154,7 @@ async def _cancelled(task: asyncio.Task[None]) -> None:
 async def _leave(operator: Operator, news: HandNews) -> None:
     words = await operator.leave()
     if not news.problem:  # of one that was never reached there is nothing to say
-        _tell(f"{operator.hand.address}: {words}")
+        tell(f"{operator.hand.address}: {words}")
 
 
 def _password(file: Path | None) -> str:
@@ -187,7 +186,3 @@ def _refuse_doubles(addresses: Sequence[str]) -> None:
     for address in addresses:
         if addresses.count(address) > 1:
             raise UsageError(f"{address} is there twice")
-
-
-def _tell(words: str) -> None:
-    print("robotiq-async:", printable(words), file=sys.stderr, flush=True)

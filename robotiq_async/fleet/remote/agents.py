@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Final
 
 from ...errors import AgentError
-from ...log import log
+from ...log import Log
 from ..network.bus import Bus, Undo
 from ..wire.names import GripperName
 
@@ -40,5 +40,5 @@ class Agents:
         before = len(self._tokens)
         (self._tokens.add if is_there else self._tokens.discard)(token)
         if before < 2 <= len(self._tokens):
-            log.error("%s: %s", self._name, TWO_AGENTS)
+            Log(str(self._name)).error("%s", TWO_AGENTS)
             self._two()

@@ -106,7 +106,7 @@ class RemoteSession:
         self._looking: asyncio.Task[Any] | None = None
         channels.reopen(self.loop)
         self.mirror.begin(now())
-        self._unreadable, self._misrouted = Complaints(), Complaints()
+        self._unreadable, self._misrouted = Complaints(self.log), Complaints(self.log)
         # One wildcard, and every payload says what it is about: samples may come under the wrong key.
         self._undo: Undo = bus.subscribe(name.key("*"), self._hear)
         self.agents = Agents(name, bus, self.keeper.stay_away)
@@ -242,14 +242,14 @@ class RemoteSession:
                 else:
                     self._hear_status(payload, in_turn=True)
         except RobotiqError as error:
-            self._unreadable.warn("%s: a message was dropped: %s", self.name, error)
+            self._unreadable.warn("a message was dropped: %s", error)
         if self.mirror.has_missed() and not self.is_over:
             self._missed.fetch()  # an event was dropped on the way
 
     def _is_about_another(self, mark: object) -> bool:
         if not self.mirror.is_about_another(mark):
             return False
-        self._misrouted.warn("%s: a message about another gripper was dropped", self.name)
+        self._misrouted.warn("a message about another gripper was dropped")
         return True
 
     def _hear_status(self, payload: bytes, *, in_turn: bool, asked: float | None = None) -> bool:
