@@ -9,7 +9,7 @@ gripper (editions 2012, 2014 and 2018 agree but for the glove and centring bits)
 from __future__ import annotations
 
 from collections.abc import MutableSequence, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from .checks import as_int
@@ -38,11 +38,19 @@ class Field:
     shift: int = 0
     width: int = 8
     doc: str = ""
+    # Where it is within the registers, worked out once: fields are read and written at every poll.
+    _word: int = field(init=False, repr=False, compare=False)
+    _offset: int = field(init=False, repr=False, compare=False)
+    _mask: int = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_word", self.byte // 2)
+        object.__setattr__(self, "_offset", self.shift + (0 if self.byte % 2 else 8))
+        object.__setattr__(self, "_mask", (1 << self.width) - 1)
 
     def read(self, registers: Sequence[int]) -> int:
         """The field's value in a block of eight registers."""
-        high_half = 0 if self.byte % 2 else 8
-        return registers[self.byte // 2] >> (self.shift + high_half) & ((1 << self.width) - 1)
+        return registers[self._word] >> self._offset & self._mask
 
     def write(self, registers: MutableSequence[int], value: int) -> None:
         """Put a value into a block in place.
@@ -50,14 +58,12 @@ class Field:
         Raises:
             ValueError: the value does not fit into the field.
         """
-        mask = (1 << self.width) - 1
+        mask, offset = self._mask, self._offset
         if not 0 <= value <= mask:
             raise ValueError(
                 f"value {value} does not fit into {self.width} bits of byte {self.byte}: 0..{mask}"
             )
-        shift = self.shift + (0 if self.byte % 2 else 8)
-        word = registers[self.byte // 2]
-        registers[self.byte // 2] = word & ~(mask << shift) | value << shift
+        registers[self._word] = registers[self._word] & ~(mask << offset) | value << offset
 
 
 # Request: client to gripper. Bits that are not named are reserved and stay 0.

@@ -212,9 +212,10 @@ class Axis:
 
     def _pressed(self, time: float) -> float:
         """How far the axis has been pressed into what stops it, from 0 to 1."""
-        way, position = self._way, self.position(time)
+        way = self._way
         if not way.outcome.is_contact:
             return 0.0
+        position = self.position(time)
         if position == way.end:
             return 1.0
         return 0.0 if way.end == way.surface else max(0.0, (position - way.surface) / (way.end - way.surface))

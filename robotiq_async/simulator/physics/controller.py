@@ -63,7 +63,8 @@ class Controller:
     @property
     def next_event(self) -> float:
         """When something happens next by itself; infinite when nothing will."""
-        return min(self.faults.changes_at, *(axis.ends_at for axis in self.axes))
+        a, b, c, scissor = self.axes
+        return min(self.faults.changes_at, a.ends_at, b.ends_at, c.ends_at, scissor.ends_at)
 
     def update(self, time: float) -> None:
         """Let happen what happens at this time, and drive the axes accordingly."""

@@ -35,7 +35,7 @@ class PresentFaults:
     @property
     def changes_at(self) -> float:
         """When the next fault ends or escalates."""
-        return min((self._escalates_at, *self._ends.values()))
+        return min(self._escalates_at, min(self._ends.values(), default=math.inf))
 
     def update(self, time: float) -> None:
         """End what ends at this time; interference that has lasted 20 s becomes the major fault."""

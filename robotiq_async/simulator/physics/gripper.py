@@ -129,7 +129,7 @@ class SimulatedGripper:
         image[offset : offset + len(registers)] = registers
         checked = reg.check_registers(image)
         self._catch_up()
-        if not self.is_powered:
+        if not self._is_on:
             return
         self._written = list(checked)
         self._writes.append(Write(self._clock(), checked))
@@ -147,7 +147,7 @@ class SimulatedGripper:
     def status_registers(self) -> reg.Registers:
         """The eight status registers; zeros without power."""
         self._catch_up()
-        if not self.is_powered:
+        if not self._is_on:
             return (0,) * reg.REGISTER_COUNT
         return status_registers(self._controller, self._time)
 
@@ -300,6 +300,10 @@ class SimulatedGripper:
     def is_powered(self) -> bool:
         """Whether the gripper is switched on."""
         self._catch_up()
+        return self._is_on
+
+    @property
+    def _is_on(self) -> bool:
         return self._time >= self._off_until
 
     @property
@@ -359,16 +363,16 @@ class SimulatedGripper:
     def _catch_up(self) -> None:
         """Let everything happen that is due, each thing at its own time."""
         now = max(self._time, (self._clock() - self._began) * self._speedup)
-        while (due := min(self._controller.next_event, self._next_effect)) <= now:
-            if self._controller.next_event <= due:
-                self._controller.update(due)
+        while True:
+            event = self._controller.next_event
+            effect = self._pending[0][0] if self._pending else math.inf
+            if event > now and effect > now:
+                break
+            if event <= effect:
+                self._controller.update(event)
             else:
                 self._controller.apply(*self._pending.popleft())
         self._time = now
-
-    @property
-    def _next_effect(self) -> float:
-        return self._pending[0][0] if self._pending else math.inf
 
 
 def _check_speedup(value: float) -> float:
