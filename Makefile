@@ -17,8 +17,10 @@ STAMP := $(VENV)/.complete
 SITE := $(VENV)-site
 RELEASE := $(VENV)-release
 
-# The caller's environment must not leak into ours: an active venv or a PYTHONPATH would shadow it.
+# The caller's environment must not leak into ours: an active venv or a PYTHONPATH would shadow it, and without
+# bytecode each of the hundreds of processes that the tests start compiles all of its modules anew.
 unexport VIRTUAL_ENV CONDA_PREFIX PYTHONHOME PYTHONPATH PYTHONSTARTUP PIP_USER PIP_TARGET PIP_PREFIX UV_PYTHON
+unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help demo show test test-web test-ros2 pages docs dist pythons canary soak fuzz explore bench lint check format constraints clean
