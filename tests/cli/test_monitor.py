@@ -29,6 +29,7 @@ from robotiq_async.control.state_machine import refusal
 from robotiq_async.control.triggers import Trigger
 from robotiq_async.enums import AXES
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from tests.grippers import active_gripper
 
 if TYPE_CHECKING:
     Screen = Pilot[None]
@@ -214,7 +215,7 @@ async def test_keys_open_close_and_spread(active: Operator) -> None:
 
 @pytest.mark.parametrize("key", ["space", "h"])
 async def test_halt_is_one_key(key: str) -> None:
-    async with SimulatorServer(SimulatedGripper(speedup=4)) as slow:
+    async with SimulatorServer(active_gripper()) as slow:
         hand = RobotiqHand(slow.address, poll_interval=SLOWLY)
         operator = Operator(hand)
         async with hand, shown(operator) as pilot:
@@ -272,7 +273,7 @@ async def test_a_yes_resets_and_activates(active: Operator) -> None:
 
 
 async def test_halt_works_while_a_question_is_open() -> None:
-    async with SimulatorServer(SimulatedGripper(speedup=4)) as slow:
+    async with SimulatorServer(active_gripper()) as slow:
         hand = RobotiqHand(slow.address, poll_interval=SLOWLY)
         async with hand, shown(Operator(hand)) as pilot:
             await pilot.press("c")
@@ -337,7 +338,7 @@ async def test_the_log_keeps_clear_of_its_scroll_bar(operator: Operator) -> None
 
 @pytest.mark.parametrize("key", ["q", "ctrl+c"])
 async def test_quitting_in_a_motion_holds_it(key: str) -> None:
-    async with SimulatorServer(SimulatedGripper(speedup=4)) as slow:
+    async with SimulatorServer(active_gripper()) as slow:
         hand = RobotiqHand(slow.address, poll_interval=SLOWLY)
         async with hand:
             async with shown(Operator(hand)) as pilot:

@@ -13,6 +13,7 @@ from robotiq_async import RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.conftest import WITHOUT
 from tests.cli.terminal import Terminal
+from tests.grippers import active_gripper
 
 
 async def told_to_go(gripper: SimulatedGripper) -> None:
@@ -28,8 +29,6 @@ async def closing(
 ) -> AsyncIterator[tuple[Terminal, SimulatedGripper]]:
     """A monitor that has told an active gripper to close."""
     async with SimulatorServer(gripper) as server:
-        async with RobotiqHand(server.address):
-            pass
         terminal = Terminal("-m", "robotiq_async", "monitor", *options, server.address)
         await terminal.shows(b"READY")
         terminal.press("c")
@@ -53,7 +52,7 @@ async def test_quitting_without_having_moved_leaves_the_fingers_alone(
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 async def test_a_signal_stops_what_was_moved(number: signal.Signals) -> None:
-    async with closing(SimulatedGripper(speedup=4)) as (terminal, gripper):
+    async with closing(active_gripper()) as (terminal, gripper):
         terminal.kill(number)
         await terminal.shows(b"The fingers were stopped")
         assert await terminal.end() == 0
@@ -62,7 +61,7 @@ async def test_a_signal_stops_what_was_moved(number: signal.Signals) -> None:
 
 
 async def test_a_terminal_that_is_closed_stops_what_was_moved() -> None:
-    async with closing(SimulatedGripper(speedup=4)) as (terminal, gripper):
+    async with closing(active_gripper()) as (terminal, gripper):
         terminal.hang_up()
         assert await terminal.end() == 0
         assert not gripper.request_registers[0] & 0x0800
@@ -74,7 +73,7 @@ async def test_two_signals_do_not_keep_each_other_from_stopping(
     first: signal.Signals, second: signal.Signals
 ) -> None:
     """Closing a terminal sends two: one from the system, one from the shell."""
-    async with closing(SimulatedGripper(speedup=4)) as (terminal, gripper):
+    async with closing(active_gripper()) as (terminal, gripper):
         terminal.kill(first)
         terminal.kill(second)
         await terminal.shows(b"The fingers were stopped")
@@ -83,7 +82,7 @@ async def test_two_signals_do_not_keep_each_other_from_stopping(
 
 
 async def test_a_terminal_that_stops_reading_holds_nothing_up() -> None:
-    async with closing(SimulatedGripper(), "--speed", "0") as (terminal, gripper):
+    async with closing(active_gripper(speedup=1), "--speed", "0") as (terminal, gripper):
         terminal.stop_reading()
         for _ in range(20):  # what fills the terminal, and textual's queue behind it, many times
             terminal.press("+-")

@@ -20,6 +20,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.telemetry.gate import is_loopback
 from robotiq_async.telemetry.services import SERVICES
 from tests.foxglove_client import Client
+from tests.grippers import active_gripper
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Call, Shell
@@ -53,10 +54,8 @@ async def test_it_prints_where_to_look_and_leaves_the_fingers_alone(
 
 
 async def test_what_a_viewer_moved_is_stopped_although_another_says_nothing(shell: Shell) -> None:
-    gripper = SimulatedGripper(speedup=4)
+    gripper = active_gripper()
     async with SimulatorServer(gripper) as server:
-        async with RobotiqHand(server.address):
-            pass
         process = await shell.start("view", "--control", "--port", "0", server.address)
         url = await shell.read_line(process)
         _, silent = await asyncio.open_connection("127.0.0.1", int(url.rpartition(":")[2]))

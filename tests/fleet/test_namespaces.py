@@ -12,7 +12,7 @@ pytest.importorskip("zenoh")
 @pytest.mark.skipif(bool(cuts.missing()), reason=cuts.missing() or "here it can")
 async def test_nothing_comes_to_the_wrong_gripper() -> None:
     try:
-        came = await cuts.marathon(5)
+        came = await cuts.marathon(3)
     except RuntimeError as error:
         pytest.skip(f"no network namespaces or no nftables here: {error}")
     assert came["wrong"] == 0

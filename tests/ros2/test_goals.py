@@ -19,6 +19,7 @@ from robotiq_async.ros2.translation.settings import PARAMETERS, check_settings
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.wire.request import Request
 from tests.fake_hand import FakeHand
+from tests.grippers import active_gripper
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 CLOSE = Targets(((240, Finger.ABC),))
@@ -29,7 +30,7 @@ USUAL = {name: parameter.default for name, parameter in PARAMETERS.items()}
 async def slow() -> AsyncIterator[RobotiqHand]:
     """A hand at a gripper that takes half a second to close."""
     async with (
-        SimulatorServer(SimulatedGripper(spread=False, speedup=4, device_cycle=0.02)) as server,
+        SimulatorServer(active_gripper(spread=False, device_cycle=0.02)) as server,
         RobotiqHand(server.address) as hand,
     ):
         yield hand

@@ -85,7 +85,7 @@ def test_what_a_hand_tells_of_times_belongs_together(
     factory: Callable[[], asyncio.AbstractEventLoop],
 ) -> None:
     async def main() -> None:
-        async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
+        async with SimulatorServer(SimulatedGripper(speedup=100)) as server:
             hand = RobotiqHand(server.address)
             statuses, transitions, requests = hand.statuses(10_000), hand.transitions(), hand.requests()
             before = now()
@@ -117,7 +117,7 @@ def test_a_transition_comes_after_the_status_that_it_was_seen_in(
     factory: Callable[[], asyncio.AbstractEventLoop],
 ) -> None:
     async def main() -> None:
-        async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
+        async with SimulatorServer(SimulatedGripper(speedup=100)) as server:
             hand = RobotiqHand(server.address)
             async with hand:
                 statuses, transitions = hand.statuses(1000), hand.transitions()
@@ -138,7 +138,7 @@ def test_another_client_and_a_loop_that_is_held_up_are_warned_of_at_any_time(
 ) -> None:
     async def main() -> None:
         async with (
-            SimulatorServer(SimulatedGripper(speedup=20)) as server,
+            SimulatorServer(SimulatedGripper(speedup=100)) as server,
             RobotiqHand(server.address) as hand,
         ):
             image = Request(activate=True, go=True, axes=(AxisRequest(50, 255, 100),) * 4)

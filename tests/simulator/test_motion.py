@@ -40,7 +40,7 @@ def test_full_closing_takes_as_long_as_measured(active: Bench, speed: int, secon
     began = active.now
     active.go(255, speed=speed)
     while active.status.is_moving:
-        active.wait(0.001)
+        active.wait(0.005)
     assert active.now - began == pytest.approx(seconds, rel=0.01)
     assert active.gripper.position(Finger.A) >= 240
 

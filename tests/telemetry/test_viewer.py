@@ -30,6 +30,7 @@ from robotiq_async.telemetry.robot_description import transforms
 from robotiq_async.telemetry.services import SERVICES
 from robotiq_async.telemetry.viewer import SHOWN, Viewer
 from tests.foxglove_client import Client, client
+from tests.grippers import active_gripper
 
 PROTOCOLS = [Subprotocol("foxglove.sdk.v1")]
 SOCKETS = Path("/proc/net/tcp")
@@ -258,7 +259,7 @@ def test_an_origin_is_told_of_once() -> None:
 
 
 async def test_a_viewer_that_leaves_holds_what_moves() -> None:
-    async with SimulatorServer(SimulatedGripper(speedup=4)) as slow, RobotiqHand(slow.address) as hand:
+    async with SimulatorServer(active_gripper()) as slow, RobotiqHand(slow.address) as hand:
         viewer = Viewer(hand, port=0, operator=Operator(hand))
         async with viewer:
             async with client(viewer) as one:
@@ -320,7 +321,7 @@ async def test_a_refusal_says_why(operator: Operator) -> None:
 
 async def test_a_halt_does_not_wait_for_a_move() -> None:
     async with (
-        SimulatorServer(SimulatedGripper(speedup=4)) as slow,
+        SimulatorServer(active_gripper()) as slow,
         RobotiqHand(slow.address) as hand,
         viewed(Operator(hand)) as client,
     ):
@@ -333,7 +334,7 @@ async def test_a_halt_does_not_wait_for_a_move() -> None:
 
 
 async def test_leaving_holds_what_a_viewer_has_set_in_motion() -> None:
-    async with SimulatorServer(SimulatedGripper(speedup=4)) as slow, RobotiqHand(slow.address) as hand:
+    async with SimulatorServer(active_gripper()) as slow, RobotiqHand(slow.address) as hand:
         operator = Operator(hand)
         async with viewed(operator) as one:
             await one.ask(1, "close", {})
@@ -362,7 +363,7 @@ async def test_a_client_that_says_nothing_does_not_keep_the_viewer(operator: Ope
 
 
 async def test_nothing_that_concerns_viewers_delays_the_stop() -> None:
-    gripper = SimulatedGripper(speedup=2)
+    gripper = active_gripper(speedup=2)
     async with SimulatorServer(gripper) as server:
         hand = RobotiqHand(server.address)
         viewer = Viewer(hand, port=0, operator=Operator(hand))
@@ -377,7 +378,7 @@ async def test_nothing_that_concerns_viewers_delays_the_stop() -> None:
 
 
 async def test_calls_that_come_while_it_is_left_move_nothing() -> None:
-    async with SimulatorServer(SimulatedGripper(speedup=4)) as slow, RobotiqHand(slow.address) as hand:
+    async with SimulatorServer(active_gripper()) as slow, RobotiqHand(slow.address) as hand:
         operator = Operator(hand)
         async with Viewer(hand, port=0, operator=operator) as viewer:
             connection = await connect(
@@ -482,7 +483,7 @@ async def test_a_request_of_megabytes_is_refused_unread(operator: Operator) -> N
 
 
 async def test_a_halt_finds_its_way_through_a_crowd() -> None:
-    async with SimulatorServer(SimulatedGripper(speedup=4)) as slow, RobotiqHand(slow.address) as hand:
+    async with SimulatorServer(active_gripper()) as slow, RobotiqHand(slow.address) as hand:
         slow.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
         await hand.wait_for_state(State.FAULT)
         async with viewed(Operator(hand)) as one:

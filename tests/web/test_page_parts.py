@@ -26,6 +26,7 @@ from robotiq_async.web.page.words import event_words, fault_words, state_words
 from robotiq_async.web.server import PageServer
 from robotiq_async.web.settings import PageSettings
 from tests.fake_hand import FakeHand
+from tests.grippers import active_gripper
 
 # -- commands ----------------------------------------------------------------------------------------------
 
@@ -92,7 +93,7 @@ async def test_what_was_asked_for_too_long_ago_moves_nothing_but_a_halt_is_never
 
 
 async def test_a_page_that_is_gone_has_its_motion_held_and_no_other() -> None:
-    gripper = SimulatedGripper(speedup=4, spread=False)
+    gripper = active_gripper(spread=False)
     async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
         desk = Desk(hand)
         desk.do("move", page="one", position=CLOSED, fingers="A")
@@ -116,7 +117,7 @@ async def test_a_halt_of_a_page_that_is_gone_is_completed(hand: RobotiqHand) -> 
 
 
 async def test_a_halt_finds_its_way_through_a_crowd() -> None:
-    async with SimulatorServer(SimulatedGripper(speedup=4)) as server, RobotiqHand(server.address) as hand:
+    async with SimulatorServer(active_gripper()) as server, RobotiqHand(server.address) as hand:
         server.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
         await hand.wait_for_state(State.FAULT)
         desk = Desk(hand)
@@ -214,7 +215,7 @@ async def test_operators_are_those_of_the_hands() -> None:
 
 
 async def test_a_process_that_dies_is_noticed_and_its_motions_are_held() -> None:
-    gripper = SimulatedGripper(speedup=4, spread=False)
+    gripper = active_gripper(spread=False)
     async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
         settings = PageSettings(port=0, control=True, addresses=(hand.address,))
         async with PageServer([hand], settings, operators=[Operator(hand)]) as page:
