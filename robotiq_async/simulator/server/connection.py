@@ -13,6 +13,7 @@ from pymodbus.server.requesthandler import ServerRequestHandler
 from .framing import BadFrameError, Frame, refusal
 
 if TYPE_CHECKING:
+    import asyncio
     from collections.abc import Collection, Iterable
 
     from pymodbus.server.base import ModbusBaseServer
@@ -65,6 +66,7 @@ class Connection(ServerRequestHandler):
         self._endpoint = endpoint
         self._inbox = bytearray()
         self._answering = False
+        self._answer_task: asyncio.Task[None] | None = None
         self._outbox: deque[tuple[float, bytes]] = deque()
         """What is sent later, and when, in order: no reply overtakes an older one."""
         self._is_clogged = False
@@ -91,6 +93,13 @@ class Connection(ServerRequestHandler):
         """The client has read."""
         self._is_clogged = False
         self._answer_next()
+
+    def handle_later(self) -> None:
+        """Answer the request that was taken, in a task.
+
+        pymodbus goes through the loop's descriptor for other threads, which costs two turns and system calls.
+        """
+        self._answer_task = self.loop.create_task(self.handle_request())  # type: ignore[no-untyped-call]
 
     def send(self, data: bytes, addr: tuple[Any, ...] | None = None) -> None:  # noqa: ARG002
         """Send a reply, or what the policy makes of it, and go on with the next request."""
