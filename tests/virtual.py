@@ -96,9 +96,9 @@ class _Selector(selectors.DefaultSelector):
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
         self.hold.end()
-        # While callbacks are ready nobody waits, and there is nothing to look at but the descriptor by
-        # which other threads wake the loop: what they want done is among the callbacks already.
-        events = super().select(0) if timeout != 0 or len(self.get_map()) > 1 else []
+        # Without a serial line there is nothing to look at but the descriptor by which other threads wake the
+        # loop: what they want done is among the callbacks already, and only who waits for nothing else looks.
+        events = super().select(0) if timeout is None or len(self.get_map()) > 1 else []
         self.turns += 1
         if self.at_turn is not None and self.turns >= self.at_turn[0]:
             call, self.at_turn = self.at_turn[1], None

@@ -114,8 +114,13 @@ class Host(_Loop):
                 handle.when() + self.slept, self._run, handle
             )  # by its clock it is not due yet
         elif not handle.cancelled():
-            with self._entered(self):
+            # What _entered does, without a context manager: a program's every step passes here.
+            before = asyncio._get_running_loop()
+            asyncio._set_running_loop(self)
+            try:
                 handle._run()
+            finally:
+                asyncio._set_running_loop(before)
 
     # -- what programs ask of a loop -------------------------------------------------------------------
 
