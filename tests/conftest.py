@@ -25,8 +25,8 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "suite"))
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """More than there are cores: a third of the time a worker waits for a process, a browser or a network."""
-    return (os.cpu_count() or 1) * 3 // 2
+    """More than there are cores: half of the time a worker waits for a process, a motion or a network."""
+    return (os.cpu_count() or 1) * 2
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
