@@ -53,11 +53,11 @@ from robotiq_async.fleet.control.lease import Holder
 from robotiq_async.fleet.keys.access_list import AccessList
 from robotiq_async.fleet.keys.credentials import Credentials
 from robotiq_async.fleet.network.endpoints import Endpoint
+from robotiq_async.frozen_mapping import FrozenMapping
 from robotiq_async.link.address import parse_address
 from robotiq_async.link.simulation import Simulation
 from robotiq_async.session.statistics import Counters
 from robotiq_async.simulator import Trouble
-from robotiq_async.values import FrozenMapping
 from robotiq_async.web.settings import PageSettings
 from robotiq_async.wire.registers import TCP_REGISTERS, gDT
 from robotiq_async.wire.request import AxisRequest, Request
@@ -216,7 +216,7 @@ NO_VALUES = {
     "Command": "work in progress",
     "Counters": "work in progress",
     "Pair": "holds a private key",
-    "Posted": "work in progress",
+    "PendingRequest": "work in progress",
     "Subject": "arguments of a command",
     "Action": "what a person may ask, with the function that does it",
     "Campaign": "work in progress",

@@ -22,7 +22,7 @@ from .commands.simulate import simulate
 from .commands.status import status
 from .commands.view import view
 from .commands.web import web
-from .flow import flowing
+from .reflow import reflow
 
 COMMANDS: Final = (
     *(demo, simulate, status, move, monitor, web, view, doctor),
@@ -54,11 +54,11 @@ def build() -> App:
 
 
 def _app(name: str, words: str) -> App:
-    return App(name=name, help=flowing(words), help_format="plaintext", version=__version__)
+    return App(name=name, help=reflow(words), help_format="plaintext", version=__version__)
 
 
 def _add(app: App, command: Callable[..., object]) -> None:
-    app.command(command, help=flowing(command.__doc__ or ""))
+    app.command(command, help=reflow(command.__doc__ or ""))
 
 
 def _fleet() -> App:

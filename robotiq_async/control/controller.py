@@ -24,7 +24,7 @@ from ..errors import (
 from ..wire.request import Request
 from ..wire.status import RobotiqStatus
 from .callers import Callers
-from .keeping import Keeping
+from .grip_keeper import GripKeeper
 from .merging import merged
 from .motion import Move
 from .pending import Command
@@ -70,7 +70,7 @@ class Controller:
         """Whether an activation of ours may still be under way: to be taken back if the hand is stopped."""
         self._hold_on_return = NO_AXES
         """Axes whose hold was not delivered before the link went down."""
-        self._keeping = Keeping(self._shadow, log=machine.log)
+        self._grip_keeper = GripKeeper(self._shadow, log=machine.log)
         """Whether rGTO may be left set when the hand is stopped."""
         self._keeps_grip = False
         """Whether that is asked for."""
@@ -164,7 +164,7 @@ class Controller:
 
     def stop(self) -> None:
         """The hand is being stopped: nothing more is taken, and whoever waits is told."""
-        self._keeping.begin(self.machine.state, halts=self._callers.pending.halting is not None)
+        self._grip_keeper.begin(self.machine.state, halts=self._callers.pending.halting is not None)
         self.machine.fire(Trigger.ASK_STOP)
         self._callers.fail(NotStartedError("the hand was stopped"))
         self.machine.drop_sequence()
@@ -186,7 +186,7 @@ class Controller:
         if self._activating:
             self._begin(reset(self._shadow.at_rest))
         elif self.status is not None:
-            self._begin(self._keeping.sequence() if keep_grip else shutdown(self._shadow.last_image))
+            self._begin(self._grip_keeper.sequence() if keep_grip else shutdown(self._shadow.last_image))
 
     # -- what is known ---------------------------------------------------------------------------------
 
@@ -242,7 +242,7 @@ class Controller:
         if not self.machine.is_busy or self.status is None:
             return self._callers.pending.halting is not None
         state, may_move = self.machine.state, self._activating or self._shadow.may_go(self.status)
-        if self._keeps_grip and self._keeping.rests(self.status):
+        if self._keeps_grip and self._grip_keeper.rests(self.status):
             may_move = False  # whether to leave it so is decided on what is read next
         stops = state is State.DO_RESET or (state is State.DO_SHUTDOWN and may_move)
         return stops and not self._step
@@ -269,7 +269,7 @@ class Controller:
             return None
         sent = self._callers.take()
         if image.go and not shadow.base.go:
-            self._keeping.tell_of_lost_grips(status, sent.moved)
+            self._grip_keeper.tell_of_lost_grips(status, sent.moved)
         number = shadow.writing(image, sent.moved, now)
         if sent.positions:
             self._callers.moves.written(number)
@@ -285,7 +285,7 @@ class Controller:
     def lost(self, why: RobotiqError | None = None) -> None:
         """The link is down: what was not acknowledged is dropped, never to be sent again."""
         self.machine.fire(Trigger.LINK_LOST)
-        self._keeping.doubt = "the link went down"
+        self._grip_keeper.doubt = "the link went down"
         error = ConnectionLostError(f"the link went down before this was done: {why}")
         error.__cause__ = why
         self._hold_on_return |= self._callers.lost(error)

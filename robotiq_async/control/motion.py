@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from ..enums import AXES, STROKE_COUNTS, Finger, ObjectStatus, names_of
 from ..errors import ConnectionLostError, RobotiqError
-from ..values import FrozenMapping
+from ..frozen_mapping import FrozenMapping
 from ..wire.status import RobotiqStatus
 from .waiters import Waiter, fail
 

@@ -15,7 +15,7 @@ from ..errors import ConnectFailedError, ProtocolError, ResponseTimeoutError, Ro
 from ..link.address import Address
 from ..link.host_names import addresses_of
 from ..link.modbus import ModbusTransport
-from ..link.simulated import SimulatedTransport, new_gripper
+from ..link.sim_transport import SimulatedTransport, new_gripper
 from ..link.transport import Transport
 from ..session.statistics import percentile
 from ..wire.registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap

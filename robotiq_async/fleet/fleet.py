@@ -14,8 +14,8 @@ from ..session.clock import now
 from ..session.event_loop import running_loop
 from ..session.listeners import Listeners
 from ..session.streams import Channel, Stream
-from .complaints import Complaints
 from .halting import STOPPED, halt
+from .limited_log import LimitedLog
 from .network.bus import Bus, Undo
 from .network.route import Route, default_route
 from .remote.remote_hand import RemoteHand
@@ -90,7 +90,7 @@ class Fleet:
         self._members: dict[GripperName, Member] = {}
         self._tokens: dict[GripperName, set[str]] = {}
         self._summaries = Summaries()
-        self._unreadable = Complaints()
+        self._unreadable = LimitedLog()
         self._changes: Channel[Member] = Channel(Listeners())
 
     async def __aenter__(self) -> Self:

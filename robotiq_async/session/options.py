@@ -9,10 +9,10 @@ from typing import Final
 
 from ..calibration import ForceCalibration, SpeedCalibration, Units
 from ..link.address import parse_address
+from ..link.canonical import canonical_address
 from ..link.guard import GuardedTransport
 from ..link.modbus import ModbusTransport
-from ..link.places import place_of
-from ..link.simulated import SimulatedTransport, new_gripper
+from ..link.sim_transport import SimulatedTransport, new_gripper
 from ..link.transport import Transport
 from ..log import Log, log
 from ..wire.checks import check_byte, check_flag, check_int, check_seconds
@@ -118,7 +118,7 @@ def check_options(
             make = partial(ModbusTransport, parsed, registers)
             place = str(parsed)
             unit = registers.device_id if device_id is not None and parsed.kind == "tcp" else None
-            gripper = lambda: Gripper(place_of(parsed), unit, HINTS[parsed.kind])  # noqa: E731
+            gripper = lambda: Gripper(canonical_address(parsed), unit, HINTS[parsed.kind])  # noqa: E731
     elif isinstance(address, Transport):
         place = f"<{type(address).__name__} at {id(address):#x}>"
         gripper = partial(Gripper, place)

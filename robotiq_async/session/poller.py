@@ -121,7 +121,7 @@ class Poller:
     async def run(self) -> None:
         """Own the link until asked to stop, or until the policy gives up."""
         try:
-            if await self._first_contact():
+            if await self._connect_first():
                 await self._poll()
         finally:
             # An abandoned task is ended when it is collected: the hand may have been started again by then.
@@ -131,9 +131,9 @@ class Poller:
 
     # -- connecting ------------------------------------------------------------------------------------
 
-    async def _first_contact(self) -> bool:
+    async def _connect_first(self) -> bool:
         try:
-            connected = await self._contact()
+            connected = await self._connect()
         except RobotiqConnectionError as error:
             failure = error
             if isinstance(error, (ResponseTimeoutError, ConnectionLostError)):
@@ -149,7 +149,7 @@ class Poller:
             self._controller.activates = policy is not None and policy.activate
         return connected
 
-    async def _contact(self) -> bool:
+    async def _connect(self) -> bool:
         """Open the link and see the first status; False when asked to stop meanwhile."""
         with anyio.CancelScope() as self._interruptible:
             if not self._stopping:
@@ -173,7 +173,7 @@ class Poller:
             with anyio.CancelScope() as self._interruptible:
                 await asyncio.sleep(backoff.delay)
             try:
-                connected = await self._contact()
+                connected = await self._connect()
             except RobotiqConnectionError as error:
                 self._log.debug("still no link: %s", error)
                 if backoff.gives_up(self._loop.time()):

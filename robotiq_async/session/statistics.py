@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from ..control.motion import MoveResult
 from ..errors import RobotiqError
-from ..values import FrozenMapping
+from ..frozen_mapping import FrozenMapping
 
 SAMPLES: Final = 2000
 """Periods and round trips that percentiles are taken from: 10 s at 200 Hz."""

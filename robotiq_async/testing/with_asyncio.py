@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @pytest_asyncio.fixture
 async def _robotiq_server_with_asyncio(robotiq_gripper: SimulatedGripper) -> AsyncIterator[SimulatorServer]:
-    from .lives import served  # noqa: PLC0415  # not for those who do not use it
+    from .contexts import served  # noqa: PLC0415  # not for those who do not use it
 
     async with served(robotiq_gripper) as server:
         yield server
@@ -22,7 +22,7 @@ async def _robotiq_server_with_asyncio(robotiq_gripper: SimulatedGripper) -> Asy
 
 @pytest_asyncio.fixture
 async def _robotiq_hand_with_asyncio(robotiq_server: SimulatorServer) -> AsyncIterator[RobotiqHand]:
-    from .lives import started  # noqa: PLC0415
+    from .contexts import started  # noqa: PLC0415
 
     async with started(robotiq_server) as hand:
         yield hand

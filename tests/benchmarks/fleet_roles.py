@@ -20,7 +20,7 @@ from typing import Any
 
 from robotiq_async import Finger, RobotiqHand, State
 from robotiq_async.fleet import Agent, Fleet, GripperName, RemoteHand, Route
-from robotiq_async.fleet.network.bus import Question, Urgency
+from robotiq_async.fleet.network.bus import Query, Urgency
 from robotiq_async.fleet.network.configuration import agent_configuration, client_configuration
 from robotiq_async.fleet.network.zenoh_bus import ZenohBus, open_bus
 from robotiq_async.fleet.wire.envelope import Answer, unpack_call
@@ -219,7 +219,7 @@ async def generator(endpoint: str, count: str) -> None:
     """Statuses of so many grippers, 200 times a second each."""
     bus = await open_bus(agent_configuration("bench", "generator", [endpoint]), endpoint)
     names = [name(n, "generator") for n in range(int(count))]
-    publishers = [bus.publisher(each.key("feed"), Urgency.NEWS) for each in names]
+    publishers = [bus.publisher(each.key("feed"), Urgency.TELEMETRY) for each in names]
     bus.serve(f"{names[0].base.rpartition('/')[0]}/*/info", lambda question: describe(question))
     sequence = 0
 
@@ -256,7 +256,7 @@ def message(of: GripperName, sequence: int) -> bytes:
     ).pack()
 
 
-def describe(question: Question) -> None:
+def describe(question: Query) -> None:
     call = unpack_call(question.payload)
     of = GripperName.of_key(question.key)
     value = {"window": 1.0, "events": [], "epoch": 1, **summary(of)}
@@ -284,7 +284,7 @@ async def summaries(endpoint: str, count: str) -> None:
     """Summaries of so many grippers, once a second each."""
     bus = await open_bus(agent_configuration("bench", "generator", [endpoint]), endpoint)
     names = [name(n, "generator") for n in range(int(count))]
-    publishers = [bus.publisher(each.key("summary"), Urgency.NEWS) for each in names]
+    publishers = [bus.publisher(each.key("summary"), Urgency.TELEMETRY) for each in names]
     tokens = [bus.announce(each.key("alive", "1")) for each in names]
 
     async def run() -> None:

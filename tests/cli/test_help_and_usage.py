@@ -17,7 +17,7 @@ from robotiq_async.cli.commands.fleet import fleet, halt
 from robotiq_async.cli.commands.fleet_keys import keys
 from robotiq_async.cli.commands.measure_force import force
 from robotiq_async.cli.commands.measure_speed import speed
-from robotiq_async.cli.flow import flowing
+from robotiq_async.cli.reflow import reflow
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Shell
@@ -93,7 +93,7 @@ def test_the_help_of_an_option_is_one_line_of_the_source(command: Callable[..., 
 
 
 def test_paragraphs_flow_and_examples_stay() -> None:
-    assert flowing("One\n    two.\n\n        a\n        b\n    Three\n    four.\n") == (
+    assert reflow("One\n    two.\n\n        a\n        b\n    Three\n    four.\n") == (
         "One two.\n\n    a\n    b\nThree four."
     )
 

@@ -16,7 +16,7 @@ from robotiq_async import Finger, MoveResult, ObjectStatus, RobotiqHand, State, 
 from robotiq_async.errors import ControlLostError
 from robotiq_async.fleet import GripperName
 from robotiq_async.fleet.agent.agent_file import AgentSettings, GripperSettings, read_agent_file
-from robotiq_async.fleet.agent.news import AT_ONCE, KEPT, News
+from robotiq_async.fleet.agent.publisher import AT_ONCE, KEPT, HandPublisher
 from robotiq_async.fleet.agent.served_hand import COMMANDS, ServedHand
 from robotiq_async.fleet.control.lease import Lease
 from robotiq_async.fleet.wire import status_message
@@ -130,7 +130,7 @@ async def test_an_event_is_told_as_the_page_has_it() -> None:
     network = Network()
     heard: list[bytes] = []
     network.bus("client").subscribe(NAME.key("*"), lambda _, payload: heard.append(payload))
-    news = News(NAME, RobotiqHand("sim://"), network.bus("agent"), EPOCH, Lease())
+    news = HandPublisher(NAME, RobotiqHand("sim://"), network.bus("agent"), EPOCH, Lease())
     news.add({"kind": "conflict", "key": NAME.key("alive", "77")})
     while not heard:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
@@ -144,7 +144,7 @@ async def test_an_event_is_told_as_the_page_has_it() -> None:
 
 async def test_a_summary_and_an_info() -> None:
     hand, bus = RobotiqHand("sim://"), Network().bus("agent")
-    summary = News(NAME, hand, bus, EPOCH, Lease()).summary()
+    summary = HandPublisher(NAME, hand, bus, EPOCH, Lease()).summary()
     served = ServedHand(NAME, hand, bus, epoch=EPOCH, window=1.0)
     info = served._info(call(1))
     for name in {*summary, *info}:

@@ -15,8 +15,8 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from robotiq_async.fleet.network.asking import Asking
-from robotiq_async.fleet.network.bus import Question, Reply, Undo, Urgency, is_any
+from robotiq_async.fleet.network.bus import Query, Reply, Undo, Urgency, is_any
+from robotiq_async.fleet.network.pending_query import PendingQuery
 
 LATENCY_S = 0.0002
 LINK_LEASE_S = 1.0
@@ -37,7 +37,7 @@ class Stream:
 
     Attributes:
         is_cut: nothing arrives; what is sent meanwhile arrives when it is mended, or never.
-        keeps: whether it arrives then. News are dropped in any case.
+        keeps: whether it arrives then. Telemetry is dropped in any case.
         delay: seconds, added to every message.
         loss: share of messages that have to be sent again.
         rate: bytes a second.
@@ -143,10 +143,10 @@ class Network:
             target.loop.call_soon(deliver)
 
         if stream.is_cut:
-            if stream.keeps and urgency is not Urgency.NEWS:
+            if stream.keeps and urgency is not Urgency.TELEMETRY:
                 stream.kept.append(arrive)
             return
-        if urgency is Urgency.NEWS and stream.free_at - loop.time() > 0.05 + stream.delay:
+        if urgency is Urgency.TELEMETRY and stream.free_at - loop.time() > 0.05 + stream.delay:
             return  # dropped rather than waited for
         again = 0.0
         while self.random.random() < stream.loss:
@@ -168,7 +168,7 @@ class _Query:
 
     def __init__(self, source: MemoryBus, targets: list[MemoryBus], decides: Callable[[Reply], bool]) -> None:
         self.source = source
-        self.asking = Asking(decides)
+        self.asking = PendingQuery(decides)
         self._left = [target.name for target in targets]
 
     def take(self, target: str, reply: Reply | None) -> None:
@@ -186,7 +186,7 @@ class _Query:
             self.source.loop.call_soon(self.take, name, None)
 
 
-class _Question:
+class _Received:
     def __init__(self, key: str, payload: bytes, reply: Callable[[Reply | None], None]) -> None:
         self.key, self.payload, self._reply = key, payload, reply
         self._is_answered = False
@@ -196,7 +196,7 @@ class _Question:
         self._reply(_Reply(payload, attachment))
 
     def __del__(self) -> None:
-        """Who drops a question says so to whoever asked."""
+        """Who drops a query says so to whoever asked."""
         if not self._is_answered:
             self._reply(None)
 
@@ -215,7 +215,7 @@ class MemoryBus:
         self.loop = loop
         self.network = network
         self.subscribers: list[tuple[str, Callable[[str, bytes], None]]] = []
-        self.queryables: list[tuple[str, Callable[[Question], None]]] = []
+        self.queryables: list[tuple[str, Callable[[Query], None]]] = []
         self.tokens: set[str] = set()
         self.watchers: list[tuple[str, Callable[[str, bool], None]]] = []
         self.is_closed = False
@@ -250,7 +250,7 @@ class MemoryBus:
         self.subscribers.append(entry)
         return lambda: self.subscribers.remove(entry) if entry in self.subscribers else None
 
-    def serve(self, expression: str, handler: Callable[[Question], None]) -> Undo:
+    def serve(self, expression: str, handler: Callable[[Query], None]) -> Undo:
         entry = (expression, handler)
         self.queryables.append(entry)
         return lambda: self.queryables.remove(entry) if entry in self.queryables else None
@@ -283,7 +283,7 @@ class MemoryBus:
             timer.cancel()
             self.network.pending.discard(query)
 
-    def _find(self, key: str) -> list[tuple[MemoryBus, Callable[[Question], None]]]:
+    def _find(self, key: str) -> list[tuple[MemoryBus, Callable[[Query], None]]]:
         return [
             (other, handler)
             for other in self._others()
@@ -294,7 +294,7 @@ class MemoryBus:
     def _carry_question(
         self,
         other: MemoryBus,
-        handler: Callable[[Question], None],
+        handler: Callable[[Query], None],
         key: str,
         payload: bytes,
         query: _Query,
@@ -311,7 +311,7 @@ class MemoryBus:
 
         def arrive() -> None:
             if not other.is_closed:
-                handler(_Question(network.wrong_key(key), payload, back))
+                handler(_Received(network.wrong_key(key), payload, back))
 
         network.carry(self.name, other, len(payload), arrive, urgency)
 

@@ -13,7 +13,7 @@ from typing import Any, Final
 from zenoh import SampleKind
 from zenoh.handlers import Callback
 
-from robotiq_async.fleet.network.bus import Question, Urgency
+from robotiq_async.fleet.network.bus import Query, Urgency
 from robotiq_async.fleet.network.configuration import (
     agent_configuration,
     client_configuration,
@@ -24,7 +24,7 @@ from robotiq_async.fleet.network.zenoh_bus import ZenohBus, open_bus
 from robotiq_async.fleet.wire.names import GripperName
 
 LEFT: Final = GripperName("lab", "cell-1", "left")
-NEWS: Final = b"news"
+TELEMETRY: Final = b"news"
 PATIENCE: Final = 10.0
 
 
@@ -45,8 +45,8 @@ class Client:
 
     async def may(self, *parts: str) -> bool:
         """Whether a request is answered."""
-        question = LEFT.key(*parts)
-        return await self.bus.ask(question, b"?", timeout=PATIENCE, urgency=Urgency.COMMAND) is not None
+        query = LEFT.key(*parts)
+        return await self.bus.ask(query, b"?", timeout=PATIENCE, urgency=Urgency.COMMAND) is not None
 
     def subscribe(self, expression: str) -> asyncio.Event:
         """Set when something comes."""
@@ -88,17 +88,19 @@ class Line:
         """The agent's side."""
         bus = await self._open(agent_configuration("lab", "cell-1", [self.endpoint], keys=keys))
 
-        def answer(question: Question) -> None:
-            question.reply(b"!")
+        def answer(query: Query) -> None:
+            query.reply(b"!")
 
         for verb in ("info", "lease", "halt", "cmd/*"):
             self.stack.callback(bus.serve(f"robotiq/v1/lab/cell-1/*/{verb}", answer))
         self.stack.callback(bus.announce(LEFT.key("alive", "77")))
-        publish = {name: bus.publisher(LEFT.key(name), Urgency.NEWS) for name in ("feed", "summary", "other")}
-        agent = Agent(bus, lambda name: publish[name](NEWS))
+        publish = {
+            name: bus.publisher(LEFT.key(name), Urgency.TELEMETRY) for name in ("feed", "summary", "other")
+        }
+        agent = Agent(bus, lambda name: publish[name](TELEMETRY))
         # What it publishes itself is heard too.
         self.stack.callback(
-            bus.subscribe("**", lambda _, payload: None if payload == NEWS else agent.heard.set())
+            bus.subscribe("**", lambda _, payload: None if payload == TELEMETRY else agent.heard.set())
         )
         return agent
 

@@ -19,7 +19,7 @@ from robotiq_async.doctor.findings import GiveUpError
 from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.keys.access_list import Role
 from robotiq_async.fleet.keys.certificates import issue, make_authority
-from robotiq_async.fleet.network.bus import Question, Urgency
+from robotiq_async.fleet.network.bus import Query, Urgency
 from robotiq_async.fleet.wire.envelope import Answer
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.hand import RobotiqHand
@@ -136,7 +136,7 @@ async def test_a_fault() -> None:
 @virtual
 async def test_messages_under_the_wrong_key() -> None:
     async with lab() as here:
-        publish = here.network.bus("stray").publisher(LEFT.key("feed"), Urgency.NEWS)
+        publish = here.network.bus("stray").publisher(LEFT.key("feed"), Urgency.TELEMETRY)
         other = GripperName("lab", "cell", "right")
 
         async def stray() -> None:
@@ -184,7 +184,7 @@ async def examined_beside(answer: Callable[[str], Any]) -> dict[str, Finding]:
     bus = network.bus("agent")
     bus.announce(LEFT.key("alive", "1"))
 
-    def hear(question: Question) -> None:
+    def hear(question: Query) -> None:
         verb = question.key.removeprefix(f"{LEFT.base}/")
         number = json.loads(question.payload)["number"]
         said = answer(verb)

@@ -108,7 +108,7 @@ async def test_the_age_of_a_gripper_that_is_out_of_reach_grows_although_its_agen
 async def test_a_flood_of_summaries_that_are_none_fills_no_log(caplog: pytest.LogCaptureFixture) -> None:
     network = Network()
     async with Fleet("lab", bus=network.bus("screen")):
-        publish = network.bus("stranger").publisher(LEFT.key("summary"), Urgency.NEWS)
+        publish = network.bus("stranger").publisher(LEFT.key("summary"), Urgency.TELEMETRY)
         for _ in range(1100):
             publish(b"rubbish\n\x1b[2J")
             await asyncio.sleep(0.01)

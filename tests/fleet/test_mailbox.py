@@ -15,7 +15,7 @@ from tests.virtual import virtual
 
 
 class Postman:
-    """Brings letters, and knows when each was opened."""
+    """Brings deliveries, and knows when each was made."""
 
     def __init__(self) -> None:
         self.loop = asyncio.get_running_loop()
@@ -24,7 +24,7 @@ class Postman:
         self.opened: list[int] = []
 
     def bring(self, number: int, *, urgent: bool = False) -> None:
-        self.put(number, Kind.REQUEST if urgent else Kind.NEWS)
+        self.put(number, Kind.REQUEST if urgent else Kind.TELEMETRY)
 
     def put(self, number: int, kind: Kind) -> None:
         self.mailbox.put(partial(self._open, number, self.loop.time()), kind)
@@ -77,7 +77,7 @@ async def test_what_is_urgent_is_not_kept_waiting_nor_does_it_overtake() -> None
 @virtual
 async def test_a_letter_that_fails_keeps_no_other(caplog: pytest.LogCaptureFixture) -> None:
     postman = Postman()
-    postman.mailbox.put(partial(json.loads, "?"), Kind.NEWS)
+    postman.mailbox.put(partial(json.loads, "?"), Kind.TELEMETRY)
     postman.bring(1)
     await asyncio.sleep(0.01)
     assert postman.opened == [1]
@@ -104,7 +104,7 @@ def test_a_loop_that_has_been_closed_is_told_nothing() -> None:
     async def make() -> Mailbox:
         return Mailbox()
 
-    asyncio.run(make()).put(lambda: None, Kind.NEWS)
+    asyncio.run(make()).put(lambda: None, Kind.TELEMETRY)
 
 
 @virtual

@@ -8,7 +8,7 @@ import pytest
 
 from robotiq_async import State
 from robotiq_async.errors import AgentError, ControlLostError
-from robotiq_async.fleet.complaints import EVERY_S
+from robotiq_async.fleet.limited_log import EVERY_S
 from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.wire.envelope import Call, unpack_answer
 from robotiq_async.fleet.wire.names import GripperName
@@ -69,7 +69,7 @@ async def test_a_flood_of_messages_that_are_none_fills_no_log(
     payload: bytes, words: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     async with lab() as here, here.client() as hand:
-        publish = here.network.bus("stranger").publisher(LEFT.key("feed"), Urgency.NEWS)
+        publish = here.network.bus("stranger").publisher(LEFT.key("feed"), Urgency.TELEMETRY)
         for _ in range(300):
             publish(payload)
             await asyncio.sleep(0.001)

@@ -13,8 +13,8 @@ from robotiq_async import ConnectionLostError, Finger, RobotiqHand, State
 from robotiq_async.errors import AgentError, ControlLostError, NotAllStoppedError
 from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.fleet import Fleet
-from robotiq_async.fleet.network.asking import Asking
 from robotiq_async.fleet.network.bus import is_any
+from robotiq_async.fleet.network.pending_query import PendingQuery
 from robotiq_async.fleet.remote.requests import is_refusal, of_its_run
 from robotiq_async.fleet.wire.envelope import Answer, Call, failure
 from robotiq_async.fleet.wire.names import GripperName
@@ -193,17 +193,17 @@ def test_which_reply_decides(reply: Answer | bytes, counts: bool, refuses: bool)
 
 async def test_without_one_that_decides_it_is_the_last() -> None:
     one, other = _Came(b"1"), _Came(b"2")
-    asking = Asking(lambda _: False)
+    asking = PendingQuery(lambda _: False)
     for reply in (one, other):
         asking.take(reply)
     assert not asking.answered.done()
     asking.end()
     assert await asking.answered is other
-    first = Asking(is_any)
+    first = PendingQuery(is_any)
     for reply in (one, other):
         first.take(reply)
     first.end()
     assert await first.answered is one
-    nobody = Asking(is_any)
+    nobody = PendingQuery(is_any)
     nobody.end()
     assert await nobody.answered is None

@@ -19,9 +19,9 @@ from robotiq_async.kinematics import JOINTS, joint_angles
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.web.commands import FRESH_S, MAX_COMMANDS, PageCommands
 from robotiq_async.web.news import HandNews
+from robotiq_async.web.page.heartbeat import LOST_S, Heartbeat
 from robotiq_async.web.page.held import held, pads
 from robotiq_async.web.page.mirror import HISTORY_S, Mirror
-from robotiq_async.web.page.touch import LOST_S, Touch
 from robotiq_async.web.page.words import event_words, fault_words, state_words
 from robotiq_async.web.server import PageServer
 from robotiq_async.web.settings import PageSettings
@@ -237,24 +237,24 @@ async def test_a_process_that_dies_is_noticed_and_its_motions_are_held() -> None
 
 
 def test_what_a_browser_sends_back_may_be_anything() -> None:
-    touch, now = Touch(), monotonic()
-    assert touch.heard(now) == now
+    heartbeat, now = Heartbeat(), monotonic()
+    assert heartbeat.heard(now) == now
     nothing: tuple[object, ...] = (None, "now", [now], True, {}, now + 60, -1, float("nan"), float("-inf"))
-    assert [touch.heard(each) for each in nothing] == [0.0] * len(nothing), "which is too long ago"
+    assert [heartbeat.heard(each) for each in nothing] == [0.0] * len(nothing), "which is too long ago"
 
 
 def test_a_browser_is_lost_once_and_found_again() -> None:
-    touch = Touch()
-    assert not touch.check()
-    touch._newest -= LOST_S + 1
-    assert touch.check()
-    assert not touch.check(), "told once"
-    touch.heard(monotonic() - LOST_S - 1)
-    assert touch.is_lost, "what it sent was long under way"
-    touch.heard(monotonic())
-    assert not touch.is_lost
-    touch._newest -= LOST_S + 1
-    assert touch.check(), "and lost once more, with whatever it has set in motion since"
+    heartbeat = Heartbeat()
+    assert not heartbeat.check()
+    heartbeat._newest -= LOST_S + 1
+    assert heartbeat.check()
+    assert not heartbeat.check(), "told once"
+    heartbeat.heard(monotonic() - LOST_S - 1)
+    assert heartbeat.is_lost, "what it sent was long under way"
+    heartbeat.heard(monotonic())
+    assert not heartbeat.is_lost
+    heartbeat._newest -= LOST_S + 1
+    assert heartbeat.check(), "and lost once more, with whatever it has set in motion since"
 
 
 # -- what is held ------------------------------------------------------------------------------------------

@@ -12,9 +12,9 @@ from ...errors import AgentError
 from ...hand import RobotiqHand
 from ...log import Log
 from ...session.clock import now
-from ..complaints import Complaints
 from ..control.lease import WINDOW_S
-from ..network.bus import Bus, Question, Undo
+from ..limited_log import LimitedLog
+from ..network.bus import Bus, Query, Undo
 from ..wire.envelope import Answer
 from ..wire.names import ROOT, GripperName
 from ..wire.values import error_fields
@@ -62,7 +62,7 @@ class Agent:
         self.epoch = secrets.randbits(EPOCH_BITS)
         self._bus = bus
         self._window = window
-        self._strange = Complaints()
+        self._strange = LimitedLog()
         self._prefix = f"{ROOT}/{site}/{host}"
         self.hands = {
             name: ServedHand(GripperName(site, host, name), hand, bus, epoch=self.epoch, window=window)
@@ -149,19 +149,19 @@ class Agent:
             _, name = other
             Log(str(name)).error("%s: one of them has to go", self._said_of(name))
             if name.gripper in self.hands:
-                self.hands[name.gripper].news.add({"kind": "conflict", "key": key})
+                self.hands[name.gripper].publisher.add({"kind": "conflict", "key": key})
 
-    def _hear(self, question: Question) -> None:
+    def _hear(self, query: Query) -> None:
         self._look_at_clocks()
         try:
-            name = GripperName.of_key(question.key)
+            name = GripperName.of_key(query.key)
         except ValueError as no_name:
             refused = AgentError(f"not a request for one gripper: {no_name}")
-            question.reply(Answer("", 0, self.epoch, error=error_fields(refused)).pack())
+            query.reply(Answer("", 0, self.epoch, error=error_fields(refused)).pack())
             return
         served = self.hands.get(name.gripper)
         if served is not None:  # else it is another's, that came under a wrong key, or nobody's
-            served.hear(question.key.removeprefix(f"{name.base}/"), question)
+            served.hear(query.key.removeprefix(f"{name.base}/"), query)
 
     async def _tell(self) -> None:
         """Signs of life, summaries, and an eye on the clock."""
@@ -169,11 +169,11 @@ class Agent:
         summary_due = now()
         while True:
             for each in self._all:
-                each.news.beat(interval)
+                each.publisher.beat(interval)
             if now() >= summary_due:
                 summary_due += SUMMARY_S
                 for each in self._all:
-                    each.news.send_summary()
+                    each.publisher.send_summary()
             self._look_at_clocks()
             await asyncio.sleep(interval)
 

@@ -9,7 +9,7 @@ from contextlib import suppress
 from inspect import signature
 from typing import Any, Final, TypeVar
 
-from ...control.keeping import KEEP_S
+from ...control.grip_keeper import KEEP_S
 from ...control.motion import MoveResult
 from ...control.state_machine import RUNNING
 from ...enums import Finger
@@ -21,12 +21,12 @@ from ...version import __version__
 from ...wire.checks import check_byte, check_mask
 from ..control.admission import Admission
 from ..control.lease import Lease
-from ..network.bus import Bus, Question
+from ..network.bus import Bus, Query
 from ..wire.envelope import Answer, Call, failure, unpack_call
 from ..wire.names import GripperName
 from ..wire.values import Fields, result_fields
 from .arguments import axes_of, label_of
-from .news import News
+from .publisher import HandPublisher
 
 RETRY_S: Final = 1.0
 """From one attempt to reach a gripper that is not there to the next."""
@@ -46,10 +46,10 @@ class _Request:
         reason: why it was called off; empty if it was not, or by its caller.
     """
 
-    def __init__(self, name: str, call: Call, question: Question) -> None:
+    def __init__(self, name: str, call: Call, query: Query) -> None:
         self.name = name
         self.call = call
-        self.questions = [question]
+        self.queries = [query]
         self.answer: bytes | None = None
         self.task: asyncio.Task[MoveResult | None] | None = None
         self.reason = ""
@@ -66,7 +66,7 @@ class ServedHand:
 
     Attributes:
         name: the gripper's.
-        news: what is told of it.
+        publisher: tells what happens to it.
     """
 
     def __init__(self, name: GripperName, hand: RobotiqHand, bus: Bus, *, epoch: int, window: float) -> None:
@@ -77,7 +77,7 @@ class ServedHand:
         self._epoch = epoch
         self._lease = Lease(window)
         self._admission = Admission(name.base, epoch, self._lease)
-        self.news = News(name, hand, bus, epoch, self._lease)
+        self.publisher = HandPublisher(name, hand, bus, epoch, self._lease)
         self._requests: dict[int, _Request] = {}
         self._commanded = Finger(0)
         """The axes that the holder has commanded."""
@@ -89,7 +89,7 @@ class ServedHand:
 
     async def run(self) -> None:
         """Keep the hand running, with or without its gripper, until cancelled; then stop the fingers."""
-        remove = self._hand.add_listener(self.news.hear)
+        remove = self._hand.add_listener(self.publisher.hear)
         try:
             while True:
                 await self._run_once()
@@ -107,15 +107,15 @@ class ServedHand:
     async def _run_once(self) -> None:
         try:
             await self._hand.start(activate=False)
-            self.news.problem = ""
+            self.publisher.problem = ""
             await self._hold_what_moves()
             async for transition in self._hand.transitions():
                 if transition.target in RUNNING and self._owed:
                     await self._hold(self._owed)
         except RobotiqError as error:
-            if str(error) != self.news.problem:
+            if str(error) != self.publisher.problem:
                 self._log.warning("%s", error)
-            self.news.problem = str(error)
+            self.publisher.problem = str(error)
             await self._hand.stop(halt=False)
             await asyncio.sleep(RETRY_S)
 
@@ -128,26 +128,26 @@ class ServedHand:
 
     # -- requests --------------------------------------------------------------------------------------
 
-    def hear(self, verb: str, question: Question) -> None:
+    def hear(self, verb: str, query: Query) -> None:
         """A request has arrived."""
         try:
-            call = unpack_call(question.payload)
+            call = unpack_call(query.payload)
         except RobotiqError as error:
             call = Call(self.name.base, "")
-            question.reply(failure(call, self._epoch, error).pack())
+            query.reply(failure(call, self._epoch, error).pack())
             return
         try:
             self._admission.check_meant(call, in_any_run=verb in ("info", "halt"))
             self._expire()
-            value = self._answer(verb, call, question)
+            value = self._answer(verb, call, query)
         except (RobotiqError, TypeError, ValueError, OverflowError) as error:  # JSON may hold infinity
             self._log.info("%s refused: %s", verb, error)
-            self._reply(question, failure(call, self._epoch, error))
+            self._reply(query, failure(call, self._epoch, error))
         else:
             if value is not None:
-                self._reply(question, Answer(call.to, call.number, self._epoch, value))
+                self._reply(query, Answer(call.to, call.number, self._epoch, value))
 
-    def _answer(self, verb: str, call: Call, question: Question) -> Fields | None:
+    def _answer(self, verb: str, call: Call, query: Query) -> Fields | None:
         """The answer, or None if it comes later."""
         if self._is_ending and verb not in ("info", "halt"):
             raise ControlLostError("the agent is ending; nothing was done", "closed")
@@ -155,31 +155,31 @@ class ServedHand:
             case ["info"]:
                 return self._info(call)
             case ["lease"]:
-                return self._change_lease(call, question)
+                return self._change_lease(call, query)
             case ["halt"]:
-                self._halt(call, question)
+                self._halt(call, query)
             case ["cmd", name]:
-                self._command(name, call, question)
+                self._command(name, call, query)
             case _:
                 raise AgentError(f"no request of the name {verb!r}")
         return None
 
-    def _reply(self, question: Question, answer: Answer) -> None:
+    def _reply(self, query: Query, answer: Answer) -> None:
         # The newest status goes with it, for answers overtake statuses.
-        question.reply(answer.pack(), self.news.status_message())
+        query.reply(answer.pack(), self.publisher.status_message())
 
     def _info(self, call: Call) -> Fields:
         since = call.arguments.get("since", -1)
         return {
-            **self.news.summary(),
+            **self.publisher.summary(),
             "version": __version__,
             "window": self._lease.window,
-            "events": self.news.events_since(since) if type(since) is int and since >= 0 else [],
+            "events": self.publisher.events_since(since) if type(since) is int and since >= 0 else [],
         }
 
     # -- the lease -------------------------------------------------------------------------------------
 
-    def _change_lease(self, call: Call, question: Question) -> Fields | None:
+    def _change_lease(self, call: Call, query: Query) -> Fields | None:
         what = call.arguments.get("what")
         if what == "renew":
             self._admission.renew(call, now())
@@ -188,7 +188,7 @@ class ServedHand:
             self._grant(call, take=what == "take")
         elif what == "release":
             self._admission.renew(call, now())
-            self._release(call, question)
+            self._release(call, query)
             return None
         else:
             raise AgentError(f"no request of a lease of the name {what!r}")
@@ -206,10 +206,10 @@ class ServedHand:
             self.end_lease("expired" if holder.client == call.client else "taken", label)
         number = self._admission.acquire(call, label)
         self._log.info("%s commands the gripper", label)
-        self.news.add({"kind": "lease", "number": number, "holder": label, "reason": "granted"})
+        self.publisher.add({"kind": "lease", "number": number, "holder": label, "reason": "granted"})
         self._watch_expiry()
 
-    def _release(self, call: Call, question: Question) -> None:
+    def _release(self, call: Call, query: Query) -> None:
         leaves = call.arguments.get("halt") is False
         keeps = call.arguments.get("keep_grip") is True and self._hand.state in RUNNING
         if leaves:
@@ -223,7 +223,7 @@ class ServedHand:
             elif not leaves:
                 await self._hand.halt()
 
-        self._start(_Request("release", call, question), release())
+        self._start(_Request("release", call, query), release())
 
     async def _come_to_rest(self) -> None:
         """Hold what moves; halt if that does not come to rest in time, and nobody commands by then."""
@@ -254,7 +254,7 @@ class ServedHand:
         axes, self._commanded = self._commanded, Finger(0)
         if axes:
             self._spawn(self._hold(axes))
-        self.news.add({"kind": "lease", "number": self._lease.number, "holder": None, "reason": reason})
+        self.publisher.add({"kind": "lease", "number": self._lease.number, "holder": None, "reason": reason})
 
     async def _hold(self, axes: Finger) -> None:
         self._owed &= ~axes
@@ -288,7 +288,7 @@ class ServedHand:
 
     # -- commands --------------------------------------------------------------------------------------
 
-    def _halt(self, call: Call, question: Question) -> None:
+    def _halt(self, call: Call, query: Query) -> None:
         """From anyone, always, and as often as it is asked."""
         self._lease.intervene(call.client, "halted")
         if self._admission.is_of_holder(call):
@@ -296,22 +296,22 @@ class ServedHand:
         else:
             # Or a control loop would undo it in ten milliseconds.
             self.end_lease("halted", label_of(call))
-        self._start(_Request("halt", call, question), self._hand.halt())
+        self._start(_Request("halt", call, query), self._hand.halt())
 
-    def _command(self, name: str, call: Call, question: Question) -> None:
+    def _command(self, name: str, call: Call, query: Query) -> None:
         known = self._requests.get(call.number)
         if known is not None and self._admission.is_of_holder(call):
-            self._repeat(known, question)
+            self._repeat(known, query)
             return
         if name == "cancel":
-            self._cancel(call, question)
+            self._cancel(call, query)
             return
         self._check_known(name)
         self._admission.admit(call, now())
         axes = axes_of(name, call.arguments)
         work = self._work(name, call.arguments)  # arguments that do not fit end here, before anything is kept
         self._commanded |= axes
-        request = self._requests[call.number] = _Request(name, call, question)
+        request = self._requests[call.number] = _Request(name, call, query)
         if len(self._requests) > _REMEMBERED:
             self._forget()
         self._start(request, work)
@@ -337,14 +337,14 @@ class ServedHand:
         for mask, changes in asked.items():
             self._hand.command(mask, **changes)
 
-    def _repeat(self, request: _Request, question: Question) -> None:
+    def _repeat(self, request: _Request, query: Query) -> None:
         self._log.info("request %d came again", request.call.number)
         if request.answer is None:
-            request.questions.append(question)
+            request.queries.append(query)
         else:
-            question.reply(request.answer, self.news.status_message())
+            query.reply(request.answer, self.publisher.status_message())
 
-    def _cancel(self, call: Call, question: Question) -> None:
+    def _cancel(self, call: Call, query: Query) -> None:
         """Call off a command of the holder; the axes it moves are held."""
         self._admission.renew(call, now())
         request = self._requests.get(call.arguments.get("number", -1))
@@ -353,7 +353,7 @@ class ServedHand:
         else:
             # It may have been overtaken: it is not to be let in when it comes.
             self._admission.bar(Call(call.to, call.client, number=int(call.arguments.get("number", 0))))
-        self._reply(question, Answer(call.to, call.number, self._epoch, {}))
+        self._reply(query, Answer(call.to, call.number, self._epoch, {}))
 
     def _start(self, request: _Request, work: Coroutine[Any, Any, MoveResult | None]) -> None:
         request.task = self._spawn(work)
@@ -375,9 +375,9 @@ class ServedHand:
             if request.name in ("move", "set_position", "command"):
                 self._owed &= ~axes_of(request.name, call.arguments)
         request.answer = answer.pack()
-        for question in request.questions:
-            question.reply(request.answer, self.news.status_message())
-        request.questions.clear()
+        for query in request.queries:
+            query.reply(request.answer, self.publisher.status_message())
+        request.queries.clear()
 
     def _forget(self) -> None:
         """The oldest requests that have been answered."""

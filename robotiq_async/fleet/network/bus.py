@@ -18,11 +18,11 @@ class Urgency(Enum):
     """Halts: before everything else."""
     COMMAND = "command"
     """Commands, leases, their answers."""
-    NEWS = "news"
+    TELEMETRY = "telemetry"
     """Statuses, events, summaries: dropped rather than waited for."""
 
 
-class Question(Protocol):
+class Query(Protocol):
     """A request that has arrived; it is answered once."""
 
     @property
@@ -63,7 +63,7 @@ class Bus(Protocol):
     def subscribe(self, expression: str, listener: Callable[[str, bytes], None]) -> Undo:
         """Call a listener with key and payload of whatever is published under matching keys."""
 
-    def serve(self, expression: str, handler: Callable[[Question], None]) -> Undo:
+    def serve(self, expression: str, handler: Callable[[Query], None]) -> Undo:
         """Call a handler with each request under matching keys."""
 
     def ask(

@@ -11,25 +11,25 @@ from enum import Enum
 from typing import Final
 
 from ...log import log
-from ..complaints import EVERY_S, Complaints
+from ..limited_log import EVERY_S, LimitedLog
 
 GATHER_S: Final = 0.001
 """For so long news are gathered where they come thick and fast."""
 TURN_S: Final = 0.002
-"""So long letters are opened in one turn of the loop: the rest of it has its turn."""
+"""So long deliveries are made in one turn of the loop: the rest of it has its turn."""
 MOST: Final = 2000
 """So many requests and news may lie there; the rest is dropped, as on a network that is full."""
 
 
 class Kind(Enum):
-    """What a letter is."""
+    """What a delivery is."""
 
     HALT = "halt"
     """Opened before all others."""
     ANSWER = "answer"
     """To something of ours: never dropped."""
     REQUEST = "request"
-    NEWS = "news"
+    TELEMETRY = "telemetry"
     """May wait for a millisecond."""
 
 
@@ -44,23 +44,23 @@ class Mailbox:
         """Belong to the running loop."""
         self._loop = asyncio.get_running_loop()
         self._halts: deque[Callable[[], None]] = deque()
-        self._letters: deque[Callable[[], None]] = deque()
+        self._deliveries: deque[Callable[[], None]] = deque()
         self._is_due = False
         self._gathering: asyncio.TimerHandle | None = None
         self._opened_at = 0.0
         self._dropped = 0
         self._report_due = 0.0
-        self._failed = Complaints()
+        self._failed = LimitedLog()
 
-    def put(self, letter: Callable[[], None], kind: Kind) -> None:
+    def put(self, delivery: Callable[[], None], kind: Kind) -> None:
         """Have something called in the loop. From any thread."""
-        letters = self._halts if kind is Kind.HALT else self._letters
-        if kind is Kind.ANSWER or len(letters) < MOST:
-            letters.append(letter)
+        deliveries = self._halts if kind is Kind.HALT else self._deliveries
+        if kind is Kind.ANSWER or len(deliveries) < MOST:
+            deliveries.append(delivery)
         else:
             self._dropped += 1
             return
-        if not self._is_due or (kind is not Kind.NEWS and self._gathering is not None):
+        if not self._is_due or (kind is not Kind.TELEMETRY and self._gathering is not None):
             self._is_due = True
             with contextlib.suppress(RuntimeError):  # the loop has been closed
                 self._loop.call_soon_threadsafe(self._open)
@@ -72,16 +72,16 @@ class Mailbox:
         before, self._opened_at = self._opened_at, self._loop.time()
         self._report_dropped()
         count, until = 0, time.perf_counter() + TURN_S
-        while self._halts or self._letters:
-            letter = (self._halts or self._letters).popleft()
+        while self._halts or self._deliveries:
+            delivery = (self._halts or self._deliveries).popleft()
             count += 1
             try:
-                letter()
-            except Exception:  # noqa: BLE001  # the next letter is another's
+                delivery()
+            except Exception:  # noqa: BLE001  # the next delivery is another's
                 self._failed.warn("a message of the fleet could not be handled", exc_info=True)
             if time.perf_counter() > until:
                 break
-        if (self._halts or self._letters) and not self._is_due:
+        if (self._halts or self._deliveries) and not self._is_due:
             self._is_due = True
             self._loop.call_soon(self._open)
         elif count and not self._is_due and self._opened_at - before < 2 * GATHER_S:

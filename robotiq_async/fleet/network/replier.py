@@ -1,6 +1,6 @@
 """Replier: sends answers from a thread of its own.
 
-An answer goes out with the urgency and the patience that its question came with, which a stranger chooses:
+An answer goes out with the urgency and the patience that its query came with, which a stranger chooses:
 where nobody reads, sending one may take until the link is given up. The event loop must not wait for that.
 """
 
@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Final
 
 MOST: Final = 1000
-"""So many answers may wait; of what comes then the question is dropped, in the thread as well: that, too, is
+"""So many answers may wait; of what comes then the query is dropped, in the thread as well: that, too, is
 said to whoever asked, and may take as long. Who asked asks again, or gives up."""
 
 
@@ -25,7 +25,7 @@ class Replier:
         self._thread: threading.Thread | None = None
 
     def put(self, send: Callable[[], None], drop: Callable[[], None]) -> None:
-        """Have an answer sent after those before it, or its question dropped where too many wait."""
+        """Have an answer sent after those before it, or its query dropped where too many wait."""
         if self._thread is None:
             self._thread = threading.Thread(target=self._run, name="robotiq_async fleet", daemon=True)
             self._thread.start()

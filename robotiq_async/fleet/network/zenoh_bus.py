@@ -18,10 +18,10 @@ from zenoh.handlers import Callback
 
 from ...concurrency import in_a_thread
 from ...errors import ConnectFailedError
-from .asking import Asking
-from .bus import Question, Reply, Undo, Urgency, is_any
+from .bus import Query, Reply, Undo, Urgency, is_any
 from .locators import locators
 from .mailbox import Kind, Mailbox
+from .pending_query import PendingQuery
 from .replier import Replier
 
 CLOSE_S: Final = 1.0
@@ -32,7 +32,7 @@ LONGEST: Final = 4096
 _PRIORITY: Final = {
     Urgency.STOP: zenoh.Priority.REAL_TIME,
     Urgency.COMMAND: zenoh.Priority.INTERACTIVE_HIGH,
-    Urgency.NEWS: zenoh.Priority.DATA,
+    Urgency.TELEMETRY: zenoh.Priority.DATA,
 }
 _EXPRESS: Final = (Urgency.STOP, Urgency.COMMAND)
 """Not batched with others."""
@@ -74,7 +74,7 @@ def _close_opened(opening: asyncio.Future[zenoh.Session]) -> None:
         opening.result().close()  # type: ignore[no-untyped-call]
 
 
-class _Question:
+class _Query:
     """A query that has arrived."""
 
     def __init__(self, query: zenoh.Query, replier: Replier) -> None:
@@ -141,19 +141,19 @@ class ZenohBus:
         """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
 
         def deliver(sample: zenoh.Sample) -> None:
-            letter = functools.partial(_deliver, listener, sample)
-            self._mailbox.put(letter, Kind.NEWS)
+            delivery = functools.partial(_deliver, listener, sample)
+            self._mailbox.put(delivery, Kind.TELEMETRY)
 
         return self._undo(self._session.declare_subscriber(expression, _direct(deliver)))
 
-    def serve(self, expression: str, handler: Callable[[Question], None]) -> Undo:
+    def serve(self, expression: str, handler: Callable[[Query], None]) -> Undo:
         """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
         is_halt = expression.endswith("/halt")
         replier, kind = self._repliers[is_halt], Kind.HALT if is_halt else Kind.REQUEST
 
         def deliver(query: zenoh.Query) -> None:
             if query.payload is None or len(query.payload) <= LONGEST:
-                self._mailbox.put(lambda: handler(_Question(query, replier)), kind)
+                self._mailbox.put(lambda: handler(_Query(query, replier)), kind)
 
         return self._undo(self._session.declare_queryable(expression, _direct(deliver)))
 
@@ -167,7 +167,7 @@ class ZenohBus:
         decides: Callable[[Reply], bool] = is_any,
     ) -> asyncio.Future[Reply | None]:
         """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
-        asking = Asking(decides)
+        asking = PendingQuery(decides)
 
         def arrive(reply: zenoh.Reply) -> None:
             if reply.ok is not None:

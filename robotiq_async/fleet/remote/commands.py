@@ -18,7 +18,7 @@ from ..network.bus import Urgency
 from ..wire.values import Fields, read_result, reading
 from .observation import RemoteObservation
 from .persistence import HALT_S, until_answered
-from .requests import label, plainly
+from .requests import label, no_answer_as_lost_connection
 from .session import RemoteSession
 
 COMMAND_S: Final = 5.0
@@ -215,7 +215,7 @@ class RemoteCommands(RemoteObservation):
         self._outbox.clear()
         halting = session.spawn(self._halt(session))
         try:
-            with plainly():
+            with no_answer_as_lost_connection():
                 await asyncio.shield(halting)
         except asyncio.CancelledError:
             if not halting.cancelled():
@@ -280,13 +280,16 @@ class RemoteCommands(RemoteObservation):
         session, outbox = self._asked(), self._outbox
         assert outbox is not None
         if self._control is None and not session.keeper.is_in_control and session.keeper.lost is None:
-            with plainly():
+            with no_answer_as_lost_connection():
                 await session.keeper.acquire()
         session.check_control()
         outbox.flush()
         call = session.call(arguments)
         try:
-            with plainly(), outbox.motion() if name in ("move", "set_position") else nullcontext():
+            with (
+                no_answer_as_lost_connection(),
+                outbox.motion() if name in ("move", "set_position") else nullcontext(),
+            ):
                 value: Fields = await session.send(
                     call, f"cmd/{name}", timeout=timeout, urgency=Urgency.COMMAND
                 )

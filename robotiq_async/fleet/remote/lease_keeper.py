@@ -26,7 +26,7 @@ BY_OTHERS: Final = ("taken", "halted", "held")
 """Reasons for which nobody comes back without having been asked to."""
 
 
-class Asking(Protocol):
+class AgentClient(Protocol):
     """What the keeper needs of a run: to know whom it is about, and to ask."""
 
     name: GripperName
@@ -56,7 +56,7 @@ class LeaseKeeper:
         lost: why control was lost; None while it is held, or was never asked for.
     """
 
-    def __init__(self, run: Asking, *, wants_control: bool) -> None:
+    def __init__(self, run: AgentClient, *, wants_control: bool) -> None:
         """Hold nothing yet."""
         self.is_in_control = False
         self.lease = 0

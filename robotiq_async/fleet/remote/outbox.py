@@ -12,7 +12,7 @@ from ...enums import AXES, Finger
 from ...errors import ControlLostError, NotStartedError, RobotiqError
 from ..network.bus import Urgency
 from ..wire.envelope import Call
-from .requests import Posted
+from .requests import PendingRequest
 from .session import RemoteSession
 
 UNDER_WAY: Final = 4
@@ -101,7 +101,7 @@ class Outbox:
         except RobotiqError as error:
             self._session.log.warning("a command was not sent: %s", error)
 
-    async def _await(self, posted: Posted) -> None:
+    async def _await(self, posted: PendingRequest) -> None:
         try:
             await self._session.answer(posted)
         except NotStartedError:

@@ -17,7 +17,7 @@ from ..network.bus import Bus
 from ..network.route import parse_remote_address
 from .commands import RemoteCommands
 from .outbox import Outbox
-from .requests import plainly
+from .requests import no_answer_as_lost_connection
 from .session import CONNECT_S, RemoteSession
 
 
@@ -129,7 +129,7 @@ class RemoteHand(RemoteCommands):
         )
         self._outbox = Outbox(session)
         try:
-            with plainly():
+            with no_answer_as_lost_connection():
                 await session.connect(self._connect_timeout)
             if activate and self._control:
                 await self._activate_if_reset()
@@ -206,7 +206,7 @@ class RemoteHand(RemoteCommands):
             ControlLostError: another client commands the gripper.
             RobotiqError: not started, or the agent does not answer.
         """
-        with plainly():
+        with no_answer_as_lost_connection():
             await self._asked().keeper.acquire()
 
     async def take(self) -> None:
@@ -215,7 +215,7 @@ class RemoteHand(RemoteCommands):
         Raises:
             RobotiqError: not started, or the agent does not answer.
         """
-        with plainly():
+        with no_answer_as_lost_connection():
             await self._asked().keeper.acquire(take=True)
 
     async def release(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:
@@ -230,7 +230,7 @@ class RemoteHand(RemoteCommands):
         """
         check_flag("halt", halt)
         keep_grip = self._keep_grip if keep_grip is None else check_flag("keep_grip", keep_grip)
-        with plainly():
+        with no_answer_as_lost_connection():
             await self._asked().keeper.release(halt=halt, keep_grip=keep_grip)
 
     def __repr__(self) -> str:

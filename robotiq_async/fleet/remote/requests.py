@@ -33,7 +33,7 @@ class NoAnswerError(ConnectionLostError):
 
 
 @contextmanager
-def plainly() -> Iterator[None]:
+def no_answer_as_lost_connection() -> Iterator[None]:
     """Around what users call: that no answer came is a lost connection to them.
 
     Raises:
@@ -46,7 +46,7 @@ def plainly() -> Iterator[None]:
 
 
 @dataclass(frozen=True, slots=True)
-class Posted:
+class PendingRequest:
     """A request on its way.
 
     Attributes:
@@ -134,7 +134,9 @@ class Requests:
         self._number += 1
         return Call(self._name.base, self._client, mirror.epoch, lease, self._number, mirror.stamp, arguments)
 
-    def post(self, call: Call, verb: str, *, timeout: float, urgency: Urgency = Urgency.COMMAND) -> Posted:
+    def post(
+        self, call: Call, verb: str, *, timeout: float, urgency: Urgency = Urgency.COMMAND
+    ) -> PendingRequest:
         """Send a request: before whatever is posted after it.
 
         Args:
@@ -152,9 +154,9 @@ class Requests:
         )
         self._asking.add(asking)
         asking.add_done_callback(self._asking.discard)
-        return Posted(call, verb, timeout, urgency, now(), asking)
+        return PendingRequest(call, verb, timeout, urgency, now(), asking)
 
-    async def answer(self, posted: Posted) -> tuple[Answer, bytes]:
+    async def answer(self, posted: PendingRequest) -> tuple[Answer, bytes]:
         """Wait for the answer to a request; returns it, and the status that came with it.
 
         Raises:
@@ -185,7 +187,7 @@ class Requests:
             )
         return answer, reply.attachment
 
-    async def _wait(self, posted: Posted) -> tuple[Reply | None, bool]:
+    async def _wait(self, posted: PendingRequest) -> tuple[Reply | None, bool]:
         """Wait for a reply; returns it, and whether it came at once: as where access rules say no.
 
         Raises:

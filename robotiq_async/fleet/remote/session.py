@@ -28,8 +28,8 @@ from ...session.state_waiters import StateWaiters
 from ...session.statistics import Counters, Statistics
 from ...session.streams import Channels
 from ...wire.checks import check_seconds
-from ..complaints import Complaints
 from ..control.lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
+from ..limited_log import LimitedLog
 from ..network.bus import Bus, Undo
 from ..wire.envelope import Call
 from ..wire.names import GripperName
@@ -39,7 +39,7 @@ from .agents import Agents
 from .lease_keeper import ANSWER_S, RENEWALS, LeaseKeeper
 from .mirror import Mirror
 from .missed_events import MissedEvents
-from .requests import NoAnswerError, Posted, Requests
+from .requests import NoAnswerError, PendingRequest, Requests
 
 CONNECT_S: Final = 5.0
 OWN: Final = ("info", "lease", "halt", "cmd/cancel")
@@ -106,7 +106,7 @@ class RemoteSession:
         self._looking: asyncio.Task[Any] | None = None
         channels.reopen(self.loop)
         self.mirror.begin(now())
-        self._unreadable, self._misrouted = Complaints(self.log), Complaints(self.log)
+        self._unreadable, self._misrouted = LimitedLog(self.log), LimitedLog(self.log)
         # One wildcard, and every payload says what it is about: samples may come under the wrong key.
         self._undo: Undo = bus.subscribe(name.key("*"), self._hear)
         self.agents = Agents(name, bus, self.keeper.stay_away)
@@ -329,7 +329,7 @@ class RemoteSession:
         """The next request, under the present lease."""
         return self._requests.make(self.mirror, self.keeper.lease, arguments or {})
 
-    def post(self, call: Call, verb: str, **how: Any) -> Posted:  # noqa: ANN401
+    def post(self, call: Call, verb: str, **how: Any) -> PendingRequest:  # noqa: ANN401
         """Send a request; see :meth:`Requests.post`."""
         return self._requests.post(call, verb, **how)
 
@@ -337,7 +337,7 @@ class RemoteSession:
         """Send a request and wait for its answer; see :meth:`answer`."""
         return await self.answer(self.post(call, verb, **how))
 
-    async def answer(self, posted: Posted) -> Any:  # noqa: ANN401
+    async def answer(self, posted: PendingRequest) -> Any:  # noqa: ANN401
         """Wait for the answer to a request; see :meth:`Requests.answer`.
 
         Raises:

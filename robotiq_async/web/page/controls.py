@@ -10,8 +10,8 @@ from nicegui import events, ui
 
 from ...actions import ACTIONS, Action
 from ...enums import FORCE_MAX, SPEED_MAX
+from .heartbeat import PRESS, PRESS_WITH_VALUE, Heartbeat
 from .mirror import HandMirror, Mirror
-from .touch import PRESS, PRESS_WITH_VALUE, Touch
 
 ARMED_S: Final = 0.3
 """A question takes no yes before: nobody has read it."""
@@ -23,7 +23,7 @@ class Controls:
     """The part of the page that commands; only there when the page may."""
 
     def __init__(
-        self, mirror: Mirror, hand: HandMirror, page: str, touch: Touch, told: Callable[[str], None]
+        self, mirror: Mirror, hand: HandMirror, page: str, heartbeat: Heartbeat, told: Callable[[str], None]
     ) -> None:
         """Build it where the page is being built.
 
@@ -31,10 +31,11 @@ class Controls:
             mirror: the way to the hand.
             hand: which one.
             page: who asks.
-            touch: with its browser.
+            heartbeat: between it and its browser.
             told: is called with how each command ended.
         """
-        self._mirror, self._hand, self._page, self._touch, self._told = mirror, hand, page, touch, told
+        self._mirror, self._hand, self._page = mirror, hand, page
+        self._heartbeat, self._told = heartbeat, told
         self._dialogs: list[ui.dialog] = []
         with ui.row().classes("w-full gap-2"):
             for name in DIRECT:
@@ -93,7 +94,7 @@ class Controls:
         ui.label().bind_text_from(slider, "value", lambda each: f"{each:.0f}").classes("w-8 text-right")
 
     def _pressed(self, name: str, arguments: dict[str, Any], sent_back: object) -> None:
-        self._ask(name, arguments, at=self._touch.heard(sent_back))
+        self._ask(name, arguments, at=self._heartbeat.heard(sent_back))
 
     def _ask(self, name: str, arguments: dict[str, Any], *, at: float) -> None:
         self._outcome.set_text(f"{name} ...")

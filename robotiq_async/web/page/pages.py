@@ -9,10 +9,10 @@ from typing import Final
 from nicegui import Client, ui
 
 from .controls import Controls
+from .heartbeat import BEAT_MS, SCRIPT, Heartbeat
 from .mirror import HandMirror, Mirror
 from .panels import AxesPanel, Curves, Events, StatePanel, StatisticsPanel
 from .scene import HandScene
-from .touch import BEAT_MS, SCRIPT, Touch
 from .words import timed
 
 REFRESH_S: Final = 0.05
@@ -70,24 +70,24 @@ class Visits:
         self._mirror = mirror
         self._present: set[str] = set()
 
-    def begin(self, client: Client) -> Touch:
+    def begin(self, client: Client) -> Heartbeat:
         """A page is being made."""
-        touch = Touch()
-        client.on_connect(lambda: self._arrive(client.id, touch))
+        heartbeat = Heartbeat()
+        client.on_connect(lambda: self._arrive(client.id, heartbeat))
         client.on_disconnect(lambda: self._leave(client))
         client.on_delete(lambda: self._leave(client))
-        ui.on("beat", lambda event: touch.heard(event.args))
+        ui.on("beat", lambda event: heartbeat.heard(event.args))
 
         def look() -> None:
-            ui.run_javascript(Touch.now())
-            if touch.check():
+            ui.run_javascript(Heartbeat.now())
+            if heartbeat.check():
                 self._mirror.gone(client.id)
 
         ui.timer(BEAT_MS / 1000, look)
-        return touch
+        return heartbeat
 
-    def _arrive(self, page: str, touch: Touch) -> None:
-        touch.begin()
+    def _arrive(self, page: str, heartbeat: Heartbeat) -> None:
+        heartbeat.begin()
         self._present.add(page)
         self._mirror.count(len(self._present))
 
@@ -138,7 +138,7 @@ def _frame(title: str, mirror: Mirror, *, home: bool) -> None:
 
 def _hand_page(mirror: Mirror, hand: HandMirror, client: Client, visits: Visits) -> None:
     _frame(hand.address, mirror, home=len(mirror.hands) > 1)
-    touch = visits.begin(client)
+    heartbeat = visits.begin(client)
     shown: list[Callable[[], None]] = []
     with ui.element("div").classes("grid w-full gap-3 grid-cols-1 lg:grid-cols-2"):
         with ui.column().classes("w-full gap-2"):
@@ -161,7 +161,7 @@ def _hand_page(mirror: Mirror, hand: HandMirror, client: Client, visits: Visits)
     ]
     if mirror.control:
         with place:
-            controls = Controls(mirror, hand, client.id, touch, lambda words: events.add(timed(words)))
+            controls = Controls(mirror, hand, client.id, heartbeat, lambda words: events.add(timed(words)))
         _halt_button("halt", "stops every axis", controls.halt)
     else:
         with place:

@@ -13,13 +13,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async.link.address import parse_address
-from robotiq_async.link.places import place_of
+from robotiq_async.link.canonical import canonical_address
 
 LOOPBACK = "lo" if os.path.exists("/sys/class/net/lo") else "lo0"
 
 
 def place(text: str) -> str:
-    return place_of(parse_address(text))
+    return canonical_address(parse_address(text))
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,7 @@ PRESS_WITH_VALUE: Final = "(value) => emit(window.robotiqTime, value)"
 """What a slider sends: the value that it was let go at, which is not always known here yet."""
 
 
-class Touch:
+class Heartbeat:
     """The time that one browser has sent back.
 
     Attributes:

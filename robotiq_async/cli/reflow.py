@@ -6,7 +6,7 @@ import inspect
 from itertools import groupby
 
 
-def flowing(text: str) -> str:
+def reflow(text: str) -> str:
     """Docstrings have lines of one width; a terminal has its own: a paragraph becomes one line.
 
     What is indented, examples say, keeps its lines.

@@ -30,7 +30,7 @@ REST_S: Final = 0.05
 no motion left unseen."""
 
 
-class Keeping:
+class GripKeeper:
     """Judges the statuses of a hand that is being stopped and is to keep its grip."""
 
     def __init__(self, shadow: RequestShadow, *, log: Log = log) -> None:

@@ -1,4 +1,4 @@
-"""News: what an agent tells of one hand, to whoever listens.
+"""What an agent tells of one hand, to whoever listens.
 
 Statuses and events go out under one key, in the order in which they happened. A status is dropped rather than
 waited for; events are numbered, every status says how many there are, and whoever has missed some asks.
@@ -28,7 +28,7 @@ AT_ONCE: Final = 40
 """Events in one answer: of the longest ones as many as a message may hold."""
 
 
-class News:
+class HandPublisher:
     """What is told of one hand.
 
     Attributes:
@@ -43,8 +43,8 @@ class News:
         self._hand = hand
         self._epoch = epoch
         self._lease = lease
-        self._send = bus.publisher(name.key("feed"), Urgency.NEWS)
-        self._send_summary = bus.publisher(name.key("summary"), Urgency.NEWS)
+        self._send = bus.publisher(name.key("feed"), Urgency.TELEMETRY)
+        self._send_summary = bus.publisher(name.key("summary"), Urgency.TELEMETRY)
         self._events: deque[Fields] = deque(maxlen=KEPT)
         self._count = 0
         self._sent_at = 0.0

@@ -1,4 +1,4 @@
-"""Asking: one request on its way, and the replies to it. Several may answer; one reply is waited for."""
+"""A query on its way, and the replies to it. Several may answer; one reply is waited for."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable
 from .bus import Reply
 
 
-class Asking:
+class PendingQuery:
     """Waits for the reply that decides; without one, when all have answered, it is the last that came.
 
     Attributes:

@@ -1,4 +1,4 @@
-"""Complaints: what strangers, or a bad network, may cause thousands of times does not fill the log."""
+"""What strangers, or a bad network, may cause thousands of times does not fill the log."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..session.clock import now
 EVERY_S: Final = 10.0
 
 
-class Complaints:
+class LimitedLog:
     """Of one kind, about one source: the first at once, then one in ten seconds, with how many there were."""
 
     def __init__(self, log: Log = log) -> None:

@@ -15,7 +15,7 @@ from .address import Address
 HERE: Final = "localhost"
 
 
-def place_of(address: Address) -> str:
+def canonical_address(address: Address) -> str:
     """Where an address leads, the same for all ways to write it.
 
     Whatever means this machine is localhost. The links to a serial port are that port, at this moment.
