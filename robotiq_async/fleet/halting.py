@@ -23,6 +23,9 @@ async def halt(bus: Bus, name: GripperName, agents: int) -> str:
         bus: an open session.
         name: which one.
         agents: how many serve it: all of them have to say that it stands.
+
+    Raises:
+        Nothing of its own: whatever an agent answers, or a bus does not bring, is in what it returns.
     """
     client, numbers = secrets.token_hex(8), count(1)
 
