@@ -19,13 +19,12 @@ STOPPED: Final = "stopped"
 async def halt(bus: Bus, name: GripperName, agents: int) -> str:
     """Halt a gripper; returns how that ended: "stopped", or "no answer" or "refused" and why.
 
+    It raises none of what an agent answers, or fails to answer: that is in what it returns.
+
     Args:
         bus: an open session.
         name: which one.
         agents: how many serve it: all of them have to say that it stands.
-
-    Raises:
-        Nothing of its own: whatever an agent answers, or a bus does not bring, is in what it returns.
     """
     client, numbers = secrets.token_hex(8), count(1)
 
