@@ -49,7 +49,7 @@ def forget_keys() -> None:
 
 
 def read_line() -> str:
-    """The next line of standard input, whatever bytes it has, if it is no novel; empty when there is none."""
+    """The next line of standard input, whatever it has, at most 1000 bytes; empty when there is none."""
     return "" if sys.stdin is None else sys.stdin.buffer.readline(1000).decode(errors="replace")
 
 

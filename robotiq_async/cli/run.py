@@ -42,7 +42,7 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _mend_streams() -> None:
-    """One that is closed is nobody's; the others take any text: the name of a file need not even be one."""
+    """Replace closed standard streams by the null device; let the others escape what they cannot encode."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         stream = getattr(sys, name)
         if stream is None:  # its number is free, and no socket is to get it

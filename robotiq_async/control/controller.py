@@ -134,7 +134,14 @@ class Controller:
             waiter.set_result(None)
 
     def activate(self) -> None:
-        """Begin an activation, unless the gripper is active or activating; raises why it is not possible."""
+        """Begin an activation, unless the gripper is active or activating.
+
+        Raises:
+            GripperFaultError: a fault is reported, or the gripper has released automatically.
+            InvalidStateError: a reset or a release is under way.
+            ConnectionLostError: the link is down.
+            NotStartedError: the hand is not started, or is being stopped.
+        """
         self._begin_activation(Trigger.ASK_ACTIVATE)
 
     def reset(self, trigger: Trigger = Trigger.ASK_RESET) -> None:

@@ -1,6 +1,6 @@
 """The end of a hand that keeps its grip: rGTO stays set, if nothing moves.
 
-Clearing rGTO is what stops the fingers for certain; what becomes of a grip then no public source says. So a
+Clearing rGTO is what stops the fingers for certain; no public source says what then becomes of a grip. So a
 hand may leave rGTO set when it is stopped, but only if every axis has been seen at rest under requests that
 are known. What moves is held first, once, as a cancelled move is. On any doubt rGTO is cleared, as ever.
 docs/decisions/keeping-a-grip.md has the reasons.
@@ -23,11 +23,11 @@ from .state_machine import RUNNING
 from .triggers import Trigger, classify
 
 KEEP_S: Final = 0.5
-"""So long axes have to come to rest. What is left of the time of a stop is enough to clear rGTO also on the
+"""How long axes have to come to rest. What is left of the time of a stop is enough to clear rGTO also on the
 slowest gripper that is reckoned with (a device cycle of 0.2 s)."""
 REST_S: Final = 0.05
-"""So long every axis must have stood still: ten polls. A gDT that lags behind its echo by a reading or two is
-no motion left unseen."""
+"""How long every axis must have stood still: ten polls. A gDT that lags behind its echo by a reading or two
+leaves no motion unseen."""
 
 
 class GripKeeper:
@@ -107,5 +107,5 @@ class GripKeeper:
         axes = status.contacts & ~self._shadow.gripping(status) & ~moved
         if axes:
             self._log.warning(
-                "%s touched something while rGTO was clear: asked to stay there, and grip no more", axes
+                "%s in contact while rGTO was clear: held in place, and gripping no longer", axes
             )

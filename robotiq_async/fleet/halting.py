@@ -19,6 +19,8 @@ STOPPED: Final = "stopped"
 async def halt(bus: Bus, name: GripperName, agents: int) -> str:
     """Halt a gripper; returns how that ended: "stopped", or "no answer" or "refused" and why.
 
+    It raises none of what an agent answers, or fails to answer: that is in what it returns.
+
     Args:
         bus: an open session.
         name: which one.

@@ -32,7 +32,7 @@ class LimitedLog:
         if now() < self._next:
             return
         if self._count > 1:
-            message += " (%d like it since the last word of them)"
+            message += " (%d similar since the last report)"
             arguments += (self._count,)
         self._next, self._count = now() + EVERY_S, 0
         self._log.warning(message, *arguments, exc_info=exc_info)

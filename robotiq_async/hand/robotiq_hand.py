@@ -29,7 +29,7 @@ class RobotiqHand(Commands):
     """A Robotiq 3-Finger gripper behind Modbus TCP, a serial line, or simulated.
 
     Use it as ``async with RobotiqHand(address) as hand:``, or call :meth:`start` and :meth:`stop`. One
-    task polls the gripper; every call here leaves its wish with that task and never blocks the loop.
+    task polls the gripper; every call here hands its request to that task and never blocks the loop.
     Calls may come from any task of the loop the hand was started in. From another thread, or another
     loop, every call is a RuntimeError that says what to do, and nothing has been asked then.
 

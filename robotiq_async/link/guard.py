@@ -102,7 +102,7 @@ class GuardedTransport:
         self._drop()
         with anyio.CancelScope(shield=True):
             if not await self._worker.ended(self._response_timeout):
-                self._log.warning("the transport is left to itself: what it was asked last has not ended")
+                self._log.warning("transport abandoned: its last call has not returned")
 
     def _drop(self) -> None:
         """Have it closed as soon as it does nothing else; open() waits for that, and nobody else."""

@@ -1,16 +1,18 @@
-"""The link to one gripper. The only module that talks to pymodbus (the simulator's server aside).
+"""The link to one gripper: reads and writes over pymodbus.
+
+This module and pdus.py are the only ones of the client that use it.
 
 pymodbus does the framing and the transport; what it leaves to its user is done here:
 
 * One client object per connection, no retries and no reconnecting of its own: both would send a motion
   twice.
-* Every byte that arrives is checked before pymodbus sees it (reply.py). Anything but the whole right
+* Every byte that arrives is checked before pymodbus sees it (frames.py). Anything but the whole right
   answer, in time, ends the exchange *and* the connection: on a link that is out of step the next reply
   could be the answer to this request.
 * Transaction ids are ours. pymodbus begins at 1 on every connection, so that a reply left over from an
   earlier one would be taken for an answer. Here they begin anywhere, go on over connections, and come again
   after 65,535 requests.
-* Time-outs are a watchdog of ours that looks once in a while. pymodbus's own is ``asyncio.wait_for``,
+* Timeouts are a watchdog of ours that looks once in a while. pymodbus's own is ``asyncio.wait_for``,
   which on Python 3.11 swallows a cancellation that lands together with the reply, and which a loop that
   was held up takes for silence although the reply is waiting in the socket.
 * Foreign exceptions stop here.
@@ -281,7 +283,7 @@ class ModbusTransport:
         reasons: list[OSError] = []
         for host in await self._hosts():
             client, connected = self._make_client(host), False
-            # pymodbus drops what does not fit without a word; whatever comes is for reply.py to judge.
+            # pymodbus drops what does not fit without a word; whatever comes is for frames.py to judge.
             client.ctx.max_buffer_size = sys.maxsize
             _keep_reasons(client, reasons)
             try:

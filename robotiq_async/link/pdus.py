@@ -56,7 +56,7 @@ class InputRegistersReply(ModbusPDU):
     rtu_byte_count_pos = 2
 
     def decode(self, data: bytes) -> None:
-        """Take the registers out of the bytes after the function code, which reply.py has checked."""
+        """Take the registers out of the bytes after the function code, which frames.py has checked."""
         self.registers = (
             _BLOCK.unpack_from(data, 1)
             if data[0] == _BLOCK.size

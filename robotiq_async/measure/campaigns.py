@@ -88,7 +88,7 @@ async def time_closing(hand: Hand, speed: int, fingers: Finger, speedup: float =
         RobotiqError: as :meth:`Hand.move`.
     """
     if Finger.SCISSOR in fingers:
-        raise ValueError("fingers must be of A, B and C, got the scissor: its stroke is another")
+        raise ValueError("fingers must be A, B and C only, got the scissor: it has a different stroke")
     for _ in range(ATTEMPTS):
         opened = await hand.open(fingers, speed=255)
         await asyncio.sleep(REST_S / speedup)

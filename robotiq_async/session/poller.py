@@ -47,7 +47,7 @@ SHUTDOWN_S: Final = 1.2
 SHUTDOWN_PAUSE_S: Final = 0.05
 """Between two attempts at that."""
 READS: Final = 3
-"""At most so often the status is read in a cycle that has something to write, in a loop that is held up."""
+"""At most this many reads in a cycle that has something to write, in a loop that is held up."""
 LATE_S: Final = 0.05
 """Later than this a poll is worth a warning; on a busy machine a few milliseconds are usual."""
 LATE_WARNING_S: Final = 1.0

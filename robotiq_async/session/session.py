@@ -236,7 +236,15 @@ class Session:
         """Wait for the end of an activation; one that this hand began must not end in a fault.
 
         Args:
-            ask: asks for it; None for what the start has begun.
+            ask: asks for it; None for what the start, or another caller, has begun.
+
+        Raises:
+            GripperFaultError: it is refused because of a fault, or ended in one.
+            NotActivatedError: the gripper was reset meanwhile, or reset() or halt() took over.
+            ActivationTimeoutError: not finished within the activation timeout.
+            InvalidStateError: it is refused: a reset or a release is under way.
+            ConnectionLostError: the link is or went down.
+            NotStartedError: the hand was stopped.
         """
         if ask is None and self.machine.state not in SEQUENCES:
             return

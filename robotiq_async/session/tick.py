@@ -1,4 +1,4 @@
-"""Wakes the owner tasks of a loop, each at absolute deadlines of its own.
+"""Wakes the poller tasks of a loop, each at absolute deadlines of its own.
 
 A loop's own timers are no good for 200 Hz: epoll rounds their timeouts up to a millisecond, and uvloop's
 clock is one. On Linux the next deadline is therefore kept by the kernel, in a timerfd that the running loop
@@ -6,7 +6,7 @@ watches like a socket; elsewhere, and in a loop that has a clock of its own, by 
 hands of a loop share one: whoever is due is woken together, and a busy loop is not woken more often for it.
 
 A tick that nobody waits for is counted and not caught up with. How late a tick came tells for how long the
-loop was held up, whatever the owner task was doing meanwhile.
+loop was held up, whatever the poller task was doing meanwhile.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ class _Bell:
 
     @classmethod
     def of(cls, loop: asyncio.AbstractEventLoop) -> _Bell:
-        """The one of a loop; what loops have left that were closed without a word is given back."""
+        """The timer of a loop; frees those of loops that were closed without notice."""
         for each in list(cls._bells):
             if each.is_closed() and (left := cls._bells.pop(each, None)) is not None:
                 left.give_back()

@@ -129,7 +129,7 @@ def _stop_all() -> None:
     """The program ends: what it has set going must not go on."""
     left = list(_IN_USE)
     for each in left:
-        log.warning("%s: not stopped before the program ends; it is now", each.hand.address)
+        log.warning("%s still running at exit: stopping it", each.hand.address)
 
     async def stop() -> None:
         await asyncio.gather(

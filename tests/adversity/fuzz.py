@@ -80,7 +80,7 @@ def framed(pdu: bytes, unit: int, number: int, serial: bool) -> bytes:
 
 
 def answers(request: bytes, reply: bytes, serial: bool) -> bool:
-    """Whether a frame is the right answer to a request; written down a second time, apart from reply.py."""
+    """Whether a frame is the right answer to a request; written down a second time, apart from frames.py."""
     if serial:
         if reply[-2:] != FramerRTU.compute_CRC(reply[:-2]).to_bytes(2, "big"):
             return False
@@ -107,7 +107,7 @@ def payload(reply: bytes, serial: bool) -> bytes | None:
 
 
 def decoder(count: int, seed: int = 1) -> dict[str, int]:
-    """Put replies through the checks of reply.py and the status; in pieces, as they come off a line.
+    """Put replies through the checks of frames.py and the status; in pieces, as they come off a line.
 
     Raises:
         AssertionError: a wrong reply was taken for an answer, or a status is impossible.

@@ -152,7 +152,7 @@ def test_a_grip_that_was_let_go_is_not_taken_up_again_without_a_word(
     assert not there.gripper.grips
     outcome = call("move", "60", "--fingers", "A", "--yes", there.address)
     outcome.assert_succeeded()
-    assert "B|C touched something while rGTO was clear" in outcome.err
+    assert "B|C in contact while rGTO was clear" in outcome.err
 
 
 class InterruptingGripper(SimulatedGripper):

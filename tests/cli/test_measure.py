@@ -178,7 +178,7 @@ def test_without_matplotlib_nothing_is_begun(
         (["speed", "--output", "mine.png"], "--output must be a file named .csv, got 'mine.png'"),
         (["speed", "--output", "mine"], "--output must be a file named .csv"),
         (["force", "--output", "."], "--output must be a file named .csv"),
-        (["speed", "--fingers", "scissor"], "--fingers must be of A, B and C"),
+        (["speed", "--fingers", "scissor"], "--fingers takes A, B and C only"),
         (["force", "--output", "a.csv", "--scale", "a.csv"], "--scale must be another file than --output"),
         (["force", "--surface", "wood"], "wood"),
         (["force", "--speed", "256"], "256"),

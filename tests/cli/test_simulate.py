@@ -195,7 +195,7 @@ def test_it_serves_on_when_the_plan_is_over(call: Call, beside: Callable[..., Be
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ("dorp at 5", "no trouble is called 'dorp'; known are: delay, late, drop"),
+        ("dorp at 5", "unknown trouble 'dorp'; known are: delay, late, drop"),
         ("drop at noon", "at must be followed by a number, got 'noon'"),
         ("drop; foreign 256", "the value of foreign must be a whole number in 0..255, got 256"),
         ("wrong-checksum", "wrong-checksum does not fit a simulator on tcp"),

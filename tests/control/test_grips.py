@@ -53,7 +53,7 @@ def test_a_grip_that_is_not_taken_up_again_is_told(caplog: pytest.LogCaptureFixt
     scan.connect()
     scan.moved(60, A | S)
     (said,) = caplog.messages
-    assert said.startswith("B|C touched something while rGTO was clear")
+    assert said.startswith("B|C in contact while rGTO was clear")
     assert scan.latest.requested_position(B) == scan.latest.position(B) == 150
     assert not scan.gripper.grips
     scan.moved(80, A)

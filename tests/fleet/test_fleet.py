@@ -114,7 +114,7 @@ async def test_a_flood_of_summaries_that_are_none_fills_no_log(caplog: pytest.Lo
             await asyncio.sleep(0.01)
     lines = [record.getMessage() for record in caplog.records]
     assert len(lines) == 2
-    assert "1000 like it" in lines[1] or "1001 like it" in lines[1] or "999 like it" in lines[1]
+    assert "1000 similar" in lines[1] or "1001 similar" in lines[1] or "999 similar" in lines[1]
     assert all(line.isprintable() for line in lines)
 
 

@@ -78,7 +78,7 @@ async def test_a_flood_of_messages_that_are_none_fills_no_log(
         publish(payload)
         await asyncio.sleep(0.01)
         assert caplog.text.count(words) == 2
-        assert "300 like it" in caplog.text
+        assert "300 similar" in caplog.text
         about = {getattr(record, "hand", "") for record in caplog.records if words in record.getMessage()}
         assert about == {hand.name}
         await hand.move(30, 1)

@@ -1,4 +1,4 @@
-"""A transport object in place of an address, and what the owner task does with a link that fails."""
+"""A transport object in place of an address, and what the poller task does with a link that fails."""
 
 from __future__ import annotations
 

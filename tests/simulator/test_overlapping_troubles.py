@@ -26,7 +26,7 @@ def test_a_remark_may_hold_a_semicolon() -> None:
 
 @pytest.mark.parametrize("words", ["power cut at 5", "powercut now"])
 def test_an_unknown_kind_is_named(words: str) -> None:
-    with pytest.raises(ValueError, match="no trouble is called"):
+    with pytest.raises(ValueError, match="unknown trouble"):
         parse_troubles(words)
 
 

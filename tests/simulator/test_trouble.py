@@ -130,8 +130,8 @@ def test_no_words_are_no_trouble(text: str) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ("dorp at 5", "no trouble is called 'dorp'; known are: delay, late, drop, "),
-        ("Drop", "no trouble is called 'Drop'"),
+        ("dorp at 5", "unknown trouble 'dorp'; known are: delay, late, drop, "),
+        ("Drop", "unknown trouble 'Drop'"),
         ("drop 1", "drop takes no value, got 1.0"),
         ("silence 3", "silence takes no value, got 3.0"),
         ("drop 0", "drop takes no value, got 0.0"),
@@ -181,7 +181,7 @@ def test_no_words_are_no_trouble(text: str) -> None:
         ("drop once once", "cannot read 'drop once once' at 'once'"),
         ("drop at 5 sharp", "cannot read 'drop at 5 sharp' at 'sharp'"),
         ("delay 1 2", "cannot read 'delay 1 2' at '2'"),
-        ("drop; silence; dorp", "no trouble is called 'dorp'"),
+        ("drop; silence; dorp", "unknown trouble 'dorp'"),
     ],
 )
 def test_words_that_are_refused_say_why(words: str, message: str) -> None:

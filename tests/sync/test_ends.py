@@ -47,7 +47,7 @@ async def test_a_program_that_ends_without_stopping_stops_the_fingers() -> None:
         async with asyncio.timeout(30):
             printed, _ = await process.communicate()
         assert process.returncode == 0
-        assert b"not stopped before the program ends; it is now" in printed
+        assert b"still running at exit: stopping it" in printed
         assert not gripper.is_moving
         assert 10 < gripper.position(Finger.A) < 200
 
@@ -71,7 +71,7 @@ def test_hands_that_were_not_stopped_are_stopped_together(caplog: pytest.LogCapt
     assert [hand.state for hand in hands] == [State.SHUTDOWN] * 3
     assert [wire.is_moving() for wire in wires] == [False, True, False]
     assert [wire.writes() - written for wire, written in zip(wires, before, strict=True)] == [1, 0, 0]
-    told = [record.message for record in caplog.records if "not stopped before the program" in record.message]
+    told = [record.message for record in caplog.records if "still running at exit" in record.message]
     assert len(told) == 2
     caller._stop_all()
 

@@ -57,7 +57,7 @@ def speed(
         yes: Do not ask.
     """
     if Finger.SCISSOR in fingers:
-        raise UsageError("--fingers must be of A, B and C: the stroke of the scissor is another")
+        raise UsageError("--fingers takes A, B and C only: the scissor has a different stroke")
     factor = check(address, output, speedup, runs, step, not no_plot)
     from ...measure.campaigns import speed_campaign
 

@@ -22,7 +22,7 @@ from .served_hand import ServedHand
 
 SUMMARY_S: Final = 1.0
 BEATS: Final = 5
-"""So many signs of life in a window, also when nothing happens."""
+"""How many signs of life there are in a window, also when nothing happens."""
 LOOK_S: Final = 0.3
 """How long another agent has to show itself: a router may not have told yet."""
 EPOCH_BITS: Final = 53
@@ -139,7 +139,7 @@ class Agent:
         try:
             epoch, name = int(key.rpartition("/")[2]), GripperName.of_key(key)
         except ValueError:
-            self._strange.warn("a token that no agent makes: %r", key)
+            self._strange.warn("invalid liveliness token: %r", key)
             return None
         return (epoch, name) if epoch != self.epoch else None
 

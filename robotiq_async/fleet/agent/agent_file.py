@@ -125,7 +125,11 @@ class _Reader:
         self._text = text
 
     def settings(self) -> AgentSettings:
-        """Everything, checked."""
+        """Everything, checked.
+
+        Raises:
+            AgentFileError: not TOML, an unknown key, a missing one, or a value that does not fit.
+        """
         table = self._table()
         self._check_keys_of(table, (), _OF_AGENT, needed=("site", _GRIPPERS))
         with self._blaming("site"):

@@ -161,7 +161,7 @@ class ServedHand:
             case ["cmd", name]:
                 self._command(name, call, query)
             case _:
-                raise AgentError(f"no request of the name {verb!r}")
+                raise AgentError(f"unknown request {verb!r}")
         return None
 
     def _reply(self, query: Query, answer: Answer) -> None:
@@ -191,7 +191,7 @@ class ServedHand:
             self._release(call, query)
             return None
         else:
-            raise AgentError(f"no request of a lease of the name {what!r}")
+            raise AgentError(f"unknown lease request {what!r}")
         return {"lease": self._lease.number, "window": self._lease.window}
 
     def _grant(self, call: Call, *, take: bool) -> None:
@@ -318,7 +318,7 @@ class ServedHand:
 
     def _check_known(self, name: str) -> None:
         if name != "command" and name not in COMMANDS:
-            raise AgentError(f"no command of the name {name!r}")
+            raise AgentError(f"unknown command {name!r}")
 
     def _work(self, name: str, arguments: Fields) -> Coroutine[Any, Any, MoveResult | None]:
         if name == "command":

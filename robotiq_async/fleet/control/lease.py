@@ -16,7 +16,7 @@ WINDOW_S: Final = 1.0
 WINDOW_MIN_S: Final = 0.1
 WINDOW_MAX_S: Final = 10.0
 _KEPT: Final = 64
-"""So many numbers back it is known why a lease ended."""
+"""For how many of the last leases it is known why they ended."""
 
 
 @dataclass(frozen=True, slots=True)

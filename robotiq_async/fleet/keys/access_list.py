@@ -112,7 +112,7 @@ def _check(table: Mapping[str, object]) -> dict[str, tuple[str, ...]]:
     names: dict[str, tuple[str, ...]] = {}
     for key, value in table.items():
         if key not in known:
-            raise ValueError(f"nobody knows the role {key!r}; there are {', '.join(known)}")
+            raise ValueError(f"unknown role {key!r}; known are: {', '.join(known)}")
         if not isinstance(value, list):
             raise TypeError(f"{key} must be a list of names, got {value!r}")
         names[key] = tuple(check_subject(name) for name in value)

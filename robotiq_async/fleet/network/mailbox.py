@@ -14,11 +14,11 @@ from ...log import log
 from ..limited_log import EVERY_S, LimitedLog
 
 GATHER_S: Final = 0.001
-"""For so long news are gathered where they come thick and fast."""
+"""How long news are gathered where they come thick and fast."""
 TURN_S: Final = 0.002
-"""So long deliveries are made in one turn of the loop: the rest of it has its turn."""
+"""How long deliveries are made in one turn of the loop: the rest of the program has its turn, too."""
 MOST: Final = 2000
-"""So many requests and news may lie there; the rest is dropped, as on a network that is full."""
+"""At most this many requests and news may lie there; the rest is dropped, as on a network that is full."""
 
 
 class Kind(Enum):
@@ -78,7 +78,7 @@ class Mailbox:
             try:
                 delivery()
             except Exception:  # noqa: BLE001  # the next delivery is another's
-                self._failed.warn("a message of the fleet could not be handled", exc_info=True)
+                self._failed.warn("handling a fleet message failed", exc_info=True)
             if time.perf_counter() > until:
                 break
         if (self._halts or self._deliveries) and not self._is_due:
@@ -92,4 +92,4 @@ class Mailbox:
         if self._dropped and self._loop.time() >= self._report_due:
             dropped, self._dropped = self._dropped, 0
             self._report_due = self._loop.time() + EVERY_S
-            log.warning("%d messages of the fleet were dropped: more came than can be handled", dropped)
+            log.warning("%d fleet messages dropped: queue full", dropped)

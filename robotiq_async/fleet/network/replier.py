@@ -12,8 +12,8 @@ from collections.abc import Callable
 from typing import Final
 
 MOST: Final = 1000
-"""So many answers may wait; of what comes then the query is dropped, in the thread as well: that, too, is
-said to whoever asked, and may take as long. Who asked asks again, or gives up."""
+"""At most this many answers may wait; the query of any more is dropped, in the thread as well: that, too,
+is told to whoever asked, and may take as long. They ask again, or give up."""
 
 
 class Replier:

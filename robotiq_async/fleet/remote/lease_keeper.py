@@ -17,7 +17,7 @@ from .mirror import Mirror
 from .requests import NoAnswerError, label
 
 RENEWALS: Final = 5
-"""So often in a window the lease is renewed, and silence looked for."""
+"""How many times in a window the lease is renewed, and silence looked for."""
 ANSWER_S: Final = 0.5
 """For an answer that the agent gives at once; asked again within the time that there is."""
 RELEASE_S: Final = 0.9
@@ -156,9 +156,9 @@ class LeaseKeeper:
         self.is_in_control = False
         # After a halt or a take of somebody else nobody takes it back without having been asked to.
         self._wants_control = self._wants_control and reason not in (*BY_OTHERS, "released")
-        self.lost = ControlLostError(f"{self._run.name} is not commanded from here any more: {why}", reason)
+        self.lost = ControlLostError(f"lost control of {self._run.name}: {why}", reason)
         if reason != "released":
-            self._log.warning("not commanded from here any more: %s", why)
+            self._log.warning("lost control: %s", why)
 
     def check(self) -> None:
         """Refuse commands without a lease.

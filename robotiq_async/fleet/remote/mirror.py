@@ -16,7 +16,7 @@ from ..wire.status_message import StatusMessage
 from ..wire.values import Fields, read_request, read_transition, reading
 
 _RUNS: Final = 16
-"""So many runs of an agent are told apart."""
+"""At most this many runs of an agent are told apart."""
 DRIFT: Final = 200e-6
 """How far two clocks may part: seconds a second."""
 _SEEN: Final = {

@@ -11,7 +11,7 @@ from ...session.clock import now
 from .requests import NoAnswerError
 
 HALT_S: Final = 2.0
-"""So long a halt is asked for."""
+"""How long a halt is asked for, in seconds."""
 ATTEMPT_S: Final = 0.3
 """From one attempt to the next."""
 AGAIN_S: Final = 0.05

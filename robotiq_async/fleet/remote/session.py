@@ -45,7 +45,7 @@ CONNECT_S: Final = 5.0
 OWN: Final = ("info", "lease", "halt", "cmd/cancel")
 """Requests whose arguments no user has chosen: they are nobody's TypeError."""
 TRIES: Final = 2
-"""So often a request is called off in a window."""
+"""How many times a request is called off in a window."""
 
 
 class RemoteSession:

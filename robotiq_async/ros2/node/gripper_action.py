@@ -143,7 +143,7 @@ class GripperAction:
         if not self._warned and (any(request.command.velocity) or any(request.command.effort)):
             self._warned = True
             self._log.warning(
-                "velocity and effort of goals are not heeded: the parameters speed and force are (said once)"
+                "velocity and effort in goals are ignored; set the parameters speed and force (logged once)"
             )
 
 

@@ -145,7 +145,7 @@ class Trouble:
         """
         known = KINDS.get(self.kind)
         if known is None:
-            raise ValueError(f"no trouble is called {self.kind!r}; known are: {', '.join(KINDS)}")
+            raise ValueError(f"unknown trouble {self.kind!r}; known are: {', '.join(KINDS)}")
         if self.value is not None:
             self._keep("value", _checked_value(self.kind, known, self.value))
         if self.on not in get_args(On):

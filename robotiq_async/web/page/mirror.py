@@ -185,7 +185,7 @@ class Mirror:
         self._say({"gone": page})
 
     def count(self, pages: int) -> None:
-        """So many browsers look."""
+        """Tell how many browsers look."""
         self._say({"pages": pages})
 
     def beat(self) -> None:

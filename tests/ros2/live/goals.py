@@ -143,7 +143,7 @@ def test_speed_and_force_of_a_goal_are_parameters(cell: Cell) -> None:
         goal.ends()
         image = cell.simulator.do(lambda gripper: gripper.request_registers)
         assert bytes(half for word in image for half in divmod(word, 256))[4:6] == bytes([7, 9])
-        cell.node.prints("velocity and effort of goals are not heeded")
+        cell.node.prints("velocity and effort in goals are ignored")
     finally:
         cell.client.set("speed", 128)
         cell.client.set("force", 64)
