@@ -35,7 +35,7 @@ from robotiq_async import (
 )
 from robotiq_async.cli.consent import consent
 from robotiq_async.cli.failures import CommandError, UsageError
-from robotiq_async.cli.log_capture import forget
+from robotiq_async.cli.output.log_capture import forget
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.protocol import Hand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer

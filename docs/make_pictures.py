@@ -20,7 +20,7 @@ if __name__ == "__main__":
 
 from robotiq_async import Finger, RobotiqHand, State  # noqa: E402
 from robotiq_async.actions import ACTIONS, Operator  # noqa: E402
-from robotiq_async.cli.log_capture import forwarded_warnings  # noqa: E402
+from robotiq_async.cli.output.log_capture import forwarded_warnings  # noqa: E402
 from robotiq_async.cli.tui.screen import Monitor  # noqa: E402
 from robotiq_async.measure.plots import plot_recording  # noqa: E402
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer  # noqa: E402

@@ -24,8 +24,8 @@ from robotiq_async import (
     Stream,
 )
 from robotiq_async.actions import ACTIONS, Operator
-from robotiq_async.cli.stream_output import print_objects
-from robotiq_async.cli.tables import print_outcomes, print_status
+from robotiq_async.cli.output.stream_output import print_objects
+from robotiq_async.cli.output.tables import print_outcomes, print_status
 from robotiq_async.cli.tui.screen import Monitor
 from robotiq_async.errors import MeasuringError
 from robotiq_async.measure.campaigns import grasp, time_closing

@@ -22,7 +22,7 @@ from .commands.simulate import simulate
 from .commands.status import status
 from .commands.view import view
 from .commands.web import web
-from .reflow import reflow
+from .output.reflow import reflow
 
 COMMANDS: Final = (
     *(demo, simulate, status, move, monitor, web, view, doctor),

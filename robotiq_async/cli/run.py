@@ -19,8 +19,8 @@ from cyclopts import CycloptsError
 from ..errors import RobotiqError
 from .app import build
 from .failures import CommandError, UsageError
-from .log_capture import collected_warnings, forget
-from .notices import tell
+from .output.log_capture import collected_warnings, forget
+from .output.notices import tell
 
 _ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 SUCCESS, FAILURE, WRONG_USAGE, SIGNALLED = 0, 1, 2, 128

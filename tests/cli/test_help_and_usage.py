@@ -17,7 +17,7 @@ from robotiq_async.cli.commands.fleet import fleet, halt
 from robotiq_async.cli.commands.fleet_keys import keys
 from robotiq_async.cli.commands.measure_force import force
 from robotiq_async.cli.commands.measure_speed import speed
-from robotiq_async.cli.reflow import reflow
+from robotiq_async.cli.output.reflow import reflow
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Shell

@@ -14,8 +14,8 @@ import pytest
 
 from robotiq_async import Fault, Finger, RobotiqHand
 from robotiq_async.cli import main
-from robotiq_async.cli.stream_output import print_objects
-from robotiq_async.cli.text import event_line
+from robotiq_async.cli.output.stream_output import print_objects
+from robotiq_async.cli.output.text import event_line
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.terminal import ROOT
 

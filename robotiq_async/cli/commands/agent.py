@@ -12,8 +12,8 @@ from cyclopts import Parameter
 from ...log import log
 from ..arguments import Flag, need
 from ..failures import UsageError
-from ..log_capture import forget, forwarded_warnings
-from ..notices import tell
+from ..output.log_capture import forget, forwarded_warnings
+from ..output.notices import tell
 
 if TYPE_CHECKING:
     from ...fleet.agent.agent import Agent

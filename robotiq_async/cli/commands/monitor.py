@@ -13,7 +13,7 @@ from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..arguments import USUAL, Address, Byte, Flag, Link, need
 from ..consent import forget_keys
 from ..failures import CommandError, UsageError
-from ..log_capture import forget, forwarded_warnings
+from ..output.log_capture import forget, forwarded_warnings
 
 SCREEN_S: Final = 1.0
 """How long the screen may take to restore the terminal."""
@@ -81,7 +81,7 @@ def _is_terminal() -> bool:
 
 async def _look(address: str, link: Link, *, as_json: bool) -> None:
     from ..connect import connected
-    from ..stream_output import print_objects, watch
+    from ..output.stream_output import print_objects, watch
 
     async with connected(address, link, halt=False) as hand:
         await (print_objects if as_json else watch)(hand)

@@ -81,7 +81,7 @@ async def _move(
     link: Link,
 ) -> None:
     from ..connect import connected
-    from ..tables import print_outcomes
+    from ..output.tables import print_outcomes
 
     async with connected(address, link, halt=True, keep_grip=keep) as hand:
         if not hand.is_activated:

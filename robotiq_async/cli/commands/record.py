@@ -16,7 +16,7 @@ from ...log import printable
 from ...telemetry.payloads import title
 from ..arguments import USUAL, Address, Flag, Link, need
 from ..failures import CommandError, UsageError
-from ..text import FORMATTERS, clock
+from ..output.text import FORMATTERS, clock
 
 if TYPE_CHECKING:
     from ...protocol import Hand

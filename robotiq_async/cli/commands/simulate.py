@@ -14,7 +14,7 @@ from ...telemetry.gate import is_loopback
 from ...wire.registers import RTU_REGISTERS
 from ..arguments import Byte, Flag, Host, Port, Unit
 from ..failures import usage
-from ..notices import tell
+from ..output.notices import tell
 
 if TYPE_CHECKING:
     from ...simulator import Trouble

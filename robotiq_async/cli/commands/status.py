@@ -29,7 +29,7 @@ async def status(
         as_json: Print one JSON object in place of the table.
     """
     from ..connect import connected
-    from ..tables import print_status
+    from ..output.tables import print_status
 
     async with connected(address, link, halt=False) as hand:
         if as_json:

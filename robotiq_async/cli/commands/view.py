@@ -13,7 +13,7 @@ from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...telemetry.gate import is_loopback
 from ..arguments import USUAL, Address, Byte, Flag, Host, Link, Port, need
 from ..failures import CommandError, UsageError
-from ..notices import tell
+from ..output.notices import tell
 
 
 async def view(
@@ -63,7 +63,7 @@ async def view(
     need("foxglove", "view")
     from ...telemetry.viewer import ORIGINS, Viewer
     from ..connect import make_operator, operated
-    from ..log_capture import forwarded_warnings
+    from ..output.log_capture import forwarded_warnings
 
     if not is_loopback(host):
         if control:

@@ -17,7 +17,7 @@ from ...telemetry.payloads import title
 from ..arguments import USUAL, Address, Byte, Flag, Host, Link, Port, need
 from ..browser import opened
 from ..failures import CommandError, UsageError, usage
-from ..notices import tell
+from ..output.notices import tell
 
 if TYPE_CHECKING:
     from ...web.news import HandNews
@@ -72,7 +72,7 @@ async def web(
     from ...web.server import PageServer
     from ...web.settings import PageSettings
     from ..connect import make_operator
-    from ..log_capture import forwarded_warnings
+    from ..output.log_capture import forwarded_warnings
 
     operators = [make_operator(each, link, speed=speed, force=force) for each in addresses or ("sim://",)]
     with usage():

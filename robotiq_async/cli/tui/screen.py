@@ -21,7 +21,7 @@ from ...errors import RobotiqError
 from ...session.clock import now
 from ...telemetry.payloads import fault_fields, title
 from ...wire.status import RobotiqStatus
-from ..text import clock, event_line
+from ..output.text import clock, event_line
 from .widgets import Axes, Line, Question, link_text, state_text
 from .words import KEYS, refusal_words, transition_words
 

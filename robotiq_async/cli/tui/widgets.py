@@ -17,7 +17,7 @@ from ...enums import AXES, Fault, Finger, ObjectStatus, Severity, State
 from ...session.statistics import Statistics
 from ...telemetry.state_words import STATE_WORDS
 from ...wire.status import NO_REQUEST, RobotiqStatus
-from ..text import NOTHING
+from ..output.text import NOTHING
 from .words import HINTS
 
 HISTORY: Final = 60

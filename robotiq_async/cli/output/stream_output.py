@@ -9,19 +9,19 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Final
 
-from ..concurrency import in_a_thread
-from ..enums import Fault, State
-from ..session.clock import now
-from ..session.streams import Transition
-from ..telemetry.feed import compact
-from ..telemetry.payloads import Fields, fault_fields, transition_fields
-from ..telemetry.raw_output import write_all
-from ..wire.status import RobotiqStatus
+from ...concurrency import in_a_thread
+from ...enums import Fault, State
+from ...session.clock import now
+from ...session.streams import Transition
+from ...telemetry.feed import compact
+from ...telemetry.payloads import Fields, fault_fields, transition_fields
+from ...telemetry.raw_output import write_all
+from ...wire.status import RobotiqStatus
 from .log_capture import forwarded_warnings
 from .text import clock, event_line, status_line
 
 if TYPE_CHECKING:
-    from ..protocol import Hand
+    from ...protocol import Hand
 
 BUFFER: Final = 4000
 """Statuses kept for a slow reader: twenty seconds."""

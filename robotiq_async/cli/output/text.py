@@ -6,10 +6,10 @@ from collections.abc import Callable
 from datetime import datetime
 from typing import Final
 
-from ..control.triggers import Trigger
-from ..enums import AXES
-from ..telemetry.payloads import Fields
-from ..wire.status import NO_REQUEST
+from ...control.triggers import Trigger
+from ...enums import AXES
+from ...telemetry.payloads import Fields
+from ...wire.status import NO_REQUEST
 
 NOTHING: Final = "-"
 """Stands for what means nothing."""

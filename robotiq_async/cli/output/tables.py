@@ -9,12 +9,12 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from ..enums import AXES, Fault, Finger
+from ...enums import AXES, Fault, Finger
 from .text import axis_words
 
 if TYPE_CHECKING:
-    from .. import MoveResult, RobotiqStatus
-    from ..protocol import Hand
+    from ... import MoveResult, RobotiqStatus
+    from ...protocol import Hand
 
 
 def print_status(hand: Hand) -> None:
