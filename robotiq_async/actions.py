@@ -26,7 +26,7 @@ from .enums import (
 )
 from .errors import MoveSupersededError, NotStartedError
 from .protocol import Hand
-from .session.clock import now
+from .session.timing.clock import now
 from .wire.checks import check_byte
 
 CANCELS_RECOVERY: Final = frozenset({"halt", "reset", "release"})

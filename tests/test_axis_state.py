@@ -14,7 +14,7 @@ from robotiq_async.enums import AXES
 from robotiq_async.ros2.translation.diagnosis import diagnose, status_text
 from robotiq_async.telemetry.payloads import reading_fields
 from robotiq_async.web.page.mirror import HandMirror
-from robotiq_async.web.page.words import axis_words
+from robotiq_async.web.page.widgets.words import axis_words
 from tests.fake_hand import FakeHand
 from tests.register_words import status_of
 

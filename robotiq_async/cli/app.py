@@ -13,8 +13,8 @@ from .commands.demo import demo
 from .commands.doctor import doctor
 from .commands.fleet import fleet, halt
 from .commands.fleet_keys import keys as fleet_keys
-from .commands.measure_force import force as measure_force
-from .commands.measure_speed import speed as measure_speed
+from .commands.measure.force import force as measure_force
+from .commands.measure.speed import speed as measure_speed
 from .commands.monitor import monitor
 from .commands.move import move
 from .commands.record import plot, record, recover, replay

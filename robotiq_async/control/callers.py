@@ -9,7 +9,7 @@ from ..enums import NO_AXES, Finger
 from ..errors import MoveSupersededError, RobotiqError
 from ..wire.status import RobotiqStatus
 from .motion import LiveMoves
-from .pending import Command, PendingCommand
+from .requests.pending import Command, PendingCommand
 from .waiters import Waiter, resolve
 
 

@@ -25,11 +25,11 @@ from ..wire.request import Request
 from ..wire.status import RobotiqStatus
 from .callers import Callers
 from .grip_keeper import GripKeeper
-from .merging import merged
 from .motion import Move
-from .pending import Command
+from .requests.merging import merged
+from .requests.pending import Command
+from .requests.shadow import NEVER, RequestShadow
 from .sequences import Sequence, activation, automatic_release, reset, shutdown
-from .shadow import NEVER, RequestShadow
 from .state_machine import RUNNING, StateMachine
 from .triggers import Trigger, classify
 from .waiters import Waiter

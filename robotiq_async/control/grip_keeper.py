@@ -15,10 +15,10 @@ from ..enums import NO_AXES, Fault, Finger, State
 from ..log import Log, log
 from ..wire.request import Request
 from ..wire.status import RobotiqStatus
-from .merging import merged
-from .pending import PendingCommand
+from .requests.merging import merged
+from .requests.pending import PendingCommand
+from .requests.shadow import RequestShadow
 from .sequences import Sequence, stop_fingers
-from .shadow import RequestShadow
 from .state_machine import RUNNING
 from .triggers import Trigger, classify
 

@@ -16,8 +16,8 @@ from ..enums import Fault, Severity
 from ..errors import GripperFaultError, NotActivatedError
 from ..wire.request import Request
 from ..wire.status import RobotiqStatus
+from .requests.writes import WINDOW_S
 from .triggers import Trigger, classify
-from .writes import WINDOW_S
 
 Sequence = Generator[Request | None, RobotiqStatus, None]
 """Yields what to write now, is sent the next status that counts."""

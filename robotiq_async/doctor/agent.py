@@ -14,8 +14,8 @@ from ..fleet.wire.envelope import Call, unpack_answer
 from ..fleet.wire.names import GripperName
 from ..fleet.wire.status_message import StatusMessage, unpack
 from ..fleet.wire.values import Fields
-from ..session.clock import now
 from ..session.statistics import percentile
+from ..session.timing.clock import now
 from ..version import __version__
 from ..wire.status import RobotiqStatus
 from .findings import Finding, GiveUpError, Level, Report

@@ -10,10 +10,10 @@ from typing import Any, Final, Self
 
 from ..enums import Fault, State
 from ..errors import NotAllStoppedError, ProtocolError
-from ..session.clock import now
-from ..session.event_loop import running_loop
 from ..session.listeners import Listeners
 from ..session.streams import Channel, Stream
+from ..session.timing.clock import now
+from ..session.timing.event_loop import running_loop
 from .halting import STOPPED, halt
 from .limited_log import LimitedLog
 from .network.bus import Bus, Undo

@@ -6,7 +6,7 @@ import math
 from typing import Final
 
 from ..log import Log, log
-from ..session.clock import now
+from ..session.timing.clock import now
 
 EVERY_S: Final = 10.0
 

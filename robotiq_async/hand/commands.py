@@ -7,13 +7,13 @@ import asyncio
 import anyio
 
 from ..control.motion import Move, MoveResult
-from ..control.pending import Command
+from ..control.requests.pending import Command
 from ..control.state_machine import SEQUENCES
 from ..control.triggers import Trigger
 from ..enums import CLOSED, OPEN, Finger
 from ..errors import MoveTimeoutError
 from ..grasping import GraspResult, check_at_least
-from ..session.clock import now
+from ..session.timing.clock import now
 from ..wire.checks import check_byte, check_mask, check_optional_byte, check_timeout
 from .naming import tells_its_hand
 from .recovery import Recovery

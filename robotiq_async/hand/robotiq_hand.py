@@ -9,7 +9,6 @@ from ..calibration import ForceCalibration, SpeedCalibration
 from ..control.state_machine import StateMachine
 from ..enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..link.transport import Transport
-from ..session.event_loop import running_loop
 from ..session.options import (
     ACTIVATION_TIMEOUT_S,
     CONNECT_TIMEOUT_S,
@@ -20,6 +19,7 @@ from ..session.options import (
 from ..session.reconnecting import ReconnectPolicy
 from ..session.session import Session
 from ..session.streams import Channels
+from ..session.timing.event_loop import running_loop
 from ..wire.checks import check_flag
 from .commands import Commands
 from .naming import tells_its_hand

@@ -30,7 +30,7 @@ from ..calibration.csv_tables import (
 from ..enums import Finger
 from ..errors import MeasuringError
 from ..protocol import Hand
-from ..session.clock import now
+from ..session.timing.clock import now
 
 REST_S: Final = 0.3
 """Between two runs, in the gripper's time: a finger that has just stopped may still swing."""

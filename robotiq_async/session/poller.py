@@ -32,7 +32,7 @@ from .options import Options
 from .reconnecting import Backoff
 from .statistics import Counters
 from .streams import Channels, SentRequest
-from .tick import Tick
+from .timing.tick import Tick
 
 # anyio loads its backend when it is first used: some 20 ms that would hold up the loop in which a hand
 # starts. Where it keeps it is not documented; a name that has changed costs those 20 ms and nothing else.

@@ -27,13 +27,13 @@ from ..errors import (
 )
 from ..wire.status import RobotiqStatus
 from .claims import Claims
-from .clock import now
-from .event_loop import check_loop
 from .options import Options
 from .poller import Poller
 from .state_waiters import StateWaiters
 from .statistics import Counters
 from .streams import Channels, Transition
+from .timing.clock import now
+from .timing.event_loop import check_loop
 
 T = TypeVar("T")
 Failing = Mapping[State, Callable[[], RobotiqError]]

@@ -21,8 +21,8 @@ from ..errors import RobotiqError
 from ..log import Log, log
 from ..wire.request import Request
 from ..wire.status import RobotiqStatus
-from .event_loop import check_loop
 from .listeners import Listeners
+from .timing.event_loop import check_loop
 
 T = TypeVar("T")
 U = TypeVar("U")

@@ -18,8 +18,8 @@ from ..errors import RobotiqConnectionError
 from ..kinematics import joint_angles, joint_velocities
 from ..log import Log
 from ..protocol import Hand, HandStream
-from ..session.clock import now
 from ..session.streams import SentRequest, Transition
+from ..session.timing.clock import now
 from ..wire.status import RobotiqStatus
 from .joint_states import SCHEMA, SCHEMA_NAME, JointStateEncoder
 from .payloads import (

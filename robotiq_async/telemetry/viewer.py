@@ -36,7 +36,7 @@ from ..enums import State
 from ..errors import ViewerError
 from ..log import log
 from ..protocol import Hand
-from ..session.clock import now
+from ..session.timing.clock import now
 from ..wire.checks import check_int
 from .feed import EVENT, JOINTS, TOPICS, Feed, Message, Topic, compact, json_topic
 from .gate import Gate, hidden_address

@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from ..hand import RobotiqHand
-from ..session.event_loop import running_loop
+from ..session.timing.event_loop import running_loop
 from ..simulator import SimulatedGripper, SimulatorServer
 
 

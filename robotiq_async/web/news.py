@@ -10,8 +10,8 @@ from typing import Final
 from ..enums import AXES, Fault, State
 from ..errors import NotStartedError
 from ..protocol import Hand, HandStream
-from ..session.clock import now
 from ..session.streams import Transition
+from ..session.timing.clock import now
 from ..telemetry.payloads import Fields, fault_fields, transition_fields
 from ..wire.status import RobotiqStatus
 

@@ -24,7 +24,7 @@ from ..concurrency import wait_shielded
 from ..errors import ViewerError
 from ..log import log
 from ..protocol import Hand
-from ..session.clock import now
+from ..session.timing.clock import now
 from ..telemetry.payloads import Fields
 from .commands import PageCommands
 from .news import HandNews

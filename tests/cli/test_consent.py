@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from robotiq_async.cli.app import COMMANDS
-from robotiq_async.cli.commands.measure_force import force
-from robotiq_async.cli.commands.measure_speed import speed
+from robotiq_async.cli.commands.measure.force import force
+from robotiq_async.cli.commands.measure.speed import speed
 from robotiq_async.simulator import SimulatorServer
 from tests.cli.terminal import ROOT, Terminal
 

@@ -15,8 +15,8 @@ from robotiq_async.cli import main
 from robotiq_async.cli.app import COMMANDS as FUNCTIONS
 from robotiq_async.cli.commands.fleet import fleet, halt
 from robotiq_async.cli.commands.fleet_keys import keys
-from robotiq_async.cli.commands.measure_force import force
-from robotiq_async.cli.commands.measure_speed import speed
+from robotiq_async.cli.commands.measure.force import force
+from robotiq_async.cli.commands.measure.speed import speed
 from robotiq_async.cli.output.reflow import reflow
 
 if TYPE_CHECKING:

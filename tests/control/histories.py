@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from robotiq_async.control.shadow import RequestShadow
-from robotiq_async.control.writes import WriteHistory
+from robotiq_async.control.requests.shadow import RequestShadow
+from robotiq_async.control.requests.writes import WriteHistory
 from robotiq_async.enums import Finger
 from robotiq_async.wire.request import AxisRequest, Request
 from robotiq_async.wire.status import RobotiqStatus

@@ -8,7 +8,7 @@ from robotiq_async import Finger, MoveResult, RobotiqStatus, State
 from robotiq_async.calibration.closing_time import closing_time
 from robotiq_async.control.controller import Controller
 from robotiq_async.control.motion import Move
-from robotiq_async.control.pending import Command
+from robotiq_async.control.requests.pending import Command
 from robotiq_async.control.state_machine import StateMachine
 from robotiq_async.control.triggers import Trigger
 from robotiq_async.enums import AXES

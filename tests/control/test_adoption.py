@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.control.adoption import DIRECTION_WAIT_S, Adoption
+from robotiq_async.control.requests.adoption import DIRECTION_WAIT_S, Adoption
 from robotiq_async.enums import AXES, Finger, Mode, ObjectStatus
 from robotiq_async.wire.request import AxisRequest, Request
 from robotiq_async.wire.status import RobotiqStatus

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.control.merging import merged
-from robotiq_async.control.pending import Command, PendingCommand
+from robotiq_async.control.requests.merging import merged
+from robotiq_async.control.requests.pending import Command, PendingCommand
 from robotiq_async.enums import AXES, NO_AXES, Finger, Mode
 from robotiq_async.errors import MoveSupersededError
 from robotiq_async.wire.request import AxisRequest, Request

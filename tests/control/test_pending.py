@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.control.pending import Command, PendingCommand
+from robotiq_async.control.requests.pending import Command, PendingCommand
 from robotiq_async.enums import AXES, Finger
 from robotiq_async.errors import ConnectionLostError, MoveSupersededError
 from tests.control.outcome import Outcome

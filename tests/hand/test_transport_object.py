@@ -19,7 +19,7 @@ from robotiq_async import (
     State,
     Transport,
 )
-from robotiq_async.session.clock import now
+from robotiq_async.session.timing.clock import now
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.wire.registers import Registers
 from robotiq_async.wire.request import Request

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from robotiq_async.link.worker import LateError, Worker
-from robotiq_async.session.clock import now
+from robotiq_async.session.timing.clock import now
 from tests.virtual import run
 
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import pytest
 
-from robotiq_async.control.pending import Command
+from robotiq_async.control.requests.pending import Command
 from robotiq_async.control.triggers import Trigger
 from robotiq_async.enums import Finger, State
 from robotiq_async.errors import (

@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from robotiq_async.control.pending import Command
+from robotiq_async.control.requests.pending import Command
 from robotiq_async.enums import Finger, State
 from robotiq_async.errors import NotStartedError
 from robotiq_async.session.poller import SHUTDOWN_S

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import pytest
 
-from robotiq_async.control.pending import Command
+from robotiq_async.control.requests.pending import Command
 from robotiq_async.control.triggers import Trigger
 from robotiq_async.enums import Finger, State
 from robotiq_async.errors import (

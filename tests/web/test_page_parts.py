@@ -20,9 +20,9 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.web.commands import FRESH_S, MAX_COMMANDS, PageCommands
 from robotiq_async.web.news import HandNews
 from robotiq_async.web.page.heartbeat import LOST_S, Heartbeat
-from robotiq_async.web.page.held import held, pads
 from robotiq_async.web.page.mirror import HISTORY_S, Mirror
-from robotiq_async.web.page.words import event_words, fault_words, state_words
+from robotiq_async.web.page.widgets.held import held, pads
+from robotiq_async.web.page.widgets.words import event_words, fault_words, state_words
 from robotiq_async.web.server import PageServer
 from robotiq_async.web.settings import PageSettings
 from tests.fake_hand import FakeHand

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ...log import printable
-from ...session.clock import now
+from ...session.timing.clock import now
 from ..arguments import Flag, need
 from ..failures import CommandError, usage
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Final
 
 from ...concurrency import in_a_thread
 from ...enums import Fault, State
-from ...session.clock import now
 from ...session.streams import Transition
+from ...session.timing.clock import now
 from ...telemetry.feed import compact
 from ...telemetry.payloads import Fields, fault_fields, transition_fields
 from ...telemetry.raw_output import write_all

@@ -18,7 +18,7 @@ from textual.worker import Worker
 from ...actions import ACTIONS, Operator
 from ...enums import AXES, Fault, State
 from ...errors import RobotiqError
-from ...session.clock import now
+from ...session.timing.clock import now
 from ...telemetry.payloads import fault_fields, title
 from ...wire.status import RobotiqStatus
 from ..output.text import clock, event_line

@@ -11,7 +11,7 @@ from typing import Final
 from ...errors import AgentError
 from ...hand import RobotiqHand
 from ...log import Log
-from ...session.clock import now
+from ...session.timing.clock import now
 from ..control.lease import WINDOW_S
 from ..limited_log import LimitedLog
 from ..network.bus import Bus, Query, Undo

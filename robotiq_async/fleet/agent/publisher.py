@@ -13,8 +13,8 @@ from typing import Any, Final
 
 from ...errors import RobotiqError
 from ...hand import RobotiqHand
-from ...session.clock import now
 from ...session.streams import SentRequest, Transition
+from ...session.timing.clock import now
 from ...wire.status import RobotiqStatus
 from ..control.lease import Lease
 from ..network.bus import Bus, Urgency

@@ -16,7 +16,7 @@ from ...enums import Finger
 from ...errors import AgentError, ControlLostError, RobotiqConnectionError, RobotiqError
 from ...hand import RobotiqHand
 from ...log import Log
-from ...session.clock import now
+from ...session.timing.clock import now
 from ...version import __version__
 from ...wire.checks import check_byte, check_mask
 from ..control.admission import Admission

@@ -8,7 +8,7 @@ from typing import Any, Final, Protocol
 
 from ...errors import ControlLostError, RobotiqError
 from ...log import Log
-from ...session.clock import now
+from ...session.timing.clock import now
 from ..wire.envelope import Call
 from ..wire.names import GripperName
 from ..wire.values import Fields, reading

@@ -9,10 +9,10 @@ from ...calibration import Units
 from ...enums import Finger, State
 from ...errors import ConnectionLostError, NotStartedError, StateTimeoutError
 from ...grasping import SLIP_COUNTS, GripEvent, GripWatch
-from ...session.event_loop import check_loop
 from ...session.state_waiters import check_states
 from ...session.statistics import Counters, Statistics
 from ...session.streams import Channel, Channels, SentRequest, Stream, Transition
+from ...session.timing.event_loop import check_loop
 from ...wire.checks import check_int, check_timeout
 from ...wire.status import RobotiqStatus
 from ..wire.names import GripperName

@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any, Final, TypeVar
 
 from ...errors import AgentError, NotAllowedError, ProtocolError
-from ...session.clock import now
+from ...session.timing.clock import now
 from .requests import NoAnswerError
 
 HALT_S: Final = 2.0

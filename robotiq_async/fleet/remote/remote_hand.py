@@ -9,9 +9,9 @@ from ...calibration import ForceCalibration, SpeedCalibration
 from ...enums import State
 from ...errors import InvalidStateError, NotStartedError
 from ...log import Log
-from ...session.event_loop import running_loop
 from ...session.options import check_units
 from ...session.streams import Channels
+from ...session.timing.event_loop import running_loop
 from ...wire.checks import check_flag, check_seconds
 from ..network.bus import Bus
 from ..network.route import parse_remote_address

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from ...errors import AgentError, ConnectionLostError, NotAllowedError, RobotiqError
-from ...session.clock import now
+from ...session.timing.clock import now
 from ..network.bus import Bus, Reply, Urgency
 from ..wire.envelope import Answer, Call, unpack_answer
 from ..wire.names import GripperName

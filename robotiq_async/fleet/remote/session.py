@@ -22,11 +22,11 @@ from ...errors import (
     RobotiqError,
 )
 from ...log import Log
-from ...session.clock import now
-from ...session.event_loop import check_loop
 from ...session.state_waiters import StateWaiters
 from ...session.statistics import Counters, Statistics
 from ...session.streams import Channels
+from ...session.timing.clock import now
+from ...session.timing.event_loop import check_loop
 from ...wire.checks import check_seconds
 from ..control.lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
 from ..limited_log import LimitedLog

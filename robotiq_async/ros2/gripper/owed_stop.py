@@ -16,7 +16,7 @@ from ...errors import (
 )
 from ...log import Log
 from ...protocol import Hand
-from ...session.clock import now
+from ...session.timing.clock import now
 
 OWED_S: Final = 60.0
 """Later nothing can move any more that was moving when the link was lost: the longest is a release."""

@@ -14,7 +14,7 @@ from rclpy.clock import Clock, ROSClock
 from sensor_msgs.msg import JointState
 
 from ...kinematics import JOINTS
-from ...session.clock import now
+from ...session.timing.clock import now
 from ...telemetry.joint_states import JointStateEncoder
 from ...wire.status import RobotiqStatus
 from ..translation.diagnosis import Diagnosis

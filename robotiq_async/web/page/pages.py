@@ -8,12 +8,12 @@ from typing import Final
 
 from nicegui import Client, ui
 
-from .controls import Controls
 from .heartbeat import BEAT_MS, SCRIPT, Heartbeat
 from .mirror import HandMirror, Mirror
-from .panels import AxesPanel, Curves, Events, StatePanel, StatisticsPanel
-from .scene import HandScene
-from .words import timed
+from .widgets.controls import Controls
+from .widgets.panels import AxesPanel, Curves, Events, StatePanel, StatisticsPanel
+from .widgets.scene import HandScene
+from .widgets.words import timed
 
 REFRESH_S: Final = 0.05
 STAGE: Final = "h-[36vh] lg:h-[calc(100vh-13rem)] lg:sticky lg:top-16 min-h-[250px]"

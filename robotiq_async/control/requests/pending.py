@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from functools import reduce
 from operator import or_
 
-from ..enums import AXES, NO_AXES, Finger
-from ..errors import RobotiqError
-from .waiters import Waiter, fail
+from ...enums import AXES, NO_AXES, Finger
+from ...errors import RobotiqError
+from ..waiters import Waiter, fail
 
 
 @dataclass(frozen=True, slots=True)

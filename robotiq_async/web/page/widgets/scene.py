@@ -9,13 +9,13 @@ from typing import Any, Final
 from nicegui import ui
 from nicegui.elements.scene.scene_object3d import Object3D
 
-from ...description import HandModel, Pose, Shape, hand_model
-from ...description.geometry import turned
-from ...enums import AXES, Finger, ObjectStatus
-from ...kinematics import JOINTS, PREFIX, finger_angles, palm_angle
-from ...wire.status import RobotiqStatus
+from ....description import HandModel, Pose, Shape, hand_model
+from ....description.geometry import turned
+from ....enums import AXES, Finger, ObjectStatus
+from ....kinematics import JOINTS, PREFIX, finger_angles, palm_angle
+from ....wire.status import RobotiqStatus
+from ..mirror import HandMirror
 from .held import held, pads
-from .mirror import HandMirror
 from .words import COLORS
 
 SCALE: Final = 10.0

@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from ..enums import AXES, CLOSED, OPEN, Finger, ObjectStatus
-from ..wire.request import AxisRequest, Request
-from ..wire.status import RobotiqStatus
-from .contact import agrees
+from ...enums import AXES, CLOSED, OPEN, Finger, ObjectStatus
+from ...wire.request import AxisRequest, Request
+from ...wire.status import RobotiqStatus
+from ..contact import agrees
 
 DIRECTION_WAIT_S: Final = 0.1
 """How long a moving axis is watched for its direction: at the slowest speed a count takes 43 ms

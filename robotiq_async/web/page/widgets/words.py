@@ -6,10 +6,10 @@ from datetime import datetime
 from time import time
 from typing import Any, Final
 
-from ...enums import AXES, Fault, Finger, ObjectStatus, Severity, State
-from ...telemetry.state_words import STATE_WORDS
-from ...wire.status import NO_REQUEST
-from .mirror import HandMirror
+from ....enums import AXES, Fault, Finger, ObjectStatus, Severity, State
+from ....telemetry.state_words import STATE_WORDS
+from ....wire.status import NO_REQUEST
+from ..mirror import HandMirror
 
 NAMES: Final = tuple("scissor" if axis is Finger.SCISSOR else str(axis.name) for axis in AXES)
 COLORS: Final = ("#3b82f6", "#22a35a", "#e8890c", "#a855f7")

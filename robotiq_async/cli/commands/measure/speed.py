@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ...enums import Finger
-from ..addresses import full_address
-from ..arguments import Address, Fingers, Yes
-from ..consent import consent
-from ..failures import UsageError
-from .measure import NoPlot, Runs, Speedup, carry_out, check, gripper, load_rich, refused, told
+from ....enums import Finger
+from ...addresses import full_address
+from ...arguments import Address, Fingers, Yes
+from ...consent import consent
+from ...failures import UsageError
+from .campaign import NoPlot, Runs, Speedup, carry_out, check, gripper, load_rich, refused, told
 
 if TYPE_CHECKING:
-    from ...measure.campaigns import Campaign
+    from ....measure.campaigns import Campaign
 
 WARNING = """the fingers MOVE: they open and close fully, {count} times. Nothing may be between them.
 If it is not active yet it is activated first, and what it holds drops."""
@@ -59,7 +59,7 @@ def speed(
     if Finger.SCISSOR in fingers:
         raise UsageError("--fingers takes A, B and C only: the scissor has a different stroke")
     factor = check(address, output, speedup, runs, step, not no_plot)
-    from ...measure.campaigns import speed_campaign
+    from ....measure.campaigns import speed_campaign
 
     with refused():
         origin = {"gripper": full_address(address), "fingers": str(fingers.name)}
@@ -70,7 +70,7 @@ def speed(
 
 
 async def _measure(address: str, campaign: Campaign, fingers: Finger, speedup: float, plot: bool) -> None:
-    from ...measure.campaigns import expected_seconds, time_closing
+    from ....measure.campaigns import expected_seconds, time_closing
 
     output = campaign.path
     if not campaign.left:
@@ -85,7 +85,7 @@ async def _measure(address: str, campaign: Campaign, fingers: Finger, speedup: f
             await carry_out(campaign, run, lambda value: expected_seconds(value) / speedup, "speed")
     told([output])
     if plot:
-        from ...measure.plots import plot_speed
+        from ....measure.plots import plot_speed
 
         label = "simulated" if address.startswith("sim:") else "measured"
         with refused():

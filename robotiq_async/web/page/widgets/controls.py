@@ -8,10 +8,10 @@ from typing import Any, Final
 
 from nicegui import events, ui
 
-from ...actions import ACTIONS, Action
-from ...enums import FORCE_MAX, SPEED_MAX
-from .heartbeat import PRESS, PRESS_WITH_VALUE, Heartbeat
-from .mirror import HandMirror, Mirror
+from ....actions import ACTIONS, Action
+from ....enums import FORCE_MAX, SPEED_MAX
+from ..heartbeat import PRESS, PRESS_WITH_VALUE, Heartbeat
+from ..mirror import HandMirror, Mirror
 
 ARMED_S: Final = 0.3
 """A question takes no yes before: nobody has read it."""

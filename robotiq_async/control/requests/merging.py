@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..enums import AXES, Finger
-from ..wire.request import AxisRequest, Request
-from ..wire.status import RobotiqStatus
-from .contact import drifts
+from ...enums import AXES, Finger
+from ...wire.request import AxisRequest, Request
+from ...wire.status import RobotiqStatus
+from ..contact import drifts
 from .pending import PendingCommand
 
 

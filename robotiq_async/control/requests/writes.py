@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
-from ..wire.registers import Echo
-from ..wire.request import Request
-from ..wire.status import RobotiqStatus
+from ...wire.registers import Echo
+from ...wire.request import Request
+from ...wire.status import RobotiqStatus
 
 WINDOW_S: Final = 0.5
 """How long after its acknowledgement a write may still be about to show; the slowest device cycle that is

@@ -8,8 +8,8 @@ from typing import Any, Final
 
 from nicegui import ui
 
-from ...enums import AXES
-from .mirror import HISTORY_S, HandMirror
+from ....enums import AXES
+from ..mirror import HISTORY_S, HandMirror
 from .words import COLORS, NAMES, axis_words, event_words, fault_words, state_words, timed
 
 CURVES_S: Final = 0.5

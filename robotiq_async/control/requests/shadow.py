@@ -12,12 +12,12 @@ from functools import reduce
 from operator import or_
 from typing import Final
 
-from ..enums import AXES, NO_AXES, Finger, ObjectStatus
-from ..wire.request import AxisRequest, Request
-from ..wire.status import RobotiqStatus
+from ...enums import AXES, NO_AXES, Finger, ObjectStatus
+from ...wire.request import AxisRequest, Request
+from ...wire.status import RobotiqStatus
+from ..contact import TOLERANCE, agrees
+from ..triggers import Trigger, classify
 from .adoption import Adoption
-from .contact import TOLERANCE, agrees
-from .triggers import Trigger, classify
 from .writes import SILENT_S, WINDOW_S, WriteHistory
 
 NEVER: Final = float("-inf")

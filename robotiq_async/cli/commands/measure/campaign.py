@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ...errors import MeasuringError
-from ..addresses import full_address, is_simulated
-from ..arguments import Flag, need
-from ..consent import read_line
-from ..failures import CommandError, UsageError
+from ....errors import MeasuringError
+from ...addresses import full_address, is_simulated
+from ...arguments import Flag, need
+from ...consent import read_line
+from ...failures import CommandError, UsageError
 
 if TYPE_CHECKING:
-    from ...measure.campaigns import Campaign
-    from ...protocol import Hand
-    from ...simulator import SimulatedGripper
+    from ....measure.campaigns import Campaign
+    from ....protocol import Hand
+    from ....simulator import SimulatedGripper
 
 SPEEDUP = 15.0
 """How much faster than real time the simulated gripper of sim:// runs by default."""
@@ -69,13 +69,13 @@ async def gripper(
     Raises:
         RobotiqError: no gripper there, or it cannot be activated.
     """
-    from ..connect import make_hand
+    from ...connect import make_hand
 
     if not address.startswith("sim:"):
         async with make_hand(address) as hand:
             yield hand
         return
-    from ...simulator import SimulatedGripper, SimulatorServer
+    from ....simulator import SimulatedGripper, SimulatorServer
 
     simulated = SimulatedGripper(speedup=speedup)
     interval = POLL_S if speedup > 1 else 5 * POLL_S
@@ -110,7 +110,7 @@ async def carry_out(
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-    from ...calibration.csv_tables import TableError
+    from ....calibration.csv_tables import TableError
 
     done, left = len(campaign.table), campaign.left
     if done and left:
@@ -184,7 +184,7 @@ def refused() -> Iterator[None]:
     Raises:
         CommandError: in place of TableError and OSError.
     """
-    from ...calibration.csv_tables import TableError
+    from ....calibration.csv_tables import TableError
 
     try:
         yield

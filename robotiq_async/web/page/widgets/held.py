@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from math import dist
 from typing import Final
 
-from ...description import HandModel, Pose
-from ...description.geometry import Vector
-from ...enums import Finger
-from ...kinematics import PREFIX
+from ....description import HandModel, Pose
+from ....description.geometry import Vector
+from ....enums import Finger
+from ....kinematics import PREFIX
 
 ALONE_M: Final = 0.02
 """How far something reaches from a finger that nobody helps to hold it."""

@@ -1,0 +1,1 @@
+"""``robotiq-async measure speed`` and ``measure force``."""

@@ -1,0 +1,1 @@
+"""When polls are due, and by which clock."""
