@@ -10,10 +10,8 @@ from robotiq_async import (
     Fault,
     Finger,
     GripperFaultError,
-    InvalidStateError,
     RobotiqHand,
     State,
-    StateTimeoutError,
 )
 from robotiq_async.simulator import SimulatorServer
 from tests.hand.watching import settled, until_moving
@@ -21,27 +19,6 @@ from tests.hand.watching import settled, until_moving
 pytestmark = pytest.mark.virtual_time
 
 A = Finger.A
-
-
-async def test_release_reset_activate(hand: RobotiqHand, server: SimulatorServer) -> None:
-    with pytest.raises(InvalidStateError) as caught:
-        await hand.atr()
-    assert caught.value.allowed == {State.FAULT}
-    server.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
-    await hand.wait_for_state(State.FAULT)
-    with pytest.raises(GripperFaultError) as fault:
-        await hand.activate()
-    assert fault.value.fault is Fault.SCISSOR_BLOCKED
-    await hand.atr()
-    assert hand.state is State.ATR_DONE
-    with pytest.raises(GripperFaultError):
-        await hand.set_position(3)
-    await hand.reset()
-    assert hand.state is State.RESET
-    assert hand.is_reset
-    await hand.activate()
-    await hand.activate()
-    assert hand.state is State.RUNNING_IDLE
 
 
 @pytest.mark.parametrize("fault", [Fault.SCISSOR_BLOCKED, Fault.ACTIVATION_FAULT, 0x0C])
@@ -69,19 +46,6 @@ async def test_recover_from_a_release(hand: RobotiqHand, server: SimulatorServer
     await hand.wait_for_state(State.FAULT)
     await hand.recover()
     assert hand.state is State.RUNNING_IDLE
-
-
-async def test_recover_gives_up_in_time(hand: RobotiqHand, server: SimulatorServer) -> None:
-    server.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
-    await hand.wait_for_state(State.FAULT)
-    with pytest.raises(StateTimeoutError):
-        await hand.recover(timeout=0.1)
-
-
-async def test_recover_while_running_does_nothing(hand: RobotiqHand, server: SimulatorServer) -> None:
-    writes = len(server.gripper.writes)
-    await hand.recover()
-    assert len(server.gripper.writes) == writes
 
 
 async def test_activation_fault_of_its_own_fails_the_start(server: SimulatorServer) -> None:

@@ -26,12 +26,6 @@ pytestmark = pytest.mark.virtual_time
 A, B, C, S = AXES
 
 
-async def test_set_position_returns_when_acknowledged(hand: RobotiqHand, server: SimulatorServer) -> None:
-    await hand.set_position(200, A)
-    assert last_write(server).position(A) == 200
-    assert hand.is_moving
-
-
 async def test_set_speed_and_force(hand: RobotiqHand, server: SimulatorServer) -> None:
     await hand.set_speed(7, A | S)
     await hand.set_force(9, B)

@@ -131,7 +131,7 @@ async def test_an_activation_that_takes_too_long_fails_the_start_and_is_taken_ba
         assert not last_write(server).activate
 
 
-async def test_nobody_there() -> None:
+async def test_a_start_that_finds_nobody_names_the_address() -> None:
     server = SimulatorServer()
     await server.start()
     address = server.address
