@@ -1,4 +1,4 @@
-"""Requests that a client of ours would not send: each is answered, and none of them moves a finger."""
+"""Malformed requests: each is answered with an error, and none of them moves a finger."""
 
 from __future__ import annotations
 
