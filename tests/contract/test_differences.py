@@ -149,14 +149,14 @@ async def silent_state(here: Bench) -> str:
 
 async def back_again(here: Bench) -> str:
     async with here.make() as hand:
-        lease = here.lab and here.lab.agent.hands["left"]._lease.number
+        lease = here.lab and here.lab.lease
         await network_down(here, 3.0)
         await hand.wait_for_state(State.RUNNING_IDLE)
         if isinstance(hand, RemoteHand):
             await until(lambda: hand.is_in_control)
         word = await outcome(hand.set_speed(7), "done")
         assert here.last_write.axes[0].speed == 7
-        if here.lab is not None and here.lab.agent.hands["left"]._lease.number != lease:
+        if here.lab is not None and here.lab.lease != lease:
             word += ", under a new lease"
         return word
 

@@ -11,6 +11,7 @@ from typing import Any
 from robotiq_async import RobotiqHand
 from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
+from robotiq_async.fleet.wire import status_message
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.wire.request import AxisRequest, Request
 from tests.fleet.network import MemoryBus, Network
@@ -41,6 +42,11 @@ class Lab:
     def client_over(self, bus: Any, **options: Any) -> RemoteHand:
         """The same, over a bus of the test's own."""
         return RemoteHand("zenoh://lab/cell/left", bus=bus, **options)
+
+    @property
+    def lease(self) -> int:
+        """The number of the lease, as every status of the agent tells it."""
+        return status_message.unpack(self.agent.hands["left"].news.status_message()).lease
 
     async def end_agent(self) -> None:
         self.serving.cancel()

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robotiq_async.fleet.fleet import Fleet
 from robotiq_async.fleet.wire.names import ROOT, GripperName, check_name
 
 GOOD = st.from_regex(r"[A-Za-z0-9_.-]{1,64}", fullmatch=True)
@@ -109,3 +110,11 @@ def test_what_is_no_key(key: str) -> None:
 def test_different_grippers_have_different_marks() -> None:
     names = [GripperName("lab", f"cell{host}", f"g{gripper}") for host in range(20) for gripper in range(50)]
     assert len({name.mark for name in names}) == len(names)
+
+
+@pytest.mark.parametrize("name", ["*", "**", "a*", "$*", "a/b", "?", "#", "", "a" * 65, "ä"])
+def test_names_with_wildcards_are_none(name: str) -> None:
+    with pytest.raises(ValueError, match=r"1\.\.64"):
+        GripperName("lab", "cell", name)
+    with pytest.raises(ValueError, match=r"1\.\.64"):
+        Fleet(name)

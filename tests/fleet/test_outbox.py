@@ -168,7 +168,7 @@ async def test_two_first_commands_at_once_share_one_lease() -> None:
             hand.set_speed(3), hand.set_force(4), hand.move(30, A), return_exceptions=True
         )
         assert [each for each in results if isinstance(each, BaseException)] == []
-        assert here.agent.hands["left"]._lease.number == 1
+        assert here.lease == 1
 
 
 @virtual
@@ -179,7 +179,7 @@ async def test_asking_for_the_lease_again_holds_nothing() -> None:
         await hand.acquire()
         await hand.take()
         assert abs((await moving).positions[A] - 60) <= 2
-        assert here.agent.hands["left"]._lease.number == 1
+        assert here.lease == 1
 
 
 @virtual

@@ -20,6 +20,7 @@ from robotiq_async.fleet.wire.envelope import Answer, Call, failure
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.fleet.lab import SPEEDUP, Lab, activate_beforehand, lab
+from tests.fleet.world import ServingAgent, world
 from tests.virtual import virtual
 
 LEFT = GripperName("lab", "cell", "left")
@@ -207,3 +208,26 @@ async def test_without_one_that_decides_it_is_the_last() -> None:
     nobody = PendingQuery(is_any)
     nobody.end()
     assert await nobody.answered is None
+
+
+@virtual
+async def test_of_two_agents_that_start_at_once_one_stays() -> None:
+    async with world() as here:
+        await here.agent.end()
+        here.agents.clear()
+        here.network.part("one", "two")  # a router that has not told yet
+        here.network.loop.call_later(0.4, here.network.join, "one", "two")
+
+        async def start(name: str) -> str:
+            agent = ServingAgent(here, name, {})
+            try:
+                await agent.start()
+            except TimeoutError:
+                assert agent.serving is not None
+                assert isinstance(agent.serving.exception(), AgentError)
+                await agent.host.bury()
+                return "gave up"
+            here.agents.append(agent)
+            return "serves"
+
+        assert sorted(await asyncio.gather(start("one"), start("two"))) == ["gave up", "serves"]

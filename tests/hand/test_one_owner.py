@@ -1,16 +1,29 @@
-"""Promise 8: one hand owns a gripper in this process, however its address is written."""
+"""One hand owns a gripper in this process, however its address is written; another client is noticed."""
 
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
 
-from robotiq_async import ConnectFailedError, Finger, InvalidStateError, RobotiqHand, State
+from robotiq_async import (
+    ConnectFailedError,
+    Fault,
+    Finger,
+    InvalidStateError,
+    MoveSupersededError,
+    RobotiqHand,
+    State,
+)
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
+from robotiq_async.wire.request import AxisRequest, Request
+from tests.hand.watching import settled, until_moving
 from tests.serial_line import SerialLine
+
+A = Finger.A
 
 
 class Gateway:
@@ -125,3 +138,42 @@ async def test_a_gripper_is_free_again_after_stop_and_after_a_failed_start(serve
     await server.start()
     await first.start()
     await first.stop()
+
+
+@pytest.mark.virtual_time
+async def test_two_hands_on_one_address(hand: RobotiqHand, server: SimulatorServer) -> None:
+    for spelled in (server.address, server.address.removeprefix("tcp://"), f"localhost:{server.port}"):
+        other = RobotiqHand(spelled)
+        with pytest.raises(InvalidStateError):
+            await other.start()
+    await hand.stop()
+    async with RobotiqHand(server.address):
+        pass
+
+
+async def test_another_client_is_noticed(
+    hand: RobotiqHand, server: SimulatorServer, caplog: pytest.LogCaptureFixture
+) -> None:
+    moving = asyncio.create_task(hand.move(255, speed=0))
+    await until_moving(server, hand)
+    image = Request(activate=True, go=True, axes=(AxisRequest(10, 255, 100),) * 4)
+    with caplog.at_level(logging.WARNING, logger="robotiq_async"):
+        server.gripper.write(0, image.registers)
+        with pytest.raises(MoveSupersededError):
+            await moving
+    assert hand.statistics.foreign_commands == 1
+    assert "another client" in caplog.text
+    await settled(hand)
+    assert server.gripper.position(A) == pytest.approx(10, abs=2)
+
+
+async def test_a_gripper_found_in_fault_is_not_taken_for_one_that_others_command(
+    server: SimulatorServer,
+) -> None:
+    server.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    async with RobotiqHand(server.address) as hand:
+        async for status in hand.statuses():
+            if status.sequence > 10:
+                break
+        assert hand.state is State.FAULT
+        assert hand.statistics.foreign_commands == 0

@@ -394,6 +394,10 @@ async def never_begun(channel: Channel[int]) -> object:
     return channel.open(None).take_nowait()
 
 
+async def derived_and_never_begun(channel: Channel[int]) -> object:
+    return channel.derive(letters).take_nowait()
+
+
 async def left_in_the_middle(channel: Channel[int]) -> object:
     stream = channel.open(None)
     channel.push(1)
@@ -473,6 +477,7 @@ async def closed(channel: Channel[int]) -> object:
     "leave",
     [
         never_begun,
+        derived_and_never_begun,
         left_in_the_middle,
         timed_out,
         timed_out_and_the_error_is_kept,

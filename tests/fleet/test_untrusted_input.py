@@ -1,4 +1,4 @@
-"""What strangers call themselves and send, on its way to logs, to others and to terminals."""
+"""What unknown clients call themselves and send is harmless in logs, in answers and on terminals."""
 
 from __future__ import annotations
 
