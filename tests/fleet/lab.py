@@ -46,7 +46,7 @@ class Lab:
     @property
     def lease(self) -> int:
         """The number of the lease, as every status of the agent tells it."""
-        return status_message.unpack(self.agent.hands["left"].news.status_message()).lease
+        return status_message.unpack(self.agent.hands["left"].publisher.status_message()).lease
 
     async def end_agent(self) -> None:
         self.serving.cancel()
