@@ -35,6 +35,12 @@ def test_no_module_is_longer_than_four_hundred_lines() -> None:
     assert not long
 
 
+def test_no_room_has_more_than_a_dozen_modules_side_by_side() -> None:
+    rooms = [PACKAGE, *(path for path in PACKAGE.rglob("*") if path.is_dir())]
+    modules = {room: [each for each in room.glob("*.py") if each.stem != "__init__"] for room in rooms}
+    assert not {str(room): len(inside) for room, inside in modules.items() if len(inside) > 12}
+
+
 def test_importing_the_library_imports_neither_simulator_nor_extras() -> None:
     """They take tens of milliseconds, and the extras may be missing."""
     script = "import sys, robotiq_async; print(*sys.modules)"
