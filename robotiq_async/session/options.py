@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Final
+from typing import Final, NamedTuple
 
 from ..calibration import ForceCalibration, SpeedCalibration, Units
-from ..link.address import parse_address
+from ..link.address import Address, parse_address
 from ..link.canonical import canonical_address
 from ..link.guard import GuardedTransport
 from ..link.modbus import ModbusTransport
@@ -16,7 +16,7 @@ from ..link.sim_transport import SimulatedTransport, new_gripper
 from ..link.transport import Transport
 from ..log import Log, log
 from ..wire.checks import check_byte, check_flag, check_int, check_seconds
-from ..wire.registers import REGISTER_COUNT, RTU_REGISTERS, TCP_REGISTERS
+from ..wire.registers import REGISTER_COUNT, RTU_REGISTERS, TCP_REGISTERS, RegisterMap
 from .claims import Gripper
 from .reconnecting import ReconnectPolicy
 
@@ -97,38 +97,11 @@ def check_options(
     given_name = _check_name(name)
     connect_s = check_seconds("connect_timeout", connect_timeout, 0.01, 5.0)
     response_s = check_seconds("response_timeout", response_timeout, 0.005, 0.5)
-    if isinstance(address, str):
-        parsed = parse_address(address)
-        registers = RTU_REGISTERS if parsed.kind == "rtu" else TCP_REGISTERS
-        if device_id is not None:
-            registers = replace(registers, device_id=check_int("device_id", device_id, 1, 247))
-        last = 0x10000 - REGISTER_COUNT
-        if request_address is not None:
-            registers = replace(registers, request=check_int("request_address", request_address, 0, last))
-        if status_address is not None:
-            registers = replace(registers, status=check_int("status_address", status_address, 0, last))
-        make: Callable[..., Transport]
-        gripper: Callable[[], Gripper]
-        if parsed.kind == "sim":
-            simulated = new_gripper(parsed.simulation)
-            make = partial(SimulatedTransport, simulated, registers)
-            place = f"{parsed}#{id(simulated):x}"  # every sim:// is a gripper of its own
-            gripper = partial(Gripper, place)
-        else:
-            make = partial(ModbusTransport, parsed, registers)
-            place = str(parsed)
-            unit = registers.device_id if device_id is not None and parsed.kind == "tcp" else None
-            gripper = lambda: Gripper(canonical_address(parsed), unit, HINTS[parsed.kind])  # noqa: E731
-    elif isinstance(address, Transport):
-        place = f"<{type(address).__name__} at {id(address):#x}>"
-        gripper = partial(Gripper, place)
-        make = partial(GuardedTransport, address, place, log=Log(given_name or place))
-    else:
-        raise TypeError(f"address must be a string or a Transport, got {address!r}")
+    way = _way_to(address, device_id, request_address, status_address, given_name)
     return Options(
-        make_transport=partial(make, connect_timeout=connect_s, response_timeout=response_s),
-        address=place,
-        gripper=gripper,
+        make_transport=partial(way.make, connect_timeout=connect_s, response_timeout=response_s),
+        address=way.address,
+        gripper=way.gripper,
         poll_interval=check_seconds("poll_interval", poll_interval, 0.001, 0.1),
         activation_timeout=check_seconds("activation_timeout", activation_timeout, 0.01, 120.0),
         policy=_check_reconnect(reconnect),
@@ -137,7 +110,53 @@ def check_options(
         units=check_units(calibration, force_calibration),
         keep_grip=check_flag("keep_grip", keep_grip),
         given_name=given_name,
-        log=Log(given_name or place),
+        log=Log(given_name or way.address),
+    )
+
+
+class _Way(NamedTuple):
+    """How a gripper is reached: the address that is shown, which one it is, and what makes its transport."""
+
+    address: str
+    gripper: Callable[[], Gripper]
+    make: Callable[..., Transport]
+
+
+def _way_to(address: object, device_id: object, request: object, status: object, name: str) -> _Way:
+    if isinstance(address, str):
+        parsed = parse_address(address)
+        return _over_modbus(
+            parsed, _check_registers(parsed, device_id, request, status), device_id is not None
+        )
+    if isinstance(address, Transport):
+        shown = f"<{type(address).__name__} at {id(address):#x}>"
+        guarded = partial(GuardedTransport, address, shown, log=Log(name or shown))
+        return _Way(shown, partial(Gripper, shown), guarded)
+    raise TypeError(f"address must be a string or a Transport, got {address!r}")
+
+
+def _check_registers(address: Address, device_id: object, request: object, status: object) -> RegisterMap:
+    registers = RTU_REGISTERS if address.kind == "rtu" else TCP_REGISTERS
+    if device_id is not None:
+        registers = replace(registers, device_id=check_int("device_id", device_id, 1, 247))
+    last = 0x10000 - REGISTER_COUNT
+    if request is not None:
+        registers = replace(registers, request=check_int("request_address", request, 0, last))
+    if status is not None:
+        registers = replace(registers, status=check_int("status_address", status, 0, last))
+    return registers
+
+
+def _over_modbus(address: Address, registers: RegisterMap, names_unit: bool) -> _Way:
+    if address.kind == "sim":
+        simulated = new_gripper(address.simulation)
+        shown = f"{address}#{id(simulated):x}"  # every sim:// is a gripper of its own
+        return _Way(shown, partial(Gripper, shown), partial(SimulatedTransport, simulated, registers))
+    unit = registers.device_id if names_unit and address.kind == "tcp" else None
+    return _Way(
+        str(address),
+        lambda: Gripper(canonical_address(address), unit, HINTS[address.kind]),
+        partial(ModbusTransport, address, registers),
     )
 
 
