@@ -13,6 +13,10 @@ import anyio
 T = TypeVar("T")
 
 
+class LateError(Exception):
+    """A call was not done in time."""
+
+
 async def wait_shielded(work: asyncio.Future[Any]) -> None:
     """Wait until something is done, also when cancelled meanwhile; the cancellation is raised afterwards.
 

@@ -157,7 +157,9 @@ class SpeedCalibration:
             TypeError: not a number.
             ValueError: slower or faster than any value.
         """
-        return closest("mm_per_s", mm_per_s, {value: self.mm_per_s(value) for value in covered(self.points)})
+        return nearest_in_range(
+            "mm_per_s", mm_per_s, {value: self.mm_per_s(value) for value in covered(self.points)}
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,7 +232,9 @@ class ForceCalibration:
             TypeError: not a number.
             ValueError: weaker or stronger than any value.
         """
-        return closest("newton", newton, {value: self.newton(value) for value in covered(self.points)})
+        return nearest_in_range(
+            "newton", newton, {value: self.newton(value) for value in covered(self.points)}
+        )
 
 
 def _owners_table(path: Path | str, layout: Layout) -> Table:
@@ -296,7 +300,7 @@ def interpolated(name: str, value: int, points: Sequence[tuple[int, float]]) -> 
     return at_left + (at_right - at_left) * (value - left) / (right - left)
 
 
-def closest(name: str, wanted: float, figures: Mapping[int, float]) -> int:
+def nearest_in_range(name: str, wanted: float, figures: Mapping[int, float]) -> int:
     """The value whose figure comes closest, the lowest of several.
 
     Raises:

@@ -8,6 +8,7 @@ from typing import TypeVar
 
 import anyio
 
+from ..concurrency import LateError
 from ..errors import (
     ConnectFailedError,
     ConnectionLostError,
@@ -18,7 +19,7 @@ from ..errors import (
 from ..log import Log, log
 from ..wire.registers import Registers, check_registers
 from .transport import Transport
-from .worker import LateError, Worker
+from .worker import Worker
 
 T = TypeVar("T")
 

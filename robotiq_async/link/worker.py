@@ -7,13 +7,10 @@ from collections import deque
 from collections.abc import Awaitable, Callable
 from typing import Any, Final, TypeVar
 
+from ..concurrency import LateError
 from .modbus import GRACE_S, HELD_S
 
 T = TypeVar("T")
-
-
-class LateError(Exception):
-    """A call was not done in time."""
 
 
 class Worker:

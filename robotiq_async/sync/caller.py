@@ -9,11 +9,12 @@ import os
 from collections.abc import Callable, Coroutine
 from typing import Any, Final, TypeVar
 
+from ..concurrency import LateError
 from ..enums import State
 from ..errors import NotStartedError, RobotiqError
 from ..hand import RobotiqHand as AsyncRobotiqHand
 from ..log import log
-from .loop_thread import LOOP_THREAD, LateError
+from .loop_thread import LOOP_THREAD
 
 T = TypeVar("T")
 Function = Callable[[], Coroutine[Any, Any, T]]

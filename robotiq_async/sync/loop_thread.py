@@ -15,6 +15,7 @@ from collections.abc import Callable, Coroutine
 from queue import Empty, SimpleQueue
 from typing import Any, Final, Generic, TypeVar
 
+from ..concurrency import LateError
 from ..log import log
 
 T = TypeVar("T")
@@ -26,10 +27,6 @@ LOOK_S: Final = 0.1
 """Who waits looks so often whether the loop is still there. Windows tells of Ctrl-C no sooner."""
 GIVE_UP_S: Final = 3.0
 """What a call that was interrupted may take to end: stop() takes up to 2 s, a hold up to 1 s."""
-
-
-class LateError(Exception):
-    """A call was not done in time."""
 
 
 class LoopThread:

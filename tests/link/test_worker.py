@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from robotiq_async.link.worker import LateError, Worker
+from robotiq_async.concurrency import LateError
+from robotiq_async.link.worker import Worker
 from robotiq_async.session.timing.clock import now
 from tests.virtual import run
 
