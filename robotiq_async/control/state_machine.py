@@ -153,6 +153,8 @@ class StateMachine:
         """Called with source, target and trigger after each change of state."""
         self._state = State.DISCONNECTED
         self._sequence: Generator[Request | None, RobotiqStatus, None] | None = None
+        self.is_busy = False
+        """Whether a sequence is under way. Not worked out when asked: that is three times a poll."""
 
     @property
     def state(self) -> State:
@@ -194,14 +196,9 @@ class StateMachine:
 
     # -- the sequence under way ------------------------------------------------------------------------
 
-    @property
-    def is_busy(self) -> bool:
-        """Whether a sequence is under way."""
-        return self._sequence is not None
-
     def begin(self, sequence: Generator[Request | None, RobotiqStatus, None]) -> None:
         """Run a sequence, in place of the one under way."""
-        self._sequence = sequence
+        self._sequence, self.is_busy = sequence, True
         next(sequence)
 
     def advance(self, status: RobotiqStatus) -> Request | None:
@@ -216,14 +213,14 @@ class StateMachine:
             pass
         except RobotiqError as error:
             self.log.warning("%s", error)
-        self._sequence = None
+        self.drop_sequence()
         self.delivered()
         self.fire(classify(status))
         return None
 
     def drop_sequence(self) -> None:
         """Nothing more comes of the sequence under way."""
-        self._sequence = None
+        self._sequence, self.is_busy = None, False
 
 
 def refusal(trigger: Trigger, state: State, status: RobotiqStatus | None = None) -> RobotiqError:

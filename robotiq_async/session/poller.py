@@ -235,9 +235,10 @@ class Poller:
         tick.late = 0.0
         asked = tick.time()
         registers = await self._transport.read()
-        status = RobotiqStatus(registers, tick.time(), next(self._channels.numbers))
+        answered = tick.time()
+        status = RobotiqStatus(registers, answered, next(self._channels.numbers))
         counters.polls += 1
-        counters.round_trips.append(status.timestamp - asked)
+        counters.round_trips.append(answered - asked)
         if self._last_poll:
             counters.periods.append(asked - self._last_poll)
         self._last_poll = asked

@@ -76,7 +76,8 @@ class Tick:
     def hurry(self) -> None:
         """Have the next wait end at once; the ticks come when they would have come."""
         self._hurried = True
-        self._wake()
+        if self._waiter is not None and not self._waiter.done():
+            self._waiter.set_result(None)
 
     async def wait(self) -> int:
         """Wait for the next tick, and return how many have passed since the last wait.
@@ -103,9 +104,6 @@ class Tick:
         count = 1 + int(late / self.interval)
         self.due += count * self.interval
         self._passed += count
-        self._wake()
-
-    def _wake(self) -> None:
         if self._waiter is not None and not self._waiter.done():
             self._waiter.set_result(None)
 
