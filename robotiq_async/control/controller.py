@@ -213,7 +213,7 @@ class Controller:
         """
         self.status = status
         self._shadow.see(status, status.timestamp if asked is None else asked)
-        if self.machine.is_busy:
+        if self.machine.sequence is not None:
             return  # the sequence decides what it means
         before, condition = self.machine.state, classify(status)
         if before is State.DISCONNECTED and condition is Trigger.SEEN_RESET and self.activates:
@@ -241,12 +241,12 @@ class Controller:
     @property
     def has_request(self) -> bool:
         """Whether there may be something to write."""
-        return self.machine.is_busy or not self._callers.pending.is_empty
+        return self.machine.sequence is not None or not self._callers.pending.is_empty
 
     @property
     def is_urgent(self) -> bool:
         """Whether a stop is to be written. It does not wait for a status that may never come."""
-        if not self.machine.is_busy or self.status is None:
+        if self.machine.sequence is None or self.status is None:
             return self._callers.pending.halting is not None
         state, may_move = self.machine.state, self._activating or self._shadow.may_go(self.status)
         if self._keeps_grip and self._grip_keeper.rests(self.status):
@@ -259,7 +259,7 @@ class Controller:
         status, pending = self.status, self._callers.pending
         if status is None:
             return None
-        if self.machine.is_busy:
+        if self.machine.sequence is not None:
             return self._next_step(status, now)
         # Most cycles end here.
         if pending.is_empty or self.machine.state not in _COMMANDED:
@@ -286,7 +286,7 @@ class Controller:
         """The image was acknowledged."""
         number = self._shadow.acknowledged(now)
         self._callers.acknowledged(number)
-        if number == self._step or (not self.machine.is_busy and self._callers.pending.is_empty):
+        if number == self._step or (self.machine.sequence is None and self._callers.pending.is_empty):
             self.machine.delivered()
 
     def lost(self, why: RobotiqError | None = None) -> None:
@@ -319,7 +319,7 @@ class Controller:
         image = self.machine.advance(status)
         if image is not None:
             self._step = self._shadow.writing(image, NO_AXES, now)
-        elif not self.machine.is_busy:
+        elif self.machine.sequence is None:
             self._after_sequence(status)
         return image
 

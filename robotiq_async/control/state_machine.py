@@ -152,9 +152,8 @@ class StateMachine:
         self.changed = changed
         """Called with source, target and trigger after each change of state."""
         self._state = State.DISCONNECTED
-        self._sequence: Generator[Request | None, RobotiqStatus, None] | None = None
-        self.is_busy = False
-        """Whether a sequence is under way. Not worked out when asked: that is three times a poll."""
+        self.sequence: Generator[Request | None, RobotiqStatus, None] | None = None
+        """The one under way, for :meth:`begin`, :meth:`advance` and :meth:`drop_sequence` to change."""
 
     @property
     def state(self) -> State:
@@ -198,7 +197,7 @@ class StateMachine:
 
     def begin(self, sequence: Generator[Request | None, RobotiqStatus, None]) -> None:
         """Run a sequence, in place of the one under way."""
-        self._sequence, self.is_busy = sequence, True
+        self.sequence = sequence
         next(sequence)
 
     def advance(self, status: RobotiqStatus) -> Request | None:
@@ -206,21 +205,21 @@ class StateMachine:
 
         When that was its end, the state follows what the status shows.
         """
-        assert self._sequence is not None, "a sequence is under way"
+        assert self.sequence is not None, "a sequence is under way"
         try:
-            return self._sequence.send(status)
+            return self.sequence.send(status)
         except StopIteration:
             pass
         except RobotiqError as error:
             self.log.warning("%s", error)
-        self.drop_sequence()
+        self.sequence = None
         self.delivered()
         self.fire(classify(status))
         return None
 
     def drop_sequence(self) -> None:
         """Nothing more comes of the sequence under way."""
-        self._sequence, self.is_busy = None, False
+        self.sequence = None
 
 
 def refusal(trigger: Trigger, state: State, status: RobotiqStatus | None = None) -> RobotiqError:

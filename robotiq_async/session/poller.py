@@ -325,6 +325,6 @@ class Poller:
         self._controller.shut_down(keep_grip=self._keep_grip)
         while True:
             await self._cycle()
-            if not self._controller.machine.is_busy:
+            if self._controller.machine.sequence is None:
                 return
             await asyncio.sleep(self._options.poll_interval)

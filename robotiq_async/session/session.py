@@ -248,7 +248,7 @@ class Session:
         """
         if ask is None and self.machine.state not in SEQUENCES:
             return
-        faulty = () if ask is not None or self.machine.is_busy else (State.FAULT, State.ATR_DONE)
+        faulty = () if ask is not None or self.machine.sequence is not None else (State.FAULT, State.ATR_DONE)
         failing: Failing = {
             State.FAULT: self._fault,
             State.ATR_DONE: self._fault,

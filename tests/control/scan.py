@@ -146,7 +146,7 @@ class Scan:
     def stop(self, *, keep_grip: bool = False) -> None:
         self.controller.stop()
         self.controller.shut_down(keep_grip=keep_grip)
-        self.until(lambda: not self.controller.machine.is_busy, 1.0)
+        self.until(lambda: self.controller.machine.sequence is None, 1.0)
 
     # -- what has happened -----------------------------------------------------------------------------
 

@@ -226,7 +226,7 @@ def test_a_link_that_goes_down_meanwhile_is_a_doubt() -> None:
     scan.controller.lost(None)
     scan.controller.see(scan.status())
     scan.controller.shut_down(keep_grip=True)
-    scan.until(lambda: not scan.controller.machine.is_busy, 1.0)
+    scan.until(lambda: scan.controller.machine.sequence is None, 1.0)
     assert not scan.gripper.grips
     assert not scan.last_image.go
 
@@ -242,7 +242,7 @@ def test_replies_that_were_looked_at_late_tell_of_no_rest(caplog: pytest.LogCapt
         at = scan.now + late
         scan.controller.see(RobotiqStatus(status.registers, at, status.sequence), scan.now)
         images.append(scan.controller.decide(at))
-        assert scan.controller.machine.is_busy
+        assert scan.controller.machine.sequence is not None
         scan.now += POLL_S
     assert images[:3] == [None] * 3
     assert images[3] is not None

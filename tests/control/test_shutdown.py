@@ -48,7 +48,7 @@ def test_the_shutdown_never_activates_a_gripper_that_was_power_cycled_unnoticed(
     scan.controller.stop()
     scan.controller.status = scan.status()
     scan.controller.shut_down()
-    assert scan.controller.machine.is_busy, "the write that was not acknowledged may still act"
+    assert scan.controller.machine.sequence is not None, "the write that was not acknowledged may still act"
     scan.run(0.5)
     assert not scan.gripper.is_moving
     assert not scan.latest.activation_echo
@@ -114,6 +114,6 @@ def test_a_shutdown_that_nobody_answers_is_over_when_its_time_is(scan: Scan) -> 
     scan.controller.shut_down()
     scan.controller.stopped()
     assert scan.state is State.SHUTDOWN
-    assert not scan.controller.machine.is_busy
+    assert scan.controller.machine.sequence is None
     with pytest.raises(NotStartedError):
         scan.command(A, position=3)

@@ -35,7 +35,7 @@ def test_the_new_state_is_in_place_when_the_change_is_told() -> None:
 
 def test_a_machine_begins_disconnected_and_with_no_sequence() -> None:
     assert StateMachine().state is State.DISCONNECTED
-    assert not StateMachine().is_busy
+    assert StateMachine().sequence is None
 
 
 @pytest.mark.parametrize("state", State)
@@ -78,7 +78,7 @@ def test_a_sequence_is_handed_statuses_and_says_what_to_write() -> None:
     seen: list[RobotiqStatus] = []
     machine = Recorded(State.DO_ACTIVATION).machine
     machine.begin(one_write(seen))
-    assert machine.is_busy
+    assert machine.sequence is not None
     assert not seen, "it is asked for; what the gripper shows decides whether it begins"
     assert machine.advance(RESET) is IMAGE
     assert seen == [RESET]
@@ -92,7 +92,7 @@ def test_at_the_end_of_a_sequence_the_state_follows_what_the_status_shows() -> N
     machine.advance(RESET)
     machine.delivered()
     assert machine.advance(READY) is None
-    assert not machine.is_busy
+    assert machine.sequence is None
     assert recorded.changes == [
         (State.DO_ACTIVATION, State.WF_ACTIVATION, Trigger.DELIVERED),
         (State.WF_ACTIVATION, State.RUNNING_IDLE, Trigger.SEEN_READY),
@@ -106,7 +106,7 @@ def test_a_sequence_with_nothing_to_begin_leads_to_where_the_gripper_is() -> Non
     machine = Recorded(State.DO_ACTIVATION).machine
     machine.begin(nothing())
     assert machine.advance(READY) is None
-    assert not machine.is_busy
+    assert machine.sequence is None
     assert machine.state is State.RUNNING_IDLE
 
 
@@ -120,7 +120,7 @@ def test_a_sequence_that_fails_is_said_in_the_log_and_leads_to_where_the_gripper
     machine = Recorded(State.WF_ACTIVATION).machine
     machine.begin(failing())
     assert machine.advance(FAULT) is None
-    assert not machine.is_busy
+    assert machine.sequence is None
     assert machine.state is State.FAULT
     (record,) = [each for each in caplog.records if each.levelname == "WARNING"]
     assert record.getMessage() == str(GripperFaultError(Fault(0x0E)))
@@ -151,7 +151,7 @@ def test_a_sequence_that_is_dropped_is_over_and_changes_no_state() -> None:
     recorded = Recorded(State.WF_RESET)
     recorded.machine.begin(one_write([]))
     recorded.machine.drop_sequence()
-    assert not recorded.machine.is_busy
+    assert recorded.machine.sequence is None
     assert recorded.machine.state is State.WF_RESET
     assert not recorded.changes
 

@@ -76,8 +76,7 @@ class Tick:
     def hurry(self) -> None:
         """Have the next wait end at once; the ticks come when they would have come."""
         self._hurried = True
-        if self._waiter is not None and not self._waiter.done():
-            self._waiter.set_result(None)
+        self._wake()
 
     async def wait(self) -> int:
         """Wait for the next tick, and return how many have passed since the last wait.
@@ -104,6 +103,9 @@ class Tick:
         count = 1 + int(late / self.interval)
         self.due += count * self.interval
         self._passed += count
+        self._wake()
+
+    def _wake(self) -> None:
         if self._waiter is not None and not self._waiter.done():
             self._waiter.set_result(None)
 
