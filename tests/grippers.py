@@ -1,14 +1,18 @@
-"""A simulated gripper as a client before has left it, for tests that are not about the activation."""
+"""Simulated grippers as a client before has left them: active and open."""
 
 from __future__ import annotations
 
+import asyncio
 import time
-from typing import Any
+from typing import Any, Final
 
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.wire.request import AxisRequest, Request
 
-_ACTIVATION_S = 10.0
+_OPEN: Final = (AxisRequest(0, 255, 64),) * 3 + (AxisRequest(128, 255, 64),)
+ACTIVATION: Final = Request(activate=True, axes=_OPEN).registers
+OPENING: Final = Request(activate=True, go=True, axes=_OPEN).registers
+_ACTIVATION_S: Final = 10.0
 """Simulated seconds that are more than enough for one."""
 
 
@@ -19,7 +23,13 @@ def active_gripper(speedup: float = 4.0, **options: Any) -> SimulatedGripper:
     """
     ahead = 0.0
     gripper = SimulatedGripper(lambda: time.monotonic() + ahead, speedup=speedup, **options)
-    axes = (AxisRequest(0, 255, 64),) * 3 + (AxisRequest(128, 255, 64),)
-    gripper.write(0, Request(activate=True, axes=axes).registers)
+    gripper.write(0, ACTIVATION)
     ahead = _ACTIVATION_S / speedup
     return gripper
+
+
+async def activate_beforehand(gripper: SimulatedGripper) -> None:
+    """Leave a gripper active and open, as another client would; in a virtual loop that takes no time."""
+    for image in (ACTIVATION, OPENING):
+        gripper.write(0, image)
+        await asyncio.sleep(_ACTIVATION_S)

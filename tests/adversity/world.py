@@ -16,7 +16,8 @@ from robotiq_async.enums import AXES
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
 from robotiq_async.simulator.server.framing import Frame
 from robotiq_async.wire.registers import Registers
-from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.wire.request import Request
+from tests.grippers import activate_beforehand
 from tests.virtual import VirtualLoop
 from tests.virtual_line import VirtualLine
 
@@ -98,11 +99,7 @@ class World:
 
     async def activate_beforehand(self) -> None:
         """Leave the gripper active and open, as another client would."""
-        axes = (AxisRequest(0, 255, 64),) * 3 + (AxisRequest(128, 255, 64),)
-        self.gripper.write(0, Request(activate=True, axes=axes).registers)
-        await asyncio.sleep(10)
-        self.gripper.write(0, Request(activate=True, go=True, axes=axes).registers)
-        await asyncio.sleep(10)
+        await activate_beforehand(self.gripper)
 
     async def until(self, condition: Callable[[], bool]) -> None:
         """Wait until something is true; half a minute at most, and in this loop that takes no time."""

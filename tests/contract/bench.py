@@ -16,7 +16,8 @@ from robotiq_async.enums import AXES
 from robotiq_async.protocol import Hand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.wire.request import Request
-from tests.fleet.lab import SPEEDUP, Lab, activate_beforehand, lab
+from tests.fleet.lab import SPEEDUP, Lab, lab
+from tests.grippers import activate_beforehand
 from tests.virtual import virtual
 
 LOCAL, REMOTE = "local", "remote"

@@ -13,8 +13,8 @@ from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire import status_message
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.wire.request import AxisRequest, Request
 from tests.fleet.network import MemoryBus, Network
+from tests.grippers import activate_beforehand
 
 SPEEDUP = 5.0
 
@@ -53,15 +53,6 @@ class Lab:
         await asyncio.gather(self.serving, return_exceptions=True)
 
 
-async def activate_beforehand(gripper: SimulatedGripper) -> None:
-    """Leave the gripper active and open, as another client would."""
-    axes = (AxisRequest(0, 255, 64),) * 3 + (AxisRequest(128, 255, 64),)
-    gripper.write(0, Request(activate=True, axes=axes).registers)
-    await asyncio.sleep(10)
-    gripper.write(0, Request(activate=True, go=True, axes=axes).registers)
-    await asyncio.sleep(10)
-
-
 @asynccontextmanager
 async def lab(
     *,
@@ -89,4 +80,4 @@ async def lab(
             await asyncio.gather(serving, return_exceptions=True)
 
 
-__all__ = ["Lab", "MemoryBus", "activate_beforehand", "lab"]
+__all__ = ["Lab", "MemoryBus", "lab"]

@@ -14,12 +14,10 @@ from robotiq_async.errors import NotAllStoppedError
 from robotiq_async.fleet.fleet import Fleet
 from robotiq_async.fleet.wire.envelope import Call
 from robotiq_async.fleet.wire.names import GripperName
-from tests.fleet.by_hand import ask, move_slowly
+from tests.fleet.by_hand import LEFT, ask, move_slowly
 from tests.fleet.cell import told
 from tests.fleet.world import motions, world
 from tests.virtual import virtual
-
-LEFT = GripperName("lab", "cell", "left")
 
 
 @virtual

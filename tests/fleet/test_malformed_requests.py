@@ -13,12 +13,11 @@ from robotiq_async.errors import AgentError, ProtocolError, RobotiqError
 from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.wire.envelope import Call, unpack_answer
 from robotiq_async.fleet.wire.names import GripperName
-from tests.fleet.by_hand import ask, move_slowly
+from tests.fleet.by_hand import LEFT, ask, move_slowly
 from tests.fleet.lab import lab
 from tests.fleet.world import world
 from tests.virtual import virtual
 
-LEFT = GripperName("lab", "cell", "left")
 INFINITE = float("inf")  # JSON of Python has it
 STRANGE: list[tuple[str, Any]] = [
     ("cmd/cancel", {"number": INFINITE}),

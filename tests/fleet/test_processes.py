@@ -16,7 +16,7 @@ import pytest
 from robotiq_async import ConnectionLostError, Finger, State
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.wire.request import AxisRequest, Request
+from tests.grippers import ACTIVATION, OPENING
 
 pytest.importorskip("zenoh")
 
@@ -99,9 +99,8 @@ class Site:
 async def site() -> AsyncIterator[Site]:
     loop, jumped = asyncio.get_running_loop(), [0.0]
     gripper = SimulatedGripper(lambda: loop.time() + jumped[0], spread=False)
-    axes = (AxisRequest(0, 255, 64),) * 3 + (AxisRequest(128, 255, 64),)
-    for go in (False, True):
-        gripper.write(0, Request(activate=True, go=go, axes=axes).registers)
+    for image in (ACTIVATION, OPENING):
+        gripper.write(0, image)
         jumped[0] += 30
         gripper.status_registers()
     with contextlib.closing(socket.create_server(("127.0.0.1", 0))) as free:

@@ -10,14 +10,20 @@ import asyncio
 import pytest
 
 from robotiq_async import ConnectionLostError, Finger, State
-from robotiq_async.fleet.wire.names import GripperName
+from tests.fleet.by_hand import LEFT
 from tests.fleet.cell import told
 from tests.fleet.lab import lab
 from tests.fleet.spoiling import Garbling
-from tests.fleet.world import motions, world
+from tests.fleet.world import World, motions, world
 from tests.virtual import virtual
 
-LEFT = GripperName("lab", "cell", "left")
+
+async def status_on_its_way(here: World) -> tuple[str, bytes]:
+    """A status of the present run as a relay keeps it: its key and its bytes."""
+    heard: list[tuple[str, bytes]] = []
+    here.network.bus("relay").subscribe(LEFT.key("*"), lambda key, payload: heard.append((key, payload)))
+    await asyncio.sleep(0.2)
+    return [each for each in heard if each[1][:1] != b"{"][-1]
 
 
 @pytest.mark.parametrize("seconds", [0.5, 0.9, 1.0, 1.1, 3.0])
@@ -113,10 +119,7 @@ async def test_a_request_is_carried_out_once_and_answered_as_often_as_it_comes()
 async def test_a_stale_status_is_not_the_state_of_now() -> None:
     """unh_marine_autonomy 139: a relay sent an old frame once more."""
     async with world() as here:
-        heard: list[tuple[str, bytes]] = []
-        here.network.bus("relay").subscribe(LEFT.key("*"), lambda key, payload: heard.append((key, payload)))
-        await asyncio.sleep(0.2)
-        old = [each for each in heard if each[1][:1] != b"{"][-1]
+        old = await status_on_its_way(here)
         here.cut(here.other)
         await asyncio.sleep(2)
         assert here.other.hand.state is State.DISCONNECTED
@@ -132,10 +135,7 @@ async def test_a_stale_status_is_not_the_state_of_now() -> None:
 @virtual
 async def test_a_status_of_a_former_run_brings_nothing_back() -> None:
     async with world() as here:
-        heard: list[tuple[str, bytes]] = []
-        here.network.bus("relay").subscribe(LEFT.key("*"), lambda key, payload: heard.append((key, payload)))
-        await asyncio.sleep(0.2)
-        old = [each for each in heard if each[1][:1] != b"{"][-1]
+        old = await status_on_its_way(here)
         await here.agent.end()
         await here.start_agent("next agent")
         await here.until(lambda: here.holder.hand.is_in_control)

@@ -19,8 +19,9 @@ from robotiq_async.fleet.remote.requests import is_refusal, of_its_run
 from robotiq_async.fleet.wire.envelope import Answer, Call, failure
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from tests.fleet.lab import SPEEDUP, Lab, activate_beforehand, lab
+from tests.fleet.lab import SPEEDUP, Lab, lab
 from tests.fleet.world import ServingAgent, world
+from tests.grippers import activate_beforehand
 from tests.virtual import virtual
 
 LEFT = GripperName("lab", "cell", "left")

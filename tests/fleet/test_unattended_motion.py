@@ -11,12 +11,20 @@ import pytest
 
 from robotiq_async import Finger, RobotiqError, State
 from robotiq_async.errors import AgentError
+from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import Answer
 from tests.fleet.by_hand import move_slowly
 from tests.fleet.lab import lab
 from tests.fleet.spoiling import Spoiling
 from tests.fleet.world import world
 from tests.virtual import virtual
+
+
+async def cut_off(hand: RemoteHand) -> None:
+    """Begin a slow move, and cancel it on its way."""
+    with pytest.raises(TimeoutError):
+        async with asyncio.timeout(0.3):
+            await hand.move(255, Finger.A, speed=0)
 
 
 @virtual
@@ -77,9 +85,7 @@ async def test_a_cancelled_move_is_called_off_although_that_was_lost(lost: int) 
     async with lab() as here:
         bus = Spoiling(here.network.bus("client"), "cmd/cancel", times=lost)
         async with here.client_over(bus) as hand:
-            with pytest.raises(TimeoutError):
-                async with asyncio.timeout(0.3):
-                    await hand.move(255, Finger.A, speed=0)
+            await cut_off(hand)
             await asyncio.sleep(2.5)
             assert not here.gripper.is_moving
             assert here.gripper.position(Finger.A) < 220
@@ -92,9 +98,7 @@ async def test_a_cancelled_move_is_called_off_although_that_was_misrouted() -> N
         answer = Answer("robotiq/v1/lab/cell/right", 3, 1, {}).pack()
         bus = Spoiling(here.network.bus("client"), "cmd/cancel", times=1, answer=answer, is_sent=False)
         async with here.client_over(bus) as hand:
-            with pytest.raises(TimeoutError):
-                async with asyncio.timeout(0.3):
-                    await hand.move(255, Finger.A, speed=0)
+            await cut_off(hand)
             await asyncio.sleep(0.2)
             assert not here.gripper.is_moving
             assert hand.is_in_control

@@ -11,13 +11,12 @@ from robotiq_async.errors import AgentError, ControlLostError
 from robotiq_async.fleet.limited_log import EVERY_S
 from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.wire.envelope import Call, unpack_answer
-from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.fleet.wire.status_message import StatusMessage
 from robotiq_async.fleet.wire.values import read_error
+from tests.fleet.by_hand import LEFT
 from tests.fleet.lab import lab
 from tests.virtual import virtual
 
-LEFT = GripperName("lab", "cell", "left")
 NAME = "eve\nrobotiq-async: all is well\x1b[2J"
 OTHERS = StatusMessage(LEFT.mark + 1, 2, 3.0, State.RUNNING_IDLE, 4, False, 5, False, 6, 0.5, None)
 

@@ -17,8 +17,8 @@ from robotiq_async.simulator import SimulatorServer
 from robotiq_async.wire.request import Request
 from tests.adversity.world import StampedGripper
 from tests.fleet.hosts import Host
-from tests.fleet.lab import activate_beforehand
 from tests.fleet.network import LINK_LEASE_S, RECONNECT_S, MemoryBus, Network
+from tests.grippers import activate_beforehand
 
 T = TypeVar("T")
 WINDOW_S = 1.0

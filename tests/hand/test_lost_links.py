@@ -17,7 +17,7 @@ from robotiq_async import (
 )
 from robotiq_async.simulator import SimulatorServer
 from robotiq_async.wire.request import Request
-from tests.hand.watching import settled, travels
+from tests.hand.watching import settled, travels, until_moving
 
 A = Finger.A
 
@@ -43,9 +43,7 @@ async def test_a_cut_link_ends_a_move_and_comes_back_without_a_write(
     hand: RobotiqHand, server: SimulatorServer
 ) -> None:
     moving = asyncio.create_task(hand.move(255, speed=0))
-    async for _ in hand.statuses():
-        if server.gripper.is_moving:
-            break
+    await until_moving(server, hand)
     writes = len(server.gripper.writes)
     transitions = hand.transitions()
     server.cut()
@@ -110,9 +108,7 @@ async def test_a_power_cycle_leaves_the_hand_in_reset_until_it_is_activated(
     hand: RobotiqHand, server: SimulatorServer
 ) -> None:
     moving = asyncio.create_task(hand.move(255, speed=0))
-    async for _ in hand.statuses():
-        if server.gripper.is_moving:
-            break
+    await until_moving(server, hand)
     await server.power_cycle(0.5)
     with pytest.raises((ConnectionLostError, NotActivatedError)):
         await moving

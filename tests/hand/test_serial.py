@@ -13,6 +13,7 @@ import pytest_asyncio
 from robotiq_async import ConnectFailedError, ConnectionLostError, Fault, Finger, RobotiqHand, State
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
 from tests.conftest import Clock
+from tests.hand.watching import until_moving
 from tests.serial_line import SerialLine
 
 A = Finger.A
@@ -65,9 +66,7 @@ async def test_a_pulled_line_comes_back(
 ) -> None:
     moving = asyncio.create_task(serial_hand.move(255, speed=0))
     await serial_hand.wait_for_state(State.RUNNING_CC)
-    async for _ in serial_hand.statuses():
-        if serial_server.gripper.is_moving:
-            break
+    await until_moving(serial_server, serial_hand)
     writes = len(serial_server.gripper.writes)
     line.pull()
     with pytest.raises(ConnectionLostError):

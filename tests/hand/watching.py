@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from robotiq_async import Finger, RobotiqHand, State
 from robotiq_async.enums import AXES
-from robotiq_async.simulator import SimulatorServer
+from robotiq_async.simulator import SerialSimulatorServer, SimulatorServer
 from robotiq_async.wire.request import Request
 
 
@@ -23,7 +23,7 @@ async def settled(hand: RobotiqHand) -> None:
             return
 
 
-async def until_moving(server: SimulatorServer, hand: RobotiqHand) -> None:
+async def until_moving(server: SimulatorServer | SerialSimulatorServer, hand: RobotiqHand) -> None:
     async for _ in hand.statuses():
         if server.gripper.is_moving:
             return
