@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field
 from socket import gethostname
 from typing import Final, Self
 
+from ..enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..telemetry.gate import is_loopback
 from ..wire.checks import check_int
 
@@ -41,8 +42,8 @@ class PageSettings:
     port: int = PORT
     control: bool = False
     addresses: tuple[str, ...] = ()
-    speed: int = 0
-    force: int = 0
+    speed: int = DEFAULT_SPEED
+    force: int = DEFAULT_FORCE
     password: str = field(default="", repr=False)
     certificate: str = ""
     key: str = ""

@@ -286,14 +286,25 @@ async def test_a_slider_sends_where_it_was_let_go(browser: Browser, hand: Roboti
     """And not where it was some milliseconds before, which is what the server knows of it then."""
     requests = hand.requests()
     await browser.run("document.querySelector('[data-testid=speed] [tabindex]').focus()")
-    value, before, done = 0, 0, 0
+    pressed, before, done = 0, 0, 0
     while done - before < 4:  # all of them, and none too late, as on a busy machine
-        value, before = value + 4, done
+        pressed, before = pressed + 4, done
         await browser.do(lambda: ActionChains(browser.driver).send_keys(Keys.RIGHT * 4).perform())
-        answers = await browser.until(partial(speeds_set, browser, value))
+        answers = await browser.until(partial(speeds_set, browser, pressed))
         done = sum(each.endswith("set") for each in answers)
     await hand.move(20, Finger.A)
-    assert [*requests.drain()][-1].request.axes[0].speed == value
+    assert [*requests.drain()][-1].request.axes[0].speed == DEFAULT_SPEED + pressed
+
+
+async def test_a_slider_is_not_set_back_to_what_the_server_knew(browser: Browser, hand: RobotiqHand) -> None:
+    """Each value was answered with itself, which overwrote the next: four steps to the right were three."""
+    await browser.run("document.querySelector('[data-testid=speed] [tabindex]').focus()")
+    steps = ActionChains(browser.driver)
+    for _ in range(12):
+        steps.send_keys(Keys.RIGHT).pause(0.015)
+    await browser.do(steps.perform)
+    await browser.until(partial(speeds_set, browser, 12))
+    assert browser.find("speed").get_attribute("aria-valuenow") == str(DEFAULT_SPEED + 12)
 
 
 def speeds_set(browser: Browser, times: int) -> list[str] | Literal[False]:

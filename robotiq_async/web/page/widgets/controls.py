@@ -19,6 +19,12 @@ DIRECT: Final = ("open", "close", "wide", "normal", "pinch")
 ASKED: Final = tuple(name for name, action in ACTIONS.items() if action.warning)
 
 
+class _Slider(ui.slider):
+    """Keeps its value in the browser: an answer of the server would set back one that has moved on."""
+
+    LOOPBACK = False
+
+
 class Controls:
     """The part of the page that commands; only there when the page may."""
 
@@ -88,7 +94,7 @@ class Controls:
             self._pressed(f"set_{what}", {"value": value}, sent_back)
 
         ui.label(what)
-        slider = ui.slider(min=0, max=highest, value=value).props(f"data-testid={what}")
+        slider = _Slider(min=0, max=highest, value=value).props(f"data-testid={what}")
         # Sent when it is let go, and not for every value on the way.
         slider.on("change", change, js_handler=PRESS_WITH_VALUE)
         ui.label().bind_text_from(slider, "value", lambda each: f"{each:.0f}").classes("w-8 text-right")
