@@ -36,8 +36,8 @@ class PageCommands:
         """
         self._operators = operators
         self._answer = answer
-        self._tasks: dict[str, set[asyncio.Task[None]]] = {}
-        self._halts: set[asyncio.Task[None]] = set()
+        self._tasks: dict[str, set[asyncio.Task[str]]] = {}
+        self._halts: set[asyncio.Task[str]] = set()
 
     @property
     def under_way(self) -> bool:
@@ -52,10 +52,17 @@ class PageCommands:
                 it was asked for: ``time.monotonic()`` of this machine, which is the same in every process.
         """
         page, name = str(request["page"]), str(request["name"])
-        task = asyncio.get_running_loop().create_task(self._carry_out(request, page, name))
         tasks = self._halts if name == HALT else self._tasks.setdefault(page, set())
+
+        def ended(task: asyncio.Task[str]) -> None:
+            tasks.discard(task)
+            ok, words = _outcome(task)
+            self._answer({"page": page, "number": request["number"], "name": name, "ok": ok, "words": words})
+
+        task = asyncio.get_running_loop().create_task(self._carry_out(request, page, name))
         tasks.add(task)
-        task.add_done_callback(tasks.discard)
+        # Not at the end of the task: a page that is gone in the same turn has it cancelled before it begins.
+        task.add_done_callback(ended)
 
     def gone(self, page: str) -> None:
         """The page has ended or cannot be heard: its motions are held. A halt of it is completed."""
@@ -73,20 +80,7 @@ class PageCommands:
         self.all_gone()
         await asyncio.gather(*tasks, *self._halts, return_exceptions=True)
 
-    async def _carry_out(self, request: Fields, page: str, name: str) -> None:
-        answer: Fields = {"page": page, "number": request["number"], "name": name, "ok": False}
-        try:
-            answer["words"] = await self._call(request, page, name)
-            answer["ok"] = True
-        except (RobotiqError, ValueError, TypeError) as error:
-            answer["words"] = str(error)
-        except asyncio.CancelledError:
-            answer["words"] = "the page was gone: the axes are held"
-            raise
-        finally:
-            self._answer(answer)
-
-    async def _call(self, request: Fields, page: str, name: str) -> str:
+    async def _carry_out(self, request: Fields, page: str, name: str) -> str:
         if not self._operators:
             raise ValueError("this page only looks: start it with --control")
         if name != HALT and not 0 <= monotonic() - request["at"] <= FRESH_S:
@@ -98,3 +92,13 @@ class PageCommands:
             raise ValueError(f"there is no {name} of hand {request['hand']}")
         operator = self._operators[request["hand"]]
         return await service.call(operator, json.dumps(request["arguments"]).encode())
+
+
+def _outcome(task: asyncio.Task[str]) -> tuple[bool, str]:
+    """Whether a command has been carried out, and how it ended in words."""
+    try:
+        return True, task.result()
+    except asyncio.CancelledError:
+        return False, "the page was gone: the axes are held"
+    except (RobotiqError, ValueError, TypeError) as error:
+        return False, str(error)

@@ -31,8 +31,8 @@ from tests.grippers import active_gripper
 # -- commands ----------------------------------------------------------------------------------------------
 
 
-class Desk:
-    """Commands, and their answers."""
+class Pages:
+    """What pages ask for, and how they are answered."""
 
     def __init__(self, *hands: Any) -> None:
         self.answers: list[dict[str, Any]] = []
@@ -50,84 +50,93 @@ class Desk:
 
 
 async def test_a_command_is_carried_out_and_answered(hand: RobotiqHand) -> None:
-    desk = Desk(hand)
-    desk.do("close")
-    answer = await desk.answer()
+    pages = Pages(hand)
+    pages.do("close")
+    answer = await pages.answer()
     assert answer["ok"]
     assert answer["words"].startswith("A at 24")
-    desk.do("reset")
-    assert "needs the argument 'confirm'" in (await desk.answer())["words"]
-    desk.do("reset", confirm=True)
-    assert (await desk.answer())["words"] == "the gripper is reset"
+    pages.do("reset")
+    assert "needs the argument 'confirm'" in (await pages.answer())["words"]
+    pages.do("reset", confirm=True)
+    assert (await pages.answer())["words"] == "the gripper is reset"
 
 
 @pytest.mark.parametrize(("name", "hand"), [("explode", 0), ("close", 1), ("close", -1)])
 async def test_what_there_is_not_is_refused(name: str, hand: int) -> None:
-    desk = Desk(FakeHand())
-    desk.do(name, hand=hand)
-    answer = await desk.answer()
+    pages = Pages(FakeHand())
+    pages.do(name, hand=hand)
+    answer = await pages.answer()
     assert (answer["ok"], answer["words"]) == (False, f"there is no {name} of hand {hand}")
 
 
 async def test_without_operators_nothing_is_carried_out() -> None:
     """Whatever the process of the page says: looking only is decided where the hand is."""
-    desk = Desk()
+    pages = Pages()
     for name in ("close", "halt"):
-        desk.do(name)
-        assert "only looks" in (await desk.answer())["words"]
+        pages.do(name)
+        assert "only looks" in (await pages.answer())["words"]
 
 
 async def test_what_was_asked_for_too_long_ago_moves_nothing_but_a_halt_is_never_too_old(
     hand: RobotiqHand,
 ) -> None:
     """Whether it waited in the browser, on the network, or for this loop, which something had held up."""
-    desk, requests = Desk(hand), hand.requests()
+    pages, requests = Pages(hand), hand.requests()
     for ago in (FRESH_S + 0.1, 1e9, -1.0):
         for name, arguments in (("close", {}), ("set_speed", {"value": 9}), ("reset", {"confirm": True})):
-            desk.do(name, ago=ago, **arguments)
-            assert "came too late" in (await desk.answer())["words"]
+            pages.do(name, ago=ago, **arguments)
+            assert "came too late" in (await pages.answer())["words"]
     assert requests.take_nowait() is None
     assert hand.state is State.RUNNING_IDLE
-    desk.do("halt", ago=1e9)
-    assert (await desk.answer())["ok"]
+    pages.do("halt", ago=1e9)
+    assert (await pages.answer())["ok"]
 
 
 async def test_a_page_that_is_gone_has_its_motion_held_and_no_other() -> None:
     gripper = active_gripper(spread=False)
     async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
-        desk = Desk(hand)
-        desk.do("move", page="one", position=CLOSED, fingers="A")
-        desk.do("move", page="two", position=100, fingers="B")
+        pages = Pages(hand)
+        pages.do("move", page="one", position=CLOSED, fingers="A")
+        pages.do("move", page="two", position=100, fingers="B")
         async for status in hand.statuses():
             if status.moving & Finger.A and status.moving & Finger.B:
                 break
-        desk.commands.gone("one")
-        answers = [await desk.answer(), await desk.answer()]
+        pages.commands.gone("one")
+        answers = [await pages.answer(), await pages.answer()]
         assert [each["page"] for each in answers] == ["one", "two"]
         assert (answers[0]["ok"], answers[1]["words"].partition(";")[0]) == (False, "B at 100")
         assert hand.status.position(Finger.A) < 200
-        assert not desk.commands.under_way
+        assert not pages.commands.under_way
 
 
 async def test_a_halt_of_a_page_that_is_gone_is_completed(hand: RobotiqHand) -> None:
-    desk = Desk(hand)
-    desk.do("halt")
-    desk.commands.gone("one")
-    assert (await desk.answer())["words"] == "every axis stands still"
+    pages = Pages(hand)
+    pages.do("halt")
+    pages.commands.gone("one")
+    assert (await pages.answer())["words"] == "every axis stands still"
+
+
+async def test_a_command_is_answered_whenever_its_page_is_gone() -> None:
+    """Also in the same turn of the loop, before it has begun, as after a process that stood still."""
+    pages = Pages(FakeHand())
+    pages.do("close")
+    pages.commands.gone("one")
+    assert (await pages.answer())["words"] == "the page was gone: the axes are held"
+    assert not pages.commands.under_way
 
 
 async def test_a_halt_finds_its_way_through_a_crowd() -> None:
     async with SimulatorServer(active_gripper()) as server, RobotiqHand(server.address) as hand:
         server.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
         await hand.wait_for_state(State.FAULT)
-        desk = Desk(hand)
+        pages = Pages(hand)
         for _ in range(MAX_COMMANDS + 1):
-            desk.do("recover", confirm=True)
-        assert "under way already" in (await desk.answer())["words"]
-        desk.do("halt")
-        words = [(await desk.answer())["words"] for _ in range(MAX_COMMANDS + 1)]
+            pages.do("recover", confirm=True)
+        assert "under way already" in (await pages.answer())["words"]
+        pages.do("halt")
+        words = [(await pages.answer())["words"] for _ in range(MAX_COMMANDS + 1)]
         assert "every axis stands still" in words
-        await desk.commands.close()
+        await pages.commands.close()
 
 
 # -- news and mirror ---------------------------------------------------------------------------------------
