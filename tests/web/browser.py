@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any, Final, Literal, TypeVar
 
 from selenium import webdriver
+from selenium.common.exceptions import TimeoutException
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
@@ -93,7 +94,11 @@ class Browser:
 
     async def says(self, name: str, words: str) -> str:
         """Wait until a part of the page has these words; returns all of them."""
-        return await self.until(lambda: words in self.find(name).text and self.find(name).text)
+        try:
+            return await self.until(lambda: words in self.find(name).text and self.find(name).text)
+        except TimeoutException:
+            said = [each.text for each in self.driver.find_elements(By.CSS_SELECTOR, f"[data-testid={name}]")]
+            raise AssertionError(f"{name} says {said}, and not {words!r}") from None
 
     async def click(self, name: str) -> None:
         await self.until(lambda: self.find(name).is_enabled())
