@@ -352,6 +352,34 @@ async def test_a_page_that_cannot_be_heard_holds_its_motion(browser: Browser, st
     assert status.position(Finger.A) < 200
 
 
+async def test_a_browser_that_comes_back_shows_what_is_newest(browser: Browser, stage: Stage) -> None:
+    """NiceGUI sends the newest first, and then what got lost before: "moving", of a hand that stood still."""
+    await browser.says("state", "ready")
+    await stage.slow()
+    await browser.run(LOSE)
+    moving = asyncio.create_task(stage.hand.move(60))
+    await browser.until(lambda: browser.driver.execute_script("return window.lost"))
+    await browser.run("window.socket.io.engine.close()")
+    stage.pace.set(FAST)
+    await moving
+    told = await browser.run("return window.robotiqTime")
+    for _ in range(4):  # the first is among what it missed, or after it
+        told = await browser.until(partial(told_after, browser, told))
+    assert browser.find("state").text == "ready"
+
+
+LOSE = """
+window.lost = false;
+const { ws } = window.socket.io.engine.transport;
+ws.onmessage = (event) => { window.lost ||= event.data.includes('"moving"'); };
+"""
+
+
+def told_after(browser: Browser, time: float) -> float | Literal[False]:
+    told: float = browser.driver.execute_script("return window.robotiqTime")
+    return told > time and told
+
+
 @pytest.mark.skipif(os.name != "posix", reason="stops a process")
 async def test_a_page_whose_process_stands_still_holds_its_motion_and_takes_no_press(
     browser: Browser, stage: Stage

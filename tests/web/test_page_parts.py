@@ -266,6 +266,20 @@ def test_a_browser_is_lost_once_and_found_again() -> None:
     assert heartbeat.check(), "and lost once more, with whatever it has set in motion since"
 
 
+def test_a_browser_that_comes_back_has_caught_up_when_it_knows_a_time_since() -> None:
+    heartbeat = Heartbeat()
+    heartbeat.begin()
+    heartbeat.heard(monotonic())
+    assert not heartbeat.has_caught_up(), "it was never away"
+    told_before = monotonic()
+    heartbeat.begin()
+    heartbeat.heard(told_before)
+    assert not heartbeat.has_caught_up(), "what it missed is still to come"
+    heartbeat.heard(monotonic())
+    assert heartbeat.has_caught_up()
+    assert not heartbeat.has_caught_up(), "told once"
+
+
 # -- what is held ------------------------------------------------------------------------------------------
 
 

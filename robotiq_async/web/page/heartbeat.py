@@ -4,6 +4,9 @@ The server sends the time by its own clock four times a second, and the browser 
 with its heartbeat, and with every press of a button. So a press that was held up on its way, or made on a
 page that shows what was long ago, is told apart from a fresh one (where the hand is, and the whole way behind
 it), although the two clocks know nothing of each other.
+
+It also tells when a browser that was away has got all that it missed. NiceGUI 3 sends what is newest first
+then, and after it once more what was on its way when the connection was lost: that would go on being shown.
 """
 
 from __future__ import annotations
@@ -52,13 +55,26 @@ class Heartbeat:
     def __init__(self) -> None:
         """In touch, for now: it has just asked for the page."""
         self.is_lost = False
-        self._newest = 0.0
-        self.begin()
+        self._newest = monotonic()
+        self._has_been_here = False
+        self._came_back_at: float | None = None
 
     def begin(self) -> None:
-        """It has just connected."""
-        self.is_lost = False
-        self._newest = monotonic()
+        """It has just connected, for the first time or again."""
+        self.is_lost, self._newest = False, monotonic()
+        if self._has_been_here:
+            self._came_back_at = self._newest
+        self._has_been_here = True
+
+    def has_caught_up(self) -> bool:
+        """Whether a browser that came back has got all that it missed; true once.
+
+        It knows a time then that it was told since: after everything else, for messages keep their order.
+        """
+        if self._came_back_at is None or self._newest <= self._came_back_at:
+            return False
+        self._came_back_at = None
+        return True
 
     @staticmethod
     def now() -> str:

@@ -7,6 +7,7 @@ from time import monotonic
 from typing import Final
 
 from nicegui import Client, ui
+from nicegui.events import GenericEventArguments
 
 from .heartbeat import BEAT_MS, SCRIPT, Heartbeat
 from .mirror import HandMirror, Mirror
@@ -63,7 +64,7 @@ PRESSED: Final = ", and nothing that is pressed here arrives, HALT neither"
 
 
 class Visits:
-    """Who looks: counts the browsers, and notices when one is gone."""
+    """Who looks: counts the browsers, notices when one is gone, and tells one that came back all anew."""
 
     def __init__(self, mirror: Mirror) -> None:
         """Nobody does yet."""
@@ -76,13 +77,19 @@ class Visits:
         client.on_connect(lambda: self._arrive(client.id, heartbeat))
         client.on_disconnect(lambda: self._leave(client))
         client.on_delete(lambda: self._leave(client))
-        ui.on("beat", lambda event: heartbeat.heard(event.args))
+
+        def beat(event: GenericEventArguments) -> None:
+            heartbeat.heard(event.args)
+            if heartbeat.has_caught_up():
+                for element in [*client.elements.values()]:
+                    element.update()
 
         def look() -> None:
             ui.run_javascript(Heartbeat.now())
             if heartbeat.check():
                 self._mirror.gone(client.id)
 
+        ui.on("beat", beat)
         ui.timer(BEAT_MS / 1000, look)
         return heartbeat
 
