@@ -82,7 +82,7 @@ class PageCommands:
 
     async def _carry_out(self, request: Fields, page: str, name: str) -> str:
         if not self._operators:
-            raise ValueError("this page only looks: one of robotiq-async web --control commands")
+            raise ValueError("this page only looks; to command from a page: robotiq-async web --control")
         if name != HALT and not 0 <= monotonic() - request["at"] <= FRESH_S:
             raise ValueError("this came too late to be carried out: the connection was held up")
         if name != HALT and len(self._tasks.get(page, ())) > MAX_COMMANDS:
