@@ -15,7 +15,7 @@ tables in docs/ are made from the table below.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from enum import Enum
 from typing import Final
 
@@ -31,6 +31,7 @@ from ..errors import (
 from ..log import Log, log
 from ..wire.request import Request
 from ..wire.status import RobotiqStatus
+from .sequences import Sequence
 from .triggers import Trigger, classify
 
 
@@ -152,7 +153,7 @@ class StateMachine:
         self.changed = changed
         """Called with source, target and trigger after each change of state."""
         self._state = State.DISCONNECTED
-        self.sequence: Generator[Request | None, RobotiqStatus, None] | None = None
+        self.sequence: Sequence | None = None
         """The one under way, for :meth:`begin`, :meth:`advance` and :meth:`drop_sequence` to change."""
 
     @property
@@ -195,7 +196,7 @@ class StateMachine:
 
     # -- the sequence under way ------------------------------------------------------------------------
 
-    def begin(self, sequence: Generator[Request | None, RobotiqStatus, None]) -> None:
+    def begin(self, sequence: Sequence) -> None:
         """Run a sequence, in place of the one under way."""
         self.sequence = sequence
         next(sequence)
