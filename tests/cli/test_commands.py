@@ -296,11 +296,9 @@ async def test_doctor_finds_nothing_wrong_with_the_simulator(shell: Shell) -> No
     outcome.assert_succeeded()
     lines = outcome.out.splitlines()
     assert lines[0].split()[:2] == ["ok", "Modbus"]
-    # The others are the simulator's; how quick it answers is the machine's, which may be busy.
-    assert {line[6:20].strip() for line in lines if line.startswith(("FAIL", "warn"))} <= {
-        "round trip",
-        "rate",
-    }
+    assert not any(line.startswith("FAIL") for line in lines)
+    # All but two are the simulator's; how quick it answers is the machine's, which may be busy.
+    assert {line[6:20].strip() for line in lines if line.startswith("warn")} <= {"round trip", "rate"}
 
 
 def test_doctor_fails_when_something_is_broken(call: Call) -> None:

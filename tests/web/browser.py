@@ -12,6 +12,7 @@ from typing import Any, Final, Literal, TypeVar
 from selenium import webdriver
 from selenium.common.exceptions import TimeoutException
 from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
 from selenium.webdriver.support.wait import WebDriverWait
@@ -105,6 +106,13 @@ class Browser:
         # In the middle of the window: at its foot the halt would be hit.
         await self.do(lambda: self.driver.execute_script(MIDDLE, self.find(name)))
         await self.do(lambda: self.find(name).click())
+
+    async def press_keys(self, keys: str) -> None:
+        """Where the focus is."""
+        await self.do(lambda: ActionChains(self.driver).send_keys(keys).perform())
+
+    async def focus_slider(self, name: str) -> None:
+        await self.run(f"document.querySelector('[data-testid={name}] [tabindex]').focus()")
 
     async def run(self, script: str, *arguments: object) -> Any:
         return await self.do(lambda: self.driver.execute_script(script, *arguments))

@@ -251,7 +251,7 @@ async def test_halt_stops_it_and_so_does_the_space_bar(browser: Browser, stage: 
     await browser.says("events", "halt: every axis stands still")
     # While the button that was clicked has the focus: the space bar would press it again.
     await press(browser, hand, "close")
-    await browser.do(lambda: ActionChains(browser.driver).send_keys(" ").perform())
+    await browser.press_keys(" ")
     await seen(hand, moving=False, go=False)
 
 
@@ -279,20 +279,18 @@ async def test_what_is_dangerous_is_asked_about(browser: Browser, hand: RobotiqH
         return hand.state is State.RESET
 
     await browser.until(insist)
-    await browser.do(
-        lambda: ActionChains(browser.driver).send_keys(Keys.ESCAPE).perform()
-    )  # if it asks again
+    await browser.press_keys(Keys.ESCAPE)  # it may have asked once more
     await browser.says("state", "reset")
 
 
 async def test_a_slider_sends_where_it_was_let_go(browser: Browser, hand: RobotiqHand) -> None:
     """And not where it was some milliseconds before, which is what the server knows of it then."""
     requests = hand.requests()
-    await browser.run("document.querySelector('[data-testid=speed] [tabindex]').focus()")
+    await browser.focus_slider("speed")
     pressed, before, done = 0, 0, 0
     while done - before < 4:  # all of them, and none too late, as on a busy machine
         pressed, before = pressed + 4, done
-        await browser.do(lambda: ActionChains(browser.driver).send_keys(Keys.RIGHT * 4).perform())
+        await browser.press_keys(Keys.RIGHT * 4)
         answers = await browser.until(partial(speeds_set, browser, pressed))
         done = sum(each.endswith("set") for each in answers)
     await hand.move(20, Finger.A)
@@ -301,7 +299,7 @@ async def test_a_slider_sends_where_it_was_let_go(browser: Browser, hand: Roboti
 
 async def test_a_slider_is_not_set_back_to_what_the_server_knew(browser: Browser, hand: RobotiqHand) -> None:
     """Each value was answered with itself, which overwrote the next: four steps to the right were three."""
-    await browser.run("document.querySelector('[data-testid=speed] [tabindex]').focus()")
+    await browser.focus_slider("speed")
     steps = ActionChains(browser.driver)
     for _ in range(12):
         steps.send_keys(Keys.RIGHT).pause(0.015)
@@ -387,16 +385,22 @@ async def test_a_page_whose_process_stands_still_holds_its_motion_and_takes_no_p
     """What is pressed meanwhile arrives when it runs again, or never, and moves nothing."""
     await stage.slow()
     await press(browser, stage.hand, "close")
-    requests, process = stage.hand.requests(), stage.page._process.pid
+    process = stage.page._process.pid
     os.kill(process, signal.SIGSTOP)
     try:
         status = await seen(stage.hand, moving=False)
         assert status.position(Finger.A) < 200
         await browser.says("cut", "what is shown is old")
+        requests = stage.hand.requests()
         await browser.do(lambda: browser.find("open").click())
+        # On a busy machine the browser may have given the connection up, and what was pressed went with it.
+        arrives = await browser.run("return window.socket.connected")
     finally:
         os.kill(process, signal.SIGCONT)
+    if arrives:
+        await browser.says("outcome", "too late")
     await browser.until(lambda: not browser.find("cut").is_displayed())
+    assert requests.take_nowait() is None
     await press(browser, stage.hand, "close")  # it comes after what was pressed before
     targets = [each.request.axes[0].position for each in requests.drain() if each.request.go]
     assert targets
