@@ -152,7 +152,7 @@ def clone() -> str:
 async def test_the_tutorial_is_typed(clone: str) -> None:
     printed = await at_the_prompt(clone, "\n".join(code.text for code, _ in TYPED), ROOT)
     for line in "".join(output.text for _, output in TYPED).splitlines():
-        assert line.replace("...", "") in printed, line
+        assert line.replace("...", "") in printed, f"{line}\nis missing from what it printed:\n{printed}"
 
 
 async def test_the_program_of_the_tutorial(clone: str, tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import asyncio
 import contextlib
 import io
 import sys
-from collections.abc import Coroutine
+from collections.abc import Coroutine, Iterator
 from doctest import ELLIPSIS, OutputChecker
 from itertools import pairwise
 from pathlib import Path
@@ -33,28 +33,34 @@ TYPED = [
     if "def test_" in code.text
 ]
 """Between a test and its output stands the command that runs it."""
+BETWEEN_STATEMENTS = 0.05
+"""Seconds, as a person's keys are slow: ten polls, and half a second of the simulated fingers."""
 
 
-def compiled(block: Block) -> CodeType:
-    """A block as ``python -m asyncio`` compiles it, with the page's line numbers."""
-    code = compile(
-        "\n" * (block.line - 1) + block.text,
-        "tutorial.md",
-        "exec",
-        ast.PyCF_ALLOW_TOP_LEVEL_AWAIT,
-        dont_inherit=True,
-    )
-    assert isinstance(code, CodeType)
-    return code
+def statements(block: Block) -> Iterator[CodeType]:
+    """Each statement of a block as ``python -m asyncio`` compiles it, with the page's line numbers."""
+    lines = "\n" * (block.line - 1) + block.text
+    for statement in ast.parse(lines).body:
+        code = compile(
+            ast.Module([statement], []),
+            "tutorial.md",
+            "exec",
+            ast.PyCF_ALLOW_TOP_LEVEL_AWAIT,
+            dont_inherit=True,
+        )
+        assert isinstance(code, CodeType)
+        yield code
 
 
 async def typed(block: Block, names: dict[str, Any]) -> str:
-    """What a block prints."""
+    """What a block prints, with the hand polling on between its statements as it does at the prompt."""
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
-        outcome = FunctionType(compiled(block), names)()
-        if isinstance(outcome, Coroutine):
-            await outcome
+        for code in statements(block):
+            outcome = FunctionType(code, names)()
+            if isinstance(outcome, Coroutine):
+                await outcome
+            await asyncio.sleep(BETWEEN_STATEMENTS)
     return printed.getvalue()
 
 
