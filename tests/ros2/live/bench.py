@@ -1,11 +1,10 @@
-"""What a live test works with: a simulated gripper, and a client of ROS, both in threads of this process.
+"""What a live test works with: a client of ROS, in a thread of this process, and what it listens to.
 
 Everything here waits for what happens, and for PATIENCE_S at most.
 """
 
 from __future__ import annotations
 
-import asyncio
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
@@ -29,7 +28,6 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.ros2.live.processes import PATIENCE_S
 
 T = TypeVar("T")
@@ -37,53 +35,6 @@ SUCCEEDED: Final = GoalStatus.STATUS_SUCCEEDED
 CANCELED: Final = GoalStatus.STATUS_CANCELED
 ABORTED: Final = GoalStatus.STATUS_ABORTED
 LATEST: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-
-
-class Simulator:
-    """A simulated gripper behind Modbus TCP, in a loop of its own."""
-
-    def __init__(self, *, speedup: float = 4.0) -> None:
-        self.gripper = SimulatedGripper(speedup=speedup, device_cycle=0.005 * speedup, spread=False)
-        self.server = SimulatorServer(self.gripper)
-        self._loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
-
-    def __enter__(self) -> Self:
-        self._thread.start()
-        self._run(self.server.start())
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._run(self.server.stop())
-        self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join()
-        self._loop.close()
-
-    @property
-    def address(self) -> str:
-        return self.server.address
-
-    def do(self, work: Callable[[SimulatedGripper], T]) -> T:
-        """Do something to the gripper, in its thread."""
-
-        async def inside() -> T:
-            return work(self.gripper)
-
-        done: T = self._run(inside())
-        return done
-
-    def lose_link(self) -> None:
-        async def inside() -> None:
-            self.server.refuse()
-            self.server.cut()
-
-        self._run(inside())
-
-    def find_link(self) -> None:
-        self._run(self.server.accept())
-
-    def _run(self, work: Any) -> Any:
-        return asyncio.run_coroutine_threadsafe(work, self._loop).result(PATIENCE_S)
 
 
 class Topic:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import signal
 
-from tests.ros2.live.bench import ABORTED, SUCCEEDED, Client, Simulator
+from tests.ros2.live.bench import ABORTED, SUCCEEDED, Client
 from tests.ros2.live.goals import begun
 from tests.ros2.live.processes import node
+from tests.ros2.live.simulated import Simulator
 
 
 def test_a_killed_node_leaves_the_fingers_running(simulator: Simulator) -> None:
@@ -18,7 +19,7 @@ def test_a_killed_node_leaves_the_fingers_running(simulator: Simulator) -> None:
         begun(client.move(2.8))
         process.send(signal.SIGKILL)
         assert process.ends() == -signal.SIGKILL
-    assert simulator.do(lambda gripper: gripper.request_registers[0] >> 8 & 0x08), "rGTO"
+    assert simulator.read("request_registers")[0] >> 8 & 0x08, "rGTO"
     with node(address=simulator.address, autostart=True) as process, Client() as client:
         process.prints("commands are taken")
         assert client.call("halt").success

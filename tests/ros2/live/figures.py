@@ -16,8 +16,9 @@ from pathlib import Path
 from statistics import median
 from typing import Final
 
-from tests.ros2.live.bench import ABORTED, CANCELED, Client, Goal, Simulator
+from tests.ros2.live.bench import ABORTED, CANCELED, Client, Goal
 from tests.ros2.live.processes import Process, isolate, node
+from tests.ros2.live.simulated import Simulator
 
 SECONDS: Final = 10.0
 """That CPU time and polls are taken over."""
@@ -125,7 +126,7 @@ def stillness() -> None:
             began = time.monotonic()
             goal.cancel()
             goal.ends()
-            held.append(simulator.do(lambda it: it.writes[-1].time) - began + 0.005)
+            held.append(simulator.read("writes")[-1].time - began + 0.005)
     told("cancel to still, by the gripper's clock (its cycle of 5 ms included)", held)
 
 

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import pytest
 
-from robotiq_async.simulator import SimulatedGripper
-from tests.ros2.live.bench import Client, Simulator
+from tests.ros2.live.bench import Client
 from tests.ros2.live.processes import OF_ROS, Process, isolate, node
+from tests.ros2.live.simulated import Simulator
 
 isolate()
 
@@ -39,12 +39,14 @@ def shared() -> Iterator[Cell]:
 
 
 @pytest.fixture
-def cell(shared: Cell) -> Cell:
-    """The same, with open fingers and nothing between them."""
-    shared.simulator.do(SimulatedGripper.remove_object)
+def cell(shared: Cell) -> Iterator[Cell]:
+    """The same, with open fingers and nothing between them; what the node logs meanwhile is shown."""
+    began = len(shared.node.lines)
+    shared.simulator.do("remove_object")
     shared.client.set("allow_stalling", True)
     shared.client.move(0.0).ends()
-    return shared
+    yield shared
+    print("".join(shared.node.lines[began:]))  # noqa: T201
 
 
 @pytest.fixture

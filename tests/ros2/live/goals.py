@@ -11,16 +11,17 @@ import pytest
 
 from robotiq_async import Fault, Finger
 from robotiq_async.ros2.translation.joints import joint_names
-from tests.ros2.live.bench import ABORTED, CANCELED, SUCCEEDED, Goal, Simulator, waited
+from tests.ros2.live.bench import ABORTED, CANCELED, SUCCEEDED, Goal, waited
 from tests.ros2.live.fixtures import Cell
 from tests.ros2.live.processes import Process
+from tests.ros2.live.simulated import Simulator
 
 A = Finger.A
 STATES = joint_names()
 
 
 def position(simulator: Simulator, axis: Finger = A) -> int:
-    return simulator.do(lambda gripper: gripper.position(axis))
+    return int(simulator.do("position", axis))
 
 
 def begun(goal: Goal) -> Goal:
@@ -63,7 +64,7 @@ def test_feedback_comes_twenty_times_a_second(cell: Cell) -> None:
 
 
 def test_a_contact_is_a_grasp(cell: Cell) -> None:
-    cell.simulator.do(lambda gripper: gripper.place_object(A, position=100))
+    cell.simulator.do("place_object", A, position=100)
     status, result = cell.client.move(2.8).ends()
     assert status == SUCCEEDED
     assert result.stalled
@@ -73,7 +74,7 @@ def test_a_contact_is_a_grasp(cell: Cell) -> None:
 
 def test_a_contact_aborts_where_stalling_is_not_allowed(cell: Cell) -> None:
     assert cell.client.set("allow_stalling", False).successful
-    cell.simulator.do(lambda gripper: gripper.place_object(A, position=100))
+    cell.simulator.do("place_object", A, position=100)
     status, result = cell.client.move(2.8).ends()
     assert status == ABORTED
     assert result.stalled
@@ -141,7 +142,7 @@ def test_speed_and_force_of_a_goal_are_parameters(cell: Cell) -> None:
         assert goal is not None
         begun(goal).cancel()
         goal.ends()
-        image = cell.simulator.do(lambda gripper: gripper.request_registers)
+        image = cell.simulator.read("request_registers")
         assert bytes(half for word in image for half in divmod(word, 256))[4:6] == bytes([7, 9])
         cell.node.prints("velocity and effort in goals are ignored")
     finally:
@@ -164,16 +165,16 @@ def test_speed_and_force_of_a_goal_are_parameters(cell: Cell) -> None:
 def test_bad_goals_are_refused_with_a_reason(
     cell: Cell, names: Sequence[str], positions: Sequence[float], reason: str
 ) -> None:
-    writes = cell.simulator.do(lambda gripper: len(gripper.writes))
+    writes = len(cell.simulator.read("writes"))
     assert cell.client.send(names, positions) is None
     cell.node.prints(f"goal rejected: {reason}")
-    assert cell.simulator.do(lambda gripper: len(gripper.writes)) == writes
+    assert len(cell.simulator.read("writes")) == writes
     assert cell.client.move(0.0).ends()[0] == SUCCEEDED, "the node lives on"
 
 
 def test_a_fault_refuses_goals_until_recover(cell: Cell) -> None:
     goal = begun(cell.client.move(2.8))
-    cell.simulator.do(lambda gripper: gripper.inject_fault(Fault.SCISSOR_BLOCKED))
+    cell.simulator.do("inject_fault", Fault.SCISSOR_BLOCKED)
     assert goal.ends()[0] == ABORTED
     assert cell.client.send(["fingers"], [0.0]) is None
     cell.node.prints("goal rejected: the gripper is in fault 0x0E")

@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 from ament_index_python.packages import get_package_prefix, get_package_share_directory
 
-from tests.ros2.live.bench import Client, Simulator
+from tests.ros2.live.bench import Client
 from tests.ros2.live.processes import Process
+from tests.ros2.live.simulated import Simulator
 
 
 @pytest.fixture(autouse=True)

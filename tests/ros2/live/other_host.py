@@ -8,9 +8,10 @@ import socket
 
 import pytest
 
-from tests.ros2.live.bench import ABORTED, CANCELED, SUCCEEDED, Client, Simulator
+from tests.ros2.live.bench import ABORTED, CANCELED, SUCCEEDED, Client
 from tests.ros2.live.goals import begun, position
 from tests.ros2.live.processes import Process, node
+from tests.ros2.live.simulated import Simulator
 
 pytest.importorskip("zenoh")
 

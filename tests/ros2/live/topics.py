@@ -11,9 +11,10 @@ import pytest
 from robotiq_async import Finger
 from robotiq_async.description import HandModel
 from robotiq_async.ros2.translation.joints import joint_names
-from tests.ros2.live.bench import SUCCEEDED, Client, Simulator
+from tests.ros2.live.bench import SUCCEEDED, Client
 from tests.ros2.live.goals import position
 from tests.ros2.live.processes import node
+from tests.ros2.live.simulated import Simulator
 
 
 def test_a_prefix_is_before_every_joint(simulator: Simulator) -> None:
@@ -65,7 +66,7 @@ def test_topics(simulator: Simulator, tmp_path_factory: pytest.TempPathFactory) 
         assert link.level == gripper.level == b"\x00"
         assert link.hardware_id == simulator.address
         assert client.call("activate").success
-        simulator.do(lambda it: it.place_object(Finger.B, position=90))
+        simulator.do("place_object", Finger.B, position=90)
         client.move(2.8).ends()
         fields = json.loads(status.wait().data)
         assert fields["contacts"] == ["B"]
