@@ -293,7 +293,8 @@ async def shell() -> AsyncIterator[Shell]:
 @pytest.fixture(autouse=True)
 def no_terminal_is_left() -> Iterator[None]:
     yield
-    for process in Terminal.running:
-        os.kill(process, signal.SIGKILL)
-        os.waitpid(process, 0)
+    for process in list(Terminal.running):
+        with contextlib.suppress(ProcessLookupError, ChildProcessError):  # a test may still be waiting for it
+            os.kill(process, signal.SIGKILL)
+            os.waitpid(process, 0)
     Terminal.running.clear()

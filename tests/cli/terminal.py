@@ -63,6 +63,9 @@ class Terminal:
 
     async def end(self) -> int:
         async with asyncio.timeout(30):
-            _, status = await asyncio.to_thread(os.waitpid, self._process, 0)
+            return await asyncio.to_thread(self._wait)
+
+    def _wait(self) -> int:
+        _, status = os.waitpid(self._process, 0)
         self.running.discard(self._process)
         return os.waitstatus_to_exitcode(status)

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import signal
 from asyncio.subprocess import Process
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import pytest
 
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.wire.request import Request
+from tests import conftest
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Shell
@@ -22,6 +25,24 @@ LINES = (1, 6, 12, 20, 30, 40)
 def assert_fingers_stopped(server: SimulatorServer) -> None:
     assert not server.gripper.is_moving
     assert not Request.from_registers(server.gripper.request_registers).go
+
+
+@pytest.fixture
+def ignored() -> Iterator[None]:
+    """As under nohup, and in a job in the background."""
+    before = [(number, signal.signal(number, signal.SIG_IGN)) for number in (signal.SIGHUP, signal.SIGINT)]
+    yield
+    for number, handler in before:
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("ignored")
+async def test_what_the_tests_start_hears_a_signal_that_they_ignore(shell: Shell) -> None:
+    conftest.pytest_configure()
+    process = await shell.python("-c", "import signal; print(*map(signal.getsignal, (1, 2)), sep='\\n')")
+    first, second = (await shell.finish(process)).out.splitlines()
+    assert (first, "default_int_handler" in second) == (str(signal.SIG_DFL), True)
+    os.kill(os.getpid(), signal.SIGHUP)  # ends no test
 
 
 async def interrupted(shell: Shell, process: Process) -> str:
