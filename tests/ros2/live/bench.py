@@ -94,7 +94,8 @@ class Client:
         self._executor.add_node(self.node)
         self._action = ActionClient(self.node, ParallelGripperCommand, f"{name}/gripper_cmd")
         self._clients: dict[str, Any] = {}
-        self._thread = threading.Thread(target=self._executor.spin, daemon=True)
+        self._is_ending = threading.Event()
+        self._thread = threading.Thread(target=self._spin, daemon=True)
 
     def __enter__(self) -> Self:
         self._thread.start()
@@ -102,10 +103,16 @@ class Client:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._executor.shutdown()
+        # Shut down from here while it spins, an executor may fall over what has gone.
+        self.inside(self._is_ending.set)
         self._thread.join(PATIENCE_S)
+        self._executor.shutdown()
         self.node.destroy_node()
         rclpy.shutdown(context=self._context)
+
+    def _spin(self) -> None:
+        while not self._is_ending.is_set():
+            self._executor.spin_once()
 
     def inside(self, work: Callable[[], T]) -> T:
         """Do something in the executor's thread: an action client elsewhere may miss its answer."""
