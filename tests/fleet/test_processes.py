@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from robotiq_async import ConnectionLostError, Finger, State
+from robotiq_async.fleet import ControlLostError
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.grippers import ACTIVATION, OPENING
@@ -185,7 +186,8 @@ async def test_an_agent_is_frozen_and_goes_on(site: Site) -> None:
         await site.until(lambda: hand.is_in_control)
         try:
             await hand.move(0, Finger.A, speed=255)
-        except ConnectionLostError:  # the link of before was given up only now, with this on it
+        except (ConnectionLostError, ControlLostError):
+            # Only now is the hand told that the link, or the lease, of before has ended.
             await site.until(lambda: hand.is_in_control)
             await hand.move(0, Finger.A, speed=255)
 
