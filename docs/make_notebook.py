@@ -53,9 +53,10 @@ print("at", [result.positions[axis] for axis in (Finger.A, Finger.B, Finger.C)])
         CODE,
         """import asyncio
 
-opening = asyncio.create_task(hand.open())
 seen = []
 async for status in hand.statuses():
+    if not seen:
+        opening = asyncio.create_task(hand.open())
     seen.append(status.position(Finger.A))
     if opening.done():
         break
