@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import ast
 import contextlib
-import inspect
 import io
 import json
 import re
-from types import FunctionType
 from typing import Any
 
 from docs import make_notebook
+from tests.docs import prompt
 
 NOTEBOOK: dict[str, Any] = json.loads(make_notebook.FILE.read_text(encoding="utf-8"))
 CELLS: list[dict[str, Any]] = NOTEBOOK["cells"]
@@ -28,12 +26,9 @@ async def test_its_cells_print_what_they_show() -> None:
     for cell in CELLS:
         if cell["cell_type"] == make_notebook.CODE:
             source = cell["source"].replace("speedup=10", "speedup=100")
-            code = compile(source, cell["id"], "exec", ast.PyCF_ALLOW_TOP_LEVEL_AWAIT, dont_inherit=True)
             printed = io.StringIO()
             with contextlib.redirect_stdout(printed):
-                outcome = FunctionType(code, names)()
-                if inspect.iscoroutine(outcome):
-                    await outcome
+                await prompt.run(prompt.compiled(source, cell["id"]), names)
             assert printed.getvalue() == shown(cell), cell["source"]
 
 

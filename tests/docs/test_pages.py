@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import ast
 import inspect
 import re
 from contextlib import AsyncExitStack, redirect_stdout
 from io import StringIO
 from pathlib import Path
-from types import CodeType, FunctionType
+from types import CodeType
 from typing import Any
 
 import pytest
@@ -18,6 +17,7 @@ from robotiq_async.control.state_machine import TABLE, Verdict
 from robotiq_async.control.triggers import Trigger
 from robotiq_async.enums import State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from tests.docs import prompt
 from tests.docs.agents import ROOM, agent_of_the_pages
 from tests.docs.pages import DOCS, PAGES, ROOT, Block, blocks, outputs, prose, requirements
 from tests.docs.test_tutorial import agree
@@ -44,8 +44,7 @@ def awaits_at_the_top(block: Block) -> bool:
     """Whether it is for a prompt or a notebook; in a program it would be a syntax error."""
     if block.language != "python":
         return False
-    code = compile(block.text, "page", "exec", flags=ast.PyCF_ALLOW_TOP_LEVEL_AWAIT, dont_inherit=True)
-    return bool(code.co_flags & inspect.CO_COROUTINE)
+    return bool(prompt.compiled(block.text, "page").co_flags & inspect.CO_COROUTINE)
 
 
 @pytest.mark.parametrize("page", [*PAGES, *FRONT], ids=name)
@@ -141,9 +140,7 @@ OUTPUTS = {
 def compiled(page: Path, block: Block, address: str) -> CodeType:
     quick = block.text.replace('"sim://"', '"sim://?speedup=20"')
     source = "\n" * (block.line - 1) + quick.replace("tcp://192.168.1.11", address)
-    code = compile(source, str(page), "exec", ast.PyCF_ALLOW_TOP_LEVEL_AWAIT, dont_inherit=True)
-    assert isinstance(code, CodeType)
-    return code
+    return prompt.compiled(source, str(page))
 
 
 @pytest.mark.parametrize(("page", "block"), CODE, ids=lambda value: name(value) or f"line {value.line}")
@@ -157,9 +154,7 @@ async def test_code_runs(
                 monkeypatch.setenv(variable, value)
         names: dict[str, Any] = {}
         with redirect_stdout(StringIO()) as printed:
-            outcome = FunctionType(compiled(page, block, server.address), names)()
-            if inspect.iscoroutine(outcome):
-                await outcome
+            await prompt.run(compiled(page, block, server.address), names)
         shown = OUTPUTS.get((page, block))
         assert shown is None or agree(shown.text, printed.getvalue()), printed.getvalue()
         for function in [value for key, value in names.items() if key.startswith("test_")]:

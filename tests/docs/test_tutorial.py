@@ -7,16 +7,17 @@ import asyncio
 import contextlib
 import io
 import sys
-from collections.abc import Coroutine, Iterator
+from collections.abc import Iterator
 from doctest import ELLIPSIS, OutputChecker
 from itertools import pairwise
 from pathlib import Path
-from types import CodeType, FunctionType
+from types import CodeType
 from typing import Any
 
 import pytest
 
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from tests.docs import prompt
 from tests.docs.pages import DOCS, ROOT, Block, blocks
 
 BLOCKS = blocks((DOCS / "tutorial.md").read_text(encoding="utf-8"))
@@ -41,15 +42,7 @@ def statements(block: Block) -> Iterator[CodeType]:
     """Each statement of a block as ``python -m asyncio`` compiles it, with the page's line numbers."""
     lines = "\n" * (block.line - 1) + block.text
     for statement in ast.parse(lines).body:
-        code = compile(
-            ast.Module([statement], []),
-            "tutorial.md",
-            "exec",
-            ast.PyCF_ALLOW_TOP_LEVEL_AWAIT,
-            dont_inherit=True,
-        )
-        assert isinstance(code, CodeType)
-        yield code
+        yield prompt.compiled(ast.Module([statement], []), "tutorial.md")
 
 
 async def typed(block: Block, names: dict[str, Any]) -> str:
@@ -57,9 +50,7 @@ async def typed(block: Block, names: dict[str, Any]) -> str:
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         for code in statements(block):
-            outcome = FunctionType(code, names)()
-            if isinstance(outcome, Coroutine):
-                await outcome
+            await prompt.run(code, names)
             await asyncio.sleep(BETWEEN_STATEMENTS)
     return printed.getvalue()
 

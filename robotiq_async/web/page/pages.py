@@ -81,7 +81,7 @@ class Visits:
         def beat(event: GenericEventArguments) -> None:
             heartbeat.heard(event.args)
             if heartbeat.has_caught_up():
-                for element in [*client.elements.values()]:
+                for element in list(client.elements.values()):
                     element.update()
 
         def look() -> None:

@@ -19,7 +19,7 @@ def test_a_killed_node_leaves_the_fingers_running(simulator: Simulator) -> None:
         begun(client.move(2.8))
         process.send(signal.SIGKILL)
         assert process.ends() == -signal.SIGKILL
-    assert simulator.read("request_registers")[0] >> 8 & 0x08, "rGTO"
+    assert simulator.request.go, "rGTO"
     with node(address=simulator.address, autostart=True) as process, Client() as client:
         process.prints("commands are taken")
         assert client.call("halt").success

@@ -36,15 +36,6 @@ async def main():
     await hand.stop(halt=False)
 asyncio.run(main())
 """
-SIMULATE: Final = """
-import asyncio
-from robotiq_async.simulator import SimulatorServer
-async def main():
-    async with SimulatorServer() as server:
-        print(server.address)
-        await asyncio.Event().wait()
-asyncio.run(main())
-"""
 
 
 def told(what: str, seconds: list[float]) -> None:
@@ -177,8 +168,8 @@ def main() -> None:
     isolate()
     print(f"load before: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores", flush=True)  # noqa: T201
     stillness()
-    with Process("-c", SIMULATE) as gripper:
-        address = gripper.prints("tcp://").strip()
+    with Simulator(speedup=1.0) as simulator:
+        address = simulator.address
         latencies(address)
         alone(address)
         with_node(address, 1.0, "node, joint states at 1 Hz")

@@ -10,7 +10,6 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
 from robotiq_async.ros2.translation.settings import PARAMETERS
-from robotiq_async.wire.request import Request
 from tests.ros2.live.bench import ABORTED, SUCCEEDED, Client
 from tests.ros2.live.goals import begun, position
 from tests.ros2.live.processes import node
@@ -118,7 +117,7 @@ def test_of_parameters_that_are_set_together_none_counts_if_one_is_refused(simul
 
 def speed(simulator: Simulator) -> int:
     """That finger A was last given."""
-    return Request.from_registers(simulator.read("request_registers")).axes[0].speed
+    return simulator.request.axes[0].speed
 
 
 def test_a_gripper_that_is_not_there(simulator: Simulator) -> None:
@@ -141,7 +140,7 @@ def test_a_signal_while_the_node_shuts_down(simulator: Simulator) -> None:
         process.send(signal.SIGINT)
         assert goal.ends()[0] == ABORTED
         assert process.ends() == 0
-        assert not simulator.read("request_registers")[0] >> 8 & 0x08, "rGTO"
+        assert not simulator.request.go, "rGTO"
         assert position(simulator) < 230
         assert "Traceback" not in process.text
 
@@ -158,6 +157,6 @@ def test_a_signal_during_a_goal(simulator: Simulator, number: signal.Signals) ->
         assert process.ends() == 0
         there = position(simulator)
         assert there < 230
-        assert not simulator.read("request_registers")[0] >> 8 & 0x08, "rGTO"
+        assert not simulator.request.go, "rGTO"
         assert position(simulator) == there
         assert "Traceback" not in process.text

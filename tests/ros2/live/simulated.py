@@ -14,6 +14,7 @@ from multiprocessing.connection import Connection
 from typing import Any, Final, Self
 
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.wire.request import Request
 from tests.ros2.live.processes import PATIENCE_S
 
 SPAWN: Final = multiprocessing.get_context("spawn")  # a fork would take over what ROS has open
@@ -23,9 +24,8 @@ class Simulator:
     """A simulated gripper behind Modbus TCP."""
 
     def __init__(self, *, speedup: float = 4.0) -> None:
-        self._pipe, theirs = SPAWN.Pipe()
-        self._theirs = theirs
-        self._child = SPAWN.Process(target=_run, args=(theirs, speedup), daemon=True)
+        self._pipe, self._theirs = SPAWN.Pipe()
+        self._child = SPAWN.Process(target=_run, args=(self._theirs, speedup), daemon=True)
 
     def __enter__(self) -> Self:
         self._child.start()
@@ -38,6 +38,11 @@ class Simulator:
         self._child.join(PATIENCE_S)
         assert self._child.exitcode == 0, "the simulator has failed, and said why"
         self._child.close()
+
+    @property
+    def request(self) -> Request:
+        """What was last asked of it."""
+        return Request.from_registers(self.read("request_registers"))
 
     def do(self, method: str, *arguments: Any, **named: Any) -> Any:
         """Call a method of the gripper."""
