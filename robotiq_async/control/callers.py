@@ -30,6 +30,11 @@ class Callers:
         """What is on the line."""
         self.halting: list[tuple[int, Waiter[None]]] = []
 
+    @property
+    def has_undelivered_stop(self) -> bool:
+        """Whether a halt or a hold waits to be sent, or for its acknowledgement."""
+        return any(each.hold or each.halting is not None for each in (self.pending, self._sent))
+
     # -- what they ask ---------------------------------------------------------------------------------
 
     def command(self, command: Command, waiter: Waiter[None] | None = None) -> None:

@@ -170,8 +170,12 @@ class Controller:
         self._begin(automatic_release(self._shadow.at_rest))
 
     def stop(self) -> None:
-        """The hand is being stopped: nothing more is taken, and whoever waits is told."""
+        """The hand is being stopped: take no more requests, drop those not sent, and tell their callers."""
         self._grip_keeper.begin(self.machine.state, halts=self._callers.pending.halting is not None)
+        if self._activating and not self._step:
+            self._activating = False  # it was not sent: there is nothing to take back
+        if not self._callers.pending.is_empty:
+            self.machine.log.info("stopped: what was asked for and not sent yet is dropped")
         self.machine.fire(Trigger.ASK_STOP)
         self._callers.fail(NotStartedError("the hand was stopped"))
         self.machine.drop_sequence()
@@ -180,6 +184,17 @@ class Controller:
         """The shutdown is over, whether it came to its end or its time did."""
         self.machine.drop_sequence()
         self.machine.fire(Trigger.STOPPED)
+
+    @property
+    def has_undelivered_stop(self) -> bool:
+        """Whether a halt, a hold or a reset was asked for that the gripper has not acknowledged."""
+        resets = self.machine.state is State.DO_RESET
+        return resets or self._callers.has_undelivered_stop or bool(self._hold_on_return)
+
+    def keep_no_grip(self, why: str) -> None:
+        """Clear rGTO in the shutdown under way after all."""
+        self._keeps_grip = False
+        self._grip_keeper.doubt = why
 
     def shut_down(self, *, keep_grip: bool = False) -> None:
         """Begin to stop the fingers, if there is anything to stop.

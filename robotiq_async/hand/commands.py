@@ -93,7 +93,8 @@ class Commands(Recovery):
             raise ValueError("command() needs at least one of position, speed and force in 0..255, got none")
         position = check_optional_byte("position", position)
         speed, force = check_optional_byte("speed", speed), check_optional_byte("force", force)
-        self._asked().controller.command(Command(axes, position, speed, force))
+        session = self._asked()
+        session.ask(session.controller.command, Command(axes, position, speed, force))
 
     @tells_its_hand
     async def move(
@@ -138,7 +139,7 @@ class Commands(Recovery):
         controller = session.controller
         ended: asyncio.Future[MoveResult] = session.waiter()
         move = Move(target, axes, now(), ended)
-        usual = controller.move(move, speed, force)
+        usual = session.ask(controller.move, move, speed, force)
         limit = usual if limit is None else limit
         with session.counters.move() as note:
             try:
@@ -147,12 +148,12 @@ class Commands(Recovery):
                     note(result)
                     return result
             except asyncio.CancelledError:
-                controller.abandon(move, unseen=True)
+                session.ask(controller.abandon, move, unseen=True)
                 if ended.done() and not ended.cancelled():
                     ended.exception()  # nobody else will look at it
                 raise
             finally:
-                controller.abandon(move)
+                session.ask(controller.abandon, move)
             raise MoveTimeoutError(
                 f"{axes} still moved after {limit:.2f} s on the way to {target}", self.status
             )

@@ -217,7 +217,9 @@ class Observation:
         if self.state in states:
             return self.state
         names = " or ".join(state.name for state in states)
-        return await self._asked().reach(set(states), limit, what=f"{names} was not reached")
+        session = self._started()
+        session.check_loop("the hand")
+        return await session.reach(set(states), limit, what=f"{names} was not reached")
 
     # -- inside ----------------------------------------------------------------------------------------
 
@@ -237,11 +239,12 @@ class Observation:
         """The run under way, for whoever asks for something.
 
         Raises:
-            NotStartedError, ConnectionLostError: as :meth:`_started`.
+            NotStartedError, ConnectionLostError: as :meth:`_started`; or stop() was called.
             RuntimeError: called from another thread or event loop.
         """
         session = self._started()
         session.check_loop("the hand")
+        session.check_takes_requests()
         return session
 
     @tells_its_hand

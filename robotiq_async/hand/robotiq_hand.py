@@ -8,6 +8,7 @@ from typing import Self
 from ..calibration import ForceCalibration, SpeedCalibration
 from ..control.state_machine import StateMachine
 from ..enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ..errors import NotStartedError
 from ..link.transport import Transport
 from ..session.options import (
     ACTIVATION_TIMEOUT_S,
@@ -151,6 +152,9 @@ class RobotiqHand(Commands):
             await session.connected()
             if activate:
                 await session.activated()
+        except NotStartedError:
+            await session.ended()  # stop() was called meanwhile: what it asked for counts
+            raise
         except BaseException:
             await self.stop()
             raise
@@ -158,9 +162,17 @@ class RobotiqHand(Commands):
     async def stop(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:
         """Stop the fingers (rGTO = 0), keep the activation, disconnect. Idempotent.
 
+        It is final from the call on: every request is refused with NotStartedError, what was asked before
+        and not sent yet is dropped, and what other tasks wait for ends with NotStartedError. No request that
+        starts or continues a motion is sent any more.
+
         Ends within 2 s even on a dead link, and also when cancelled meanwhile: the cancellation is
-        raised once the hand has stopped. If the link is down, it is tried once more. What other tasks
-        wait for ends with NotStartedError.
+        raised once the hand has stopped. If the link is down, it is tried once more.
+
+        Of several calls under way the strongest counts, whichever comes first: without ``keep_grip``, then
+        with it, then ``halt=False``; one that is stronger than those before it has 2 s of its own. A halt or
+        a hold that was not delivered makes of ``halt=False`` a stop with ``keep_grip``. A hand that has
+        stopped is left as it is.
 
         With ``keep_grip`` axes that move are held where they are, and rGTO stays set, so that what grips
         goes on gripping while nobody is connected. But only when every axis has been seen at rest: on any

@@ -12,6 +12,7 @@ import asyncio
 import contextlib
 import importlib
 import math
+from enum import IntEnum
 from typing import Final
 
 import anyio
@@ -58,6 +59,20 @@ STOOD_STILL: Final = (
 )
 
 
+class Ending(IntEnum):
+    """What becomes of the fingers at the end, gentlest first."""
+
+    LEAVE = 0
+    """They go on with what they do."""
+    KEEP = 1
+    """What moves is held, and rGTO stays set if everything is seen at rest."""
+    HALT = 2
+    """rGTO is cleared."""
+
+
+_STRONGER: Final = {Ending.KEEP: "held", Ending.HALT: "stopped"}
+
+
 class Poller:
     """Runs one hand's link from start to stop. :meth:`run` is the body of its task."""
 
@@ -91,23 +106,48 @@ class Poller:
         """Why the hand gave up, if it did."""
         self._stopping = False
         self._end_by = math.inf
-        self._halt_at_stop = True
-        self._keep_grip = False
+        self._ending = Ending.HALT
+        """The strongest that was asked for; a task that ends by itself stops the fingers."""
         self._interruptible: anyio.CancelScope | None = None
         self._tick = Tick(options.poll_interval)
         self._last_poll = 0.0
         self._warned = -math.inf
 
     def request_stop(self, *, halt: bool, keep_grip: bool = False) -> None:
-        """Ask the task to end; with ``halt`` it stops the fingers first. Never blocks.
+        """End the task; with ``halt`` it stops the fingers first. Never blocks.
 
         With ``keep_grip`` as well it holds what moves, and leaves rGTO set if it sees everything at rest.
+        From here on the controller refuses every request and has dropped what was not sent. Of several
+        requests to stop the strongest counts, whichever comes first.
         """
+        ending = Ending.LEAVE if not halt else Ending.KEEP if keep_grip else Ending.HALT
         if not self._stopping:
-            self._stopping, self._halt_at_stop, self._keep_grip = True, halt, keep_grip
+            # A hold or a halt that is not delivered yet is dropped with the rest: this one makes up for it.
+            self._ending = max(ending, Ending.KEEP) if self._controller.has_undelivered_stop else ending
             self._end_by = self._loop.time() + STOP_S
+            self._refuse_requests()
+        elif ending > self._ending:
+            self._log.info("a stronger stop came meanwhile: the fingers are %s", _STRONGER[ending])
+            self._ending = ending
+            self._end_by = self._loop.time() + STOP_S
+            if ending is Ending.HALT:
+                self._controller.keep_no_grip("a stop() without keep_grip came meanwhile")
+        elif ending < self._ending:
+            self._log.warning(
+                "a stop that is under way is stronger: the fingers are %s", _STRONGER[self._ending]
+            )
         if self._interruptible is not None:
             self._interruptible.cancel()
+
+    def _refuse_requests(self) -> None:
+        """Take no more requests, and drop those that were not sent.
+
+        At once, and not when the task gets to its end: between a read and a write of this cycle a request
+        would still be taken, and a motion begin.
+        """
+        self._stopping = True
+        self._controller.stop()
+        self._channels.publish_changes()
 
     def hurry(self) -> None:
         """Begin the next cycle at once if there is a stop to write; it does not wait for the tick."""
@@ -165,6 +205,7 @@ class Poller:
         """Open the link again; False when that is given up, or when asked to stop."""
         self._log.warning("link lost: %s", why)
         self._controller.lost(why)
+        self._channels.publish_changes()
         if self._options.policy is None:
             self.failure = why
             return False
@@ -219,14 +260,18 @@ class Poller:
         now = self._tick.time()
         request = self._controller.decide(now)
         if request is None:
+            self._channels.publish_changes()
             return
+        # Listeners hear of it after the write: what they ask for would come too late for this one.
         try:
             await self._transport.write(request.registers)
         except RobotiqConnectionError:
+            self._channels.publish_changes()
             self._channels.requests.push(SentRequest(request, now, acknowledged=False))
             raise
         self._counters.writes += 1
         self._controller.acknowledged(self._tick.time())
+        self._channels.publish_changes()
         self._channels.requests.push(SentRequest(request, now, acknowledged=True))
 
     async def _poll_once(self) -> None:
@@ -243,6 +288,7 @@ class Poller:
             counters.periods.append(asked - self._last_poll)
         self._last_poll = asked
         self._controller.see(status, asked)
+        self._channels.publish_changes()
         self._channels.statuses.push(status)
 
     def _is_held_up(self) -> bool:
@@ -286,21 +332,39 @@ class Poller:
     # -- the end ---------------------------------------------------------------------------------------
 
     async def _finish(self) -> None:
-        """Stop the fingers if that is possible in time, then disconnect."""
-        self._stopping = True
-        deadline = min(self._end_by, self._loop.time() + SHUTDOWN_S)
+        """See to the fingers as far as that is possible in time, then disconnect."""
+        if not self._stopping:
+            self._refuse_requests()
         try:
-            self._controller.stop()
-            with anyio.CancelScope(deadline=deadline, shield=True) as scope:
-                if self._halt_at_stop and self._controller.status is not None:
-                    await self._stop_fingers()
-            if scope.cancelled_caught:
-                self._log.warning("the gripper did not confirm in time that the fingers were stopped")
+            await self._end_motion_and_close()
         finally:
             if not self._loop.is_closed():
                 self._tick.close()
-                await self._transport.close()
                 self._controller.stopped()
+                self._channels.publish_changes()
+
+    async def _end_motion_and_close(self) -> None:
+        """A stronger stop may be asked for while a gentler one is carried out, or while the link closes."""
+        done = Ending.LEAVE
+        while True:
+            try:
+                while done < self._ending:
+                    done = self._ending
+                    await self._end_motion()
+            finally:
+                if not self._loop.is_closed():
+                    await self._transport.close()
+            if done == self._ending:
+                return
+
+    async def _end_motion(self) -> None:
+        if self._controller.status is None:
+            return
+        deadline = min(self._end_by, self._loop.time() + SHUTDOWN_S)
+        with anyio.CancelScope(deadline=deadline, shield=True) as scope:
+            await self._stop_fingers()
+        if scope.cancelled_caught:
+            self._log.warning("the gripper did not confirm in time that the fingers were stopped")
 
     async def _stop_fingers(self) -> None:
         """Clear rGTO and see it; until the time is over. Unlike a motion, a stop may be sent again."""
@@ -314,6 +378,7 @@ class Poller:
                     self._log.warning("the fingers could not be told to stop, trying again: %s", error)
                 failed = True
                 self._controller.lost(error)
+                self._channels.publish_changes()
             await asyncio.sleep(SHUTDOWN_PAUSE_S)
 
     async def _stop_fingers_once(self) -> None:
@@ -322,7 +387,7 @@ class Poller:
             # activated by what was known of it before.
             await self._transport.open()
             await self._poll_once()
-        self._controller.shut_down(keep_grip=self._keep_grip)
+        self._controller.shut_down(keep_grip=self._ending is Ending.KEEP)
         while True:
             await self._cycle()
             if self._controller.machine.sequence is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Collection, Mapping
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, ParamSpec, TypeVar
 
 import anyio
 
@@ -35,6 +35,7 @@ from .streams import Channels, Transition
 from .timing.clock import now
 from .timing.event_loop import check_loop
 
+P = ParamSpec("P")
 T = TypeVar("T")
 Failing = Mapping[State, Callable[[], RobotiqError]]
 """States that mean that what is waited for will not come, each with the error that says so."""
@@ -75,6 +76,7 @@ class Session:
         machine.changed = self._on_transition
         self._poller = Poller(options.make_transport(), self.controller, self.counters, channels, options)
         machine.fire(Trigger.ASK_START)
+        channels.publish_changes()
         self.is_over = False
         self._task = self._loop.create_task(self._poller.run(), name="robotiq_async poller")
         self._task.add_done_callback(self._end)
@@ -96,6 +98,10 @@ class Session:
         """
         self.check_loop("hand.stop()")
         self._poller.request_stop(halt=halt, keep_grip=keep_grip)
+        await self.ended()
+
+    async def ended(self) -> None:
+        """Wait for the end that was asked for; a cancellation meanwhile is raised after it."""
         try:
             await wait_shielded(self._task)
         finally:
@@ -113,6 +119,7 @@ class Session:
         self._channels.end()
         self.machine.fire(Trigger.ASK_STOP)
         self.controller.stopped()
+        self._channels.publish_changes()
 
     def _claim(self) -> None:
         gripper = self.options.gripper
@@ -141,7 +148,7 @@ class Session:
             failure = lambda: ConnectionLostError(f"internal error: {bug!r}")  # noqa: E731
         elif self._poller.failure is not None:
             failure = self.link_lost
-        self._waiters.fail(failure or (lambda: NotStartedError("the hand was stopped")))
+        self._waiters.fail(failure or self._stopped)
         self._channels.end(failure)
 
     # -- whether it can be asked -----------------------------------------------------------------------
@@ -168,6 +175,15 @@ class Session:
         if self._loop.is_closed():
             raise NotStartedError("the event loop that the hand ran in was closed: start() it again")
 
+    def check_takes_requests(self) -> None:
+        """Refuse what a hand that is being stopped does not do.
+
+        Raises:
+            NotStartedError: stop() was called.
+        """
+        if self.machine.state is State.DO_SHUTDOWN:
+            raise self._stopped()
+
     def link_lost(self) -> RobotiqConnectionError:
         """The error that tells that the link is down, and why if that is known."""
         failure = self._poller.failure
@@ -190,14 +206,25 @@ class Session:
         """What a caller waits with."""
         return self._loop.create_future()
 
-    async def answered(self, ask: Callable[[Waiter[None]], None]) -> None:
-        """Ask for something and wait until it was acknowledged.
+    def ask(self, request: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Make a request of the controller; what it changes is told after it.
+
+        Raises:
+            RobotiqError: it is refused.
+        """
+        try:
+            return request(*args, **kwargs)
+        finally:
+            self._channels.publish_changes()
+
+    async def answered(self, request: Callable[[Waiter[None]], None]) -> None:
+        """Make a request and wait until it was acknowledged.
 
         Raises:
             RobotiqError: why it was not.
         """
         waiter = self.waiter()
-        ask(waiter)
+        self.ask(request, waiter)
         self._poller.hurry()
         await waiter
 
@@ -223,10 +250,11 @@ class Session:
             StateTimeoutError: not in time.
             RobotiqError: refused, or it will not come.
         """
-        ends = {} if failing is None else {State.DISCONNECTED: self.link_lost, **failing}
+        ends: Failing = {State.DISCONNECTED: self.link_lost, State.DO_SHUTDOWN: self._stopped}
+        ends = {} if failing is None else {**ends, **failing}
         with self._waiters.watching(states, ends) as reached:
             if ask is not None:
-                ask()
+                self.ask(ask)
                 self._poller.hurry()
             with anyio.move_on_after(timeout):
                 return await reached
@@ -273,7 +301,8 @@ class Session:
             RobotiqConnectionError: the link went down meanwhile.
             NotStartedError: the hand was stopped.
         """
-        with self._waiters.watching((), {State.DISCONNECTED: self.link_lost}) as told:
+        ends: Failing = {State.DISCONNECTED: self.link_lost, State.DO_SHUTDOWN: self._stopped}
+        with self._waiters.watching((), ends) as told:
 
             def tell(item: object) -> None:
                 if isinstance(item, RobotiqStatus) and not told.done():
@@ -285,6 +314,10 @@ class Session:
             finally:
                 remove()
 
+    @staticmethod
+    def _stopped() -> NotStartedError:
+        return NotStartedError("the hand was stopped")
+
     def _fault(self) -> GripperFaultError:
         assert self.controller.status is not None, "a fault was read from a status"
         return GripperFaultError(self.controller.status.fault)
@@ -292,5 +325,4 @@ class Session:
     def _on_transition(self, source: State, target: State, trigger: Trigger) -> None:
         self.counters.faults += target is State.FAULT
         self._waiters.reached(target)
-        # Last, for a listener may bring about the next one.
-        self._channels.transitions.push(Transition(source, target, trigger, now()))
+        self._channels.changes.append(Transition(source, target, trigger, now()))

@@ -307,6 +307,17 @@ class Channels:
         self.transitions: Channel[Transition] = Channel(self.listeners)
         self.requests: Channel[SentRequest] = Channel(self.listeners)
         self._all: tuple[Channel[Any], ...] = (self.statuses, self.transitions, self.requests)
+        self.changes: deque[Transition] = deque()
+        """Changes of state of the call under way, to be told after it."""
+
+    def publish_changes(self) -> None:
+        """Tell of the changes of state that a call has brought about, now that it is over.
+
+        A listener may command the hand, too. Told in the middle of a call it would come before what that
+        call still had to do, and its request would be overwritten by the older one.
+        """
+        while self.changes:
+            self.transitions.push(self.changes.popleft())
 
     def reopen(self, loop: asyncio.AbstractEventLoop) -> None:
         """The hand starts in a loop."""

@@ -8,8 +8,17 @@ from typing import Any
 
 import pytest
 
-from robotiq_async import Finger, RobotiqHand, RobotiqStatus, SentRequest, State, Transition
-from robotiq_async.simulator import SimulatorServer
+from robotiq_async import (
+    Finger,
+    MoveSupersededError,
+    NotStartedError,
+    RobotiqHand,
+    RobotiqStatus,
+    SentRequest,
+    State,
+    Transition,
+)
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
 A = Finger.A
 
@@ -84,6 +93,46 @@ async def test_a_command_of_a_listener_goes_out_in_the_same_turn(
     assert kinds[0] is RobotiqStatus
     assert kinds.count(RobotiqStatus) == 1, "no other status came between"
     assert SentRequest in kinds
+
+
+async def test_a_command_of_a_listener_comes_after_the_one_that_it_is_called_for(
+    hand: RobotiqHand, gripper: SimulatedGripper
+) -> None:
+    """Called in the middle of that one, its own command was overwritten without a word."""
+    seen: list[State] = []
+
+    def listen(item: object) -> None:
+        if isinstance(item, Transition):
+            seen.append(item.target)
+            if item.target is State.RUNNING_CC and len(seen) == 1:
+                hand.command(A, position=30)
+
+    remove = hand.add_listener(listen)
+    with pytest.raises(MoveSupersededError):
+        await hand.move(200, A)
+    await hand.wait_for_state(State.RUNNING_IDLE)
+    remove()
+    assert gripper.writes[-1].registers[1] & 0xFF == 30
+
+
+async def test_a_stop_that_a_listener_asks_for_is_final(hand: RobotiqHand, gripper: SimulatedGripper) -> None:
+    stopping: list[asyncio.Task[None]] = []
+    states: list[State] = []
+
+    def listen(item: object) -> None:
+        if isinstance(item, Transition):
+            states.append(item.target)
+        if isinstance(item, Transition) and item.target is State.RUNNING_CC:
+            stopping.append(asyncio.create_task(hand.stop()))
+
+    remove = hand.add_listener(listen)
+    writes = len(gripper.writes)
+    with pytest.raises(NotStartedError):
+        await hand.move(200, A)
+    await stopping[0]
+    remove()
+    assert len(gripper.writes) == writes
+    assert states == [State.RUNNING_CC, State.DO_SHUTDOWN, State.SHUTDOWN]
 
 
 async def test_a_listener_added_before_the_start_outlasts_the_stop(server: SimulatorServer) -> None:

@@ -52,6 +52,34 @@ async def test_an_end_that_keeps_a_grip_leaves_rgto_set() -> None:
 
 
 @virtual
+async def test_a_stronger_stop_while_the_link_closes_opens_it_again() -> None:
+    async with polled() as here:
+        here.controller.command(Command(Finger.ABC, 200, 0))
+        await here.polls(20)
+        here.wire.closing_s = 0.3
+        here.poller.request_stop(halt=False)
+        await asyncio.sleep(0.1)
+        assert here.wire.calls[-1] == "close"
+        assert here.wire.gripper.is_moving
+        here.poller.request_stop(halt=True)
+        await here.end()
+        assert not here.wire.gripper.is_moving
+        assert here.wire.calls.count("open") == 2
+
+
+@virtual
+async def test_a_stronger_stop_ends_one_that_keeps_a_grip() -> None:
+    async with polled() as here:
+        here.controller.command(Command(Finger.ABC, 50, 255))
+        await here.polls(300)
+        here.poller.request_stop(halt=True, keep_grip=True)
+        await here.polls(2)
+        here.poller.request_stop(halt=True)
+        await here.end()
+        assert not here.requests[-1].request.go
+
+
+@virtual
 async def test_what_is_to_be_held_at_the_end_is_told_before_anything_is_read() -> None:
     """A gripper that hears and is not heard holds, too."""
     async with polled() as here:

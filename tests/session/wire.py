@@ -22,6 +22,7 @@ class Wire:
         calls: what was asked of it, in order.
         failing: the calls that fail, and with what; until taken out.
         silent: the calls that are not answered.
+        closing_s: how long it takes to close.
     """
 
     def __init__(self, speedup: float = 1.0) -> None:
@@ -30,6 +31,7 @@ class Wire:
         self.calls: list[str] = []
         self.failing: dict[str, RobotiqConnectionError] = {}
         self.silent: set[str] = set()
+        self.closing_s = 0.0
 
     async def open(self) -> None:
         await self._carry("open")
@@ -46,6 +48,7 @@ class Wire:
     async def close(self) -> None:
         self.calls.append("close")
         self.is_open = False
+        await asyncio.sleep(self.closing_s)
 
     async def _carry(self, what: str) -> None:
         self.calls.append(what)

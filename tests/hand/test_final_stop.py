@@ -1,0 +1,291 @@
+"""stop() is final from its call on, and of several stops the strongest counts."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import pytest
+
+from robotiq_async import Finger, NotStartedError, RobotiqHand, State
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.wire.request import Request
+from tests.contract.bench import until
+from tests.grippers import activate_beforehand
+
+pytestmark = pytest.mark.virtual_time
+
+A = Finger.A
+LATENCY_S = 0.15
+"""Of a slow network: at it a stop found the controller 150 ms late."""
+TURNS = pytest.mark.parametrize(
+    "turn", [0.0, 0.002, 0.004, 0.006, 0.05, 0.16], ids=lambda s: f"{s * 1000:g}ms"
+)
+"""When in a cycle the stop comes: before, in and after its read."""
+
+
+async def call(what: Callable[[], Any]) -> None:
+    """A request of the hand, whether it is to be awaited or not."""
+    answer = what()
+    if isinstance(answer, Awaitable):
+        await answer
+
+
+REQUESTS: dict[str, Callable[[RobotiqHand], Any]] = {
+    "command": lambda hand: hand.command(position=255),
+    "command a speed": lambda hand: hand.command(speed=255),
+    "move": lambda hand: hand.move(255),
+    "open": lambda hand: hand.open(),
+    "close": lambda hand: hand.close(),
+    "grasp": lambda hand: hand.grasp(),
+    "set_position": lambda hand: hand.set_position(255),
+    "set_speed": lambda hand: hand.set_speed(255),
+    "set_force": lambda hand: hand.set_force(255),
+    "hold": lambda hand: hand.hold(),
+    "halt": lambda hand: hand.halt(),
+    "activate": lambda hand: hand.activate(),
+    "reset": lambda hand: hand.reset(),
+    "atr": lambda hand: hand.atr(),
+    "recover": lambda hand: hand.recover(),
+}
+
+
+def images_since(gripper: SimulatedGripper, count: int) -> list[Request]:
+    return [Request.from_registers(write.registers) for write in gripper.writes[count:]]
+
+
+async def slow(server: SimulatorServer, turn: float) -> None:
+    """Answer late from now on, and wait for a moment of a cycle."""
+    server.replies.delay(LATENCY_S)
+    await asyncio.sleep(4 * LATENCY_S + turn)
+
+
+@TURNS
+@pytest.mark.parametrize("request_", REQUESTS.values(), ids=REQUESTS)
+async def test_after_the_call_of_stop_every_request_is_refused(
+    hand: RobotiqHand,
+    server: SimulatorServer,
+    gripper: SimulatedGripper,
+    turn: float,
+    request_: Callable[[RobotiqHand], Any],
+) -> None:
+    """A command was taken, and an image with rGTO went out: 96 counts of motion."""
+    await slow(server, turn)
+    writes = len(gripper.writes)
+    stopping = asyncio.create_task(hand.stop())
+    await asyncio.sleep(0)
+    with pytest.raises(NotStartedError):
+        await call(lambda: request_(hand))
+    await stopping
+    assert not any(image.go or not image.activate for image in images_since(gripper, writes))
+
+
+@TURNS
+@pytest.mark.parametrize("options", [{}, {"halt": False}, {"keep_grip": True}], ids=str)
+async def test_a_control_loop_beside_a_stop_is_refused_at_once(
+    hand: RobotiqHand,
+    server: SimulatorServer,
+    gripper: SimulatedGripper,
+    turn: float,
+    options: dict[str, bool],
+) -> None:
+    """At 2 ms, its commands were taken for 108 ms."""
+    await slow(server, turn)
+    taken: list[float] = []
+    loop = asyncio.get_running_loop()
+
+    async def control() -> None:
+        position = 0
+        while True:
+            hand.command(A, position=(position := position + 1) % 200)
+            taken.append(loop.time())
+            await asyncio.sleep(0.002)
+
+    controlling = asyncio.create_task(control())
+    await asyncio.sleep(0.02)
+    writes = len(gripper.writes)
+    stopping, called = asyncio.create_task(hand.stop(**options)), loop.time()
+    await asyncio.wait({controlling})
+    assert isinstance(controlling.exception(), NotStartedError)
+    assert max(taken) <= called
+    await stopping
+    # One image may have been on its way when the stop was called, and one is the hold of keep_grip.
+    going = [image for image in images_since(gripper, writes) if image.go]
+    assert len(going) <= 1 + ("keep_grip" in options)
+
+
+@TURNS
+@pytest.mark.parametrize("options", [{}, {"halt": False}, {"keep_grip": True}], ids=str)
+async def test_what_was_not_sent_yet_is_dropped_and_its_callers_hear_of_it_at_once(
+    hand: RobotiqHand,
+    server: SimulatorServer,
+    gripper: SimulatedGripper,
+    caplog: pytest.LogCaptureFixture,
+    turn: float,
+    options: dict[str, bool],
+) -> None:
+    """It went out up to 250 ms after the stop."""
+    await slow(server, turn)
+    loop, writes = asyncio.get_running_loop(), len(gripper.writes)
+    asked = [asyncio.create_task(hand.move(255)), asyncio.create_task(hand.set_force(200))]
+    await asyncio.sleep(0)
+    hand.command(A, speed=200)
+    before = len(images_since(gripper, writes))
+    with caplog.at_level(logging.INFO, logger="robotiq_async"):
+        stopping, called = asyncio.create_task(hand.stop(**options)), loop.time()
+        await asyncio.wait(asked)
+    assert loop.time() - called < 0.001
+    assert all(isinstance(each.exception(), NotStartedError) for each in asked)
+    assert "what was asked for and not sent yet is dropped" in caplog.text
+    await stopping
+    assert before == 0
+    assert not any(image.go for image in images_since(gripper, writes))
+
+
+@TURNS
+async def test_a_command_beside_a_stop_that_keeps_a_grip_leaves_the_grip_alone(
+    hand: RobotiqHand, server: SimulatorServer, gripper: SimulatedGripper, turn: float
+) -> None:
+    """It took the grip apart."""
+    gripper.place_object(Finger.ABC, 150)
+    await hand.close()
+    await slow(server, turn)
+    writes = len(gripper.writes)
+    stopping = asyncio.create_task(hand.stop(keep_grip=True))
+    await asyncio.sleep(0)
+    with pytest.raises(NotStartedError):
+        hand.command(position=0)
+    await stopping
+    assert not images_since(gripper, writes)
+    assert gripper.grips == Finger.ABC
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.1, 0.16, 0.31])
+async def test_a_gripper_is_not_activated_after_the_end_was_asked_for(turn: float) -> None:
+    """It was: rACT was raised, and taken back."""
+    loop = asyncio.get_running_loop()
+    gripper = SimulatedGripper(loop.time, speedup=20)
+    async with SimulatorServer(gripper) as server:
+        server.replies.delay(LATENCY_S)
+        hand = RobotiqHand(server.address)
+        starting = asyncio.create_task(hand.start())
+        await asyncio.sleep(turn)
+        raised = [image for image in images_since(gripper, 0) if image.activate]
+        starting.cancel()
+        await asyncio.wait({starting})
+        assert [image for image in images_since(gripper, 0) if image.activate] == raised == []
+        assert hand.state is State.SHUTDOWN
+
+
+async def test_an_activation_that_was_not_sent_needs_no_taking_back(
+    hand: RobotiqHand, server: SimulatorServer, gripper: SimulatedGripper
+) -> None:
+    await hand.reset()
+    await slow(server, 0.0)
+    writes = len(gripper.writes)
+    activating = asyncio.create_task(hand.activate())
+    await asyncio.sleep(0)
+    stopping = asyncio.create_task(hand.stop())
+    await asyncio.wait({activating})
+    assert isinstance(activating.exception(), NotStartedError)
+    await stopping
+    assert not any(image.activate for image in images_since(gripper, writes))
+
+
+async def test_the_end_by_an_exception_is_final_too(
+    server: SimulatorServer, gripper: SimulatedGripper
+) -> None:
+    await activate_beforehand(gripper)
+    hand = RobotiqHand(server.address)
+
+    async def control() -> None:
+        while True:
+            hand.command(A, position=200)
+            await asyncio.sleep(0)
+
+    async def fail() -> None:
+        async with hand:
+            server.replies.delay(LATENCY_S)
+            await asyncio.sleep(1)
+            tasks.append(asyncio.create_task(control()))
+            raise ZeroDivisionError
+
+    tasks: list[asyncio.Task[None]] = []
+    writes = len(gripper.writes)
+    with pytest.raises(ZeroDivisionError):
+        await fail()
+    (controlling,) = tasks
+    assert isinstance(controlling.exception(), NotStartedError)
+    assert not any(image.go for image in images_since(gripper, writes))
+
+
+# -- several stops -----------------------------------------------------------------------------------------
+
+STOPS = {"leave": {"halt": False}, "keep": {"keep_grip": True}, "halt": {}}
+
+
+@pytest.mark.parametrize("between", [0.0, 0.0005, 0.003, 0.02, 0.1])
+@pytest.mark.parametrize("second", STOPS)
+@pytest.mark.parametrize("first", STOPS)
+async def test_the_strongest_stop_counts_whoever_asks_first(
+    hand: RobotiqHand, gripper: SimulatedGripper, first: str, second: str, between: float
+) -> None:
+    """With a gentler one under way, stop() returned with rGTO set, and the fingers went on."""
+    await hand.set_speed(0)
+    await hand.set_position(255)
+    await until(lambda: gripper.is_moving)
+    stops = [asyncio.create_task(hand.stop(**STOPS[first]))]
+    await asyncio.sleep(between)
+    was_over = stops[0].done()
+    stops.append(asyncio.create_task(hand.stop(**STOPS[second])))
+    await asyncio.gather(*stops)
+    await asyncio.sleep(0.05)
+    strongest = max(first, first if was_over else second, key=list(STOPS).index)
+    assert hand.state is State.SHUTDOWN
+    assert gripper.is_moving == (strongest == "leave")
+    assert Request.from_registers(gripper.request_registers).go == (strongest != "halt")
+
+
+async def test_a_weaker_stop_hears_that_a_stronger_one_counts(
+    hand: RobotiqHand, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.WARNING, logger="robotiq_async"):
+        await asyncio.gather(hand.stop(), hand.stop(keep_grip=True))
+    assert "a stop that is under way is stronger: the fingers are stopped" in caplog.text
+
+
+@pytest.mark.parametrize("ask", ["halt", "hold"])
+async def test_a_halt_or_a_hold_that_was_not_delivered_is_not_lost_with_a_gentle_stop(
+    hand: RobotiqHand, gripper: SimulatedGripper, ask: str
+) -> None:
+    await hand.set_speed(0)
+    await hand.set_position(255)
+    await until(lambda: gripper.is_moving)
+    asking = asyncio.create_task(getattr(hand, ask)())
+    await asyncio.sleep(0)
+    await hand.stop(halt=False)
+    await asyncio.wait({asking})
+    assert isinstance(asking.exception(), NotStartedError)
+    assert not gripper.is_moving
+
+
+async def test_a_gentle_stop_during_a_start_stays_gentle(
+    server: SimulatorServer, gripper: SimulatedGripper
+) -> None:
+    """What start() does about its own failure does not count as a stronger stop."""
+    hand = RobotiqHand(server.address)
+    starting = asyncio.create_task(hand.start())
+    await until(lambda: gripper.is_moving)
+    await hand.stop(halt=False)
+    await asyncio.wait({starting})
+    assert isinstance(starting.exception(), NotStartedError)
+    assert gripper.is_moving
+
+
+async def test_waiting_for_the_end_is_no_request(hand: RobotiqHand) -> None:
+    stopping = asyncio.create_task(hand.stop())
+    await asyncio.sleep(0)
+    assert await hand.wait_for_state(State.SHUTDOWN) is State.SHUTDOWN
+    await stopping
