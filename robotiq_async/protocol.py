@@ -87,7 +87,9 @@ class Hand(Protocol):
     async def stop(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:
         """Stop the fingers and disconnect, within 2 s and also when cancelled meanwhile. Idempotent.
 
-        What others wait for ends with NotStartedError. The state is SHUTDOWN afterwards.
+        Final from the call on: every request is refused, what was not sent is dropped, and what others wait
+        for ends with NotStartedError. The strongest of several calls under way counts. The state is SHUTDOWN
+        afterwards.
 
         Args:
             halt: False leaves the fingers to what they do.
