@@ -35,8 +35,6 @@ BY_HAND: Final = frozenset({"__init__", "blocking", "caller", "loop_thread", "st
 """Modules there that are not made."""
 ABOUT_ERRORS: Final = "tells_its_hand"
 """A decorator that changes nothing of what a method gives: what it raises has been told its hand by then."""
-COMMANDS: Final = {"add_listener": "False", "start": "activate", "stop": "False", "wait_for_state": "False"}
-"""When a call commands the gripper: always, unless it stands here or gives a stream."""
 DOCSTRINGS: Final = {
     "Observation": "A hand that is looked at.",
     "RobotiqHand": """A Robotiq 3-Finger gripper behind Modbus TCP, a serial line, or simulated, that blocks.
@@ -153,8 +151,8 @@ class _Module:
         result, what = _result(node, kind), f"self._inner.{node.name}"
         if not decorators:
             way = "wait" if isinstance(node, ast.AsyncFunctionDef) else "tell"
-            commands = COMMANDS.get(node.name, str(result is not Stream))
-            what = f"self._caller.{way}(lambda: {what}({_arguments(node)}), commands={commands})"
+            way = "stop" if node.name == "stop" else way
+            what = f"self._caller.{way}(lambda: {what}({_arguments(node)}))"
         if result is not None:
             what = f"{result.__name__}({what}, self._caller)"
             if result is not Stream:

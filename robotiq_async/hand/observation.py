@@ -221,6 +221,11 @@ class Observation:
         session.check_loop("the hand")
         return await session.reach(set(states), limit, what=f"{names} was not reached")
 
+    @property
+    def _has_commanded(self) -> bool:
+        """Whether a request was written since the last start: one that was refused leaves no trace."""
+        return self._session is not None and self._session.counters.has_begun_to_write
+
     # -- inside ----------------------------------------------------------------------------------------
 
     def _started(self) -> Session:

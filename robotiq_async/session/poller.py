@@ -262,6 +262,7 @@ class Poller:
         if request is None:
             self._channels.publish_changes()
             return
+        self._counters.has_begun_to_write = True
         # Listeners hear of it after the write: what they ask for would come too late for this one.
         try:
             await self._transport.write(request.registers)

@@ -67,6 +67,8 @@ class Counters:
 
     polls: int = 0
     writes: int = 0
+    has_begun_to_write: bool = False
+    """Whether a write was begun, acknowledged or not."""
     overruns: int = 0
     reconnects: int = 0
     longest_stall: float = 0.0

@@ -28,24 +28,17 @@ class Caller:
 
     Attributes:
         hand: the hand, in its event loop.
-        has_commanded: whether it commands the gripper, since its start. Of one that only looks, nothing is
-            written when the program is interrupted or ends.
     """
 
     def __init__(self, hand: AsyncRobotiqHand) -> None:
         """Keep the hand; nothing runs yet."""
         self.hand: Final = hand
-        self.has_commanded = False
         self._calls: set[object] = set()
         """Those that are being made: what they do cannot be told yet."""
         self._is_left_behind = False
 
-    def wait(self, function: Function[T], *, commands: bool) -> T:
+    def wait(self, function: Function[T]) -> T:
         """Make a call, and wait for it.
-
-        Args:
-            function: what to call.
-            commands: whether it commands the gripper.
 
         Raises:
             BaseException: whatever it raises, or strikes this thread meanwhile.
@@ -53,33 +46,53 @@ class Caller:
         call = object()
         self._calls.add(call)
         _IN_USE.add(self)  # also when the program drops it: it runs on
-        self.has_commanded = self.has_commanded or commands
         try:
             return LOOP_THREAD.call(function, interrupted=self._hold)
         finally:
             self._calls.discard(call)
             if not self._calls and not self.is_running:
-                self.has_commanded = False
                 _IN_USE.discard(self)
 
-    def tell(self, function: Callable[[], T], *, commands: bool) -> T:
+    def tell(self, function: Callable[[], T]) -> T:
         """Make a call that does not wait. Listeners may do so, too.
-
-        Args:
-            function: what to call.
-            commands: whether it commands the gripper.
 
         Raises:
             Exception: whatever it raises.
         """
         if LOOP_THREAD.is_here:
-            self.has_commanded = self.has_commanded or commands
             return function()
 
         async def call() -> T:
             return function()
 
-        return self.wait(call, commands=commands)
+        return self.wait(call)
+
+    def stop(self, function: Function[None]) -> None:
+        """Make the call that stops the hand; of one that does not run, without the event loop.
+
+        Once the interpreter ends no thread can begin, and objects that are deleted then stop their hands.
+
+        Raises:
+            BaseException: as :meth:`wait`.
+        """
+        if self._calls or self.is_running:
+            self.wait(function)
+            return
+        stopping = function()
+        try:
+            stopping.send(None)  # there is nothing to wait for
+        except StopIteration:
+            return
+        finally:
+            stopping.close()
+
+    @property
+    def has_commanded(self) -> bool:
+        """Whether the hand has written to the gripper since its start.
+
+        Of one that only looks nothing is written when the program is interrupted or ends.
+        """
+        return self.hand._has_commanded  # noqa: SLF001  # both are the hand
 
     def check_process(self) -> None:
         """Refuse a hand that runs in the process that this one was forked from.
@@ -150,7 +163,12 @@ def _after_fork() -> None:
     _IN_USE.clear()
 
 
+def _at_exit() -> None:
+    LOOP_THREAD.begins_no_more = True
+    _stop_all()
+
+
 # Threads that are daemons still run then: it comes before the interpreter ends.
-atexit.register(_stop_all)
+atexit.register(_at_exit)
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_after_fork)

@@ -29,7 +29,7 @@ class Commands(Recovery):
             RobotiqError: the hand takes no commands now, or the link went down before the
                 acknowledgement (the request is not sent again).
         """
-        self._caller.wait(lambda: self._inner.set_position(value, fingers), commands=True)
+        self._caller.wait(lambda: self._inner.set_position(value, fingers))
 
     def set_speed(self, value: int, fingers: Finger | int = Finger.ALL) -> None:
         """Set the speed of axes, also of a motion under way; never starts one.
@@ -41,7 +41,7 @@ class Commands(Recovery):
         Raises:
             TypeError, ValueError, RobotiqError: as :meth:`set_position`.
         """
-        self._caller.wait(lambda: self._inner.set_speed(value, fingers), commands=True)
+        self._caller.wait(lambda: self._inner.set_speed(value, fingers))
 
     def set_force(self, value: int, fingers: Finger | int = Finger.ALL) -> None:
         """Set the force of axes; never starts a motion. More force tightens a grip.
@@ -53,7 +53,7 @@ class Commands(Recovery):
         Raises:
             TypeError, ValueError, RobotiqError: as :meth:`set_position`.
         """
-        self._caller.wait(lambda: self._inner.set_force(value, fingers), commands=True)
+        self._caller.wait(lambda: self._inner.set_force(value, fingers))
 
     def command(
         self,
@@ -79,9 +79,7 @@ class Commands(Recovery):
             ValueError: an argument outside its range, or none of position, speed and force.
             RobotiqError: the hand takes no commands now.
         """
-        self._caller.tell(
-            lambda: self._inner.command(fingers, position=position, speed=speed, force=force), commands=True
-        )
+        self._caller.tell(lambda: self._inner.command(fingers, position=position, speed=speed, force=force))
 
     def move(
         self,
@@ -118,8 +116,7 @@ class Commands(Recovery):
             RobotiqStateError: the hand takes no commands now, or was stopped.
         """
         return self._caller.wait(
-            lambda: self._inner.move(position, fingers, speed=speed, force=force, timeout=timeout),
-            commands=True,
+            lambda: self._inner.move(position, fingers, speed=speed, force=force, timeout=timeout)
         )
 
     def open(
@@ -131,9 +128,7 @@ class Commands(Recovery):
         timeout: float | None = None,
     ) -> MoveResult:
         """Open fingers: :meth:`move` to 0. Returns and raises what it does."""
-        return self._caller.wait(
-            lambda: self._inner.open(fingers, speed=speed, force=force, timeout=timeout), commands=True
-        )
+        return self._caller.wait(lambda: self._inner.open(fingers, speed=speed, force=force, timeout=timeout))
 
     def close(
         self,
@@ -145,7 +140,7 @@ class Commands(Recovery):
     ) -> MoveResult:
         """Close the fingers, not the connection (that is :meth:`stop`): :meth:`move` to 255."""
         return self._caller.wait(
-            lambda: self._inner.close(fingers, speed=speed, force=force, timeout=timeout), commands=True
+            lambda: self._inner.close(fingers, speed=speed, force=force, timeout=timeout)
         )
 
     def grasp(
@@ -185,8 +180,7 @@ class Commands(Recovery):
             RobotiqError: as :meth:`move`.
         """
         return self._caller.wait(
-            lambda: self._inner.grasp(fingers, at_least=at_least, speed=speed, force=force, timeout=timeout),
-            commands=True,
+            lambda: self._inner.grasp(fingers, at_least=at_least, speed=speed, force=force, timeout=timeout)
         )
 
     def hold(self, fingers: Finger | int = Finger.ALL) -> None:
@@ -210,7 +204,7 @@ class Commands(Recovery):
             NotActivatedError: the gripper lost its activation before it was sent.
             RobotiqError: not connected, or the link went down before the acknowledgement.
         """
-        self._caller.wait(lambda: self._inner.hold(fingers), commands=True)
+        self._caller.wait(lambda: self._inner.hold(fingers))
 
     def halt(self) -> None:
         """Stop every axis now (rGTO = 0); the next command goes again, and moves only what it addresses.
@@ -227,4 +221,4 @@ class Commands(Recovery):
             StateTimeoutError: an activation or a release was not seen to end within 5 s.
             RobotiqError: not connected, or the link went down before the acknowledgement.
         """
-        self._caller.wait(lambda: self._inner.halt(), commands=True)
+        self._caller.wait(lambda: self._inner.halt())

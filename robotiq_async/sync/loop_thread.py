@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import sys
 import threading
 import time
 from collections.abc import Callable, Coroutine
@@ -41,6 +42,8 @@ class LoopThread:
 
     def forget(self) -> None:
         """There is no thread: that of a parent process is not ours."""
+        self.begins_no_more = False
+        """Whether the program ends: a hand that starts now would not be stopped at its end."""
         self._beginning = threading.Lock()
         """Only threads that Ctrl-C cannot strike take it."""
         self._server: _Server | None = None
@@ -71,7 +74,8 @@ class LoopThread:
             limit: seconds to wait for it; None for as long as it takes.
 
         Raises:
-            RuntimeError: called in the loop's own thread, which would wait for itself; or there is no thread.
+            RuntimeError: called in the loop's own thread, which would wait for itself; or there is no thread,
+                or the program ends.
             LateError: not done within the limit; it goes on.
             BaseException: whatever the call raises.
         """
@@ -80,6 +84,9 @@ class LoopThread:
                 "a blocking call in the hand's own event loop, as from a listener, would wait for itself: "
                 "make it from another thread, or use the async robotiq_async.RobotiqHand"
             )
+        if sys.is_finalizing():
+            # The thread does not run any more, and another one would never begin: this call would never end.
+            raise RuntimeError("the interpreter is ending: a blocking hand takes no calls now")
         call = _Call(function)
         try:
             task = self._made(call, limit)
@@ -111,6 +118,8 @@ class LoopThread:
 
     def _serving(self, call: _Call[Any]) -> _Server:
         """Begin a thread with a call, unless another thread does so at this moment."""
+        if self.begins_no_more:
+            raise RuntimeError("the program is ending: a blocking hand that starts now would not be stopped")
         answer: SimpleQueue[_Server | OSError] = SimpleQueue()
         threading.Thread(target=self._serve, args=(call, answer), name=NAME, daemon=True).start()
         server = answer.get()

@@ -98,11 +98,11 @@ class Observation(BlockingHand):
             TypeError: buffer is not an int.
             ValueError: buffer is outside its range.
         """
-        return Stream(self._caller.tell(lambda: self._inner.statuses(buffer), commands=False), self._caller)
+        return Stream(self._caller.tell(lambda: self._inner.statuses(buffer)), self._caller)
 
     def transitions(self) -> Stream[Transition]:
         """Every change of state from now on, for one reader, none lost. Ends after :meth:`stop`."""
-        return Stream(self._caller.tell(lambda: self._inner.transitions(), commands=False), self._caller)
+        return Stream(self._caller.tell(lambda: self._inner.transitions()), self._caller)
 
     def requests(self, buffer: int | None = None) -> Stream[SentRequest]:
         """Every request written from now on, for one reader. Ends after :meth:`stop`.
@@ -114,7 +114,7 @@ class Observation(BlockingHand):
             TypeError: buffer is not an int.
             ValueError: buffer is outside its range.
         """
-        return Stream(self._caller.tell(lambda: self._inner.requests(buffer), commands=False), self._caller)
+        return Stream(self._caller.tell(lambda: self._inner.requests(buffer)), self._caller)
 
     def grip_events(
         self,
@@ -142,10 +142,7 @@ class Observation(BlockingHand):
             ValueError: an argument outside its range.
         """
         return Stream(
-            self._caller.tell(
-                lambda: self._inner.grip_events(fingers, since=since, slip=slip), commands=False
-            ),
-            self._caller,
+            self._caller.tell(lambda: self._inner.grip_events(fingers, since=since, slip=slip)), self._caller
         )
 
     def add_listener(
@@ -170,7 +167,7 @@ class Observation(BlockingHand):
         Raises:
             TypeError: callback cannot be called, or is a coroutine function.
         """
-        return self._caller.tell(lambda: self._inner.add_listener(callback), commands=False)
+        return self._caller.tell(lambda: self._inner.add_listener(callback))
 
     def wait_for_state(self, *states: State, timeout: float | None = None) -> State:
         """Wait until the hand is, if only for a moment, in one of these states, and return it.
@@ -186,4 +183,4 @@ class Observation(BlockingHand):
             NotStartedError: the hand is not started, or was stopped meanwhile.
             RobotiqConnectionError: the hand gave up on its link.
         """
-        return self._caller.wait(lambda: self._inner.wait_for_state(*states, timeout=timeout), commands=False)
+        return self._caller.wait(lambda: self._inner.wait_for_state(*states, timeout=timeout))

@@ -22,7 +22,7 @@ class Recovery(Observation):
             ActivationTimeoutError: not finished within the activation timeout.
             RobotiqError: not possible now, or the link went down.
         """
-        self._caller.wait(lambda: self._inner.activate(), commands=True)
+        self._caller.wait(lambda: self._inner.activate())
 
     def reset(self) -> None:
         """Reset the gripper (rACT = 0): clears faults, and lets go of what it holds.
@@ -34,7 +34,7 @@ class Recovery(Observation):
             StateTimeoutError: the gripper did not report the reset within 5 s.
             RobotiqError: not possible now, or the link went down.
         """
-        self._caller.wait(lambda: self._inner.reset(), commands=True)
+        self._caller.wait(lambda: self._inner.reset())
 
     def atr(self) -> None:
         """Release automatically: all axes open slowly, whatever the fault. Only in FAULT.
@@ -48,7 +48,7 @@ class Recovery(Observation):
             StateTimeoutError: the release was not finished within 60 s.
             RobotiqError: the link went down.
         """
-        self._caller.wait(lambda: self._inner.atr(), commands=True)
+        self._caller.wait(lambda: self._inner.atr())
 
     def recover(self, timeout: float | None = None) -> None:
         """Do whatever the present fault needs, until the gripper is active again.
@@ -66,4 +66,4 @@ class Recovery(Observation):
             NotActivatedError: the gripper was reset during the new activation.
             RobotiqError: the link went down, or the hand was stopped.
         """
-        self._caller.wait(lambda: self._inner.recover(timeout), commands=True)
+        self._caller.wait(lambda: self._inner.recover(timeout))

@@ -122,7 +122,7 @@ class RobotiqHand(Commands):
             NotActivatedError: the gripper was reset during the activation that was begun.
             ActivationTimeoutError: the activation was not finished in time.
         """
-        self._caller.wait(lambda: self._inner.start(activate), commands=activate)
+        self._caller.wait(lambda: self._inner.start(activate))
 
     def stop(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:
         """Stop the fingers (rGTO = 0), keep the activation, disconnect. Idempotent.
@@ -150,4 +150,4 @@ class RobotiqHand(Commands):
             halt: False disconnects and leaves the fingers to what they do; for programs that only look.
             keep_grip: whether a grip stays in force; None for what the hand was made with.
         """
-        self._caller.wait(lambda: self._inner.stop(halt=halt, keep_grip=keep_grip), commands=False)
+        self._caller.stop(lambda: self._inner.stop(halt=halt, keep_grip=keep_grip))

@@ -31,7 +31,7 @@ class Stream(Generic[T]):
             RobotiqConnectionError: the hand gave up on its link.
             RuntimeError: another thread is waiting on the same stream.
         """
-        items = self._caller.wait(self._next, commands=False)
+        items = self._caller.wait(self._next)
         if not items:
             raise StopIteration
         return items[0]
@@ -49,12 +49,12 @@ class Stream(Generic[T]):
 
     def take_nowait(self) -> T | None:
         """The next item if there is one already."""
-        return self._caller.tell(self._stream.take_nowait, commands=False)
+        return self._caller.tell(self._stream.take_nowait)
 
     def drain(self) -> Iterator[T]:
         """What is there already, one after the other."""
-        return iter(self._caller.tell(lambda: list(self._stream.drain()), commands=False))
+        return iter(self._caller.tell(lambda: list(self._stream.drain())))
 
     def close(self) -> None:
         """End the stream; a waiting reader ends too. Idempotent."""
-        self._caller.wait(self._stream.aclose, commands=False)
+        self._caller.wait(self._stream.aclose)

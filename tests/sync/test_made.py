@@ -65,11 +65,11 @@ def test_what_has_coroutines_gets_a_blocking_class_of_its_own() -> None:
         "class Toy(BlockingHand):\n",
         "        return Gauge(self._inner.gauge, self._caller)\n",
         "    def find(self, *names: str, limit: int = CLOSED) -> Gauge:\n",
-        "self._caller.wait(lambda: self._inner.find(*names, limit=limit), commands=True), self._caller\n",
-        "        self._caller.tell(lambda: self._inner.nod(), commands=True)\n",
+        "Gauge(self._caller.wait(lambda: self._inner.find(*names, limit=limit)), self._caller)\n",
+        "        self._caller.tell(lambda: self._inner.nod())\n",
         "class Gauge(Blocking[AsyncGauge]):\n",
         "    def read(self, finger: Finger = Finger.A) -> float:\n",
-        "        return self._caller.wait(lambda: self._inner.read(finger), commands=True)\n",
+        "        return self._caller.wait(lambda: self._inner.read(finger))\n",
         "            ValueError: there is none.\n",
     ):
         assert words in text

@@ -1,0 +1,173 @@
+"""Calls while the interpreter ends, and calls that are refused: neither hangs, nor leaves a trace."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from robotiq_async import Finger, RobotiqError, State
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.sync import RobotiqHand, caller
+from robotiq_async.sync.loop_thread import LOOP_THREAD
+from robotiq_async.wire.request import Request
+from tests.conftest import Clock
+from tests.docs.pages import ROOT
+from tests.sync.conftest import Wire, until
+
+PROGRAM = """
+import atexit, contextlib, gc, sys, threading, weakref
+
+ADDRESS = sys.argv[1]
+{before}
+from robotiq_async.sync import RobotiqHand
+
+class Station:
+    def __init__(self, late, *, runs=True):
+        self.hand, self.late = RobotiqHand(ADDRESS), late
+        if runs:
+            self.hand.start()
+            self.hand.command(position=255, speed=0)
+            for status in self.hand.statuses():
+                if status.is_moving:
+                    break
+
+    def __del__(self):
+        self.late(self.hand)
+
+@contextlib.contextmanager
+def session():
+    with RobotiqHand(ADDRESS) as hand:
+        hand.command(position=255, speed=0)
+        yield hand
+
+{program}
+"""
+LATE = """
+def park():
+    {0}
+
+atexit.register(park)
+"""
+THREAD = """
+hand = RobotiqHand(ADDRESS)
+hand.start()
+threading.Thread(target=hand.move, args=(255,), kwargs={"speed": 0}, daemon=True).start()
+while not hand.is_moving:
+    pass
+"""
+ENDINGS = {
+    "the end": ("", "Station(lambda hand: None)"),
+    "an error": ("", "station = Station(lambda hand: None); raise SystemExit(0)"),
+    "del stops": ("", "station = Station(lambda hand: hand.stop())"),
+    "del stops one that never started": ("", "station = Station(lambda hand: hand.stop(), runs=False)"),
+    "del moves": ("", "station = Station(lambda hand: hand.move(0))"),
+    "del commands": ("", "station = Station(lambda hand: hand.command(position=0))"),
+    "del reads": ("", "station = Station(lambda hand: hand.is_moving)"),
+    "del starts": ("", "station = Station(lambda hand: hand.start(), runs=False)"),
+    "del waits": ("", "station = Station(lambda hand: next(hand.statuses()))"),
+    "a cycle": ("", "station = Station(lambda hand: hand.halt()); station.itself = station"),
+    "entered and not left": ("", "context = session(); context.__enter__()"),
+    "with in a generator": (
+        "",
+        "def run():\n  with RobotiqHand(ADDRESS) as hand: yield\nsteps = run(); next(steps)",
+    ),
+    "an exit stack": ("", "stack = contextlib.ExitStack(); hand = stack.enter_context(RobotiqHand(ADDRESS))"),
+    "finalize": ("", "hand = RobotiqHand(ADDRESS); hand.start(); weakref.finalize(Station, hand.stop)"),
+    "atexit stops": (LATE.format("hand.stop()"), "hand = RobotiqHand(ADDRESS); hand.start()"),
+    "atexit starts": (LATE.format("RobotiqHand(ADDRESS).start()"), ""),
+    "a thread waits": ("", THREAD),
+}
+
+
+@pytest.mark.parametrize("ending", ENDINGS.values(), ids=ENDINGS)
+async def test_a_call_while_the_interpreter_ends_ends_too_and_nothing_goes_on(
+    ending: tuple[str, str],
+) -> None:
+    """On Python 3.11 it waited for ever for a thread that never began."""
+    clock = Clock()
+    gripper = SimulatedGripper(clock)
+    gripper.write(0, Request(activate=True).registers)
+    clock.ahead += 10
+    async with SimulatorServer(gripper) as server:
+        code = PROGRAM.format(before=ending[0], program=ending[1])
+        process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-c", code, server.address),
+            cwd=ROOT,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+        )
+        try:
+            async with asyncio.timeout(20):
+                printed, _ = await process.communicate()
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                process.kill()
+        assert process.returncode == 0, printed.decode()
+        assert not gripper.is_moving, printed.decode()
+
+
+def test_stopping_a_hand_that_never_started_needs_no_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(LOOP_THREAD, "begins_no_more", True)
+    hand = RobotiqHand(Wire())
+    hand.stop()
+    hand.stop(halt=False)
+    with pytest.raises(TypeError, match="halt"):
+        hand.stop(halt=3)  # type: ignore[arg-type]
+    with pytest.raises(RuntimeError, match="the program is ending"):
+        hand.start()
+    assert hand.state is State.DISCONNECTED
+
+
+REFUSED: dict[str, Callable[[RobotiqHand], Any]] = {
+    "move": lambda hand: hand.move(999),
+    "grasp": lambda hand: hand.grasp(at_least=9),
+    "command": lambda hand: hand.command(),
+    "set_position": lambda hand: hand.set_position(-1),
+    "set_speed": lambda hand: hand.set_speed(256),
+    "set_force": lambda hand: hand.set_force(1.5),  # type: ignore[arg-type]
+    "hold": lambda hand: hand.hold(0),
+    "atr": lambda hand: hand.atr(),
+    "recover": lambda hand: hand.recover(timeout=-1),
+    "activate": lambda hand: hand.activate(),
+}
+
+
+@pytest.mark.parametrize("refused", REFUSED.values(), ids=REFUSED)
+def test_a_call_that_is_refused_does_not_count_as_commanding(
+    refused: Callable[[RobotiqHand], Any], wire: Wire
+) -> None:
+    """At the end of the program rGTO was cleared under the motion of another client."""
+    wire.command(255)
+    hand = RobotiqHand(wire)
+    hand.start(activate=False)
+    until(wire.is_moving)
+    with contextlib.suppress(ValueError, TypeError, RobotiqError):
+        refused(hand)
+    before = wire.writes()
+    caller._stop_all()
+    assert wire.writes() == before
+    assert wire.is_moving()
+
+
+def test_a_hold_of_what_another_client_moves_counts_as_commanding(wire: Wire) -> None:
+    wire.command(255)
+    hand = RobotiqHand(wire)
+    hand.start(activate=False)
+    until(wire.is_moving)
+    hand.hold()
+    assert hand._caller.has_commanded
+    hand.stop()
+
+
+def test_what_a_hand_has_commanded_counts_until_its_next_start(hand: RobotiqHand, wire: Wire) -> None:
+    hand.set_position(100, Finger.A)
+    assert hand._caller.has_commanded
+    hand.stop()
+    hand.start()
+    assert not hand._caller.has_commanded
