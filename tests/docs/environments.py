@@ -10,6 +10,7 @@ import asyncio
 import functools
 import re
 import shlex
+import signal
 import subprocess
 import sys
 import tempfile
@@ -24,6 +25,9 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.docs.agents import ROOM, agent_of_the_pages
 from tests.docs.pages import DOCS, PAGES, ROOT, Block, blocks, requirements
 from tests.docs.test_tutorial import PROGRAM, TEST, TYPED, agree
+from tests.docs.test_web_service import PAGE as WEB_SERVICE
+from tests.docs.test_web_service import service, stops
+from tests.grippers import active_gripper
 
 PATIENCE = 60.0
 TUTORIAL = DOCS / "tutorial.md"
@@ -42,7 +46,9 @@ def code_of(page: Path) -> list[Block]:
     return [block for block in blocks(text_of(page)) if block.language == "python"]
 
 
-CODE = {page: code_of(page) for page in PAGES if page != TUTORIAL and code_of(page)}
+ELSEWHERE = (TUTORIAL, WEB_SERVICE)
+"""Pages whose code is no matter of the prompt: each has tests of its own."""
+CODE = {page: code_of(page) for page in PAGES if page not in ELSEWHERE and code_of(page)}
 WITH_TESTS = [page for page, code in CODE.items() if any("def test_" in block.text for block in code)]
 
 
@@ -139,6 +145,13 @@ async def test_the_readme(tmp_path: Path) -> None:
         program.write_text(example.text.replace("tcp://192.168.1.11", server.address), encoding="utf-8")
         printed = await run(environment("."), str(program), folder=tmp_path)
     assert "holding it with" in printed
+
+
+async def test_the_web_service(tmp_path: Path) -> None:
+    """In an environment that holds what the page has its reader install."""
+    python = environment(requirements(text_of(WEB_SERVICE)))
+    async with service(active_gripper(1.0), tmp_path, python) as here:
+        await stops(here, signal.SIGINT)
 
 
 # -- the tutorial ------------------------------------------------------------------------------------------

@@ -24,7 +24,7 @@ LINES = [
     for number, line in enumerate(block.text.replace("\\\n", " ").splitlines())
     if line.strip() and not line.startswith("#")
 ]
-OTHERS = {"cp", "export", "python3", "ros2", "source", "sudo"}
+OTHERS = {"cp", "curl", "export", "python3", "ros2", "source", "sudo"}
 """Programs that are not ours: ``python3 -m venv``, and what ROS and the shell have."""
 TARGETS = set(re.findall(r"^([a-z0-9-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
 EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"][
