@@ -38,6 +38,7 @@ class PageCommands:
         self._answer = answer
         self._tasks: dict[str, set[asyncio.Task[str]]] = {}
         self._halts: set[asyncio.Task[str]] = set()
+        self._is_ending = False
 
     @property
     def under_way(self) -> bool:
@@ -74,8 +75,13 @@ class PageCommands:
         for page in list(self._tasks):
             self.gone(page)
 
+    def refuse(self) -> None:
+        """Take nothing but halts from now on: the hands are about to be stopped."""
+        self._is_ending = True
+
     async def close(self) -> None:
-        """Hold whatever is under way; no more commands may come. Waits until they have ended."""
+        """Hold whatever is under way, and take no more. Waits until all have ended."""
+        self.refuse()
         tasks = [task for tasks in self._tasks.values() for task in tasks]
         self.all_gone()
         await asyncio.gather(*tasks, *self._halts, return_exceptions=True)
@@ -83,6 +89,8 @@ class PageCommands:
     async def _carry_out(self, request: Fields, page: str, name: str) -> str:
         if not self._operators:
             raise ValueError("this page only looks; to command from a page: robotiq-async web --control")
+        if name != HALT and self._is_ending:
+            raise ValueError("the page is ending: nothing is moved from here now")
         if name != HALT and not 0 <= monotonic() - request["at"] <= FRESH_S:
             raise ValueError("this came too late to be carried out: the connection was held up")
         if name != HALT and len(self._tasks.get(page, ())) > MAX_COMMANDS:

@@ -123,6 +123,10 @@ class PageServer:
         """Wait until the process of the page has ended by itself."""
         await self._over.wait()
 
+    def refuse_commands(self) -> None:
+        """Take nothing but halts from now on: for a program that is about to stop the hands."""
+        self._commands.refuse()
+
     async def _close(self) -> None:
         for task in self._tasks:
             task.cancel()

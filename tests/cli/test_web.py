@@ -17,14 +17,22 @@ from urllib.request import url2pathname
 
 import pytest
 
-from robotiq_async import RobotiqHand
+from robotiq_async import Finger, NotStartedError, RobotiqHand, State
+from robotiq_async.actions import Operator
 from robotiq_async.cli.browser import opened
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
 pytest.importorskip("nicegui", reason="the page needs the extra web")
 
+from robotiq_async.cli.commands.web import _leave_all
+from robotiq_async.web.server import PageServer
+from robotiq_async.web.settings import PageSettings
+
 if TYPE_CHECKING:
     from tests.cli.conftest import Call, Shell
+
+
+SETTINGS = PageSettings(control=True, addresses=("one", "two"))
 
 
 def status(url: str) -> int:
@@ -163,3 +171,26 @@ async def test_where_no_browser_can_be_opened_it_says_so(
         monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
         async with opened("http://127.0.0.1:1/", pytest.fail) as is_opened:
             assert not is_opened
+
+
+@pytest.mark.virtual_time
+async def test_all_hands_are_stopped_at_once(server: SimulatorServer, gripper: SimulatedGripper) -> None:
+    """One after the other, those whose turn came late moved on for 2 s for each dead link before them."""
+    operators = []
+    async with SimulatorServer(SimulatedGripper(asyncio.get_running_loop().time, speedup=20)) as dead:
+        for address in (dead.address, server.address):
+            operators.append(Operator(RobotiqHand(address)))
+            await operators[-1].hand.start()
+            await operators[-1].move(10, Finger.A)
+        moving = asyncio.create_task(operators[1].move(255, Finger.A, speed=0))
+        await operators[1].hand.wait_for_state(State.RUNNING_CC)
+        await operators[1].hand.wait_for_state(State.RUNNING_IDLE)
+        dead.replies.drop()
+        page = PageServer([each.hand for each in operators], SETTINGS, operators=operators)
+        leaving = asyncio.create_task(_leave_all(operators, page))
+        await operators[1].hand.wait_for_state(State.SHUTDOWN)
+        assert not leaving.done()
+        assert not gripper.is_moving
+        await leaving
+        await asyncio.wait({moving})
+        assert isinstance(moving.exception(), NotStartedError)

@@ -231,3 +231,22 @@ async def test_the_end_of_the_node_owes_nothing(
     await lose_link(connection, server)
     await goal
     await connection.close("the end")  # no task is left: the fixtures look
+
+
+@pytest.mark.parametrize("name", ["activate", "reset", "recover", "release"])
+async def test_a_connection_that_is_ending_takes_no_command_while_the_rest_ends(
+    connection: Connection, gripper: SimulatedGripper, name: str
+) -> None:
+    """The publishers were stopped first, and commands were taken until that was done."""
+    goal = begin(connection)
+    await until_moving(connection)
+    connection.refuse("the node is shutting down")
+    with pytest.raises(RefusedError):
+        await connection.command(name)
+    with pytest.raises(RefusedError):
+        await begin(connection, key=b"2")
+    with pytest.raises(RefusedError):
+        await connection.permit()
+    await connection.close("the node is shutting down")
+    assert (await goal).ending is Ending.ABORTED
+    assert await settled(gripper) < FAR

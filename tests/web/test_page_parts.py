@@ -116,6 +116,20 @@ async def test_a_halt_of_a_page_that_is_gone_is_completed(hand: RobotiqHand) -> 
     assert (await pages.answer())["words"] == "every axis stands still"
 
 
+async def test_a_page_that_is_ending_takes_nothing_but_a_halt(hand: RobotiqHand) -> None:
+    """With several hands the others were still commanded while the first one stopped."""
+    pages, requests = Pages(hand), hand.requests()
+    pages.commands.refuse()
+    for name, arguments in (("close", {}), ("set_speed", {"value": 9}), ("reset", {"confirm": True})):
+        pages.do(name, **arguments)
+        answer = await pages.answer()
+        assert not answer["ok"]
+        assert "the page is ending" in answer["words"]
+    assert requests.take_nowait() is None
+    pages.do("halt")
+    assert (await pages.answer())["ok"]
+
+
 async def test_a_command_is_answered_whenever_its_page_is_gone() -> None:
     """Also in the same turn of the loop, before it has begun, as after a process that stood still."""
     pages = Pages(FakeHand())

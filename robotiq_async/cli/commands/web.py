@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 from cyclopts import Parameter
 
 from ...actions import Operator
+from ...concurrency import wait_shielded
 from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...errors import RobotiqError
 from ...telemetry.payloads import title
@@ -101,20 +102,33 @@ async def web(
 async def _show(
     page: PageServer, operators: Sequence[Operator], settings: PageSettings, *, open_browser: bool
 ) -> None:
-    # In this order nothing that concerns the page delays the stop of the fingers.
     async with page, AsyncExitStack() as stack:
-        for index, operator in enumerate(operators):
-            stack.push_async_callback(_leave, operator, page.news[index])
-            await _start(page, index, operator, alone=len(operators) == 1, stack=stack)
-        if all(news.problem for news in page.news):
-            raise CommandError("; ".join(news.problem for news in page.news))
-        if not settings.loopback and not settings.certificate:
-            tell("without a certificate the password goes through the network for everybody to read")
-        print(page.url, flush=True)
-        if open_browser and not await stack.enter_async_context(opened(page.url)):
-            tell("no browser could be opened here: open the address above yourself")
-        await page.ended()
-        raise CommandError("the process of the page has ended; what it says is above")
+        try:
+            await _serve(page, operators, settings, stack, open_browser=open_browser)
+        finally:
+            # First: nothing that concerns the page, or a gripper that cannot be reached, delays it.
+            await _leave_all(operators, page)
+
+
+async def _serve(
+    page: PageServer,
+    operators: Sequence[Operator],
+    settings: PageSettings,
+    stack: AsyncExitStack,
+    *,
+    open_browser: bool,
+) -> None:
+    for index, operator in enumerate(operators):
+        await _start(page, index, operator, alone=len(operators) == 1, stack=stack)
+    if all(news.problem for news in page.news):
+        raise CommandError("; ".join(news.problem for news in page.news))
+    if not settings.loopback and not settings.certificate:
+        tell("without a certificate the password goes through the network for everybody to read")
+    print(page.url, flush=True)
+    if open_browser and not await stack.enter_async_context(opened(page.url)):
+        tell("no browser could be opened here: open the address above yourself")
+    await page.ended()
+    raise CommandError("the process of the page has ended; what it says is above")
 
 
 async def _start(
@@ -149,6 +163,12 @@ async def _try_again(page: PageServer, index: int, operator: Operator) -> None:
 async def _cancelled(task: asyncio.Task[None]) -> None:
     task.cancel()
     await asyncio.gather(task, return_exceptions=True)
+
+
+async def _leave_all(operators: Sequence[Operator], page: PageServer) -> None:
+    """Stop all hands at once: one whose link is dead takes 2 s, and the others would move on meanwhile."""
+    page.refuse_commands()
+    await wait_shielded(asyncio.gather(*map(_leave, operators, page.news)))
 
 
 async def _leave(operator: Operator, news: HandNews) -> None:

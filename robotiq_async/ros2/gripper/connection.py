@@ -95,10 +95,14 @@ class Connection:
             return False
         return True
 
-    async def close(self, reason: str) -> None:
-        """Disconnect; the fingers are stopped if commands were ever taken. Idempotent."""
+    def refuse(self, reason: str) -> None:
+        """Take no more commands, and end those under way: :meth:`close` follows."""
         self.takes_commands, self._is_closed = False, True
         self._end_all(reason)
+
+    async def close(self, reason: str) -> None:
+        """Disconnect; the fingers are stopped if commands were ever taken. Idempotent."""
+        self.refuse(reason)
         try:
             await self.hand.stop(halt=self._took_commands)
         finally:

@@ -153,6 +153,7 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
             raise
 
     async def _disconnect(self, connection: Connection, reason: str) -> None:
+        connection.refuse(reason)  # first: nothing is begun while the rest ends
         await self._publishing.stop()
         await connection.close(reason)
         self._publishing.tell_status(connection)  # the newest one is kept for whoever comes later
