@@ -169,6 +169,10 @@ class Controller:
         self._callers.fail(MoveSupersededError("atr() took over"))
         self._begin(automatic_release(self._shadow.at_rest))
 
+    def drop_requests(self, error: RobotiqError) -> None:
+        """Drop what was asked and not sent, but for holds and halts, and tell its callers."""
+        self._callers.fail_but_stops(error)
+
     def stop(self) -> None:
         """The hand is being stopped: take no more requests, drop those not sent, and tell their callers."""
         self._grip_keeper.begin(self.machine.state, halts=self._callers.pending.halting is not None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from typing import Final
 
@@ -20,19 +21,23 @@ class LimitedLog:
         self._next = -math.inf
         self._count = 0
 
-    def warn(self, message: str, *arguments: object, exc_info: bool = False) -> None:
-        """Log a warning, or count it.
+    def warn(
+        self, message: str, *arguments: object, exc_info: bool = False, level: int = logging.WARNING
+    ) -> bool:
+        """Log a warning, or count it; returns whether it was logged.
 
         Args:
             message: for the logger.
             arguments: for the logger.
             exc_info: whether with the traceback of what is being handled.
+            level: of the logger.
         """
         self._count += 1
         if now() < self._next:
-            return
+            return False
         if self._count > 1:
             message += " (%d similar since the last report)"
             arguments += (self._count,)
         self._next, self._count = now() + EVERY_S, 0
-        self._log.warning(message, *arguments, exc_info=exc_info)
+        self._log.log(level, message, *arguments, exc_info=exc_info)
+        return True

@@ -11,7 +11,7 @@ from ..control.requests.pending import Command
 from ..control.state_machine import SEQUENCES
 from ..control.triggers import Trigger
 from ..enums import CLOSED, OPEN, Finger
-from ..errors import MoveTimeoutError
+from ..errors import MoveSupersededError, MoveTimeoutError
 from ..grasping import GraspResult, check_at_least
 from ..session.timing.clock import now
 from ..wire.checks import check_byte, check_mask, check_optional_byte, check_timeout
@@ -266,6 +266,11 @@ class Commands(Recovery):
             await self._reset(Trigger.ASK_HALT)
         else:
             await session.answered(session.controller.halt)
+
+    def _drop_requests(self, why: str) -> None:
+        """Drop what was asked and not sent, but for holds and halts: whoever asked has no say now."""
+        if self._session is not None and not self._session.is_over:
+            self._session.ask(self._session.controller.drop_requests, MoveSupersededError(why))
 
     @tells_its_hand
     async def _deliver(self, command: Command) -> None:

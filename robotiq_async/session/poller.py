@@ -12,7 +12,6 @@ import asyncio
 import contextlib
 import importlib
 import math
-from enum import IntEnum
 from typing import Final
 
 import anyio
@@ -29,6 +28,7 @@ from ..errors import (
 from ..link.modbus import HELD_S
 from ..link.transport import Transport
 from ..wire.status import RobotiqStatus
+from .ending import Ending
 from .options import Options
 from .reconnecting import Backoff
 from .statistics import Counters
@@ -57,20 +57,6 @@ STOOD_STILL: Final = (
     "nobody ran the event loop meanwhile, and nothing watched the fingers (as between the prompts of "
     "IPython's terminal: use robotiq_async.sync there)"
 )
-
-
-class Ending(IntEnum):
-    """What becomes of the fingers at the end, gentlest first."""
-
-    LEAVE = 0
-    """They go on with what they do."""
-    KEEP = 1
-    """What moves is held, and rGTO stays set if everything is seen at rest."""
-    HALT = 2
-    """rGTO is cleared."""
-
-
-_STRONGER: Final = {Ending.KEEP: "held", Ending.HALT: "stopped"}
 
 
 class Poller:
@@ -120,22 +106,20 @@ class Poller:
         From here on the controller refuses every request and has dropped what was not sent. Of several
         requests to stop the strongest counts, whichever comes first.
         """
-        ending = Ending.LEAVE if not halt else Ending.KEEP if keep_grip else Ending.HALT
+        ending = Ending.of(halt=halt, keep_grip=keep_grip)
         if not self._stopping:
             # A hold or a halt that is not delivered yet is dropped with the rest: this one makes up for it.
             self._ending = max(ending, Ending.KEEP) if self._controller.has_undelivered_stop else ending
             self._end_by = self._loop.time() + STOP_S
             self._refuse_requests()
         elif ending > self._ending:
-            self._log.info("a stronger stop came meanwhile: the fingers are %s", _STRONGER[ending])
+            self._log.info("a stronger stop came meanwhile: the fingers are %s", ending.done)
             self._ending = ending
             self._end_by = self._loop.time() + STOP_S
             if ending is Ending.HALT:
                 self._controller.keep_no_grip("a stop() without keep_grip came meanwhile")
         elif ending < self._ending:
-            self._log.warning(
-                "a stop that is under way is stronger: the fingers are %s", _STRONGER[self._ending]
-            )
+            self._log.warning("a stop that is under way is stronger: the fingers are %s", self._ending.done)
         if self._interruptible is not None:
             self._interruptible.cancel()
 

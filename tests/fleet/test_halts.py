@@ -6,18 +6,21 @@ A project and a number in a docstring: the issue in which it went wrong with tha
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import gc
 
 import pytest
 
 from robotiq_async import Finger, State
-from robotiq_async.errors import NotAllStoppedError
+from robotiq_async.errors import NotAllStoppedError, RobotiqStateError
 from robotiq_async.fleet.fleet import Fleet
+from robotiq_async.fleet.remote.persistence import until_answered
 from robotiq_async.fleet.wire.envelope import Call
 from robotiq_async.fleet.wire.names import GripperName
 from tests.fleet.by_hand import LEFT, ask, move_slowly
 from tests.fleet.cell import told
 from tests.fleet.world import motions, world
-from tests.virtual import virtual
+from tests.virtual import VirtualLoop, virtual
 
 
 @virtual
@@ -137,3 +140,28 @@ async def test_what_was_asked_before_a_halt_does_not_go_out_after_it() -> None:
         await asyncio.sleep(1)
         assert not here.gripper.is_moving
         assert not motions(here, writes)
+
+
+@virtual
+async def test_two_answers_in_one_turn_leave_no_exception_behind() -> None:
+    """The second one's was never retrieved, and the event loop complained."""
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualLoop)
+    answered = asyncio.Event()
+    asked = 0
+
+    async def attempt(_: float) -> None:
+        nonlocal asked
+        asked += 1
+        if asked == 2:
+            loop.call_later(0.01, answered.set)
+        await answered.wait()
+        raise RobotiqStateError("refused")
+
+    with contextlib.suppress(
+        RobotiqStateError
+    ):  # and nothing keeps its traceback, with what was awaited in it
+        await until_answered(attempt, 2.0)
+    assert asked == 2
+    gc.collect()
+    assert not loop.complaints

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -232,3 +233,26 @@ async def test_of_two_agents_that_start_at_once_one_stays() -> None:
             return "serves"
 
         assert sorted(await asyncio.gather(start("one"), start("two"))) == ["gave up", "serves"]
+
+
+@virtual
+async def test_another_agent_that_comes_and_goes_does_not_fill_log_and_events(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """2,478 lines, and as many events."""
+    async with lab() as here:
+        client = here.client(control=False)
+        await client.start()
+        events = here.agent.hands["left"].publisher._count
+        key = LEFT.key("alive", "12345")
+        with caplog.at_level(logging.ERROR, logger="robotiq_async"):
+            for _ in range(500):
+                here.agent._see_agent(key, is_there=True)
+                here.agent._see_agent(key, is_there=False)
+            assert here.agent.hands["left"].publisher._count == events + 1
+            for number in range(500):
+                client_agents = client._session.agents  # type: ignore[union-attr]
+                client_agents._see(f"{key}{number}", is_there=True)
+                client_agents._see(f"{key}{number}", is_there=False)
+        assert len(caplog.records) <= 2
+        await client.stop()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import secrets
 import time
 from collections.abc import Callable, Mapping
@@ -63,6 +64,8 @@ class Agent:
         self._bus = bus
         self._window = window
         self._strange = LimitedLog()
+        self._conflicts: dict[str, LimitedLog] = {}
+        """By gripper: a token of another agent may come and go thousands of times."""
         self._prefix = f"{ROOT}/{site}/{host}"
         self.hands = {
             name: ServedHand(GripperName(site, host, name), hand, bus, epoch=self.epoch, window=window)
@@ -147,8 +150,9 @@ class Agent:
         other = self._other(key)
         if is_there and other is not None:
             _, name = other
-            Log(str(name)).error("%s: one of them has to go", self._said_of(name))
-            if name.gripper in self.hands:
+            limited = self._conflicts.setdefault(name.gripper, LimitedLog(Log(str(name))))
+            is_told = limited.warn("%s: one of them has to go", self._said_of(name), level=logging.ERROR)
+            if is_told and name.gripper in self.hands:
                 self.hands[name.gripper].publisher.add({"kind": "conflict", "key": key})
 
     def _hear(self, query: Query) -> None:

@@ -251,6 +251,9 @@ class ServedHand:
         for request in self._requests.values():
             request.call_off(reason)
         self._requests.clear()
+        # Holding is for what moves. A speed or a force that is still to be written would act under the next
+        # holder, and after a freeze seconds late.
+        self._hand._drop_requests(f"the lease has ended: {reason}")  # noqa: SLF001  # the agent's own
         axes, self._commanded = self._commanded, Finger(0)
         if axes:
             self._spawn(self._hold(axes))

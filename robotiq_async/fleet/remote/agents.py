@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from typing import Final
 
 from ...errors import AgentError
 from ...log import Log
+from ..limited_log import LimitedLog
 from ..network.bus import Bus, Undo
 from ..wire.names import GripperName
 
@@ -23,6 +25,7 @@ class Agents:
         self._bus = bus
         self._two = two
         self._tokens: set[str] = set()
+        self._log = LimitedLog(Log(str(name)))
         self.end: Undo = bus.watch(name.key("alive", "*"), self._see)
 
     async def check_one(self) -> None:
@@ -40,5 +43,5 @@ class Agents:
         before = len(self._tokens)
         (self._tokens.add if is_there else self._tokens.discard)(token)
         if before < 2 <= len(self._tokens):
-            Log(str(self._name)).error("%s", TWO_AGENTS)
+            self._log.warn("%s", TWO_AGENTS, level=logging.ERROR)
             self._two()

@@ -45,6 +45,8 @@ async def until_answered(attempt: Callable[[float], Awaitable[T]], limit: float)
                     under_way, timeout=due - now(), return_when=asyncio.FIRST_COMPLETED
                 )
                 for each in done:
+                    each.exception()  # seen: of two that end in the same turn one may say enough
+                for each in done:
                     try:
                         return each.result()
                     except _NO_ANSWER as error:

@@ -22,6 +22,7 @@ from ...errors import (
     RobotiqError,
 )
 from ...log import Log
+from ...session.ending import Ending
 from ...session.state_waiters import StateWaiters
 from ...session.statistics import Counters, Statistics
 from ...session.streams import Channels
@@ -30,7 +31,7 @@ from ...session.timing.event_loop import check_loop
 from ...wire.checks import check_seconds
 from ..control.lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
 from ..limited_log import LimitedLog
-from ..network.bus import Bus, Undo
+from ..network.bus import Bus, Undo, Urgency
 from ..wire.envelope import Call
 from ..wire.names import GripperName
 from ..wire.status_message import unpack
@@ -39,11 +40,13 @@ from .agents import Agents
 from .lease_keeper import ANSWER_S, RENEWALS, LeaseKeeper
 from .mirror import Mirror
 from .missed_events import MissedEvents
-from .requests import NoAnswerError, PendingRequest, Requests
+from .requests import NoAnswerError, PendingRequest, Requests, label
 
 CONNECT_S: Final = 5.0
 OWN: Final = ("info", "lease", "halt", "cmd/cancel")
 """Requests whose arguments no user has chosen: they are nobody's TypeError."""
+LATE_HALT_S: Final = 0.5
+"""For the halt of a stop that comes while a gentler one is on its way; what is left of its 2 s."""
 TRIES: Final = 2
 """How many times a request is called off in a window."""
 
@@ -94,6 +97,10 @@ class RemoteSession:
         self._channels = channels
         self._owns_bus = owns_bus
         self._closing: asyncio.Task[None] | None = None
+        self._ending = Ending.LEAVE
+        """The strongest that stop() was called for."""
+        self._held_control = False
+        """Whether this hand held the lease when it was stopped."""
         self.window = WINDOW_S
         self._arrived_at = 0.0
         """When anything was heard, be it current or not."""
@@ -171,17 +178,31 @@ class RemoteSession:
         raise ConnectFailedError(str(self.name), why)
 
     async def close(self, *, halt: bool, keep_grip: bool) -> None:
-        """End the run; within two seconds, also when cancelled meanwhile, and whoever asks waits for it."""
+        """End the run; within two seconds, also when cancelled meanwhile, and whoever asks waits for it.
+
+        Of several calls the strongest counts, whichever comes first.
+        """
+        ending = Ending.of(halt=halt, keep_grip=keep_grip)
         if self._closing is None:
             self.is_over = True
+            self._ending, self._held_control = ending, self.keeper.is_in_control
             self.mirror.shut_down(State.DO_SHUTDOWN, Trigger.ASK_STOP, now())
-            self._closing = self.loop.create_task(self._close(halt=halt, keep_grip=keep_grip))
+            self._requests.fall_silent()  # nobody waits for what was asked before
+            self._closing = self.loop.create_task(self._close())
+        elif ending > self._ending:
+            self._ending = ending
+        elif ending < self._ending:
+            self.log.warning("a stop that is under way is stronger: the fingers are %s", self._ending.done)
         await wait_shielded(self._closing)
         self._closing.result()
 
-    async def _close(self, *, halt: bool, keep_grip: bool) -> None:
+    async def _close(self) -> None:
         try:
-            await self.keeper.end(halt=halt, keep_grip=keep_grip)
+            ending = self._ending
+            await self.keeper.end(halt=ending > Ending.LEAVE, keep_grip=ending is Ending.KEEP)
+            if self._ending > ending and self._held_control:
+                # Somebody asked for more while the gentler end was on its way. A halt needs no lease.
+                await self.ask("halt", {"label": label()}, timeout=LATE_HALT_S, urgency=Urgency.STOP)
         except RobotiqError as error:
             self.log.warning("the end was not acknowledged (%s): the agent holds what moves", error)
         finally:
