@@ -9,7 +9,8 @@ from typing import Any, Final
 
 from ..errors import AgentError, NotAllowedError, ProtocolError, RobotiqError
 from ..fleet.network.bus import Bus, Urgency
-from ..fleet.remote.requests import NoAnswerError, of_its_run
+from ..fleet.remote.pending_request import of_its_run
+from ..fleet.remote.requests import NoAnswerError
 from ..fleet.wire.envelope import Call, unpack_answer
 from ..fleet.wire.names import GripperName
 from ..fleet.wire.status_message import StatusMessage, unpack

@@ -8,8 +8,9 @@ from typing import Final
 
 from ..errors import AgentError, RobotiqError
 from .network.bus import Bus, Reply, Urgency
+from .remote.pending_request import is_refusal
 from .remote.persistence import HALT_S, until_answered
-from .remote.requests import NoAnswerError, is_refusal, label
+from .remote.requests import NoAnswerError, label
 from .wire.envelope import Call, unpack_answer
 from .wire.names import GripperName
 

@@ -7,7 +7,7 @@ import logging
 import secrets
 import time
 from collections.abc import Callable, Mapping
-from typing import Final
+from typing import Any, Final
 
 from ...errors import AgentError
 from ...hand import RobotiqHand
@@ -63,6 +63,7 @@ class Agent:
         self.epoch = secrets.randbits(EPOCH_BITS)
         self._bus = bus
         self._window = window
+        self._running: asyncio.Task[Any] | None = None
         self._strange = LimitedLog()
         self._conflicts: dict[str, LimitedLog] = {}
         """By gripper: a token of another agent may come and go thousands of times."""
@@ -85,6 +86,7 @@ class Agent:
             AgentError: another agent serves one of the grippers, or has the same site and host.
         """
         undo: list[Undo] = []
+        self._running = asyncio.current_task()
         try:
             await self._refuse_if_served()
             undo += [self._bus.announce(each.name.key("alive", str(self.epoch))) for each in self._all]
@@ -157,6 +159,10 @@ class Agent:
 
     def _hear(self, query: Query) -> None:
         self._look_at_clocks()
+        if self._running is not None and self._running.cancelling():
+            # Told to end, and its tasks have not had a turn yet.
+            for each in self._all:
+                each.refuse_requests()
         try:
             name = GripperName.of_key(query.key)
         except ValueError as no_name:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Coroutine
 from contextlib import suppress
 from inspect import signature
-from typing import Any, Final, TypeVar
+from typing import Final
 
 from ...control.grip_keeper import KEEP_S
-from ...control.motion import MoveResult
 from ...control.state_machine import RUNNING
 from ...enums import Finger
 from ...errors import AgentError, ControlLostError, RobotiqConnectionError, RobotiqError
@@ -24,9 +22,10 @@ from ..control.lease import Lease
 from ..network.bus import Bus, Query
 from ..wire.envelope import Answer, Call, failure, unpack_call
 from ..wire.names import GripperName
-from ..wire.values import Fields, result_fields
+from ..wire.values import Fields
 from .arguments import axes_of, label_of
 from .publisher import HandPublisher
+from .requests import Request, Requests, Work
 
 RETRY_S: Final = 1.0
 """From one attempt to reach a gripper that is not there to the next."""
@@ -34,31 +33,6 @@ COMMANDS: Final = frozenset(
     {"set_position", "set_speed", "set_force", "move", "hold", "activate", "reset", "atr", "recover"}
 )
 """What a holder may ask for: the method of a hand of that name. Beside them there are command and cancel."""
-T = TypeVar("T")
-_REMEMBERED: Final = 256
-"""Requests whose answers are kept for repetitions."""
-
-
-class _Request:
-    """Something under way, or answered already: a repetition gets the same answer.
-
-    Attributes:
-        reason: why it was called off; empty if it was not, or by its caller.
-    """
-
-    def __init__(self, name: str, call: Call, query: Query) -> None:
-        self.name = name
-        self.call = call
-        self.queries = [query]
-        self.answer: bytes | None = None
-        self.task: asyncio.Task[MoveResult | None] | None = None
-        self.reason = ""
-
-    def call_off(self, reason: str = "") -> None:
-        """Cancel it, if it is still under way."""
-        if self.task is not None and not self.task.done():
-            self.reason = reason
-            self.task.cancel()
 
 
 class ServedHand:
@@ -78,12 +52,13 @@ class ServedHand:
         self._lease = Lease(window)
         self._admission = Admission(name.base, epoch, self._lease)
         self.publisher = HandPublisher(name, hand, bus, epoch, self._lease)
-        self._requests: dict[int, _Request] = {}
+        self._requests = Requests(self.publisher, epoch, self._log, self._note)
+        self._released: Request | None = None
+        """The last one that gave the lease back."""
         self._commanded = Finger(0)
         """The axes that the holder has commanded."""
         self._owed = Finger(0)
         """The axes that are to be held as soon as the gripper is reached again."""
-        self._tasks: set[asyncio.Task[Any]] = set()
         self._expiry: asyncio.TimerHandle | None = None
         self._is_ending = False
 
@@ -94,15 +69,18 @@ class ServedHand:
             while True:
                 await self._run_once()
         finally:
-            self._is_ending = True
-            self.end_lease("closed")
+            self.refuse_requests()
             await self._hand.stop()
             remove()
             if self._expiry is not None:
                 self._expiry.cancel()
-            for task in self._tasks:
-                task.cancel()
-            await asyncio.gather(*self._tasks, return_exceptions=True)
+            await self._requests.end()
+
+    def refuse_requests(self) -> None:
+        """The agent ends: take nothing more but halts, and drop what was not sent."""
+        if not self._is_ending:
+            self._is_ending = True
+            self.end_lease("closed")
 
     async def _run_once(self) -> None:
         try:
@@ -187,7 +165,6 @@ class ServedHand:
             self._admission.check_fresh(call, now())
             self._grant(call, take=what == "take")
         elif what == "release":
-            self._admission.renew(call, now())
             self._release(call, query)
             return None
         else:
@@ -210,11 +187,17 @@ class ServedHand:
         self._watch_expiry()
 
     def _release(self, call: Call, query: Query) -> None:
+        """Also once more, and more strongly, while nobody else has come."""
+        known = self._released
+        if known is not None and (known.call.client, known.call.number) == (call.client, call.number):
+            self._requests.repeat(known, query)
+            return
+        self._admission.release(call, now())
         leaves = call.arguments.get("halt") is False
         keeps = call.arguments.get("keep_grip") is True and self._hand.state in RUNNING
         if leaves:
             self._commanded = Finger(0)
-            self._requests = {at: each for at, each in self._requests.items() if each.name != "move"}
+            self._requests.leave_moves()
         self.end_lease("released")
 
         async def release() -> None:
@@ -223,7 +206,8 @@ class ServedHand:
             elif not leaves:
                 await self._hand.halt()
 
-        self._start(_Request("release", call, query), release())
+        self._released = Request("release", call, query)
+        self._requests.start(self._released, release())
 
     async def _come_to_rest(self) -> None:
         """Hold what moves; halt if that does not come to rest in time, and nobody commands by then."""
@@ -248,15 +232,13 @@ class ServedHand:
             reason,
             f" by {by}" if by else "",
         )
-        for request in self._requests.values():
-            request.call_off(reason)
-        self._requests.clear()
+        self._requests.call_off_all(reason)
         # Holding is for what moves. A speed or a force that is still to be written would act under the next
         # holder, and after a freeze seconds late.
         self._hand._drop_requests(f"the lease has ended: {reason}")  # noqa: SLF001  # the agent's own
         axes, self._commanded = self._commanded, Finger(0)
-        if axes:
-            self._spawn(self._hold(axes))
+        if axes and not self._is_ending:  # else stop() sees to the fingers
+            self._requests.spawn(self._hold(axes))
         self.publisher.add({"kind": "lease", "number": self._lease.number, "holder": None, "reason": reason})
 
     async def _hold(self, axes: Finger) -> None:
@@ -299,12 +281,25 @@ class ServedHand:
         else:
             # Or a control loop would undo it in ten milliseconds.
             self.end_lease("halted", label_of(call))
-        self._start(_Request("halt", call, query), self._hand.halt())
+        self._requests.start(Request("halt", call, query), self._stop_now())
+
+    async def _stop_now(self) -> None:
+        """Halt; a hand that is being stopped stops its fingers then, whatever was asked of it before.
+
+        Raises:
+            RobotiqError: the fingers were not seen to stop.
+        """
+        if not self._is_ending:
+            await self._hand.halt()
+            return
+        await self._hand.stop(keep_grip=False)
+        if self._hand.status.go_echo:
+            raise AgentError("the agent ended, and the fingers were not seen to stop")
 
     def _command(self, name: str, call: Call, query: Query) -> None:
-        known = self._requests.get(call.number)
+        known = self._requests.find(call.number)
         if known is not None and self._admission.is_of_holder(call):
-            self._repeat(known, query)
+            self._requests.repeat(known, query)
             return
         if name == "cancel":
             self._cancel(call, query)
@@ -314,21 +309,23 @@ class ServedHand:
         axes = axes_of(name, call.arguments)
         work = self._work(name, call.arguments)  # arguments that do not fit end here, before anything is kept
         self._commanded |= axes
-        request = self._requests[call.number] = _Request(name, call, query)
-        if len(self._requests) > _REMEMBERED:
-            self._forget()
-        self._start(request, work)
+        self._requests.begin(Request(name, call, query), work)
 
     def _check_known(self, name: str) -> None:
         if name != "command" and name not in COMMANDS:
             raise AgentError(f"unknown command {name!r}")
 
-    def _work(self, name: str, arguments: Fields) -> Coroutine[Any, Any, MoveResult | None]:
+    def _note(self, request: Request) -> None:
+        """A request was carried out."""
+        if request.name in ("move", "set_position", "command"):
+            self._owed &= ~axes_of(request.name, request.call.arguments)
+
+    def _work(self, name: str, arguments: Fields) -> Work:
         if name == "command":
             return self._set(**arguments)
         method = getattr(self._hand, name)
         signature(method).bind(**arguments)  # called with anything, it would say so when it is awaited
-        work: Coroutine[Any, Any, MoveResult | None] = method(**arguments)
+        work: Work = method(**arguments)
         return work
 
     async def _set(self, axes: Fields) -> None:
@@ -340,56 +337,13 @@ class ServedHand:
         for mask, changes in asked.items():
             self._hand.command(mask, **changes)
 
-    def _repeat(self, request: _Request, query: Query) -> None:
-        self._log.info("request %d came again", request.call.number)
-        if request.answer is None:
-            request.queries.append(query)
-        else:
-            query.reply(request.answer, self.publisher.status_message())
-
     def _cancel(self, call: Call, query: Query) -> None:
         """Call off a command of the holder; the axes it moves are held."""
         self._admission.renew(call, now())
-        request = self._requests.get(call.arguments.get("number", -1))
+        request = self._requests.find(call.arguments.get("number", -1))
         if request is not None:
             request.call_off()
         else:
             # It may have been overtaken: it is not to be let in when it comes.
             self._admission.bar(Call(call.to, call.client, number=int(call.arguments.get("number", 0))))
         self._reply(query, Answer(call.to, call.number, self._epoch, {}))
-
-    def _start(self, request: _Request, work: Coroutine[Any, Any, MoveResult | None]) -> None:
-        request.task = self._spawn(work)
-        # Not in the task itself: one that is cancelled before it has begun never runs.
-        request.task.add_done_callback(lambda task: self._finish(request, task))
-
-    def _finish(self, request: _Request, task: asyncio.Task[MoveResult | None]) -> None:
-        call, error = request.call, None if task.cancelled() else task.exception()
-        if task.cancelled():
-            reason = request.reason or "released"
-            error = ControlLostError(f"called off: {request.reason or 'by the caller'}", reason)
-        elif isinstance(error, Exception) and not isinstance(error, RobotiqError | TypeError | ValueError):
-            self._log.error("%s failed", request.name, exc_info=error)
-            error = AgentError(f"the agent failed: {error!r}")
-        if isinstance(error, Exception):
-            answer = failure(call, self._epoch, error)
-        else:
-            answer = Answer(call.to, call.number, self._epoch, result_fields(task.result()) or {})
-            if request.name in ("move", "set_position", "command"):
-                self._owed &= ~axes_of(request.name, call.arguments)
-        request.answer = answer.pack()
-        for query in request.queries:
-            query.reply(request.answer, self.publisher.status_message())
-        request.queries.clear()
-
-    def _forget(self) -> None:
-        """The oldest requests that have been answered."""
-        for number in sorted(self._requests)[: _REMEMBERED // 2]:
-            if self._requests[number].answer is not None:
-                del self._requests[number]
-
-    def _spawn(self, work: Coroutine[Any, Any, T]) -> asyncio.Task[T]:
-        task = asyncio.get_running_loop().create_task(work)
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
-        return task

@@ -48,12 +48,15 @@ class Admission:
         """Let a command in, and count it, or say why not. The caller has ended a lease that has expired.
 
         Raises:
-            ControlLostError: it is not the holder's, or it was on its way for too long.
+            ControlLostError: it is not the holder's, or it was on its way for too long; or the one before it
+                has not come yet.
             AgentError: a later one came first.
         """
         self._check_holder(call, now)
         if call.number <= self._newest:
             raise AgentError("a later request overtook this one; nothing was done")
+        if call.after > self._newest:
+            raise ControlLostError(f"request {call.after} has not come yet; nothing was done", "early")
         self._newest = call.number
         self.lease.renew(call.seen)
 
@@ -95,6 +98,17 @@ class Admission:
         """
         self._check_holder(call, now)
         self.lease.renew(call.seen)
+
+    def release(self, call: Call, now: float) -> None:
+        """Let a client give the lease back; also one that has done so, as long as nobody has come after it.
+
+        Raises:
+            ControlLostError: as :meth:`admit`.
+        """
+        if self.lease.is_released_by(call.client, call.lease):
+            self.check_fresh(call, now)
+        else:
+            self.renew(call, now)
 
     def _check_again(self, call: Call) -> None:
         """Refuse a client that comes back by itself when somebody else has stepped in since it left.

@@ -109,6 +109,11 @@ class Lease:
         barred, reason = self._barred
         return reason if number <= barred else ""
 
+    def is_released_by(self, client: str, number: int) -> bool:
+        """Whether a client has given back the lease of a number, and it was the last one."""
+        is_last = self.holder is None and client == self._last and number == self.number - 1
+        return is_last and self._ends.get(number) == "released"
+
     def end_of(self, number: int) -> str:
         """Why the lease of a number ended."""
         return self._ends.get(number, "expired")

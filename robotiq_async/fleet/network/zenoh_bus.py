@@ -184,7 +184,7 @@ class ZenohBus:
                 payload=payload,
                 timeout=timeout,
                 priority=_PRIORITY[urgency],
-                express=True,
+                express=urgency is Urgency.STOP,
                 target=zenoh.QueryTarget.BEST_MATCHING,
                 consolidation=zenoh.ConsolidationMode.NONE,
                 congestion_control=zenoh.CongestionControl.DROP,

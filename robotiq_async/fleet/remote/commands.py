@@ -17,9 +17,7 @@ from ...wire.checks import check_byte, check_mask, check_optional_byte, check_ti
 from ..network.bus import Urgency
 from ..wire.values import Fields, read_result, reading
 from .observation import RemoteObservation
-from .persistence import HALT_S, until_answered
-from .requests import label, no_answer_as_lost_connection
-from .session import RemoteSession
+from .requests import no_answer_as_lost_connection
 
 COMMAND_S: Final = 5.0
 """For what ends when the gripper acknowledges it."""
@@ -213,7 +211,7 @@ class RemoteCommands(RemoteObservation):
         session = self._asked()
         assert self._outbox is not None
         self._outbox.clear()
-        halting = session.spawn(self._halt(session))
+        halting = session.stops.halt()
         try:
             with no_answer_as_lost_connection():
                 await asyncio.shield(halting)
@@ -224,11 +222,6 @@ class RemoteCommands(RemoteObservation):
             elif session.is_over:
                 raise NotStartedError("the hand was stopped") from None
             raise
-
-    async def _halt(self, session: RemoteSession) -> None:
-        await until_answered(
-            lambda left: session.ask("halt", {"label": label()}, timeout=left, urgency=Urgency.STOP), HALT_S
-        )
 
     # -- activation, faults ----------------------------------------------------------------------------
 
@@ -295,7 +288,7 @@ class RemoteCommands(RemoteObservation):
                 )
         except (asyncio.CancelledError, RobotiqConnectionError, NotAllowedError):
             # Also when an answer came that tells nothing of what became of it.
-            cancelling = session.call_off(call)
+            cancelling = session.stops.call_off(call)
             if cancelling is not None and name in ("move", "set_position"):
                 outbox.count_motion(cancelling)
             raise

@@ -8,12 +8,14 @@ from typing import Any, Final, Protocol
 
 from ...errors import ControlLostError, RobotiqError
 from ...log import Log
+from ...session.ending import Ending
 from ...session.timing.clock import now
 from ..wire.envelope import Call
 from ..wire.names import GripperName
 from ..wire.values import Fields, reading
 from .agents import Agents
 from .mirror import Mirror
+from .pending_request import PendingRequest
 from .requests import NoAnswerError, label
 
 RENEWALS: Final = 5
@@ -39,6 +41,15 @@ class AgentClient(Protocol):
 
     async def send(self, call: Call, verb: str, **how: Any) -> Any:  # noqa: ANN401
         """Send a request and wait for its answer."""
+
+    def post(self, call: Call, verb: str, **how: Any) -> PendingRequest:  # noqa: ANN401
+        """Send a request."""
+
+    async def answer(self, posted: PendingRequest) -> Any:  # noqa: ANN401
+        """Wait for the answer to a request."""
+
+    def end_calls(self, lease: int, error: ControlLostError) -> None:
+        """A lease has ended: who waits for something that was asked under it is told."""
 
     async def ask_quietly(self, verb: str, arguments: Fields, timeout: float) -> None:
         """Ask for what the answer does by itself."""
@@ -70,6 +81,10 @@ class LeaseKeeper:
         self._acquiring = asyncio.Lock()
         self._returning: asyncio.Task[Any] | None = None
         self._finding_out: asyncio.Task[Any] | None = None
+        self._giving_back: asyncio.Task[Any] | None = None
+        """How the lease is given back now, or was last."""
+        self._ending: Ending | None = None
+        self._is_ending = False
 
     async def begin(self, deadline: float) -> None:
         """Acquire the lease if that is wanted; again when an answer was lost, until it is time to give up.
@@ -86,16 +101,11 @@ class LeaseKeeper:
                 if getattr(error, "reason", "late") != "late" or now() >= deadline:
                     raise
 
-    async def end(self, *, halt: bool, keep_grip: bool) -> None:
-        """The run ends: give the lease back.
-
-        Raises:
-            RobotiqError: the agent did not acknowledge it.
-        """
+    def end(self, ending: Ending) -> None:
+        """The run ends: give the lease back, at once; see :meth:`give_back`."""
         self._wants_control = False
-        if self.is_in_control:
-            self.is_in_control = False
-            await self._give_back(halt=halt, keep_grip=keep_grip)
+        self._is_ending = True
+        self.give_back(ending)
 
     def abandon(self) -> None:
         """Nothing can be sent any more."""
@@ -120,16 +130,41 @@ class LeaseKeeper:
                 return  # asked for again, the agent would take what is under way for forgotten
             await self._acquire({"what": "take" if take else "acquire"})
 
-    async def release(self, *, halt: bool, keep_grip: bool) -> None:
-        """Give the lease back.
+    def give_back(self, ending: Ending) -> None:
+        """Give the lease back, if this client holds it; sent in this very call.
 
-        Raises:
-            RobotiqError: the agent did not answer, or the fingers were not seen to stop.
+        Asked for again, before that is acknowledged or before the run is over, the strongest ending counts.
         """
         self._wants_control = False
         if self.is_in_control:
             self.lose("released", "it was given back")
-            await self._give_back(halt=halt, keep_grip=keep_grip)
+            self._giving_back, self._ending = None, None
+        elif self._giving_back is None or (self._giving_back.done() and not self._is_ending):
+            self._giving_back = None
+            return
+        if self._ending is None or ending > self._ending:
+            self._ending = ending
+            what = {"what": "release", "halt": ending > Ending.LEAVE, "keep_grip": ending is Ending.KEEP}
+            posted = self._run.post(self._run.call(what), "lease", timeout=RELEASE_S)
+            self._giving_back = self._run.spawn(self._run.answer(posted))
+            # Who asked for a gentler end is not told of its failure, but of how this one went.
+            self._giving_back.add_done_callback(lambda task: task.cancelled() or task.exception())
+        elif ending < self._ending:
+            self._log.warning("a stop that is under way is stronger: the fingers are %s", self._ending.done)
+
+    async def given_back(self) -> None:
+        """Wait until the end that was asked for is acknowledged.
+
+        Raises:
+            RobotiqError: the agent did not answer, or the fingers were not seen to stop.
+        """
+        awaited = None
+        while self._giving_back is not awaited:
+            awaited = self._giving_back
+            assert awaited is not None
+            await asyncio.wait({awaited})
+        if awaited is not None:
+            awaited.result()
 
     def look(self) -> None:
         """Renew the lease, or acquire it again when that is due; several times in a window."""
@@ -157,6 +192,7 @@ class LeaseKeeper:
         # After a halt or a take of somebody else nobody takes it back without having been asked to.
         self._wants_control = self._wants_control and reason not in (*BY_OTHERS, "released")
         self.lost = ControlLostError(f"lost control of {self._run.name}: {why}", reason)
+        self._run.end_calls(self.lease, self.lost)
         if reason != "released":
             self._log.warning("lost control: %s", why)
 
@@ -179,7 +215,8 @@ class LeaseKeeper:
         value = await self._run.send(call, "lease", timeout=ANSWER_S)
         with reading("a lease"):
             self.lease, self._lease_run = int(value["lease"]), self._run.mirror.epoch
-        self.is_in_control, self._wants_control, self._may_return, self.lost = True, True, True, None
+        if not self._is_ending:
+            self.is_in_control, self._wants_control, self._may_return, self.lost = True, True, True, None
 
     async def _acquire_again(self) -> None:
         try:
@@ -191,10 +228,6 @@ class LeaseKeeper:
                 self._wants_control, self.lost = False, error
         except RobotiqError:
             pass  # again in a moment
-
-    async def _give_back(self, *, halt: bool, keep_grip: bool) -> None:
-        call = self._run.call({"what": "release", "halt": halt, "keep_grip": keep_grip})
-        await self._run.send(call, "lease", timeout=RELEASE_S)
 
     async def _renew(self) -> None:
         await self._run.ask_quietly("lease", {"what": "renew"}, self._run.window)

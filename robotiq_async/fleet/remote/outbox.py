@@ -12,7 +12,7 @@ from ...enums import AXES, Finger
 from ...errors import ControlLostError, NotStartedError, RobotiqError
 from ..network.bus import Urgency
 from ..wire.envelope import Call
-from .requests import PendingRequest
+from .pending_request import PendingRequest
 from .session import RemoteSession
 
 UNDER_WAY: Final = 4
@@ -51,6 +51,12 @@ class Outbox:
         """What waits is not to be sent any more."""
         self._waiting.clear()
         self._asked = None
+
+    def drop(self) -> None:
+        """The hand is stopped."""
+        if self._waiting:
+            self._session.log.info("stopped: what was asked for and not sent yet is dropped")
+        self.clear()
 
     def flush(self) -> None:
         """Send what waits now: something is asked for after it."""

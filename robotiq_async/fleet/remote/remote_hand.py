@@ -9,6 +9,7 @@ from ...calibration import ForceCalibration, SpeedCalibration
 from ...enums import State
 from ...errors import InvalidStateError, NotStartedError
 from ...log import Log
+from ...session.ending import Ending
 from ...session.options import check_units
 from ...session.streams import Channels
 from ...session.timing.event_loop import running_loop
@@ -160,7 +161,9 @@ class RemoteHand(RemoteCommands):
         session = self._session
         if session is not None and not session.has_ended:
             session.check_loop()
-            await session.close(halt=halt, keep_grip=keep_grip)
+            assert self._outbox is not None
+            self._outbox.drop()
+            await session.close(Ending.of(halt=halt, keep_grip=keep_grip))
 
     async def _open(self) -> Bus:
         """The session to use.
@@ -230,8 +233,10 @@ class RemoteHand(RemoteCommands):
         """
         check_flag("halt", halt)
         keep_grip = self._keep_grip if keep_grip is None else check_flag("keep_grip", keep_grip)
+        keeper = self._asked().keeper
+        keeper.give_back(Ending.of(halt=halt, keep_grip=keep_grip))
         with no_answer_as_lost_connection():
-            await self._asked().keeper.release(halt=halt, keep_grip=keep_grip)
+            await keeper.given_back()
 
     def __repr__(self) -> str:
         """Address and state."""

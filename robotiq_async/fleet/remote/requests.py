@@ -7,18 +7,19 @@ import getpass
 import os
 import secrets
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any, Final
 
-from ...errors import AgentError, ConnectionLostError, NotAllowedError, RobotiqError
+from ...control.waiters import another
+from ...errors import AgentError, ConnectionLostError, NotAllowedError, NotStartedError, RobotiqError
 from ...session.timing.clock import now
 from ..network.bus import Bus, Reply, Urgency
 from ..wire.envelope import Answer, Call, unpack_answer
 from ..wire.names import GripperName
 from ..wire.values import Fields
 from .mirror import Mirror
+from .pending_request import PendingRequest, is_refusal, of_its_run
 
 IN_ANY_RUN: Final = ("info", "halt")
 """What any run of the agent may answer."""
@@ -26,6 +27,10 @@ RECENT_S: Final = 0.5
 """So soon the agent must be heard after an empty answer for that to mean that the request is not allowed."""
 AT_ONCE_S: Final = 0.25
 """Sooner than any time is over: nobody was there for the request."""
+EARLY_S: Final = 0.005
+"""So soon all is said again when the agent waits for something that got lost."""
+LAST_ANSWER_S: Final = 0.5
+"""For what the agent says of a command whose lease has ended."""
 
 
 class NoAnswerError(ConnectionLostError):
@@ -45,58 +50,8 @@ def no_answer_as_lost_connection() -> Iterator[None]:
         raise ConnectionLostError(str(error)) from error
 
 
-@dataclass(frozen=True, slots=True)
-class PendingRequest:
-    """A request on its way.
-
-    Attributes:
-        call: the request.
-        verb: the last part of the key it went to.
-        timeout: seconds for its answer.
-        urgency: of both.
-        asked_at: when it was sent.
-        asking: waits for the reply.
-    """
-
-    call: Call
-    verb: str
-    timeout: float
-    urgency: Urgency
-    asked_at: float
-    asking: asyncio.Future[Reply | None]
-
-    @property
-    def is_halt(self) -> bool:
-        """Whether it is for every run of the agent, and answered also when the agent falls silent."""
-        return self.urgency is Urgency.STOP
-
-
-def of_its_run(call: Call) -> Callable[[Reply], bool]:
-    """Whether a reply is that of the run of the agent that was asked; of any, if the request names none.
-
-    Where two agents serve a gripper, the one that refuses is the quicker one.
-    """
-
-    def decides(reply: Reply) -> bool:
-        try:
-            answer = unpack_answer(reply.payload)
-        except RobotiqError:
-            return False
-        return (answer.to, answer.number) == (call.to, call.number) and call.epoch in (0, answer.epoch)
-
-    return decides
-
-
-def is_refusal(reply: Reply) -> bool:
-    """Whether a reply to a halt says anything but that the fingers stand: of two agents both have to."""
-    try:
-        return unpack_answer(reply.payload).error is not None
-    except RobotiqError:
-        return True
-
-
 class Requests:
-    """Numbers requests, sends each once, and ends the wait when the agent falls silent."""
+    """Numbers requests, says each until it is answered, and ends the wait when the agent falls silent."""
 
     def __init__(self, name: GripperName, bus: Bus) -> None:
         """Ask the agent that serves a gripper."""
@@ -109,7 +64,16 @@ class Requests:
         self._sign: asyncio.Future[None] = self._loop.create_future()
         """Done as soon as the agent is heard."""
         self._closed: asyncio.Future[None] = self._loop.create_future()
-        self._asking: set[asyncio.Future[Reply | None]] = set()
+        self._has_ended = False
+        self._pending: set[PendingRequest] = set()
+        self._commands: dict[int, PendingRequest] = {}
+        """Those that have no answer yet, in the order in which they were asked."""
+        self._round: asyncio.TimerHandle | None = None
+
+    @property
+    def has_undelivered_hold(self) -> bool:
+        """Whether a hold was asked for that the agent has not answered for."""
+        return any(each.verb == "cmd/hold" for each in self._commands.values())
 
     def hear(self) -> None:
         """The agent is heard."""
@@ -121,13 +85,27 @@ class Requests:
         silence, self._silence = self._silence, self._loop.create_future()
         silence.set_result(None)
 
+    def lose_lease(self, lease: int, error: RobotiqError) -> None:
+        """A lease has ended: the agent has a moment to say what became of the commands under it."""
+        for posted in self._commands.values():
+            if posted.call.lease == lease:
+                posted.rest()
+                self._loop.call_later(LAST_ANSWER_S, posted.fail, another(error))
+
+    def end(self) -> None:
+        """The hand was stopped: nothing is asked from now on but for what ends motion."""
+        self._has_ended = True
+        self.fall_silent()
+
     async def close(self) -> None:
         """Nobody waits for any answer any more."""
+        self._has_ended = True
         if not self._closed.done():
             self._closed.set_result(None)
-        for asking in self._asking:
-            asking.cancel()
-        await asyncio.gather(*self._asking, return_exceptions=True)
+        pending = list(self._pending)
+        for posted in pending:
+            posted.end()
+        await asyncio.gather(*(posted.ended() for posted in pending))
 
     def make(self, mirror: Mirror, lease: int, arguments: Fields) -> Call:
         """The next request."""
@@ -137,24 +115,58 @@ class Requests:
     def post(
         self, call: Call, verb: str, *, timeout: float, urgency: Urgency = Urgency.COMMAND
     ) -> PendingRequest:
-        """Send a request: before whatever is posted after it.
+        """Send a request: before whatever is posted after it. Wait for its answer with :meth:`answer`.
 
         Args:
             call: the request.
             verb: the last part of the key it goes to.
             timeout: seconds for its answer.
             urgency: the answer to a halt is waited for also when the agent falls silent.
+
+        Raises:
+            NotStartedError: the hand was stopped.
         """
-        asking = self._bus.ask(
-            self._name.key(verb),
-            call.pack(),
-            timeout=timeout,
-            urgency=urgency,
-            decides=is_refusal if urgency is Urgency.STOP else of_its_run(call),
+        posted = PendingRequest(call, verb, timeout, urgency)
+        if self._has_ended and not posted.is_last_word:
+            raise NotStartedError("the hand was stopped")
+        self._pending.add(posted)
+        if posted.is_command:
+            self._commands[call.number] = posted
+        self._say(posted)
+        return posted
+
+    def _say(self, posted: PendingRequest) -> None:
+        number = posted.call.number
+        before = [each for each in self._commands if each < number] if posted.is_command else ()
+        copy = self._bus.ask(
+            self._name.key(posted.verb),
+            posted.packed(max(before, default=0)),
+            timeout=posted.left,
+            urgency=posted.urgency,
+            decides=is_refusal if posted.is_halt else of_its_run(posted.call),
         )
-        self._asking.add(asking)
-        asking.add_done_callback(self._asking.discard)
-        return PendingRequest(call, verb, timeout, urgency, now(), asking)
+        posted.add(copy, self._say_all_again)
+        posted.repeat(lambda: self._say_again(posted))
+
+    def _say_again(self, posted: PendingRequest) -> None:
+        """It may have been dropped on the way, or its answer: on a full network either is."""
+        if posted.left and not posted.answered.done() and (posted.is_last_word or not self._has_ended):
+            self._say(posted)
+
+    def _say_all_again(self) -> None:
+        """A command was lost, and those after it wait for it: in their order, and soon."""
+        if self._round is None:
+            self._round = self._loop.call_later(EARLY_S, self._say_round)
+
+    def _say_round(self) -> None:
+        self._round = None
+        for posted in list(self._commands.values()):
+            self._say_again(posted)
+
+    def _forget(self, posted: PendingRequest) -> None:
+        self._commands.pop(posted.call.number, None)
+        self._pending.discard(posted)
+        posted.end()
 
     async def answer(self, posted: PendingRequest) -> tuple[Answer, bytes]:
         """Wait for the answer to a request; returns it, and the status that came with it.
@@ -165,16 +177,10 @@ class Requests:
             AgentError: the answer was another gripper's, or of another version.
             ProtocolError: it is none.
         """
-        reply, at_once = await self._wait(posted)
-        if reply is None and at_once and await self._hears_on():
-            # Just after a link has come up nobody seems to be there. Nothing is done twice: the number is the
-            # same, and so is what had been heard when it was asked.
-            again = self.post(posted.call, posted.verb, timeout=posted.timeout, urgency=posted.urgency)
-            reply, at_once = await self._wait(again)
-            if reply is None and at_once and await self._hears_on():
-                raise NotAllowedError(f"{self._name}: nobody there answers to {posted.verb}: access denied")
-        if reply is None:
-            raise NoAnswerError(f"{self._name}: no answer in time; {posted.verb} may have been carried out")
+        try:
+            reply = await self._reply(posted)
+        finally:
+            self._forget(posted)
         answer = unpack_answer(reply.payload)
         if answer.to != self._name.base or answer.number not in (0, posted.call.number):
             raise AgentError(
@@ -187,25 +193,49 @@ class Requests:
             )
         return answer, reply.attachment
 
+    async def _reply(self, posted: PendingRequest) -> Reply:
+        """Wait for a reply.
+
+        Raises:
+            RobotiqError: there is none; as :meth:`answer`.
+        """
+        reply, at_once = await self._wait(posted)
+        if reply is None and at_once and await self._hears_on():
+            # Just after a link has come up nobody seems to be there. Nothing is done twice: the number is the
+            # same, and so is what had been heard when it was asked.
+            posted.begin()
+            self._say_again(posted)
+            reply, at_once = await self._wait(posted)
+            if reply is None and at_once and await self._hears_on():
+                raise NotAllowedError(f"{self._name}: nobody there answers to {posted.verb}: access denied")
+        if reply is None:
+            raise NoAnswerError(f"{self._name}: no answer in time; {posted.verb} may have been carried out")
+        return reply
+
     async def _wait(self, posted: PendingRequest) -> tuple[Reply | None, bool]:
         """Wait for a reply; returns it, and whether it came at once: as where access rules say no.
 
         Raises:
             NoAnswerError: the agent fell silent, or the run ended.
+            RobotiqError: the lease has ended, and the agent said nothing.
         """
-        asking = posted.asking
-        awaited: set[asyncio.Future[Any]] = {asking, self._closed}
-        if not posted.is_halt:
+        answered = posted.answered
+        awaited: set[asyncio.Future[Any]] = {answered, self._closed}
+        if not posted.is_last_word:
             awaited.add(self._silence)
-        try:
-            await asyncio.wait(awaited, return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            asking.cancel()
-        if not asking.done() or asking.cancelled():
+        # The bus says when the time is over; that nobody waits for longer does not hang on it.
+        limit = posted.left + LAST_ANSWER_S
+        done, _ = await asyncio.wait(awaited, timeout=limit, return_when=asyncio.FIRST_COMPLETED)
+        if not done:
+            return None, False
+        if not answered.done() or answered.cancelled():
             raise NoAnswerError(
                 f"{self._name}: the agent fell silent; {posted.verb} may have been carried out"
             )
-        return asking.result(), now() - posted.asked_at < min(AT_ONCE_S, posted.timeout / 2)
+        reply = answered.result()
+        if isinstance(reply, RobotiqError):
+            raise reply
+        return reply, now() - posted.asked_at < min(AT_ONCE_S, posted.timeout / 2)
 
     async def _hears_on(self) -> bool:
         """Whether the agent is heard from now on; a link that is down may have been up a moment ago."""

@@ -31,7 +31,7 @@ from ...session.timing.event_loop import check_loop
 from ...wire.checks import check_seconds
 from ..control.lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
 from ..limited_log import LimitedLog
-from ..network.bus import Bus, Undo, Urgency
+from ..network.bus import Bus, Undo
 from ..wire.envelope import Call
 from ..wire.names import GripperName
 from ..wire.status_message import unpack
@@ -40,15 +40,13 @@ from .agents import Agents
 from .lease_keeper import ANSWER_S, RENEWALS, LeaseKeeper
 from .mirror import Mirror
 from .missed_events import MissedEvents
-from .requests import NoAnswerError, PendingRequest, Requests, label
+from .pending_request import PendingRequest
+from .requests import NoAnswerError, Requests
+from .stops import Stops
 
 CONNECT_S: Final = 5.0
 OWN: Final = ("info", "lease", "halt", "cmd/cancel")
 """Requests whose arguments no user has chosen: they are nobody's TypeError."""
-LATE_HALT_S: Final = 0.5
-"""For the halt of a stop that comes while a gentler one is on its way; what is left of its 2 s."""
-TRIES: Final = 2
-"""How many times a request is called off in a window."""
 
 
 class RemoteSession:
@@ -58,6 +56,7 @@ class RemoteSession:
         log: for what happens to the hand.
         mirror: what has been heard.
         keeper: the lease.
+        stops: halts, and requests that are called off.
         agents: which ones serve the gripper.
         waiters: who waits for a state.
         is_over: whether the run has ended, or is about to.
@@ -97,10 +96,6 @@ class RemoteSession:
         self._channels = channels
         self._owns_bus = owns_bus
         self._closing: asyncio.Task[None] | None = None
-        self._ending = Ending.LEAVE
-        """The strongest that stop() was called for."""
-        self._held_control = False
-        """Whether this hand held the lease when it was stopped."""
         self.window = WINDOW_S
         self._arrived_at = 0.0
         """When anything was heard, be it current or not."""
@@ -110,6 +105,7 @@ class RemoteSession:
             self.mirror, lambda since: self.ask("info", {"since": since}, timeout=ANSWER_S), self.spawn
         )
         self.keeper = LeaseKeeper(self, wants_control=wants_control)
+        self.stops = Stops(self)
         self._looking: asyncio.Task[Any] | None = None
         channels.reopen(self.loop)
         self.mirror.begin(now())
@@ -177,35 +173,30 @@ class RemoteSession:
         why = "no agent of it is heard: none runs, or the network or a certificate is in the way"
         raise ConnectFailedError(str(self.name), why)
 
-    async def close(self, *, halt: bool, keep_grip: bool) -> None:
+    async def close(self, ending: Ending) -> None:
         """End the run; within two seconds, also when cancelled meanwhile, and whoever asks waits for it.
 
-        Of several calls the strongest counts, whichever comes first.
+        From this call on nothing is asked but for what ends motion. Of several calls the strongest counts,
+        whichever comes first; a hold or a halt that is not acknowledged yet makes a gentle one stronger.
         """
-        ending = Ending.of(halt=halt, keep_grip=keep_grip)
         if self._closing is None:
             self.is_over = True
-            self._ending, self._held_control = ending, self.keeper.is_in_control
+            is_holding = self._requests.has_undelivered_hold
+            ending = max(ending, self.stops.undelivered, Ending.KEEP if is_holding else Ending.LEAVE)
             self.mirror.shut_down(State.DO_SHUTDOWN, Trigger.ASK_STOP, now())
-            self._requests.fall_silent()  # nobody waits for what was asked before
+            self._requests.end()
             self._closing = self.loop.create_task(self._close())
-        elif ending > self._ending:
-            self._ending = ending
-        elif ending < self._ending:
-            self.log.warning("a stop that is under way is stronger: the fingers are %s", self._ending.done)
+        self.keeper.end(ending)
         await wait_shielded(self._closing)
         self._closing.result()
 
     async def _close(self) -> None:
         try:
-            ending = self._ending
-            await self.keeper.end(halt=ending > Ending.LEAVE, keep_grip=ending is Ending.KEEP)
-            if self._ending > ending and self._held_control:
-                # Somebody asked for more while the gentler end was on its way. A halt needs no lease.
-                await self.ask("halt", {"label": label()}, timeout=LATE_HALT_S, urgency=Urgency.STOP)
+            await self.keeper.given_back()
         except RobotiqError as error:
             self.log.warning("the end was not acknowledged (%s): the agent holds what moves", error)
         finally:
+            await self.stops.halted()
             self._undo()
             self.agents.end()
             for task in self._tasks:
@@ -327,6 +318,10 @@ class RemoteSession:
         self.keeper.lose("expired", "the agent is silent")
         self._requests.fall_silent()
 
+    def end_calls(self, lease: int, error: ControlLostError) -> None:
+        """A lease has ended: who waits for something that was asked under it is told."""
+        self._requests.lose_lease(lease, error)
+
     # -- control ---------------------------------------------------------------------------------------
 
     def check_control(self) -> None:
@@ -391,23 +386,6 @@ class RemoteSession:
         """Ask for what the answer does by itself."""
         with suppress(RobotiqError):
             await self.ask(verb, arguments, timeout=timeout)
-
-    def call_off(self, call: Call) -> asyncio.Task[Any] | None:
-        """Nobody waits for a request any more: what it set going is to be held."""
-        if not self.keeper.is_in_control or self.is_over:
-            return None
-        return self.spawn(self._call_off(call))
-
-    async def _call_off(self, call: Call) -> None:
-        for _ in range(TRIES):
-            try:
-                await self.ask("cmd/cancel", {"number": call.number}, timeout=self.window / TRIES)
-            except RobotiqError as error:
-                if getattr(error, "reason", "late") == "late":
-                    continue
-            return  # or the lease has ended: nothing is left to call off
-        # Without renewals the lease ends, and the agent holds what moves by itself.
-        self.keeper.lose("expired", "a request could not be called off")
 
     def spawn(self, work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
         """Do something beside; it ends with the run."""

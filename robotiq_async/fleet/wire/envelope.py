@@ -12,7 +12,7 @@ from .values import Clock, Fields, error_fields, read_error
 
 VERSION: Final = 1
 _LONGEST: Final = 64 * 1024
-_INTEGERS: Final = ("epoch", "lease", "number")
+_INTEGERS: Final = ("epoch", "lease", "number", "after")
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +27,8 @@ class Call:
         number: rises with each request of a client; tells a repetition, and what was overtaken.
         seen: newest stamp of the agent that the client had heard when it asked.
         arguments: by name.
+        after: number of the command before this one if that is not answered yet, so that this one does not
+            take its place when it got lost; else 0.
     """
 
     to: str
@@ -36,6 +38,7 @@ class Call:
     number: int = 0
     seen: float = 0.0
     arguments: Fields = field(default_factory=dict)
+    after: int = 0
 
     def pack(self) -> bytes:
         """The request as bytes."""
@@ -50,7 +53,7 @@ def unpack_call(data: bytes) -> Call:
     """
     fields = _object("a request", data)
     try:
-        call = Call(**{name: fields[name] for name in Call.__slots__})
+        call = Call(**{name: fields[name] for name in Call.__slots__ if name in fields or name != "after"})
     except KeyError as error:
         raise ProtocolError(f"not a request: {data[:200]!r}") from error
     if not _is_well_formed(call):
@@ -126,6 +129,8 @@ def failure(call: Call, epoch: int, error: Exception) -> Answer:
 
 def _pack(message: Call | Answer) -> bytes:
     fields = {name: getattr(message, name) for name in message.__slots__}
+    if not fields.get("after", True):
+        del fields["after"]
     return json.dumps({"version": VERSION, **fields}).encode()
 
 

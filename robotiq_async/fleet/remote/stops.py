@@ -1,0 +1,84 @@
+"""Stops: halts, and requests that are called off, until they are acknowledged."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Coroutine
+from typing import Any, Final, Protocol
+
+from ...errors import RobotiqError
+from ...session.ending import Ending
+from ..network.bus import Urgency
+from ..wire.envelope import Call
+from ..wire.values import Fields
+from .lease_keeper import LeaseKeeper
+from .persistence import HALT_S, until_answered
+from .requests import label
+
+TRIES: Final = 2
+"""How many times a request is called off in a window."""
+
+
+class Asker(Protocol):
+    """What is needed of a run."""
+
+    keeper: LeaseKeeper
+    is_over: bool
+    window: float
+
+    async def ask(self, verb: str, arguments: Fields | None = None, **how: Any) -> Any:  # noqa: ANN401
+        """Ask the agent, once."""
+
+    def spawn(self, work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
+        """Do something beside; it ends with the run."""
+
+
+class Stops:
+    """What one run has asked for that ends motion."""
+
+    def __init__(self, run: Asker) -> None:
+        """Nothing yet."""
+        self._run = run
+        self._halts: set[asyncio.Task[Any]] = set()
+        self._cancels: set[asyncio.Task[Any]] = set()
+
+    @property
+    def undelivered(self) -> Ending:
+        """What a gentle end of the run has to make up for."""
+        if self._halts:
+            return Ending.HALT
+        return Ending.KEEP if self._cancels else Ending.LEAVE
+
+    def halt(self) -> asyncio.Task[Any]:
+        """Halt, again and again until that is answered."""
+        return self._begin(self._halts, until_answered(self._halt_once, HALT_S))
+
+    async def halted(self) -> None:
+        """Wait until halts under way have ended, well or not."""
+        await asyncio.gather(*self._halts, return_exceptions=True)
+
+    def call_off(self, call: Call) -> asyncio.Task[Any] | None:
+        """Nobody waits for a request any more: what it set going is to be held."""
+        if not self._run.keeper.is_in_control or self._run.is_over:
+            return None
+        return self._begin(self._cancels, self._call_off(call))
+
+    async def _halt_once(self, left: float) -> None:
+        await self._run.ask("halt", {"label": label()}, timeout=left, urgency=Urgency.STOP)
+
+    async def _call_off(self, call: Call) -> None:
+        for _ in range(TRIES):
+            try:
+                await self._run.ask("cmd/cancel", {"number": call.number}, timeout=self._run.window / TRIES)
+            except RobotiqError as error:
+                if getattr(error, "reason", "late") == "late":
+                    continue
+            return  # or the lease has ended: nothing is left to call off
+        # Without renewals the lease ends, and the agent holds what moves by itself.
+        self._run.keeper.lose("expired", "a request could not be called off")
+
+    def _begin(self, others: set[asyncio.Task[Any]], work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
+        task = self._run.spawn(work)
+        others.add(task)
+        task.add_done_callback(others.discard)
+        return task
