@@ -103,7 +103,8 @@ class LeaseKeeper:
 
     def end(self, ending: Ending) -> None:
         """The run ends: give the lease back, at once; see :meth:`give_back`."""
-        self._wants_control = False
+        if not self._is_ending and self._giving_back is not None and self._giving_back.done():
+            self._giving_back = None  # that was another end, and is over
         self._is_ending = True
         self.give_back(ending)
 

@@ -231,6 +231,8 @@ class RemoteSession:
         Raises:
             NotStartedError: it does not.
         """
+        if self.is_over and not self.has_ended:
+            raise NotStartedError("the hand was stopped")
         if self.is_over:
             raise NotStartedError("the hand is not started: use 'async with' or start()")
         if self.loop.is_closed():
@@ -362,7 +364,8 @@ class RemoteSession:
         try:
             answer, news = await self._requests.answer(posted)
         except NoAnswerError:
-            self.check_running()
+            if not posted.is_last_word:
+                self.check_running()
             raise
         if news:
             self._hear_status(news, in_turn=False, asked=posted.asked_at)

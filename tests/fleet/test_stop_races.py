@@ -1,0 +1,272 @@
+"""What races with an end: commands that wait for a lease, halts and holds on their way, an agent's end."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import Any
+
+import pytest
+
+from robotiq_async import ConnectionLostError, Finger, NotStartedError, RobotiqError
+from robotiq_async.errors import ControlLostError
+from robotiq_async.fleet.remote.remote_hand import RemoteHand
+from robotiq_async.fleet.wire.envelope import Call, unpack_answer
+from robotiq_async.wire.request import Request
+from tests.contract.bench import until
+from tests.fleet.by_hand import LEFT
+from tests.fleet.lab import Lab, lab
+from tests.virtual import virtual
+
+A = Finger.A
+DELAY_S = 0.02
+
+
+def going(here: Lab, since: int = 0) -> list[Request]:
+    images = [Request.from_registers(write.registers) for write in here.gripper.writes[since:]]
+    return [image for image in images if image.go]
+
+
+def is_stopped(here: Lab) -> bool:
+    return not Request.from_registers(here.gripper.request_registers).go
+
+
+async def slowly(here: Lab, hand: RemoteHand) -> asyncio.Task[Any]:
+    """Have a finger move, with a network that takes its time."""
+    moving = asyncio.create_task(hand.move(255, A, speed=0))
+    moving.add_done_callback(lambda task: task.cancelled() or task.exception())
+    await until(lambda: here.gripper.is_moving)
+    for stream in here.network.both("client", "agent"):
+        stream.delay = DELAY_S
+    return moving
+
+
+@pytest.mark.parametrize("after", [each / 10_000 for each in range(12)])
+@virtual
+async def test_a_command_that_waits_for_its_lease_is_not_sent_after_stop(after: float) -> None:
+    """control=None: the lease came, and the command went out, with the hand stopped."""
+    async with lab() as here:
+        hand = here.client(control=None)
+        await hand.start()
+        writes = len(here.gripper.writes)
+        moving = asyncio.create_task(hand.move(200, A))
+        await asyncio.sleep(after)
+        sent = here.network.loop.time()
+        stopping = asyncio.create_task(hand.stop())
+        await asyncio.wait({moving})
+        assert isinstance(moving.exception(), NotStartedError)
+        await stopping
+        await asyncio.sleep(2)
+        late = [write for write in here.gripper.writes[writes:] if write.time > sent + 0.01]
+        assert not [write for write in late if Request.from_registers(write.registers).go]
+        assert not here.gripper.is_moving
+
+
+@virtual
+async def test_a_gentle_stop_does_not_give_up_the_hold_of_a_cancelled_move() -> None:
+    async with lab() as here:
+        hand = here.client()
+        await hand.start()
+        moving = await slowly(here, hand)
+        moving.cancel()
+        await asyncio.wait({moving})
+        await hand.stop(halt=False)
+        await asyncio.sleep(0.1)
+        assert not here.gripper.is_moving
+
+
+@virtual
+async def test_a_gentle_stop_does_not_give_up_a_hold() -> None:
+    async with lab() as here:
+        hand = here.client()
+        await hand.start()
+        await slowly(here, hand)
+        holding = asyncio.create_task(hand.hold())
+        await asyncio.sleep(0)
+        await hand.stop(halt=False)
+        await asyncio.gather(holding, return_exceptions=True)
+        await asyncio.sleep(0.1)
+        assert not here.gripper.is_moving
+
+
+@pytest.mark.parametrize("holds", [True, False])
+@virtual
+async def test_a_gentle_stop_does_not_give_up_a_halt(holds: bool) -> None:
+    """Also of a hand that only reads, and whose first attempt got lost."""
+    async with lab() as here, here.client("other") as other:
+        await other.release(halt=False)
+        hand = here.client(control=holds)
+        await hand.start()
+        if holds:
+            await slowly(here, hand)
+        else:
+            await other.acquire()
+            await hand.halt()
+            await other.acquire()
+            moving = asyncio.create_task(other.move(255, A, speed=0))
+            await until(lambda: here.gripper.is_moving)
+        stream = here.network.stream("client", "agent")
+        stream.is_cut = True
+        stream.keeps = False
+        halting = asyncio.create_task(hand.halt())
+        await asyncio.sleep(0)
+        stopping = asyncio.create_task(hand.stop(halt=False))
+        await asyncio.sleep(0.01)
+        stream.is_cut = False
+        await asyncio.gather(stopping, halting)
+        assert is_stopped(here)
+        assert not here.gripper.is_moving
+        if not holds:
+            with pytest.raises(ControlLostError):
+                await moving
+
+
+@pytest.mark.parametrize("how", ["stop", "release"])
+@virtual
+async def test_a_stronger_end_beside_a_gentle_release_wins(how: str) -> None:
+    """The lease was on its way back, and so the hand took itself for one that only reads."""
+    async with lab() as here:
+        hand = here.client()
+        await hand.start()
+        await slowly(here, hand)
+        gentle = asyncio.create_task(hand.release(halt=False))
+        await asyncio.sleep(0)
+        await getattr(hand, how)()
+        await gentle
+        assert is_stopped(here)
+        assert not here.gripper.is_moving
+        await hand.stop()
+
+
+@virtual
+async def test_a_stronger_end_leaves_whoever_has_come_after_alone() -> None:
+    async with lab() as here, here.client("next", control=False) as other:
+        hand = here.client()
+        await hand.start()
+        moving = await slowly(here, hand)
+        gentle = asyncio.create_task(hand.stop(halt=False))
+        await asyncio.sleep(DELAY_S * 1.2)
+        await other.acquire()
+        going_on = asyncio.create_task(other.move(250, A, speed=0))
+        await hand.stop()
+        await gentle
+        assert other.is_in_control
+        await asyncio.sleep(0.1)
+        assert here.gripper.is_moving
+        for each in (moving, going_on):
+            each.cancel()
+        await asyncio.gather(moving, going_on, return_exceptions=True)
+
+
+@virtual
+async def test_a_release_that_is_lost_is_said_again() -> None:
+    async with lab() as here:
+        hand = here.client()
+        await hand.start()
+        await slowly(here, hand)
+        stream = here.network.stream("client", "agent")
+        stream.is_cut, stream.keeps = True, False
+        stopping = asyncio.create_task(hand.stop())
+        await asyncio.sleep(0.01)
+        stream.is_cut = False
+        begun = here.network.loop.time()
+        await stopping
+        assert is_stopped(here)
+        assert here.network.loop.time() - begun < 0.5
+
+
+class Asked:
+    """A request that arrives at the agent."""
+
+    def __init__(self, verb: str, call: Call) -> None:
+        self.key, self.payload = LEFT.key(verb), call.pack()
+        self.answers: list[bytes] = []
+
+    def reply(self, payload: bytes, attachment: bytes = b"") -> None:  # noqa: ARG002
+        self.answers.append(payload)
+
+
+def every_motion(hand: RemoteHand) -> Iterator[Asked]:
+    session = hand._session
+    assert session is not None
+    for name, arguments in (
+        ("move", {"position": 250}),
+        ("command", {"axes": {"1": {"position": 250}}}),
+        ("set_position", {"value": 250}),
+        ("set_speed", {"value": 250}),
+        ("activate", {}),
+        ("reset", {}),
+        ("recover", {}),
+    ):
+        yield Asked(f"cmd/{name}", session.call(arguments))
+    yield Asked("lease", session.call({"what": "take", "label": "somebody"}))
+
+
+@virtual
+async def test_an_agent_takes_nothing_from_the_moment_it_is_told_to_end() -> None:
+    """Before its tasks have had a turn."""
+    async with lab() as here:
+        hand = here.client()
+        await hand.start()
+        requests = list(every_motion(hand))
+        writes = len(here.gripper.writes)
+        here.serving.cancel()
+        for each in requests:
+            here.agent._hear(each)
+            error = unpack_answer(each.answers[0]).error
+            assert error is not None
+            assert error["reason"] == "closed"
+        await asyncio.wait({here.serving})
+        assert not going(here, writes)
+        await hand.stop()
+
+
+@virtual
+async def test_what_was_let_in_just_before_does_not_go_out_after_it() -> None:
+    async with lab() as here:
+        hand = here.client()
+        await hand.start()
+        writes = len(here.gripper.writes)
+        for each in every_motion(hand):
+            if "lease" not in each.key:
+                here.agent._hear(each)
+        here.serving.cancel()
+        here.agent._hear(Asked("info", Call(LEFT.base, "somebody")))
+        await asyncio.wait({here.serving})
+        assert not going(here, writes)
+        await hand.stop()
+
+
+@pytest.mark.parametrize("after", [0.0, 0.002, 0.05, 0.2])
+@virtual
+async def test_a_halt_beside_the_gentle_end_of_an_agent_counts(after: float) -> None:
+    """It was refused: the hand is being stopped. But its grips were kept, and its fingers held."""
+    async with lab(keep_grip=True) as here, here.client("reader", control=False) as reader:
+        here.gripper.place_object(Finger.B, 30)
+        await here.local.set_speed(0, A)
+        await here.local.close(Finger.B)
+        await here.local.set_position(255, A)
+        here.serving.cancel()
+        await asyncio.sleep(after)
+        try:
+            await reader.halt()
+        except (ConnectionLostError, RobotiqError):
+            assert here.serving.done(), "there was somebody to ask"
+        else:
+            assert is_stopped(here)
+        with suppress(asyncio.CancelledError):
+            await here.serving
+
+
+@virtual
+async def test_a_lease_that_comes_with_the_end_is_not_kept() -> None:
+    async with lab() as here:
+        hand = here.client(control=False)
+        await hand.start()
+        acquiring = asyncio.create_task(hand.acquire())
+        await asyncio.sleep(0)
+        await hand.stop()
+        with pytest.raises(RobotiqError):
+            await acquiring
+        assert not hand.is_in_control
