@@ -98,6 +98,7 @@ async def test_a_gentle_stop_does_not_give_up_a_halt(holds: bool) -> None:
         await other.release(halt=False)
         hand = here.client(control=holds)
         await hand.start()
+        moving = None
         if holds:
             await slowly(here, hand)
         else:
@@ -107,8 +108,7 @@ async def test_a_gentle_stop_does_not_give_up_a_halt(holds: bool) -> None:
             moving = asyncio.create_task(other.move(255, A, speed=0))
             await until(lambda: here.gripper.is_moving)
         stream = here.network.stream("client", "agent")
-        stream.is_cut = True
-        stream.keeps = False
+        stream.is_cut, stream.keeps = True, False
         halting = asyncio.create_task(hand.halt())
         await asyncio.sleep(0)
         stopping = asyncio.create_task(hand.stop(halt=False))
@@ -117,7 +117,7 @@ async def test_a_gentle_stop_does_not_give_up_a_halt(holds: bool) -> None:
         await asyncio.gather(stopping, halting)
         assert is_stopped(here)
         assert not here.gripper.is_moving
-        if not holds:
+        if moving is not None:
             with pytest.raises(ControlLostError):
                 await moving
 

@@ -9,6 +9,7 @@ from inspect import signature
 from typing import Final
 
 from ...control.grip_keeper import KEEP_S
+from ...control.motion import MoveResult
 from ...control.state_machine import RUNNING
 from ...enums import Finger
 from ...errors import AgentError, ControlLostError, RobotiqConnectionError, RobotiqError
@@ -22,16 +23,18 @@ from ..control.lease import Lease
 from ..network.bus import Bus, Query
 from ..wire.envelope import Answer, Call, failure, unpack_call
 from ..wire.names import GripperName
+from ..wire.settings import read_settings, settings_of
 from ..wire.values import Fields
 from .arguments import axes_of, label_of
 from .publisher import HandPublisher
 from .requests import Request, Requests, Work
+from .settings import OwedSettings
 
 RETRY_S: Final = 1.0
 """From one attempt to reach a gripper that is not there to the next."""
-COMMANDS: Final = frozenset(
-    {"set_position", "set_speed", "set_force", "move", "hold", "activate", "reset", "atr", "recover"}
-)
+SEQUENCES: Final = frozenset({"activate", "reset", "atr", "recover"})
+"""Which go by a speed and a force of their own."""
+COMMANDS: Final = frozenset({"set_position", "set_speed", "set_force", "move", "hold"}) | SEQUENCES
 """What a holder may ask for: the method of a hand of that name. Beside them there are command and cancel."""
 
 
@@ -53,6 +56,7 @@ class ServedHand:
         self._admission = Admission(name.base, epoch, self._lease)
         self.publisher = HandPublisher(name, hand, bus, epoch, self._lease)
         self._requests = Requests(self.publisher, epoch, self._log, self._note)
+        self._settings = OwedSettings(hand)
         self._released: Request | None = None
         """The last one that gave the lease back."""
         self._commanded = Finger(0)
@@ -64,14 +68,15 @@ class ServedHand:
 
     async def run(self) -> None:
         """Keep the hand running, with or without its gripper, until cancelled; then stop the fingers."""
-        remove = self._hand.add_listener(self.publisher.hear)
+        removes = [self._hand.add_listener(each) for each in (self.publisher.hear, self._settings.hear)]
         try:
             while True:
                 await self._run_once()
         finally:
             self.refuse_requests()
             await self._hand.stop()
-            remove()
+            for remove in removes:
+                remove()
             if self._expiry is not None:
                 self._expiry.cancel()
             await self._requests.end()
@@ -174,6 +179,7 @@ class ServedHand:
     def _grant(self, call: Call, *, take: bool) -> None:
         if self._admission.is_repeated(call):
             return
+        settings = read_settings(call.arguments.get("settings", {}))
         holder = self._lease.holder
         label = label_of(call)
         if take:
@@ -182,6 +188,7 @@ class ServedHand:
             # Of the same client: it has lost the thread, and what it asked before is not to go on.
             self.end_lease("expired" if holder.client == call.client else "taken", label)
         number = self._admission.acquire(call, label)
+        self._settings.owe(settings)
         self._log.info("%s commands the gripper", label)
         self.publisher.add({"kind": "lease", "number": number, "holder": label, "reason": "granted"})
         self._watch_expiry()
@@ -211,6 +218,7 @@ class ServedHand:
 
     async def _come_to_rest(self) -> None:
         """Hold what moves; halt if that does not come to rest in time, and nobody commands by then."""
+        self._settings.give({})
         await self._hand.hold(Finger.ALL)
         with suppress(TimeoutError):
             async with asyncio.timeout(KEEP_S):
@@ -243,6 +251,7 @@ class ServedHand:
 
     async def _hold(self, axes: Finger) -> None:
         self._owed &= ~axes
+        self._settings.give({})
         try:
             await self._hand.hold(axes)
         except RobotiqConnectionError as error:
@@ -323,10 +332,15 @@ class ServedHand:
     def _work(self, name: str, arguments: Fields) -> Work:
         if name == "command":
             return self._set(**arguments)
-        method = getattr(self._hand, name)
-        signature(method).bind(**arguments)  # called with anything, it would say so when it is awaited
-        work: Work = method(**arguments)
-        return work
+        # Called with anything, it would say so when it is awaited.
+        signature(getattr(self._hand, name)).bind(**arguments)
+        return self._carry_out(name, arguments)
+
+    async def _carry_out(self, name: str, arguments: Fields) -> MoveResult | None:
+        if name not in SEQUENCES:
+            self._settings.give(settings_of(name, arguments))
+        result: MoveResult | None = await getattr(self._hand, name)(**arguments)
+        return result
 
     async def _set(self, axes: Fields) -> None:
         """What :meth:`RobotiqHand.command` does, for several axes at once."""
@@ -334,6 +348,7 @@ class ServedHand:
         for changes in asked.values():  # all of them before the first is asked for
             for name, value in changes.items():
                 check_byte(name, value)
+        self._settings.give(settings_of("command", {"axes": axes}))
         for mask, changes in asked.items():
             self._hand.command(mask, **changes)
 

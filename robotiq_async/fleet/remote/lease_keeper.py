@@ -17,6 +17,7 @@ from .agents import Agents
 from .mirror import Mirror
 from .pending_request import PendingRequest
 from .requests import NoAnswerError, label
+from .settings import Settings
 
 RENEWALS: Final = 5
 """How many times in a window the lease is renewed, and silence looked for."""
@@ -34,6 +35,7 @@ class AgentClient(Protocol):
     name: GripperName
     mirror: Mirror
     agents: Agents
+    settings: Settings
     window: float
 
     def call(self, arguments: Fields | None = None) -> Call:
@@ -212,8 +214,12 @@ class LeaseKeeper:
 
     async def _acquire(self, what: Fields) -> None:
         await self._run.agents.check_one()
-        call = self._run.call({**what, "label": label()})
+        # A run of the agent that has not heard of them gets them with the lease: nothing moves before.
+        settings, run = self._run.settings, self._run.mirror.epoch
+        unknown = settings.unknown_to(run)
+        call = self._run.call({**what, "label": label()} | ({"settings": unknown} if unknown else {}))
         value = await self._run.send(call, "lease", timeout=ANSWER_S)
+        settings.given_to(run, call.number)
         with reading("a lease"):
             self.lease, self._lease_run = int(value["lease"]), self._run.mirror.epoch
         if not self._is_ending:

@@ -15,7 +15,7 @@ from ..wire.envelope import Answer, Call, unpack_answer
 AGAIN_S: Final = 0.25
 """After so long without an answer a request is said again: a round trip is shorter than that."""
 SELDOM_S: Final = 1.0
-"""After this time, so often: it has been let in or is too late by then, but its answer may be lost as well."""
+"""After this time, so often: it has been let in by then, or is too late, and its answer may be lost."""
 
 
 def of_its_run(call: Call) -> Callable[[Reply], bool]:

@@ -20,6 +20,7 @@ from ..wire.names import GripperName
 from ..wire.values import Fields
 from .mirror import Mirror
 from .pending_request import PendingRequest, is_refusal, of_its_run
+from .settings import Settings
 
 IN_ANY_RUN: Final = ("info", "halt")
 """What any run of the agent may answer."""
@@ -51,7 +52,11 @@ def no_answer_as_lost_connection() -> Iterator[None]:
 
 
 class Requests:
-    """Numbers requests, says each until it is answered, and ends the wait when the agent falls silent."""
+    """Numbers requests, says each until it is answered, and ends the wait when the agent falls silent.
+
+    Attributes:
+        settings: the speeds and forces that were asked for.
+    """
 
     def __init__(self, name: GripperName, bus: Bus) -> None:
         """Ask the agent that serves a gripper."""
@@ -69,6 +74,7 @@ class Requests:
         self._commands: dict[int, PendingRequest] = {}
         """Those that have no answer yet, in the order in which they were asked."""
         self._round: asyncio.TimerHandle | None = None
+        self.settings = Settings()
 
     @property
     def has_undelivered_hold(self) -> bool:
@@ -177,11 +183,15 @@ class Requests:
             AgentError: the answer was another gripper's, or of another version.
             ProtocolError: it is none.
         """
+        is_refused = False
         try:
             reply = await self._reply(posted)
+            answer = unpack_answer(reply.payload)
+            is_refused = answer.error is not None
         finally:
             self._forget(posted)
-        answer = unpack_answer(reply.payload)
+            if posted.is_command and not is_refused:
+                self.settings.note(posted.verb, posted.call)
         if answer.to != self._name.base or answer.number not in (0, posted.call.number):
             raise AgentError(
                 f"{self._name}: another answer came to {posted.verb}; it may have been carried out"

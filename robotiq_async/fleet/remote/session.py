@@ -100,6 +100,7 @@ class RemoteSession:
         self._arrived_at = 0.0
         """When anything was heard, be it current or not."""
         self._requests = Requests(name, bus)
+        self.settings = self._requests.settings
         self._tasks: set[asyncio.Task[Any]] = set()
         self._missed = MissedEvents(
             self.mirror, lambda since: self.ask("info", {"since": since}, timeout=ANSWER_S), self.spawn

@@ -1,0 +1,68 @@
+"""Speeds and forces: what a request sets, and what a client gives an agent that was started anew."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from ...enums import AXES, Finger
+from ...wire.checks import check_byte, check_mask
+from .values import Fields
+
+SETTINGS: Final = ("speed", "force")
+Setting = tuple[Finger, str]
+"""One axis, and speed or force."""
+_SETTERS: Final = {"set_speed": "speed", "set_force": "force"}
+
+
+def settings_of(name: str, arguments: Mapping[str, Any]) -> dict[Setting, int]:
+    """What a command sets; empty if its arguments say nothing that can be read.
+
+    Args:
+        name: of the command, without ``cmd/``.
+        arguments: of the request.
+    """
+    try:
+        return dict(_settings(name, arguments))
+    except (AttributeError, TypeError, ValueError):
+        return {}
+
+
+def _settings(name: str, arguments: Mapping[str, Any]) -> Iterator[tuple[Setting, int]]:
+    if name == "command":
+        changed: Mapping[str, Any] = arguments.get("axes", {})
+    elif name in _SETTERS:
+        changed = {str(arguments.get("fingers", 15)): {_SETTERS[name]: arguments.get("value")}}
+    elif name == "move":
+        changed = {str(arguments.get("fingers", 7)): arguments}
+    else:
+        return
+    yield from _by_axis(changed)
+
+
+def _by_axis(changed: Mapping[str, Any]) -> Iterator[tuple[Setting, int]]:
+    for mask, changes in changed.items():
+        fingers = check_mask(int(mask))
+        for what in SETTINGS:
+            if changes.get(what) is not None:
+                value = check_byte(what, changes[what])
+                yield from (((axis, what), value) for axis in AXES if axis in fingers)
+
+
+def settings_fields(settings: Mapping[Setting, int]) -> Fields:
+    """The object for settings: as the axes of a ``command``."""
+    fields: Fields = {}
+    for (axis, what), value in settings.items():
+        fields.setdefault(str(int(axis)), {})[what] = value
+    return fields
+
+
+def read_settings(fields: object) -> dict[Setting, int]:
+    """The settings in an object.
+
+    Raises:
+        TypeError, ValueError: there are none in it.
+    """
+    if not isinstance(fields, dict) or not all(isinstance(each, dict) for each in fields.values()):
+        raise TypeError(f"settings must be an object of objects, got {fields!r:.200}")
+    return dict(_by_axis(fields))

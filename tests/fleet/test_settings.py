@@ -1,0 +1,165 @@
+"""Speed and force of a client outlive its agent: they have no echo, and the next one would not know them."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import pytest
+
+from robotiq_async import Finger, State
+from robotiq_async.fleet.wire.envelope import Call
+from robotiq_async.fleet.wire.settings import read_settings, settings_fields, settings_of
+from robotiq_async.wire.request import Request
+from tests.fleet.lab import lab
+from tests.fleet.world import World, world
+from tests.virtual import virtual
+
+A, ALL = Finger.A, Finger.ALL
+
+
+def images(here: World, since: int) -> list[Request]:
+    return [Request.from_registers(write.registers) for write in here.gripper.writes[since:]]
+
+
+async def next_agent(here: World) -> int:
+    """Kill the agent, start the next; returns how much was written by then."""
+    here.kill(here.agent.host)
+    await asyncio.sleep(1)
+    await here.start_agent("next agent")
+    hand = here.holder.hand
+    await here.until(lambda: hand.state is State.RUNNING_IDLE)
+    await asyncio.sleep(0.5)
+    if not hand.is_in_control:
+        await here.holder.do(hand.acquire())
+    return len(here.gripper.writes)
+
+
+MOTIONS: dict[str, Any] = {
+    "move": lambda hand: hand.move(30, A),
+    "set_position": lambda hand: hand.set_position(30, A),
+    "hold": lambda hand: hand.hold(),
+}
+
+
+@pytest.mark.parametrize("motion", [*MOTIONS, "command"])
+@virtual
+async def test_an_agent_that_was_started_anew_moves_with_what_was_asked_of_the_former(motion: str) -> None:
+    """Speed 10 and force 5 were asked for; after a restart it moved with 128 and 64."""
+    async with world() as here:
+        hand = here.holder.hand
+        await here.holder.do(hand.set_speed(10, ALL))
+        await here.holder.do(hand.set_force(5, ALL))
+        since = await next_agent(here)
+        if motion == "command":
+
+            async def command() -> None:
+                hand.command(A, position=30)
+
+            await here.holder.do(command())
+            await asyncio.sleep(0.5)
+        else:
+            await here.holder.do(MOTIONS[motion](hand))
+        written = images(here, since)
+        assert written or motion == "hold"
+        for image in written:
+            assert [(axis.speed, axis.force) for axis in image.axes] == [(10, 5)] * 4
+
+
+@virtual
+async def test_what_is_asked_for_by_a_move_and_by_axis_counts_too() -> None:
+    async with world() as here:
+        hand = here.holder.hand
+        await here.holder.do(hand.move(5, A, speed=200, force=7))
+        await here.holder.do(hand.set_speed(3, Finger.B))
+
+        async def command() -> None:
+            hand.command(Finger.C, speed=9)
+
+        await here.holder.do(command())
+        await asyncio.sleep(0.2)
+        since = await next_agent(here)
+        await here.holder.do(hand.set_speed(20, A))
+        await here.holder.do(hand.move(30, A))
+        for image in images(here, since):
+            assert [axis.speed for axis in image.axes] == [20, 3, 9, 128]
+            assert [axis.force for axis in image.axes] == [7, 64, 64, 64]
+
+
+@virtual
+async def test_it_is_given_again_until_the_gripper_has_it() -> None:
+    """The link to the gripper goes down with the first command, and the second comes."""
+    async with world() as here:
+        hand = here.holder.hand
+        await here.holder.do(hand.set_speed(10, ALL))
+        await next_agent(here)
+        local = here.agent.hands["left"]
+
+        async def command() -> None:
+            hand.command(A, position=30)
+
+        await here.servers["left"].stop()
+        await here.holder.do(command())
+        await here.until(lambda: local.state is State.DISCONNECTED)
+        await here.servers["left"].start()
+        await here.until(lambda: hand.state is State.RUNNING_IDLE)
+        since = len(here.gripper.writes)
+        await here.holder.do(hand.move(30, A))
+        assert images(here, since)
+        for image in images(here, since):
+            assert [axis.speed for axis in image.axes] == [10] * 4
+
+
+@virtual
+async def test_in_the_same_run_it_is_not_given_again() -> None:
+    """Somebody else has set another force since, and grips with it."""
+    async with lab() as here, here.client() as hand:
+        await hand.set_force(5)
+        async with here.client("other", control=False) as other:
+            await other.take()
+            await other.set_force(200)
+            await other.release()
+        await hand.acquire()
+        await hand.set_position(30, A)
+        image = Request.from_registers(here.gripper.request_registers)
+        assert [axis.force for axis in image.axes] == [200] * 4
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "settings"),
+    [
+        ("set_speed", {"value": 3, "fingers": 3}, {(A, "speed"): 3, (Finger.B, "speed"): 3}),
+        ("set_force", {"value": 0, "fingers": 1}, {(A, "force"): 0}),
+        ("move", {"position": 9, "fingers": 1, "speed": 4, "force": None}, {(A, "speed"): 4}),
+        ("command", {"axes": {"1": {"position": 1}, "8": {"force": 2}}}, {(Finger.SCISSOR, "force"): 2}),
+        ("set_position", {"value": 3, "fingers": 3}, {}),
+        ("activate", {}, {}),
+        ("command", {"axes": {"1": {"speed": 256}}}, {}),
+        ("command", {"axes": 3}, {}),
+        ("set_speed", {"fingers": "x"}, {}),
+    ],
+)
+def test_what_a_command_sets(name: str, arguments: dict[str, Any], settings: dict[Any, int]) -> None:
+    assert settings_of(name, arguments) == settings
+    assert read_settings(settings_fields(settings)) == settings
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [None, [], {"1": 3}, {"16": {"speed": 3}}, {"0": {"speed": 1}}, {"1": {"speed": True}}, {"x": {}}],
+)
+def test_settings_that_are_none(fields: object) -> None:
+    with pytest.raises((TypeError, ValueError)):
+        read_settings(fields)
+
+
+@virtual
+async def test_a_lease_with_settings_that_are_none_is_refused() -> None:
+    async with lab() as here, here.client("other", control=False) as other:
+        session = other._session
+        assert session is not None
+        call = session.call({"what": "acquire", "label": "", "settings": {"1": {"speed": 999}}})
+        assert isinstance(call, Call)
+        with pytest.raises(Exception, match="speed"):
+            await session.send(call, "lease", timeout=1.0)
+        assert here.lease == 0
