@@ -17,6 +17,7 @@ from robotiq_async.errors import ControlLostError
 from robotiq_async.fleet import GripperName
 from robotiq_async.fleet.agent.agent_file import AgentSettings, GripperSettings, read_agent_file
 from robotiq_async.fleet.agent.publisher import AT_ONCE, KEPT, HandPublisher
+from robotiq_async.fleet.agent.records import NoRecords
 from robotiq_async.fleet.agent.served_hand import COMMANDS, ServedHand
 from robotiq_async.fleet.control.lease import Lease
 from robotiq_async.fleet.wire import status_message
@@ -145,7 +146,7 @@ async def test_an_event_is_told_as_the_page_has_it() -> None:
 async def test_a_summary_and_an_info() -> None:
     hand, bus = RobotiqHand("sim://"), Network().bus("agent")
     summary = HandPublisher(NAME, hand, bus, EPOCH, Lease()).summary()
-    served = ServedHand(NAME, hand, bus, epoch=EPOCH, window=1.0)
+    served = ServedHand(NAME, hand, bus, NoRecords(), epoch=EPOCH, window=1.0)
     info = served._info(call(1))
     for name in {*summary, *info}:
         assert re.search(rf"^\| .*`{name}`", PROTOCOL, re.MULTILINE), name

@@ -16,6 +16,7 @@ from typing import Any
 
 from robotiq_async import Finger, RobotiqError, RobotiqHand
 from robotiq_async.fleet.agent.agent import Agent
+from robotiq_async.fleet.agent.records import file_records
 from robotiq_async.fleet.network.configuration import (
     agent_configuration,
     client_configuration,
@@ -44,7 +45,8 @@ async def agent(endpoint: str, *addresses: str, router: str = "") -> None:
     hands = {name: RobotiqHand(address) for name, address in zip(NAMES, addresses, strict=False)}
     listen, connect = ([], [router]) if router else ([endpoint], [])
     bus = await open_bus(agent_configuration("lab", "cell", listen, connect, insecure=True), endpoint)
-    serving = asyncio.ensure_future(Agent("lab", "cell", hands, bus).run(lambda: say("ready")))
+    served = Agent("lab", "cell", hands, bus, records=file_records())
+    serving = asyncio.ensure_future(served.run(lambda: say("ready")))
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, serving.cancel)
     try:
         with contextlib.suppress(asyncio.CancelledError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from bisect import bisect_right
 from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
@@ -13,6 +14,7 @@ from robotiq_async import Finger, RobotiqError, RobotiqHand, RobotiqStatus, Stat
 from robotiq_async.enums import AXES
 from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
+from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.simulator import SimulatorServer
 from robotiq_async.wire.request import Request
 from tests.adversity.world import StampedGripper
@@ -46,6 +48,7 @@ class World:
             name: StampedGripper(loop.time, speedup=1.0, device_cycle=0.005, spread=False) for name in NAMES
         }
         self.servers: dict[str, SimulatorServer] = {}
+        self.records = MemoryRecords()
         self.agents: list[ServingAgent] = []
         self.holder = Client(self, "holder", "left")
         self.other = Client(self, "other", "left")
@@ -128,6 +131,22 @@ class World:
             client.check()
 
 
+class MemoryRecords:
+    """What the agents of one world leave each other, as their folder would; it may be taken away."""
+
+    def __init__(self) -> None:
+        self.records: dict[GripperName, dict[str, Any]] = {}
+
+    def read(self, name: GripperName) -> dict[str, Any] | None:
+        return self.records.get(name)
+
+    def keep(self, name: GripperName, record: dict[str, Any]) -> None:
+        self.records[name] = json.loads(json.dumps(record))
+
+    async def kept(self) -> None:
+        pass
+
+
 class ServingAgent:
     """An agent on a host, in its own run."""
 
@@ -150,7 +169,8 @@ class ServingAgent:
                 name: RobotiqHand(f"tcp://127.0.0.{place}:{server.port}", poll_interval=POLL_S)
                 for name, server in self.world.servers.items()
             }
-            self.agent = Agent("lab", "cell", self.hands, self.bus, window=WINDOW_S, **self.options)
+            options = {"window": WINDOW_S, "records": self.world.records, **self.options}
+            self.agent = Agent("lab", "cell", self.hands, self.bus, **options)
             try:
                 await self.agent.run(lambda: self.world.network.loop.call_soon(ready.set))
             finally:

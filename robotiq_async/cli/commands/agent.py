@@ -77,6 +77,7 @@ def _settings(file: Path) -> AgentSettings:
 
 async def _serve(settings: AgentSettings) -> None:
     from ...fleet.agent.agent import Agent
+    from ...fleet.agent.records import file_records
     from ...fleet.network.configuration import agent_configuration
 
     configuration = agent_configuration(
@@ -94,7 +95,14 @@ async def _serve(settings: AgentSettings) -> None:
         bus = await _open(configuration, ", ".join(settings.listen or settings.connect))
         try:
             with forwarded_warnings(tell):
-                served = Agent(settings.site, settings.host, hands, bus, window=settings.window)
+                served = Agent(
+                    settings.site,
+                    settings.host,
+                    hands,
+                    bus,
+                    window=settings.window,
+                    records=file_records(),
+                )
                 await served.run(lambda: _announce(served))
         finally:
             await bus.close()

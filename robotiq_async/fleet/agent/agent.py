@@ -19,6 +19,7 @@ from ..network.bus import Bus, Query, Undo
 from ..wire.envelope import Answer
 from ..wire.names import ROOT, GripperName
 from ..wire.values import error_fields
+from .records import NoRecords, Records
 from .served_hand import ServedHand
 
 SUMMARY_S: Final = 1.0
@@ -46,6 +47,7 @@ class Agent:
         bus: Bus,
         *,
         window: float = WINDOW_S,
+        records: Records | None = None,
         asleep: Callable[[], float] | None = None,
     ) -> None:
         """Serve hands that are not started over an open bus; nothing is sent yet.
@@ -56,12 +58,15 @@ class Agent:
             hands: by the names of their grippers.
             bus: is left open.
             window: of the leases, in seconds; see :class:`~robotiq_async.fleet.control.lease.Lease`.
+            records: where the next run of the agent finds who may come back to command by itself; None for
+                nowhere: then nobody does.
             asleep: seconds for which this machine has been suspended so far; None asks the system.
         """
         self._asleep = asleep or _asleep
         self._slept = self._asleep()
         self.epoch = secrets.randbits(EPOCH_BITS)
         self._bus = bus
+        self._records = records or NoRecords()
         self._window = window
         self._running: asyncio.Task[Any] | None = None
         self._strange = LimitedLog()
@@ -69,7 +74,14 @@ class Agent:
         """By gripper: a token of another agent may come and go thousands of times."""
         self._prefix = f"{ROOT}/{site}/{host}"
         self.hands = {
-            name: ServedHand(GripperName(site, host, name), hand, bus, epoch=self.epoch, window=window)
+            name: ServedHand(
+                GripperName(site, host, name),
+                hand,
+                bus,
+                self._records,
+                epoch=self.epoch,
+                window=window,
+            )
             for name, hand in hands.items()
         }
 
@@ -91,6 +103,8 @@ class Agent:
             await self._refuse_if_served()
             undo += [self._bus.announce(each.name.key("alive", str(self.epoch))) for each in self._all]
             await self._refuse_if_another_began()
+            for each in self._all:
+                each.resume()
             undo.append(self._bus.watch(f"{self._prefix}/*/alive/*", self._see_agent))
             undo += [
                 self._bus.serve(f"{self._prefix}/*/{verb}", self._hear)
@@ -104,6 +118,7 @@ class Agent:
         finally:
             for take_back in reversed(undo):
                 take_back()
+            await self._records.kept()
 
     @property
     def _all(self) -> list[ServedHand]:

@@ -24,9 +24,10 @@ from ..network.bus import Bus, Query
 from ..wire.envelope import Answer, Call, failure, unpack_call
 from ..wire.names import GripperName
 from ..wire.settings import read_settings, settings_of
-from ..wire.values import Fields
+from ..wire.values import Fields, error_fields
 from .arguments import axes_of, label_of
 from .publisher import HandPublisher
+from .records import Records
 from .requests import Request, Requests, Work
 from .settings import OwedSettings
 
@@ -46,13 +47,16 @@ class ServedHand:
         publisher: tells what happens to it.
     """
 
-    def __init__(self, name: GripperName, hand: RobotiqHand, bus: Bus, *, epoch: int, window: float) -> None:
+    def __init__(
+        self, name: GripperName, hand: RobotiqHand, bus: Bus, records: Records, *, epoch: int, window: float
+    ) -> None:
         """Serve a hand that is not started."""
         self.name = name
         self._log = Log(str(name))
         self._hand = hand
         self._epoch = epoch
-        self._lease = Lease(window)
+        self._records = records
+        self._lease = Lease(window, epoch, lambda: records.keep(name, self._lease.record))
         self._admission = Admission(name.base, epoch, self._lease)
         self.publisher = HandPublisher(name, hand, bus, epoch, self._lease)
         self._requests = Requests(self.publisher, epoch, self._log, self._note)
@@ -65,6 +69,16 @@ class ServedHand:
         """The axes that are to be held as soon as the gripper is reached again."""
         self._expiry: asyncio.TimerHandle | None = None
         self._is_ending = False
+
+    def resume(self) -> None:
+        """Go on from what the run before this one has left. Nobody else serves the gripper."""
+        record = self._records.read(self.name)
+        if record is not None:
+            try:
+                self._lease.resume(record)
+            except (KeyError, TypeError, ValueError) as error:
+                self._log.warning("a record of who commanded cannot be read: %r", error)
+        self._records.keep(self.name, self._lease.record)
 
     async def run(self) -> None:
         """Keep the hand running, with or without its gripper, until cancelled; then stop the fingers."""
@@ -125,7 +139,9 @@ class ServedHand:
             value = self._answer(verb, call, query)
         except (RobotiqError, TypeError, ValueError, OverflowError) as error:  # JSON may hold infinity
             self._log.info("%s refused: %s", verb, error)
-            self._reply(query, failure(call, self._epoch, error))
+            # By this gripper, whichever it was for: a copy of it may have found its way meanwhile.
+            refused = Answer(self.name.base, call.number, self._epoch, error=error_fields(error))
+            self._reply(query, refused)
         else:
             if value is not None:
                 self._reply(query, Answer(call.to, call.number, self._epoch, value))
@@ -300,6 +316,7 @@ class ServedHand:
         """
         if not self._is_ending:
             await self._hand.halt()
+            await self._records.kept()
             return
         await self._hand.stop(keep_grip=False)
         if self._hand.status.go_echo:

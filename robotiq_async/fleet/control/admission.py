@@ -119,11 +119,16 @@ class Admission:
         again = call.arguments.get("again")
         if again is None:
             return
-        # Numbers of another run say nothing here: then it is enough that somebody has stepped in in this one.
-        number = again if type(again) is int and call.arguments.get("run") == self._epoch else 0
-        reason = self.lease.why_not_again(number)
+        is_known = type(again) is int and call.arguments.get("run") in self.lease.runs
+        reason = self.lease.why_not_again(again if is_known else 0)
         if reason:
             raise ControlLostError(f"the gripper was {reason} since: acquire() it when people agree", reason)
+        if not is_known:
+            raise ControlLostError(
+                "the agent was started anew, and does not know whether somebody has halted since: acquire() "
+                "it when people agree",
+                "restarted",
+            )
 
     def is_of_holder(self, call: Call) -> bool:
         """Whether a request comes from who holds the lease, under this lease."""

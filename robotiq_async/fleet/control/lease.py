@@ -8,8 +8,9 @@ lease as well as one that is dead in both.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 WINDOW_S: Final = 1.0
 """How long a holder stays one without having proven to hear the agent."""
@@ -17,6 +18,8 @@ WINDOW_MIN_S: Final = 0.1
 WINDOW_MAX_S: Final = 10.0
 _KEPT: Final = 64
 """For how many of the last leases it is known why they ended."""
+_RUNS: Final = 64
+"""For how many of the last runs of the agent who comes back is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,11 +43,16 @@ class Lease:
         number: counts the changes of holder, also the change to nobody. A request names the number of the
             lease it was made under, and no other is carried out.
         holder: who holds it; None for nobody.
+        runs: those of the agent that its numbers are of.
     """
 
-    def __init__(self, window: float = WINDOW_S) -> None:
-        """Nobody's yet."""
+    def __init__(
+        self, window: float = WINDOW_S, run: int = 0, changed: Callable[[], object] = lambda: None
+    ) -> None:
+        """Nobody's yet, in this run of the agent; ``changed`` is called when :attr:`record` is another."""
         self.window = window
+        self.runs: tuple[int, ...] = (run,)
+        self._changed = changed
         self.number = 0
         self.holder: Holder | None = None
         self._proven = 0.0
@@ -76,6 +84,7 @@ class Lease:
         if holder.client != self._last:
             self._last, self._last_from = holder.client, self.number
         self._proven = seen
+        self._changed()
         return self.number
 
     def renew(self, seen: float) -> None:
@@ -89,6 +98,7 @@ class Lease:
             self._ends[self.number] = reason
             self._ends.pop(self.number - _KEPT, None)
             self.number += 1
+            self._changed()
         return holder
 
     def wake(self, now: float) -> None:
@@ -103,6 +113,24 @@ class Lease:
         number = self.number if client != self._last else self._last_from - 1
         if number >= self._barred[0]:
             self._barred = number, reason
+            self._changed()
+
+    @property
+    def record(self) -> dict[str, object]:
+        """What the next run of the agent has to know."""
+        return {"runs": self.runs, "number": self.number, "barred": self._barred}
+
+    def resume(self, record: Mapping[str, Any]) -> None:
+        """Go on from what a run before this one has left.
+
+        Raises:
+            KeyError, TypeError, ValueError: it has left something else.
+        """
+        number, (barred, reason) = int(record["number"]), record["barred"]
+        runs = tuple(int(run) for run in record["runs"])
+        self.runs = (*runs, *self.runs)[-_RUNS:]
+        # The lease that was held when that run ended has ended with it.
+        self.number, self._barred = number + 1, (int(barred), str(reason))
 
     def why_not_again(self, number: int) -> str:
         """Why who held the lease of a number may not come back by itself; empty if it may."""

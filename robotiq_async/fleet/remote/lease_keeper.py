@@ -25,7 +25,7 @@ ANSWER_S: Final = 0.5
 """For an answer that the agent gives at once; asked again within the time that there is."""
 RELEASE_S: Final = 0.9
 """With the second that closing a session of zenoh may take, within the two of a stop."""
-BY_OTHERS: Final = ("taken", "halted", "held")
+BY_OTHERS: Final = ("taken", "halted", "held", "restarted")
 """Reasons for which nobody comes back without having been asked to."""
 
 

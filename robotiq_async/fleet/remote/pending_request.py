@@ -16,6 +16,8 @@ AGAIN_S: Final = 0.25
 """After so long without an answer a request is said again: a round trip is shorter than that."""
 SELDOM_S: Final = 1.0
 """After this time, so often: it has been let in by then, or is too late, and its answer may be lost."""
+STRAYS: Final = 3
+"""So many answers to something else are passed over."""
 
 
 def of_its_run(call: Call) -> Callable[[Reply], bool]:
@@ -62,6 +64,7 @@ class PendingRequest:
         self.urgency = urgency
         self._loop = asyncio.get_running_loop()
         self._until = now() + timeout
+        self._strays = 0
         self._copies: set[asyncio.Future[Reply | None]] = set()
         self._timer: asyncio.TimerHandle | None = None
         self.begin()
@@ -108,13 +111,25 @@ class PendingRequest:
             reply = None if copy.cancelled() else copy.result()
             if self.answered.done() or (reply is None and self._copies):
                 return
-            if reply is not None and _came_early(reply):
-                came_early()
-            else:
-                self.answered.set_result(reply)
+            if reply is not None and self.may_repeat:
+                if self._is_anothers(reply) and self._strays < STRAYS:
+                    self._strays += 1
+                    return  # a copy went astray, or its answer: it is said again
+                if _came_early(reply):
+                    came_early()
+                    return
+            self.answered.set_result(reply)
 
         self._copies.add(copy)
         copy.add_done_callback(take)
+
+    def _is_anothers(self, reply: Reply) -> bool:
+        try:
+            answer = unpack_answer(reply.payload)
+        except RobotiqError:
+            return False
+        is_about_this = answer.to == self.call.to and answer.number == self.call.number
+        return bool(answer.number) and not is_about_this
 
     def repeat(self, say: Callable[[], None]) -> None:
         """Have it said again if it is not answered in time."""
