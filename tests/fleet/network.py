@@ -15,7 +15,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from robotiq_async.fleet.network.bus import Query, Reply, Undo, Urgency, is_any
+from robotiq_async.fleet.network.bus import Query, Reply, Undo, Urgency, is_any, is_anything
 from robotiq_async.fleet.network.pending_query import PendingQuery
 
 LATENCY_S = 0.0002
@@ -250,8 +250,13 @@ class MemoryBus:
         self.subscribers.append(entry)
         return lambda: self.subscribers.remove(entry) if entry in self.subscribers else None
 
-    def serve(self, expression: str, handler: Callable[[Query], None]) -> Undo:
-        entry = (expression, handler)
+    def serve(
+        self,
+        expression: str,
+        handler: Callable[[Query], None],
+        allows: Callable[[bytes], bool] = is_anything,
+    ) -> Undo:
+        entry = (expression, lambda query: handler(query) if allows(query.payload) else None)
         self.queryables.append(entry)
         return lambda: self.queryables.remove(entry) if entry in self.queryables else None
 

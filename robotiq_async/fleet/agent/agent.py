@@ -19,6 +19,7 @@ from ..network.bus import Bus, Query, Undo
 from ..wire.envelope import Answer
 from ..wire.names import ROOT, GripperName
 from ..wire.values import error_fields
+from .questions import Questions
 from .records import NoRecords, Records
 from .served_hand import ServedHand
 
@@ -106,9 +107,9 @@ class Agent:
             for each in self._all:
                 each.resume()
             undo.append(self._bus.watch(f"{self._prefix}/*/alive/*", self._see_agent))
+            undo.append(self._bus.serve(f"{self._prefix}/*/info", self._hear, Questions().allow))
             undo += [
-                self._bus.serve(f"{self._prefix}/*/{verb}", self._hear)
-                for verb in ("info", "lease", "halt", "cmd/*")
+                self._bus.serve(f"{self._prefix}/*/{verb}", self._hear) for verb in ("lease", "halt", "cmd/*")
             ]
             ready()
             async with asyncio.TaskGroup() as group:

@@ -54,6 +54,11 @@ def is_any(_reply: Reply) -> bool:
     return True
 
 
+def is_anything(_payload: bytes) -> bool:
+    """Every request is taken."""
+    return True
+
+
 class Bus(Protocol):
     """One open session. All calls and all callbacks belong to the event loop it was opened in."""
 
@@ -63,8 +68,20 @@ class Bus(Protocol):
     def subscribe(self, expression: str, listener: Callable[[str, bytes], None]) -> Undo:
         """Call a listener with key and payload of whatever is published under matching keys."""
 
-    def serve(self, expression: str, handler: Callable[[Query], None]) -> Undo:
-        """Call a handler with each request under matching keys."""
+    def serve(
+        self,
+        expression: str,
+        handler: Callable[[Query], None],
+        allows: Callable[[bytes], bool] = is_anything,
+    ) -> Undo:
+        """Call a handler with each request under matching keys.
+
+        Args:
+            expression: the keys.
+            handler: belongs to the loop.
+            allows: whether a request with this payload is taken. It may be called in any thread, before
+                anything else is done; what it does not allow is dropped.
+        """
 
     def ask(
         self,

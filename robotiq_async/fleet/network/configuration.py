@@ -16,6 +16,10 @@ LOOPBACK: Final = f"tcp/127.0.0.1:{PORT}"
 LOOPBACK_TLS: Final = f"tls/127.0.0.1:{PORT}"
 QUEUED: Final = 16
 """Halts, and commands, that may lie in a link until its thread gets a turn; zenoh's own default is two."""
+UNKNOWN: Final = 1000
+"""Connections that have not said who they are; zenoh's own default is 100, and then it accepts no others."""
+UNKNOWN_MS: Final = 5000
+"""They are closed after this time; zenoh's own default is ten seconds."""
 LINK_LEASE_MS: Final = 1000
 """A side that is frozen or unplugged is noticed after this time; zenoh's own default is ten seconds."""
 
@@ -89,7 +93,7 @@ def session_configuration(
         # For ever: whoever is not there now may come.
         "connect": {"endpoints": list(connect), "timeout_ms": -1, "exit_on_failure": False},
         "scouting": {"delay": 50, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
-        "transport": {"link": link},
+        "transport": {"link": link, "unicast": {"accept_pending": UNKNOWN, "accept_timeout": UNKNOWN_MS}},
     }
 
 

@@ -18,7 +18,7 @@ from zenoh.handlers import Callback
 
 from ...concurrency import in_a_thread
 from ...errors import ConnectFailedError
-from .bus import Query, Reply, Undo, Urgency, is_any
+from .bus import Query, Reply, Undo, Urgency, is_any, is_anything
 from .locators import locators
 from .mailbox import Kind, Mailbox
 from .pending_query import PendingQuery
@@ -146,13 +146,21 @@ class ZenohBus:
 
         return self._undo(self._session.declare_subscriber(expression, _direct(deliver)))
 
-    def serve(self, expression: str, handler: Callable[[Query], None]) -> Undo:
+    def serve(
+        self,
+        expression: str,
+        handler: Callable[[Query], None],
+        allows: Callable[[bytes], bool] = is_anything,
+    ) -> Undo:
         """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
         is_halt = expression.endswith("/halt")
         replier, kind = self._repliers[is_halt], Kind.HALT if is_halt else Kind.REQUEST
 
         def deliver(query: zenoh.Query) -> None:
-            if query.payload is None or len(query.payload) <= LONGEST:
+            payload = query.payload
+            if payload is not None and len(payload) > LONGEST:
+                return
+            if allows(b"" if payload is None else payload.to_bytes()):
                 self._mailbox.put(lambda: handler(_Query(query, replier)), kind)
 
         return self._undo(self._session.declare_queryable(expression, _direct(deliver)))

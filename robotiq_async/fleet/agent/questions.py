@@ -1,0 +1,43 @@
+"""Questions: how many of them an agent reads."""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Callable
+from time import monotonic
+from typing import Final
+
+from ...log import log
+from ..control.budget import Budget
+from ..limited_log import EVERY_S
+
+_CLIENT: Final = re.compile(rb'"client": ?"([^"\\]{1,64})"')
+
+
+class Questions:
+    """Looks at a question before anything is done with it: in any thread, and in a few microseconds.
+
+    What is dropped is not answered, not even with a refusal: that would take as long as the answer.
+    """
+
+    def __init__(self, clock: Callable[[], float] = monotonic) -> None:
+        """None were asked yet."""
+        self._clock = clock
+        self._budget = Budget()
+        self._lock = threading.Lock()
+        self._dropped = 0
+        self._report_due = 0.0
+
+    def allow(self, payload: bytes) -> bool:
+        """Whether a question is looked at, by who asks. Those who do not say so share a budget."""
+        found = _CLIENT.search(payload)
+        client, now = found[1].decode("ascii", "replace") if found else "", self._clock()
+        with self._lock:
+            if self._budget.allows(client, now):
+                return True
+            self._dropped += 1
+            if now >= self._report_due:
+                log.warning("%d questions were dropped: a client asks too many", self._dropped)
+                self._dropped, self._report_due = 0, now + EVERY_S
+            return False
