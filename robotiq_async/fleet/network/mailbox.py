@@ -52,18 +52,19 @@ class Mailbox:
         self._report_due = 0.0
         self._failed = LimitedLog()
 
-    def put(self, delivery: Callable[[], None], kind: Kind) -> None:
-        """Have something called in the loop. From any thread."""
+    def put(self, delivery: Callable[[], None], kind: Kind) -> bool:
+        """Have something called in the loop. From any thread. Returns whether there was room for it."""
         deliveries = self._halts if kind is Kind.HALT else self._deliveries
         if kind is Kind.ANSWER or len(deliveries) < MOST:
             deliveries.append(delivery)
         else:
             self._dropped += 1
-            return
+            return False
         if not self._is_due or (kind is not Kind.TELEMETRY and self._gathering is not None):
             self._is_due = True
             with contextlib.suppress(RuntimeError):  # the loop has been closed
                 self._loop.call_soon_threadsafe(self._open)
+        return True
 
     def _open(self) -> None:
         if self._gathering is not None:

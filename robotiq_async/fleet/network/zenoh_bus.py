@@ -74,6 +74,12 @@ def _close_opened(opening: asyncio.Future[zenoh.Session]) -> None:
         opening.result().close()  # type: ignore[no-untyped-call]
 
 
+def _drop(query: zenoh.Query) -> None:
+    """Answer nothing, and say so."""
+    with contextlib.suppress(zenoh.ZError):
+        query.drop()  # type: ignore[no-untyped-call]
+
+
 class _Query:
     """A query that has arrived."""
 
@@ -90,11 +96,7 @@ class _Query:
             with contextlib.suppress(zenoh.ZError), query:  # the asker is gone
                 query.reply(key, payload, attachment=attachment)
 
-        def drop() -> None:
-            with contextlib.suppress(zenoh.ZError):
-                query.drop()  # type: ignore[no-untyped-call]
-
-        self._replier.put(send, drop)
+        self._replier.put(send, functools.partial(_drop, query))
 
 
 class _Reply:
@@ -115,6 +117,7 @@ class ZenohBus:
         self._mailbox = Mailbox()
         # A halt is acknowledged also where others do not read their answers.
         self._repliers = {True: Replier(), False: Replier()}
+        self._dropping = Replier()
         self._closing: asyncio.Future[None] | None = None
 
     def publisher(self, key: str, urgency: Urgency) -> Callable[[bytes], None]:
@@ -158,10 +161,15 @@ class ZenohBus:
 
         def deliver(query: zenoh.Query) -> None:
             payload = query.payload
-            if payload is not None and len(payload) > LONGEST:
+            if (
+                (payload is None or len(payload) <= LONGEST)
+                and allows(b"" if payload is None else payload.to_bytes())
+                and self._mailbox.put(lambda: handler(_Query(query, replier)), kind)
+            ):
                 return
-            if allows(b"" if payload is None else payload.to_bytes()):
-                self._mailbox.put(lambda: handler(_Query(query, replier)), kind)
+            # Not here: whoever asked is told, and where nobody reads that takes until the link is given up.
+            # zenoh hears nobody else meanwhile.
+            self._dropping.put(drop := functools.partial(_drop, query), drop)
 
         return self._undo(self._session.declare_queryable(expression, _direct(deliver)))
 
@@ -245,11 +253,12 @@ class ZenohBus:
             await asyncio.wait_for(asyncio.shield(self._closing), CLOSE_S)
 
     def _close(self) -> None:
-        for replier in self._repliers.values():
+        repliers = [*self._repliers.values(), self._dropping]
+        for replier in repliers:
             replier.close()
             replier.join(LAST_ANSWERS_S)
         self._session.close()  # type: ignore[no-untyped-call]
-        for replier in self._repliers.values():
+        for replier in repliers:
             replier.join(CLOSE_S)
 
     def _undo(self, declared: Any) -> Undo:  # noqa: ANN401  # each kind has a class of its own
