@@ -29,6 +29,9 @@ MOVE_S: Final = 100.0
 SLACK_S: Final = 5.0
 """Added to a timeout that the agent watches over."""
 
+_MOTIONS: Final = ("move", "set_position")
+"""What sets axes going, beside command()."""
+
 
 class RemoteCommands(RemoteObservation):
     """A hand on another host that is told to move."""
@@ -284,19 +287,43 @@ class RemoteCommands(RemoteObservation):
                 await session.keeper.acquire()
         session.check_control()
         outbox.flush()
-        call = session.call(arguments)
+        if name in _MOTIONS:
+            await self._give_settings(session)
+        call, lease = session.call(arguments), session.lease
         try:
             with (
                 no_answer_as_lost_connection(),
-                outbox.motion() if name in ("move", "set_position") else nullcontext(),
+                outbox.motion() if name in _MOTIONS else nullcontext(),
             ):
                 value: Fields = await session.send(
                     call, f"cmd/{name}", timeout=timeout, urgency=Urgency.COMMAND
                 )
         except (asyncio.CancelledError, RobotiqConnectionError, NotAllowedError):
+            session.settings.note(*_settings_of(name, arguments), lease)  # it may have been carried out
             # Also when an answer came that tells nothing of what became of it.
             cancelling = session.call_off(call)
-            if cancelling is not None and name in ("move", "set_position"):
+            if cancelling is not None and name in _MOTIONS:
                 outbox.count_motion(cancelling)
             raise
+        session.settings.note(*_settings_of(name, arguments), lease)
         return value
+
+    async def _give_settings(self, session: RemoteSession) -> None:
+        """Ask again for the speeds and forces that the agent does not know, before anything moves."""
+        lease = session.lease
+        missing = session.settings.to_give(lease)
+        if not missing:
+            return
+        axes = {str(int(axis)): dict(changes) for axis, changes in missing.items()}
+        with no_answer_as_lost_connection():
+            await session.ask("cmd/command", {"axes": axes}, timeout=COMMAND_S, urgency=Urgency.COMMAND)
+        session.settings.given(lease)
+        session.check_control()
+
+
+def _settings_of(name: str, arguments: Fields) -> tuple[Finger, Fields]:
+    """The axes of a request, and the speed and the force that it asks for."""
+    axes = Finger(arguments.get("fingers", 0))
+    if name in ("set_speed", "set_force"):
+        return axes, {name.removeprefix("set_"): arguments["value"]}
+    return axes, arguments

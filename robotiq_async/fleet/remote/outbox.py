@@ -14,6 +14,7 @@ from ..network.bus import Urgency
 from ..wire.envelope import Call
 from .requests import PendingRequest
 from .session import RemoteSession
+from .settings import Lease
 
 UNDER_WAY: Final = 4
 """Requests that may be unanswered at a time; 200 a second need no more up to 20 ms of round trip."""
@@ -58,12 +59,16 @@ class Outbox:
         waiting, self._waiting = self._waiting, {}
         if waiting and asked is not None and self._is_under_this_lease(asked):
             is_motion = any("position" in changes for changes in waiting.values())
+            lease = self._session.lease
+            missing = self._session.settings.to_give(lease) if is_motion else {}
+            for axis, changes in missing.items():
+                waiting[axis] = {**changes, **waiting.get(axis, {})}
             arguments = {"axes": {str(int(axis)): changes for axis, changes in waiting.items()}}
             # The time it has waited here counts like the time on its way.
             call = replace(self._session.call(arguments), seen=asked.seen)
             posted = self._session.post(call, "cmd/command", timeout=ANSWER_S, urgency=Urgency.COMMAND)
             self._under_way += 1
-            asking = self._session.spawn(self._await(posted))
+            asking = self._session.spawn(self._await(posted, waiting, lease, gives=bool(missing)))
             asking.add_done_callback(lambda _: self._done())
             if is_motion:
                 self.count_motion(asking)
@@ -101,9 +106,15 @@ class Outbox:
         except RobotiqError as error:
             self._session.log.warning("a command was not sent: %s", error)
 
-    async def _await(self, posted: PendingRequest) -> None:
+    async def _await(
+        self, posted: PendingRequest, asked: dict[Finger, dict[str, int]], lease: Lease, *, gives: bool
+    ) -> None:
         try:
             await self._session.answer(posted)
+            for axis, changes in asked.items():
+                self._session.settings.note(axis, changes, lease)
+            if gives:
+                self._session.settings.given(lease)
         except NotStartedError:
             pass  # the next command() raises it
         except ControlLostError as error:

@@ -41,6 +41,7 @@ from .lease_keeper import ANSWER_S, RENEWALS, LeaseKeeper
 from .mirror import Mirror
 from .missed_events import MissedEvents
 from .requests import NoAnswerError, PendingRequest, Requests, label
+from .settings import Lease, Settings
 
 CONNECT_S: Final = 5.0
 OWN: Final = ("info", "lease", "halt", "cmd/cancel")
@@ -58,6 +59,7 @@ class RemoteSession:
         log: for what happens to the hand.
         mirror: what has been heard.
         keeper: the lease.
+        settings: the speeds and forces that were asked for.
         agents: which ones serve the gripper.
         waiters: who waits for a state.
         is_over: whether the run has ended, or is about to.
@@ -110,6 +112,7 @@ class RemoteSession:
             self.mirror, lambda since: self.ask("info", {"since": since}, timeout=ANSWER_S), self.spawn
         )
         self.keeper = LeaseKeeper(self, wants_control=wants_control)
+        self.settings = Settings()
         self._looking: asyncio.Task[Any] | None = None
         channels.reopen(self.loop)
         self.mirror.begin(now())
@@ -326,6 +329,11 @@ class RemoteSession:
         self.mirror.fall_silent(at)
         self.keeper.lose("expired", "the agent is silent")
         self._requests.fall_silent()
+
+    @property
+    def lease(self) -> Lease:
+        """The one that requests are made under now."""
+        return self.mirror.epoch, self.keeper.lease
 
     # -- control ---------------------------------------------------------------------------------------
 
