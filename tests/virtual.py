@@ -14,6 +14,7 @@ import functools
 import gc
 import os
 import selectors
+import socket
 import threading
 import time
 from collections import deque
@@ -259,9 +260,9 @@ class MemoryTransport(asyncio.Transport):
     def get_extra_info(self, name: str, default: Any = None) -> Any:
         return {"socket": self, "peername": ("memory", 1), "sockname": ("memory", 2)}.get(name, default)
 
-    def setsockopt(self, *_: Any) -> None:
-        """The simulator sets but one option: to reset the connection in place of closing it."""
-        self._resets = True
+    def setsockopt(self, _level: int, option: int, _value: object) -> None:
+        """One option counts here, the simulator's: to reset the connection in place of closing it."""
+        self._resets |= option == socket.SO_LINGER
 
 
 def run(main: Callable[[], Coroutine[Any, Any, T]]) -> T:

@@ -8,8 +8,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
+import logging
 import os
-from collections.abc import AsyncIterator
+import time
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 
@@ -39,11 +41,13 @@ class Device:
     def __init__(self, descriptor: int) -> None:
         self.descriptor = descriptor
         self.requests: list[bytes] = []
+        self.asked_at = 0.0
         self.keep = 0
         """Replies to be kept back from here on."""
         self.kept: list[bytes] = []
-        self.spoil = False
-        """Whether checksums are wrong from here on."""
+        self.spoil: Callable[[bytes], bytes] | None = None
+        """What becomes of the next reply; of every one, if :attr:`spoils_all`."""
+        self.spoils_all = False
         asyncio.get_running_loop().add_reader(descriptor, self._ready)
         self._inbox = b""
 
@@ -55,9 +59,11 @@ class Device:
                 return
             request, self._inbox = self._inbox[:size], self._inbox[size:]
             self.requests.append(request)
+            self.asked_at = time.monotonic()
             reply = self._reply(request)
-            if self.spoil:
-                reply = reply[:-1] + bytes((reply[-1] ^ 1,))
+            if self.spoil is not None:
+                reply = self.spoil(reply)
+                self.spoil = self.spoil if self.spoils_all else None
             if self.keep:
                 self.keep -= 1
                 self.kept.append(reply)
@@ -126,7 +132,7 @@ async def test_late_replies_never_answer_a_later_request(tmp_path: Path, late: i
 
 async def test_a_late_reply_is_found_out_while_the_port_is_opened(tmp_path: Path) -> None:
     async with linked(tmp_path) as (transport, device):
-        device.keep = 1
+        device.keep = 2  # the read, and what was asked when it was not answered
         with pytest.raises(ResponseTimeoutError):
             await transport.read()
         with pytest.raises(ProtocolError):
@@ -136,9 +142,164 @@ async def test_a_late_reply_is_found_out_while_the_port_is_opened(tmp_path: Path
 
 async def test_a_wrong_check_sum_is_no_answer(tmp_path: Path) -> None:
     async with linked(tmp_path) as (transport, device):
-        device.spoil = True
+        device.spoil, device.spoils_all = wrong_checksum, True
+        with pytest.raises(ProtocolError, match="a wrong checksum"):
+            await transport.read()
+        assert not transport.is_open
+
+
+# -- a read that is asked once more ------------------------------------------------------------------------
+
+
+def wrong_checksum(reply: bytes) -> bytes:
+    return reply[:-1] + bytes((reply[-1] ^ 1,))
+
+
+SPOILT = {
+    "lost": lambda reply: reply[:0],
+    "wrong checksum": wrong_checksum,
+    "first byte": lambda reply: bytes((reply[0] ^ 4,)) + reply[1:],
+    "byte count": lambda reply: reply[:2] + bytes((reply[2] ^ 1,)) + reply[3:],
+    "last byte lost": lambda reply: reply[:-1],
+    "first byte lost": lambda reply: reply[1:],
+    "all but one byte lost": lambda reply: reply[:1],
+}
+
+
+@pytest.mark.parametrize("how", SPOILT)
+async def test_a_read_is_asked_again_when_its_answer_is_lost_or_damaged(tmp_path: Path, how: str) -> None:
+    async with linked(tmp_path) as (transport, device):
+        await transport.read()
+        for number in (1, 2):
+            asked = len(device.requests)
+            device.spoil = SPOILT[how]
+            assert await transport.read() == (len(device.requests),) * 8, "the last request is answered"
+            assert transport.repeats == number
+            first, probe, again = device.requests[asked:]
+            assert first == again
+            assert probe[:5] == first[:5], "a read, of the same registers"
+            assert probe[5] < 8, "and of fewer"
+        assert await transport.read() == (len(device.requests),) * 8
+
+
+@pytest.mark.parametrize("how", SPOILT)
+async def test_a_write_is_never_sent_again(tmp_path: Path, how: str) -> None:
+    async with linked(tmp_path) as (transport, device):
+        asked = len(device.requests)
+        device.spoil = SPOILT[how]
+        with pytest.raises(RobotiqConnectionError):
+            await transport.write((0x0900,) * 8)
+        assert [request[1] for request in device.requests[asked:]] == [16]
+        assert not transport.is_open
+        assert transport.repeats == 0
+
+
+@pytest.mark.parametrize("spoilt", range(1, 3))
+async def test_a_read_is_asked_once_more_and_no_oftener(tmp_path: Path, spoilt: int) -> None:
+    """The second time nothing may be wrong, neither with what brings the line in step nor with the answer."""
+    async with linked(tmp_path) as (transport, device):
+        counts: list[int] = []
+
+        def spoil(reply: bytes) -> bytes:
+            counts.append(reply[2] // 2)
+            return wrong_checksum(reply) if len(counts) in (1, 1 + spoilt) else reply
+
+        device.spoil, device.spoils_all = spoil, True
+        with pytest.raises(ProtocolError, match="a wrong checksum"):
+            await transport.read()
+        assert len(counts) == 1 + spoilt
+        assert counts[0] == 8
+        assert not transport.is_open
+
+
+@pytest.mark.parametrize("after", ["the silence", "the probe"])
+async def test_the_first_answer_that_was_only_late_is_not_the_second(tmp_path: Path, after: str) -> None:
+    async with linked(tmp_path) as (transport, device):
+        await transport.read()
+        asked = len(device.requests)
+        device.keep = 1
+        reading = asyncio.ensure_future(transport.read())
+        while not device.kept:  # noqa: ASYNC110
+            await asyncio.sleep(0.001)
+        if after == "the silence":
+            await asyncio.sleep(0.055)  # the time-out has passed, and the silence has begun
+            os.write(device.descriptor, device.kept.pop())
+            assert await reading == (asked + 3,) * 8
+            assert transport.is_open
+        else:
+            with pytest.raises(ResponseTimeoutError):  # the device answers in order: the late one comes first
+                await reading
+            assert not transport.is_open
+        await reopened(transport)
+        assert await transport.read() == (len(device.requests),) * 8
+
+
+async def test_the_rest_of_a_damaged_answer_is_no_part_of_the_next(tmp_path: Path) -> None:
+    async with linked(tmp_path) as (transport, device):
+        device.spoil = lambda reply: b"\xff" + reply[:10]
+        reading = asyncio.ensure_future(transport.read())
+        for _ in range(4):
+            await asyncio.sleep(0.005)
+            os.write(device.descriptor, bytes.fromhex("09 03 10 00 00"))
+        assert await reading == (len(device.requests),) * 8
+
+
+async def test_who_talks_all_the_time_is_given_up(tmp_path: Path) -> None:
+    async with linked(tmp_path) as (transport, device):
+        device.spoil = lambda reply: b"\xff" + reply[:0]
+        reading = asyncio.ensure_future(transport.read())
+        began = time.monotonic()
+        while not reading.done():
+            os.write(device.descriptor, b"\xff")
+            await asyncio.sleep(0.005)
+        assert time.monotonic() - began < 0.5
+        with pytest.raises(ProtocolError):
+            await reading
+        assert not transport.is_open
+
+
+async def test_a_read_that_is_never_answered_takes_two_response_timeouts(tmp_path: Path) -> None:
+    async with linked(tmp_path) as (transport, device):
+        device.spoil, device.spoils_all = SPOILT["lost"], True
+        began = time.monotonic()
         with pytest.raises(ResponseTimeoutError):
             await transport.read()
+        assert 0.099 <= time.monotonic() - began < 0.15
+
+
+async def test_cancelled_while_the_line_falls_silent(tmp_path: Path) -> None:
+    async with linked(tmp_path) as (transport, device):
+        device.spoil = wrong_checksum
+        reading = asyncio.ensure_future(transport.read())
+        while len(device.requests) < 2:  # noqa: ASYNC110
+            await asyncio.sleep(0.001)
+        await asyncio.sleep(0.005)
+        reading.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await reading
+        assert not transport.is_open
+
+
+async def test_reads_asked_again_are_told_once_in_a_while(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.WARNING, "robotiq_async")
+    async with linked(tmp_path) as (transport, device):
+        for _ in range(3):
+            device.spoil = wrong_checksum
+            await transport.read()
+    said = [each.getMessage() for each in caplog.records if "asked again" in each.getMessage()]
+    assert len(said) == 1
+    assert "a wrong checksum" in said[0]
+
+
+async def test_two_frames_keep_the_silence_of_the_standard(tmp_path: Path) -> None:
+    async with linked(tmp_path) as (transport, device):
+        for _ in range(20):
+            await transport.read()
+            answered = time.monotonic()
+            await transport.write((0,) * 8)
+            assert device.asked_at - answered >= 0.0016
 
 
 @pytest.mark.parametrize("size", [600, 3000])
