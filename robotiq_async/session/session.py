@@ -48,7 +48,13 @@ class Session:
     """Who owns which gripper in this process."""
 
     def __init__(
-        self, options: Options, machine: StateMachine, channels: Channels, *, activate: bool
+        self,
+        options: Options,
+        machine: StateMachine,
+        channels: Channels,
+        *,
+        activate: bool,
+        wait: float = 0.0,
     ) -> None:
         """Claim the address and begin to connect; must be made in a running event loop.
 
@@ -57,6 +63,7 @@ class Session:
             machine: of the hand: its state outlives the session.
             channels: of the hand: they were opened before, perhaps, and are read afterwards.
             activate: whether a gripper that is found reset is activated.
+            wait: seconds for which there may be no gripper yet.
 
         Raises:
             InvalidStateError: the address is owned already.
@@ -66,6 +73,7 @@ class Session:
         """Whether nothing runs any more."""
         self._loop = asyncio.get_running_loop()
         self.machine = machine
+        machine.why_down = None
         self._claim()
         self.controller = Controller(machine, options.speed, options.force, options.units.closing_s)
         self.controller.activates = activate
@@ -74,7 +82,9 @@ class Session:
         self._waiters = StateWaiters()
         channels.reopen(self._loop)
         machine.changed = self._on_transition
-        self._poller = Poller(options.make_transport(), self.controller, self.counters, channels, options)
+        self._poller = Poller(
+            options.make_transport(), self.controller, self.counters, channels, options, wait=wait
+        )
         machine.fire(Trigger.ASK_START)
         channels.publish_changes()
         self.is_over = False
@@ -186,7 +196,7 @@ class Session:
 
     def link_lost(self) -> RobotiqConnectionError:
         """The error that tells that the link is down, and why if that is known."""
-        failure = self._poller.failure
+        failure = self._poller.failure or self._poller.why_lost
         error = ConnectionLostError(f"the link is down{'' if failure is None else f': {failure}'}")
         error.__cause__ = failure
         error.hand = self.options.given_name

@@ -145,8 +145,8 @@ def test_a_stop_ends_all_the_same(wire: Wire, interrupt: Striker) -> None:
 
 def test_a_hand_that_had_just_started_is_stopped(wire: Wire) -> None:
     class Late(RobotiqHand):
-        def start(self, activate: bool = True) -> None:
-            super().start(activate)
+        def start(self, activate: bool = True, *, wait: float = 0.0) -> None:
+            super().start(activate, wait=wait)
             raise Interrupt
 
     hand = Late(wire)

@@ -45,6 +45,7 @@ class GripperSettings:
 
     address: str
     device_id: int | None = None
+    read_function: int | None = None
     poll_interval: float = POLL_INTERVAL_S
     connect_timeout: float = CONNECT_TIMEOUT_S
     response_timeout: float = RESPONSE_TIMEOUT_S

@@ -9,7 +9,8 @@ from ...fleet.network.route import is_remote
 from ...fleet.remote.remote_hand import RemoteHand
 from ...hand import RobotiqHand
 from ...protocol import Hand
-from ..translation.settings import Settings
+from ...session.options import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S, Usual
+from ..translation.settings import USUAL, Settings
 
 
 def make_hand(settings: Settings) -> Hand:
@@ -27,7 +28,19 @@ def make_hand(settings: Settings) -> Hand:
         return RemoteHand(settings.address, control=None)
     return RobotiqHand(
         settings.address,
-        poll_interval=settings.poll_interval,
+        device_id=_given(settings.device_id),
+        read_function=_given(settings.read_function),
+        # The defaults come back from ROS as plain figures, which would count as given on purpose.
+        poll_interval=_or_usual(settings.poll_interval, POLL_INTERVAL_S),
+        response_timeout=_or_usual(settings.response_timeout, RESPONSE_TIMEOUT_S),
         speed=settings.speed,
         force=settings.force,
     )
+
+
+def _given(number: int) -> int | None:
+    return None if number == USUAL else number
+
+
+def _or_usual(seconds: float, usual: Usual) -> float:
+    return usual if seconds == usual else seconds
