@@ -4,7 +4,8 @@
 room            what it holds
 ==============  ===========================================================================
 ``physics``     :class:`SimulatedGripper`: axes, contacts, faults, power, and the words it reports
-``server``      :class:`SimulatorServer` (Modbus TCP), :class:`SerialSimulatorServer` (Modbus RTU)
+``server``      :class:`SimulatorServer` (Modbus TCP), :class:`SerialSimulatorServer` (Modbus RTU),
+                :class:`RtuOverTcpSimulatorServer` (Modbus RTU behind a serial server)
 ``troubles``    what can go wrong, as data and as words: :class:`Trouble`, :func:`parse_troubles`
 ``functions``   the Modbus functions that are served
 ==============  ===========================================================================
@@ -13,8 +14,16 @@ The physics imports neither pymodbus nor asyncio.
 """
 
 from .physics.gripper import SimulatedGripper
+from .server.rtu_tcp_server import RtuOverTcpSimulatorServer
 from .server.serial_server import SerialSimulatorServer
 from .server.tcp_server import SimulatorServer
 from .troubles.trouble import Trouble, parse_troubles
 
-__all__ = ["SerialSimulatorServer", "SimulatedGripper", "SimulatorServer", "Trouble", "parse_troubles"]
+__all__ = [
+    "RtuOverTcpSimulatorServer",
+    "SerialSimulatorServer",
+    "SimulatedGripper",
+    "SimulatorServer",
+    "Trouble",
+    "parse_troubles",
+]

@@ -1,4 +1,4 @@
-"""Gateways that answer late: what a response timeout of up to 5 s does to moves, and what it leaves to stop()."""
+"""Gateways that answer late: what a response timeout of up to 5 s does to moves and to stop()."""
 
 from __future__ import annotations
 

@@ -106,10 +106,30 @@ def test_the_unit_id_over_tcp(call: Call, beside: Callable[..., Beside]) -> None
     call("status", address).assert_failed(1, "nobody answers")
 
 
-@pytest.mark.parametrize("unit", ["0", "248", "nine", "9.5"])
+@pytest.mark.parametrize("unit", ["-1", "256", "nine", "9.5"])
 def test_a_unit_id_that_no_unit_can_have(call: Call, unit: str) -> None:
-    outcome = call("simulate", "--serial", "/dev/no-such-port", "--device-id", unit)
-    outcome.assert_failed(2, f"--device-id must be an integer in 1..247, got '{unit}'")
+    outcome = call("simulate", "--serial", "/dev/no-such-port", f"--device-id={unit}")
+    outcome.assert_failed(2, f"--device-id must be an integer in 0..255, got '{unit}'")
+
+
+@pytest.mark.parametrize("unit", ["0", "248", "255"])
+@pytest.mark.parametrize("line", [("--serial", "/dev/no-such-port"), ("--rtu-over-tcp",)])
+def test_a_unit_id_that_no_unit_on_a_line_can_have(call: Call, line: tuple[str, ...], unit: str) -> None:
+    call("simulate", *line, "--device-id", unit).assert_failed(2, f"device_id must be in 1..247, got {unit}")
+
+
+def test_rtu_over_tcp(call: Call, beside: Callable[..., Beside]) -> None:
+    address = beside("simulate", "--rtu-over-tcp", "--port", "0").read_line()
+    assert address.startswith("rtu+tcp://127.0.0.1:")
+    call("status", address).assert_succeeded()
+    call("status", "--read-function", "4", address).assert_succeeded()
+    call("status", "--device-id", "12", address).assert_failed(1, "nobody answers")
+    call("status", address.removeprefix("rtu+")).assert_failed(1, "nobody answers")
+
+
+@pytest.mark.parametrize("words", [("--serial", "/dev/ttyS0", "--rtu-over-tcp"), ("--unpaced",)])
+def test_what_does_not_go_together(call: Call, words: tuple[str, ...]) -> None:
+    call("simulate", *words).assert_failed(2, words[-1])
 
 
 def test_other_than_loopback_is_warned_about(call: Call) -> None:

@@ -1,4 +1,4 @@
-"""Gateways and firmware that serve less, or elsewhere: what they refuse is named, and what can be told is told."""
+"""Gateways and firmware that serve less, or elsewhere: what they refuse is named."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ async def test_a_command_while_the_link_is_opened_again_says_why(gateway: Simula
         with pytest.raises(ConnectionLostError):
             await hand.set_position(100)
         assert hand.state is State.DISCONNECTED
-        with pytest.raises(ConnectionLostError, match="being opened again.*function 16"):
+        with pytest.raises(ConnectionLostError, match=r"being opened again.*function 16"):
             hand.command(position=100)
 
 

@@ -28,6 +28,8 @@ async def simulate(
     exact: Flag = False,
     object_: Annotated[Byte | None, Parameter(name="--object")] = None,
     serial: Annotated[str | None, Parameter(metavar="DEVICE")] = None,
+    rtu_over_tcp: Flag = False,
+    unpaced: Flag = False,
     device_id: Unit | None = None,
     trouble: Annotated[list[str] | None, Parameter(metavar="WORDS", negative=())] = None,
     troubles: Flag = False,
@@ -50,6 +52,7 @@ async def simulate(
         robotiq-async simulate --port 5021 --speedup 10 --object 150
         robotiq-async simulate --serial /dev/pts/3
         robotiq-async simulate --serial /dev/pts/3 --device-id 12
+        robotiq-async simulate --rtu-over-tcp --port 54321
         robotiq-async simulate --trouble "drop at 5 every 10" --trouble "delay 0.02"
         robotiq-async simulate --trouble "power-cut at 20 for 2; foreign 0 at 30"
 
@@ -60,11 +63,19 @@ async def simulate(
         exact: Stop exactly where it is told to, which no real gripper does.
         object_: Count at which the fingers A, B and C meet something when they close.
         serial: Serve Modbus RTU on this serial device in place of TCP (extra serial).
-        device_id: The only Modbus unit id that is answered (default: 9 serial, any on TCP).
+        rtu_over_tcp: Serve Modbus RTU through a TCP socket, as serial servers and tool ports do.
+        unpaced: Let bytes of a serial line take no time; for a real serial port, which takes it itself.
+        device_id: The only Modbus unit id that is answered (default: 9 for RTU, any on TCP).
         trouble: What goes wrong, and when; may be given again.
         troubles: List what can go wrong, and end.
     """
-    from ...simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, parse_troubles
+    from ...simulator import (
+        RtuOverTcpSimulatorServer,
+        SerialSimulatorServer,
+        SimulatedGripper,
+        SimulatorServer,
+        parse_troubles,
+    )
 
     if troubles:
         _list_troubles()
@@ -74,12 +85,20 @@ async def simulate(
         gripper = SimulatedGripper(speedup=speedup, spread=not exact)
         if object_ is not None:
             gripper.place_object(Finger.ABC, object_)
+        if serial is not None and rtu_over_tcp:
+            raise ValueError("--serial and --rtu-over-tcp contradict each other")
+        if unpaced and serial is None and not rtu_over_tcp:
+            raise ValueError("--unpaced is for a serial line: --serial or --rtu-over-tcp")
         server: SimulatorServer | SerialSimulatorServer
-        if serial is None:
-            server = SimulatorServer(gripper, port=port, host=host, device_id=device_id)
+        unit = RTU_REGISTERS.device_id if device_id is None else device_id
+        if serial is not None:
+            server = SerialSimulatorServer(serial, gripper, device_id=unit, paced=not unpaced)
+        elif rtu_over_tcp:
+            server = RtuOverTcpSimulatorServer(
+                gripper, port=port, host=host, device_id=unit, paced=not unpaced
+            )
         else:
-            unit = RTU_REGISTERS.device_id if device_id is None else device_id
-            server = SerialSimulatorServer(serial, gripper, device_id=unit)
+            server = SimulatorServer(gripper, port=port, host=host, device_id=device_id)
         server.fault_injector.check(plan)
     if serial is None and not is_loopback(host):
         tell(f"anyone who reaches {host} can command this gripper")

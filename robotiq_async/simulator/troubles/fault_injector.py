@@ -62,7 +62,7 @@ class FaultInjector:
             ValueError: one of them does not.
         """
         for trouble in troubles:
-            if KINDS[trouble.kind].link not in (None, self._target.link):
+            if not KINDS[trouble.kind].fits(self._target.link):
                 raise ValueError(f"{trouble.kind} does not fit a simulator on {self._target.link}")
 
     async def begin(self, trouble: Trouble) -> Ongoing:
@@ -159,7 +159,7 @@ class FaultInjector:
 
     def deliver(self, frame: bytes) -> Iterable[tuple[float, bytes]] | None:
         """What to send for a reply; None to hang up."""
-        reply = Reply(frame, self._target.link == "rtu")
+        reply = Reply(frame, serial=self._target.link != "tcp")
         for ongoing in self._ongoing:
             parts = ongoing.trouble.corrupt(reply)
             if parts is not None:

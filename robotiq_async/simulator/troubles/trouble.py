@@ -26,7 +26,7 @@ _EVENT: Final = 0.0
 _CONDITION: Final = math.inf
 
 On = Literal["read", "write", "any"]
-Link = Literal["tcp", "rtu"]
+Link = Literal["tcp", "rtu", "rtu+tcp"]
 
 
 class Kind(NamedTuple):
@@ -51,6 +51,12 @@ class Kind(NamedTuple):
     corruption: Corruption | None = None
     on: On = "any"
     link: Link | None = None
+
+    def fits(self, link: Link) -> bool:
+        """Whether it can happen on a kind of link: a serial server has frames of a line, and connections."""
+        if link == "rtu+tcp":
+            return self.link in (None, "rtu") or self.corruption is None
+        return self.link in (None, link)
 
     @property
     def can_hit_once(self) -> bool:
