@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import re
 import socket
 import threading
 import time
 from collections.abc import AsyncIterator, Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,8 +17,15 @@ import pytest
 from robotiq_async import RobotiqHand
 from robotiq_async.doctor import Finding, Level, examine
 from robotiq_async.doctor.gripper import _advice_for_opening
+from robotiq_async.doctor.serial_line import report_adapter
 from robotiq_async.link.address import parse_address
-from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, Trouble
+from robotiq_async.simulator import (
+    RtuOverTcpSimulatorServer,
+    SerialSimulatorServer,
+    SimulatedGripper,
+    SimulatorServer,
+    Trouble,
+)
 from robotiq_async.wire.request import AxisRequest, Request
 from tests.serial_line import SerialLine
 from tests.virtual import run
@@ -26,9 +35,9 @@ virtual_time = pytest.mark.virtual_time
 HEALTHY = ["name", "port", "Modbus", "unit id", "registers", "round trip", "rate", "activation", "fault"]
 
 
-async def findings(address: str, **options: Any) -> dict[str, Finding]:
+async def findings(address: str, *, seconds: float = 30.0, **options: Any) -> dict[str, Finding]:
     told: list[Finding] = []
-    async with asyncio.timeout(30):
+    async with asyncio.timeout(seconds):
         await examine(parse_address(address), told.append, **options)
     assert all(finding.advice for finding in told if finding.level is not Level.GOOD)
     return {finding.what: finding for finding in told}
@@ -167,12 +176,90 @@ async def test_registers_of_the_serial_kind_over_tcp() -> None:
 
 
 @virtual_time
-@pytest.mark.parametrize("where", [b"\x07\xd0", b"\x00\x00"])
-async def test_a_function_that_no_option_helps_with(where: bytes) -> None:
+@pytest.mark.parametrize(
+    ("where", "options"),
+    [
+        (b"\x00\x00", {"read_function": 3}),
+        (b"\x07\xd0", {"request_address": 1000, "status_address": 2000, "read_function": 3}),
+    ],
+)
+async def test_firmware_that_reads_with_function_3_only(where: bytes, options: dict[str, int]) -> None:
     async with answering(registers_at(3, where)) as address:
         found = await findings(address)
-    assert found["registers"].level is Level.BAD
-    assert "a Transport of your own" in found["registers"].advice
+        hand = RobotiqHand(f"tcp://{address}", **options)  # type: ignore[arg-type]
+        await hand.start(activate=False)  # the advice helps
+        await hand.stop(halt=False)
+    assert found["registers"].level is Level.DOUBT
+    words = ", ".join(f"{name}={value}" for name, value in options.items())
+    assert found["registers"].advice.startswith(f"Pass {words}, or the options so called.")
+    assert "may be the requests" in found["registers"].advice
+
+
+@virtual_time
+async def test_a_gateway_that_is_slower_than_was_waited_for() -> None:
+    async with SimulatorServer() as server:
+        server.replies.delay(1.3)
+        found = await findings(server.address, seconds=60)
+        hand = RobotiqHand(server.address, response_timeout=2.6)
+        await hand.start(activate=False)  # the advice helps
+        await hand.stop(halt=False)
+    assert found["Modbus"].level is Level.DOUBT
+    assert re.search(r"response_timeout=2\.[67];", found["Modbus"].advice)
+
+
+# -- serial lines ------------------------------------------------------------------------------------------
+
+
+@virtual_time
+async def test_a_serial_server() -> None:
+    async with RtuOverTcpSimulatorServer() as server:
+        found = await findings(server.address)
+    assert list(found) == [*HEALTHY, "other clients"]
+    assert all(finding.level is Level.GOOD for finding in found.values()), found
+    assert found["unit id"].found == "9"
+
+
+@virtual_time
+async def test_the_other_kind_of_frames() -> None:
+    async with RtuOverTcpSimulatorServer() as server:
+        found = await findings(server.address.removeprefix("rtu+"), seconds=60)
+        assert found["Modbus"].level is Level.BAD
+        assert server.address in found["Modbus"].advice
+    async with SimulatorServer() as tcp:
+        found = await findings(f"rtu+{tcp.address}", seconds=60)
+        assert found["Modbus"].level is Level.BAD
+        assert f"write the address as {tcp.address}" in found["Modbus"].advice
+
+
+@virtual_time
+async def test_a_line_that_loses_bytes() -> None:
+    async with RtuOverTcpSimulatorServer() as server:
+        damage = Trouble("wrong-checksum", every=0.5, at=0.1)
+        plan = asyncio.create_task(server.fault_injector.run([damage], lambda _: None))
+        found = await findings(server.address)
+        plan.cancel()
+        await asyncio.wait({plan})
+    assert found["line"].level is Level.DOUBT
+    assert "had to be asked again" in found["line"].found
+    assert "link" not in found
+
+
+@pytest.mark.parametrize(("kept", "level"), [(1, Level.GOOD), (2, Level.GOOD), (16, Level.DOUBT)])
+def test_how_long_an_adapter_keeps_what_it_hears(kept: int, level: Level, tmp_path: Path) -> None:
+    (tmp_path / "ttyUSB7").mkdir()
+    (tmp_path / "ttyUSB7" / "latency_timer").write_text(f"{kept}\n", encoding="ascii")
+    told: list[Finding] = []
+    report_adapter(parse_address("rtu:///dev/ttyUSB7"), told.append, tmp_path)
+    (finding,) = told
+    assert finding.level is level
+    assert f"{kept} ms" in finding.found
+    assert (f"tee {tmp_path}/ttyUSB7/latency_timer" in finding.advice) is (level is Level.DOUBT)
+
+
+def test_a_port_without_an_adapter(tmp_path: Path) -> None:
+    told: list[Finding] = []
+    report_adapter(parse_address("rtu:///dev/ttyS0"), told.append, tmp_path)
+    assert not told
 
 
 @virtual_time

@@ -257,6 +257,9 @@ class MemoryTransport(asyncio.Transport):
     def is_closing(self) -> bool:
         return self._closing
 
+    def get_write_buffer_size(self) -> int:
+        return 0  # what is written is on its way
+
     def get_extra_info(self, name: str, default: Any = None) -> Any:
         return {"socket": self, "peername": ("memory", 1), "sockname": ("memory", 2)}.get(name, default)
 

@@ -11,6 +11,7 @@ from typing import Annotated, Final
 from cyclopts import Parameter, Token
 
 from ..enums import Finger
+from ..session.options import RESPONSE_TIMEOUT_S
 from ..wire.checks import parse_fingers
 from .failures import CommandError, UsageError, usage
 
@@ -89,9 +90,9 @@ class Link:
     status_address: Annotated[
         Register | None, Parameter(help="First status register (default: 0 on TCP, 2000 serial).")
     ] = None
-    response_timeout: Annotated[
-        Seconds | None, Parameter(help="Seconds for one answer, up to 5 (default: 0.4 on TCP, 0.3 serial).")
-    ] = None
+    response_timeout: Annotated[Seconds, Parameter(help="Seconds for one answer, up to 5.")] = (
+        RESPONSE_TIMEOUT_S
+    )
 
 
 USUAL: Final = Link()

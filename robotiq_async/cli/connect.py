@@ -11,7 +11,7 @@ from ..fleet.network.route import is_remote
 from ..fleet.remote.remote_hand import RemoteHand
 from ..hand import RobotiqHand
 from ..protocol import Hand
-from ..session.options import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S
+from ..session.options import POLL_INTERVAL_S
 from .arguments import USUAL, Link, need
 from .failures import UsageError, usage
 
@@ -49,7 +49,7 @@ def make_hand(
             address,
             device_id=link.device_id,
             read_function=link.read_function,
-            response_timeout=RESPONSE_TIMEOUT_S if link.response_timeout is None else link.response_timeout,
+            response_timeout=link.response_timeout,
             request_address=link.request_address,
             status_address=link.status_address,
             poll_interval=poll_interval,

@@ -17,10 +17,12 @@ from ..link.host_names import addresses_of
 from ..link.modbus import ModbusTransport
 from ..link.sim_transport import SimulatedTransport, new_gripper
 from ..link.transport import Transport
+from ..session.options import LONGEST_RESPONSE_S, POLL_INTERVAL_S, SERIAL_POLL_INTERVAL_S, registers_of
 from ..session.statistics import percentile
 from ..wire.registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap
 from ..wire.status import RobotiqStatus
 from .findings import Finding, GiveUpError, Level, Report
+from .serial_line import report_adapter, report_damage
 
 REACH_S: Final = 3.0
 """Timeout for resolving the name, and for connecting to the port."""
@@ -32,9 +34,7 @@ WATCH_S: Final = 2.0
 TRIES: Final = 3
 """Attempts with the usual unit id and registers, before others are tried."""
 UNITS: Final = (2, 9, 1, 0, 255)
-"""Unit ids that are tried when the usual one does not answer."""
-SLOW_S: Final = 0.005
-"""The period of 200 Hz: a longer round trip does not fit."""
+"""Unit ids that are tried when the usual one does not answer; on a serial line nobody has the last two."""
 
 
 async def examine(address: Address, report: Report, *, device_id: int | None = None) -> None:
@@ -44,16 +44,19 @@ async def examine(address: Address, report: Report, *, device_id: int | None = N
         address: the gripper.
         report: called with each finding.
         device_id: Modbus unit id; None for the usual one.
+
+    Raises:
+        ValueError: a unit id that no unit on such a link can have.
     """
-    registers = RTU_REGISTERS if address.kind == "rtu" else TCP_REGISTERS
-    if device_id is not None:
-        registers = replace(registers, device_id=device_id)
+    registers = registers_of(address, device_id=device_id)
     try:
-        if address.kind == "tcp":
+        if address.is_socket:
             await _reach(address, report)
         link = await _answer(address, registers, report)
         try:
-            await _timing(link, report)
+            if address.kind == "rtu":
+                report_adapter(address, report)
+            await _timing(link, SERIAL_POLL_INTERVAL_S if address.is_rtu else POLL_INTERVAL_S, report)
             report_state(RobotiqStatus.from_registers(await link.read()), report)
             await _others(link, report)
         finally:
@@ -133,27 +136,63 @@ async def _answer(address: Address, usual: RegisterMap, report: Report) -> Trans
         _report_doubts(status, report)
         return link
     assert first is not None
-    report(Finding(Level.BAD, "Modbus", str(first), _advice_for_silence(first)))
+    if isinstance(first, ResponseTimeoutError):
+        link = _link(address, usual, LONGEST_RESPONSE_S)
+        if (took := await _seconds_to_answer(link)) is not None:
+            enough = min(LONGEST_RESPONSE_S, math.ceil(20 * took) / 10)
+            advice = f"Pass response_timeout={enough:g}; a write, and a stop, take as long."
+            report(Finding(Level.DOUBT, "Modbus", f"answers, after {took:.1f} s", advice))
+            return link
+    advice = await _other_frames(address) or _advice_for_silence(first)
+    report(Finding(Level.BAD, "Modbus", str(first), advice))
     raise GiveUpError
+
+
+async def _seconds_to_answer(link: Transport) -> float | None:
+    """How long a link takes to answer, and leave it open; None, and closed, if it does not answer."""
+    loop = asyncio.get_running_loop()
+    try:
+        await link.open()
+        asked = loop.time()
+        await link.read()
+    except RobotiqConnectionError:
+        return None
+    except BaseException:
+        await link.close()
+        raise
+    return loop.time() - asked
+
+
+async def _other_frames(address: Address) -> str:
+    """What to do if a socket speaks the other kind of frames: those of a serial line, or of Modbus TCP."""
+    if not address.is_socket:
+        return ""
+    other = replace(address, kind="tcp" if address.is_rtu else "rtu+tcp")
+    link = _link(other, registers_of(other))
+    answers = await _seconds_to_answer(link) is not None
+    await link.close()
+    return f"The frames there are others: write the address as {other}." if answers else ""
 
 
 def _candidates(address: Address, usual: RegisterMap) -> list[RegisterMap]:
     """What to try: the usual several times, for replies get lost; then other units, other registers."""
     if address.kind == "sim":
         return [usual]
-    others = [replace(usual, device_id=unit) for unit in UNITS]
+    units = UNITS[:-2] if address.is_rtu else UNITS
+    others = [replace(usual, read_function=7 - usual.read_function)]
+    others += [replace(usual, device_id=unit) for unit in units]
     for kind in (RTU_REGISTERS, TCP_REGISTERS):
         for function in dict.fromkeys((usual.read_function, 3, 4)):
             moved = replace(usual, request=kind.request, status=kind.status, read_function=function)
-            others += [replace(moved, device_id=unit) for unit in dict.fromkeys((usual.device_id, *UNITS))]
+            others += [replace(moved, device_id=unit) for unit in dict.fromkeys((usual.device_id, *units))]
     return [usual] * TRIES + [each for each in dict.fromkeys(others) if each != usual]
 
 
-def _link(address: Address, registers: RegisterMap) -> Transport:
+def _link(address: Address, registers: RegisterMap, response_timeout: float = ANSWER_S) -> Transport:
     if address.kind == "sim":
         gripper = new_gripper(address.simulation)
         return SimulatedTransport(gripper, registers, connect_timeout=REACH_S, response_timeout=ANSWER_S)
-    return ModbusTransport(address, registers, connect_timeout=REACH_S, response_timeout=ANSWER_S)
+    return ModbusTransport(address, registers, connect_timeout=REACH_S, response_timeout=response_timeout)
 
 
 def _report_answer(usual: RegisterMap, found: RegisterMap, tries: int, report: Report) -> None:
@@ -168,15 +207,19 @@ def _report_answer(usual: RegisterMap, found: RegisterMap, tries: int, report: R
         unit = Finding(Level.DOUBT, "unit id", f"{found.device_id}, and not {usual.device_id}", advice)
     report(unit)
     at = f"status at {found.status}, requests at {found.request}, function {found.read_function}"
+    options = {
+        "request_address": (found.request, usual.request),
+        "status_address": (found.status, usual.status),
+        "read_function": (found.read_function, usual.read_function),
+    }
+    given = [f"{name}={value}" for name, (value, as_usual) in options.items() if value != as_usual]
     where = Finding(Level.GOOD, "registers", at)
-    if found.read_function != usual.read_function:
-        how = f"RobotiqHand asks with function {usual.read_function} on this kind of link"
-        advice = f"{how}, and no option changes that: pass it a Transport of your own."
-        where = Finding(Level.BAD, "registers", f"{at}: unusual on this kind of link", advice)
-    elif found.status != usual.status:
-        advice = (
-            f"Pass request_address={found.request}, status_address={found.status}, or the options so called."
-        )
+    if given:
+        advice = f"Pass {', '.join(given)}, or the options so called."
+        if found.read_function != usual.read_function:
+            advice += (
+                " What this function reads may be the requests: see that status shows what the gripper does."
+            )
         where = Finding(Level.DOUBT, "registers", f"{at}: unusual on this kind of link", advice)
     report(where)
 
@@ -207,8 +250,8 @@ def _advice_for_silence(error: RobotiqConnectionError) -> str:
     return "It hangs up when asked: it may serve one client at a time, or not speak Modbus."
 
 
-async def _timing(link: Transport, report: Report) -> None:
-    """Round trip, and the rate of reads that it allows."""
+async def _timing(link: Transport, interval: float, report: Report) -> None:
+    """Round trip, and the rate of reads that it allows; ``interval`` is the usual one on such a link."""
     loop = asyncio.get_running_loop()
     times, began = [], loop.time()
     for _ in range(PROBES):
@@ -221,12 +264,14 @@ async def _timing(link: Transport, report: Report) -> None:
     times.sort()
     p50, p99 = percentile(times, 0.5), percentile(times, 0.99)
     found = f"{1000 * p50:.1f} ms, 99th percentile {1000 * p99:.1f} ms"
-    if p99 < SLOW_S:
+    if p99 < interval:
         report(Finding(Level.GOOD, "round trip", found))
     else:
-        advice = "Too slow for 200 Hz at times: use a wired network, or a larger poll_interval."
+        hertz = f"{1 / interval:.0f} Hz"
+        advice = f"Too slow for {hertz} at times: use a wired network, or a larger poll_interval."
         report(Finding(Level.DOUBT, "round trip", found, advice))
-    enough = rate >= 1 / SLOW_S
+    report_damage(link, len(times), report)
+    enough = rate >= 1 / interval
     advice = "" if enough else f"Pass poll_interval={max(0.01, math.ceil(100 / rate) / 100):g}."
     report(Finding(Level.GOOD if enough else Level.DOUBT, "rate", f"up to {rate:.0f} reads a second", advice))
 

@@ -64,6 +64,10 @@ HUSH_S: Final = 0.02
 16 ms (the usual latency timer of FTDI's)."""
 LONGEST_HUSH_S: Final = 0.1
 """For which silence is waited for; who talks on is no gripper that was asked once."""
+REPEAT_S: Final = 0.15
+"""For a read that is asked again, so that a write after it still fails within a second."""
+USUAL_RESPONSE_S: Final = 0.4
+"""With a longer response timeout a line is slow, and a read that is asked again has that time once more."""
 REPEAT_WARNING_S: Final = 60.0
 """At most one line in the log about reads asked again in this time."""
 
@@ -100,7 +104,7 @@ class ModbusTransport:
             address: a tcp, rtu or rtu+tcp address.
             registers: where the blocks lie, and the device id.
             connect_timeout: seconds for connecting.
-            response_timeout: seconds for one answer; on a serial line a read may take twice that.
+            response_timeout: seconds for one answer; on a serial line a read may be asked again after that.
             log: of the hand.
         """
         self.repeats = 0
@@ -155,7 +159,7 @@ class ModbusTransport:
                 str(self._address), f"no connection within {self._connect_timeout:g} s"
             ) from None
         if self._address.is_socket:
-            await self._settle()
+            await self._settle(SETTLE_S)
         await self._resynchronise()
 
     async def read(self) -> Registers:
@@ -298,7 +302,7 @@ class ModbusTransport:
 
     # -- in step -----------------------------------------------------------------------------------------
 
-    async def _settle(self) -> None:
+    async def _settle(self, seconds: float) -> None:
         """Give what is left over from an earlier connection time to show itself before anything is asked.
 
         A gateway that keeps its own connection to the gripper may send late replies to whoever connects
@@ -306,7 +310,7 @@ class ModbusTransport:
         left over for the next connection, and so on without end.
         """
         try:
-            await asyncio.sleep(SETTLE_S)
+            await asyncio.sleep(seconds)
         except BaseException:
             self._drop()
             raise
@@ -330,7 +334,7 @@ class ModbusTransport:
         is left of a damaged reply is dropped. Then the line is brought in step as when it is opened, by a
         read of another length: if the first answer comes now, it has the wrong length, and the link is given
         up; if the right length comes, the gripper, which answers in order, has nothing older to send. Only
-        then the status is asked for. All of that has one more response timeout. A write is never sent again:
+        then the status is asked for. All of that must be quick. A write is never sent again:
         whether the first was carried out cannot be known.
 
         Args:
@@ -339,7 +343,8 @@ class ModbusTransport:
         Raises:
             RobotiqConnectionError: again no clean answer; it is the first reason. The connection is closed.
         """
-        by = self._loop.time() + self._response_timeout
+        is_slow = self._response_timeout > USUAL_RESPONSE_S
+        by = self._loop.time() + (self._response_timeout if is_slow else REPEAT_S)
         try:
             await self._hush()
             await self._resynchronise(by)
@@ -378,14 +383,8 @@ class ModbusTransport:
     async def _pause(self) -> None:
         """Keep the silence that ends a frame: what follows too soon may be taken for a part of it."""
         left = self._heard + SILENCE_S - self._loop.time()
-        if left <= 0:
-            return
-        try:
-            await asyncio.sleep(left)
-        except BaseException:
-            self._drop()
-            raise
-        self._connected()
+        if left > 0:
+            await self._settle(left)
 
 
 def _check_sum(frame: bytes) -> None:

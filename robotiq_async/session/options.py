@@ -37,10 +37,9 @@ SERIAL_POLL_INTERVAL_S: Final = 0.015
 after each of the four frames 7 ms: 12.4 ms. In 15 ms they fit, with what an adapter needs to pass on two
 replies, so that a stream of commands misses no polls."""
 CONNECT_TIMEOUT_S: Final = 2.0
-RESPONSE_TIMEOUT_S: Final = Usual(0.4)
-"""Two of these, a read in flight and a write, still end within the second that a write may take."""
-SERIAL_RESPONSE_TIMEOUT_S: Final = 0.3
-"""Three of these do so: on a serial line a read may be asked once more."""
+RESPONSE_TIMEOUT_S: Final = 0.4
+"""Two of these, a read in flight and a write, still end within the second that a write may take; on a serial
+line also with the time in which the read may be asked once more."""
 LONGEST_RESPONSE_S: Final = 5.0
 """For gateways that are slow; a write may take more than a second then."""
 LONGEST_WAIT_S: Final = 86400.0
@@ -123,7 +122,6 @@ def check_options(
     }
     way = _way_to(address, registers, given_name)
     if way.is_rtu:
-        response_s = SERIAL_RESPONSE_TIMEOUT_S if isinstance(response_timeout, Usual) else response_s
         interval = SERIAL_POLL_INTERVAL_S if isinstance(poll_interval, Usual) else interval
     return Options(
         make_transport=partial(way.make, connect_timeout=connect_s, response_timeout=response_s),

@@ -69,10 +69,10 @@ class RobotiqHand(Commands):
                 RTU.
             poll_interval: seconds between polls, 0.001..0.1; over RTU 0.015 unless given.
             connect_timeout: seconds for opening the link, 0.01..5.
-            response_timeout: seconds for one answer, 0.005..5; over RTU 0.3 unless given. A write fails
-                within twice that, over RTU, where a read may be asked again, within three times. :meth:`stop`
-                ends within 2 s whatever it is; but a gripper that takes longer than 0.4 s to answer may not
-                have confirmed by then that the fingers were stopped, and the log says so.
+            response_timeout: seconds for one answer, 0.005..5. A write fails within twice that, and over RTU,
+                where a read may be asked again, within 0.15 s more (three times that if it is above 0.4).
+                :meth:`stop` ends within 2 s whatever it is; but a gripper that takes longer than 0.4 s to
+                answer may not have confirmed by then that the fingers were stopped, and the log says so.
             activation_timeout: seconds for an activation, 0.01..120.
             reconnect: whether a lost link is opened again, or a :class:`ReconnectPolicy`.
             speed: what the axes get until set otherwise, 0..255.

@@ -129,10 +129,11 @@ def test_intervals_and_time_outs_of_a_line_and_of_a_network() -> None:
         return options.poll_interval, transport._response_timeout
 
     assert figures("tcp://192.168.1.11") == (0.005, 0.4)
+    assert figures("tcp://192.168.1.11", response_timeout=5) == (0.005, 5.0)
     for line in ("rtu:///dev/ttyUSB0", "rtu+tcp://192.168.1.11:54321"):
-        assert figures(line) == (0.015, 0.3)
-        assert figures(line, poll_interval=0.005, response_timeout=0.4) == (0.005, 0.4), "as asked"
-        assert figures(line, poll_interval=0.1) == (0.1, 0.3)
+        assert figures(line) == (0.015, 0.4)
+        assert figures(line, poll_interval=0.005, response_timeout=0.3) == (0.005, 0.3), "as asked"
+        assert figures(line, poll_interval=0.1) == (0.1, 0.4)
 
 
 @pytest.mark.parametrize("wait", [-1, 86401, math.inf, math.nan, "1", None, True])

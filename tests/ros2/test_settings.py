@@ -66,8 +66,8 @@ def test_what_will_not_do_is_told(name: str, value: object, reason: str) -> None
     [
         ({}, (2, 4, 0.005, 0.4)),
         ({"device_id": 0, "read_function": 3, "response_timeout": 5.0}, (0, 3, 0.005, 5.0)),
-        ({"address": "rtu:///dev/ttyUSB0"}, (9, 3, 0.015, 0.3)),
-        ({"address": "rtu:///dev/ttyUSB0", "poll_interval": 0.01}, (9, 3, 0.01, 0.3)),
+        ({"address": "rtu:///dev/ttyUSB0"}, (9, 3, 0.015, 0.4)),
+        ({"address": "rtu:///dev/ttyUSB0", "poll_interval": 0.01}, (9, 3, 0.01, 0.4)),
     ],
 )
 def test_the_hand_of_the_parameters(

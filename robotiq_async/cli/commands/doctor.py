@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 from ...fleet.network.route import is_remote
 from ...link.address import parse_address
 from ...log import printable
+from ...session.options import registers_of
 from ..addresses import full_address
 from ..arguments import Address, Unit, need
-from ..failures import CommandError, UsageError
+from ..failures import CommandError, UsageError, usage
 
 if TYPE_CHECKING:
     from ...doctor import Finding
@@ -33,6 +34,7 @@ async def doctor(
 
         robotiq-async doctor tcp://192.168.1.11
         robotiq-async doctor rtu:///dev/ttyUSB0
+        robotiq-async doctor rtu+tcp://192.168.1.20:54321
         robotiq-async doctor "zenoh://lab/cell-1/left?connect=tls/192.168.1.20:7447"
 
     Args:
@@ -57,6 +59,8 @@ async def doctor(
             raise UsageError("a gripper on another host is set up there: its agent's file has device_id")
         await examine_remote(address, report)
     else:
+        with usage():
+            registers_of(parse_address(address), device_id=device_id)
         await examine(parse_address(address), report, device_id=device_id)
     if bad:
         raise CommandError(f"{full}: {', '.join(bad)}: see above")

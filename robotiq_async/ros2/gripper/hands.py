@@ -9,7 +9,7 @@ from ...fleet.network.route import is_remote
 from ...fleet.remote.remote_hand import RemoteHand
 from ...hand import RobotiqHand
 from ...protocol import Hand
-from ...session.options import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S, Usual
+from ...session.options import POLL_INTERVAL_S
 from ..translation.settings import USUAL, Settings
 
 
@@ -30,9 +30,8 @@ def make_hand(settings: Settings) -> Hand:
         settings.address,
         device_id=_given(settings.device_id),
         read_function=_given(settings.read_function),
-        # The defaults come back from ROS as plain figures, which would count as given on purpose.
-        poll_interval=_or_usual(settings.poll_interval, POLL_INTERVAL_S),
-        response_timeout=_or_usual(settings.response_timeout, RESPONSE_TIMEOUT_S),
+        poll_interval=_or_usual(settings.poll_interval),
+        response_timeout=settings.response_timeout,
         speed=settings.speed,
         force=settings.force,
     )
@@ -42,5 +41,6 @@ def _given(number: int) -> int | None:
     return None if number == USUAL else number
 
 
-def _or_usual(seconds: float, usual: Usual) -> float:
-    return usual if seconds == usual else seconds
+def _or_usual(interval: float) -> float:
+    """The default comes back from ROS as a plain figure, which would count as given on purpose."""
+    return POLL_INTERVAL_S if interval == POLL_INTERVAL_S else interval

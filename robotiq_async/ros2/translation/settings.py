@@ -53,9 +53,7 @@ PARAMETERS: Final[Mapping[str, Parameter]] = {
         0.001,
         0.1,
     ),
-    "response_timeout": Parameter(
-        float(RESPONSE_TIMEOUT_S), "Seconds for one answer; 0.4 is 0.3 over RTU.", 0.005, LONGEST_RESPONSE_S
-    ),
+    "response_timeout": Parameter(RESPONSE_TIMEOUT_S, "Seconds for one answer.", 0.005, LONGEST_RESPONSE_S),
     "publish_rate": Parameter(50.0, "Joint states a second.", 1.0, 200.0),
     "joint_prefix": Parameter(
         "", "Stands before the name of every joint, as it is: left_ makes left_finger_1_joint_1."
