@@ -2,8 +2,9 @@
 
 Every cycle reads the status, decides, and writes at once, as the scan of a PLC: what is decided is decided
 on what the gripper has just shown. Nobody else touches the transport; callers leave what they want with
-the controller and wait beside it. So no request is ever cancelled in flight, the link stays in step, and
-start() and stop() may be called from different tasks.
+the controller and wait beside it. So no request is cancelled in flight (but one that a stop has waited for
+long enough, and the link with it), the link stays in step, and start() and stop() may be called from
+different tasks.
 """
 
 from __future__ import annotations

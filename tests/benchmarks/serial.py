@@ -120,7 +120,7 @@ async def asked(hand: RobotiqHand, seconds: float) -> list[float]:
 class Benchmarks:
     """One run of all that is asked for."""
 
-    def __init__(self, folder: Path, rounds: int, seconds: float) -> None:
+    def __init__(self, _folder: Path, rounds: int, seconds: float) -> None:
         self.rounds = rounds
         self.seconds = seconds
         self.results: dict[str, Any] = {}
