@@ -351,3 +351,31 @@ def test_an_ipv4_address_is_four_numbers(host: str) -> None:
 def test_a_label_of_a_name_has_1_to_63_characters(name: str) -> None:
     with pytest.raises(ValueError, match="malformed address"):
         parse_address(name)
+
+
+# -- a serial line behind a socket -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "host", "port"),
+    [
+        ("rtu+tcp://192.168.1.20:54321", "192.168.1.20", 54321),
+        ("rtu+tcp://Arm.local:4001", "arm.local", 4001),
+        ("rtu+tcp://[::1]:54321", "::1", 54321),
+    ],
+)
+def test_a_serial_server_is_a_host_and_a_port(text: str, host: str, port: int) -> None:
+    address = parse_address(text)
+    assert address == Address("rtu+tcp", host, port)
+    assert str(address) == text.lower()
+    assert parse_address(str(address)) == address
+    assert (address.is_rtu, address.is_socket) == (True, True)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["rtu+tcp://192.168.1.20", "rtu+tcp://", "rtu+tcp://[::1]", "rtu+tcp://host:0", "rtu+tcp:///dev/ttyUSB0"],
+)
+def test_a_serial_server_has_no_usual_port(text: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(FORMS)):
+        parse_address(text)
