@@ -41,10 +41,10 @@ from ..errors import (
 from ..log import Log, log
 from ..wire.registers import REGISTER_COUNT, RegisterMap, Registers
 from .address import Address
-from .client.connecting import Client, connected_client
-from .client.watchdog import Watchdog
+from .connecting import Client, connected_client
 from .frames import Expected, MisfitError, expected_reply, show
 from .pdus import ReadRequest, WriteRequest
+from .watchdog import Watchdog
 
 # pymodbus logs its send and receive history at ERROR on every timeout; what matters of it is said in our
 # exceptions. Whoever sets a level on its logger gets what they ask for.

@@ -24,8 +24,8 @@ from ..errors import (
     ResponseTimeoutError,
     RobotiqConnectionError,
 )
-from ..link.client.watchdog import HELD_S
 from ..link.transport import Transport
+from ..link.watchdog import HELD_S
 from ..wire.status import RobotiqStatus
 from .ending import Ending
 from .opening import Opener

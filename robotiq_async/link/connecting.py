@@ -11,11 +11,11 @@ from typing import Any, Final
 from pymodbus import FramerType
 from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
 
-from ...errors import ConnectFailedError
-from ..address import Address
-from ..host_names import addresses_of, why_no_socket, why_unreachable
-from ..pdus import register
-from ..serial_ports import hasten, why_no_port
+from ..errors import ConnectFailedError
+from .address import Address
+from .host_names import addresses_of, why_no_socket, why_unreachable
+from .pdus import register
+from .serial_ports import hasten, why_no_port
 
 Client = AsyncModbusTcpClient | AsyncModbusSerialClient
 
