@@ -9,8 +9,6 @@ import asyncio
 import contextlib
 import errno
 import logging
-import os
-import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -24,6 +22,7 @@ from robotiq_async.link.modbus import ModbusTransport
 from robotiq_async.link.serial_ports import FORBIDDEN, MISSING, NO_PORT, TAKEN
 from robotiq_async.wire.registers import RTU_REGISTERS
 from tests.serial_line import SerialLine
+from tests.virtual_line import VirtualLine
 
 
 def with_crc(frame: bytes) -> bytes:
@@ -38,8 +37,8 @@ def with_crc(frame: bytes) -> bytes:
 class Device:
     """Answers reads with the number of the request in every register; replies can be kept back."""
 
-    def __init__(self, descriptor: int) -> None:
-        self.descriptor = descriptor
+    def __init__(self, port: serial.Serial) -> None:
+        self._port = port
         self.requests: list[bytes] = []
         self.asked_at = 0.0
         self.keep = 0
@@ -48,18 +47,27 @@ class Device:
         self.spoil: Callable[[bytes], bytes] | None = None
         """What becomes of the next reply; of every one, if :attr:`spoils_all`."""
         self.spoils_all = False
-        asyncio.get_running_loop().add_reader(descriptor, self._ready)
         self._inbox = b""
+        self._loop = asyncio.get_running_loop()
+        self._loop.add_reader(port.fileno(), self._ready)
+
+    def send(self, data: bytes) -> None:
+        """Put bytes on the line."""
+        self._port.write(data)
+
+    def close(self) -> None:
+        self._loop.remove_reader(self._port.fileno())
+        self._port.close()
 
     def _ready(self) -> None:
-        self._inbox += os.read(self.descriptor, 4096)
+        self._inbox += self._port.read(4096)
         while len(self._inbox) >= 8:
             size = 8 if self._inbox[1] == 3 else 9 + self._inbox[6]
             if len(self._inbox) < size:
                 return
             request, self._inbox = self._inbox[:size], self._inbox[size:]
             self.requests.append(request)
-            self.asked_at = time.monotonic()
+            self.asked_at = self._loop.time()
             reply = self._reply(request)
             if self.spoil is not None:
                 reply = self.spoil(reply)
@@ -70,7 +78,7 @@ class Device:
             else:
                 # A serial device answers in order: what was late comes first.
                 kept, self.kept = self.kept, []
-                os.write(self.descriptor, b"".join(kept) + reply)
+                self.send(b"".join(kept) + reply)
 
     def _reply(self, request: bytes) -> bytes:
         if request[1] == 16:
@@ -80,20 +88,23 @@ class Device:
 
 
 @asynccontextmanager
-async def linked(folder: Path) -> AsyncIterator[tuple[ModbusTransport, Device]]:
-    with SerialLine(folder) as line:
-        far = os.open(line.far, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-        device = Device(far)
+async def linked() -> AsyncIterator[tuple[ModbusTransport, Device]]:
+    """A transport and a device at the two ends of a line, in virtual time."""
+    with pytest.MonkeyPatch.context() as patch:
+        VirtualLine(patch)
+        device = Device(serial.serial_for_url(VirtualLine.FAR))
         transport = ModbusTransport(
-            parse_address(f"rtu://{line.near}"), RTU_REGISTERS, connect_timeout=1.0, response_timeout=0.05
+            parse_address(f"rtu://{VirtualLine.NEAR}"),
+            RTU_REGISTERS,
+            connect_timeout=1.0,
+            response_timeout=0.05,
         )
         try:
             await transport.open()
             yield transport, device
         finally:
             await transport.close()
-            asyncio.get_running_loop().remove_reader(far)
-            os.close(far)
+            device.close()
 
 
 async def reopened(transport: ModbusTransport) -> int:
@@ -105,8 +116,9 @@ async def reopened(transport: ModbusTransport) -> int:
     raise AssertionError("never in step again")
 
 
-async def test_read_and_write_use_the_addresses_of_the_serial_gripper(tmp_path: Path) -> None:
-    async with linked(tmp_path) as (transport, device):
+@pytest.mark.virtual_time
+async def test_read_and_write_use_the_addresses_of_the_serial_gripper() -> None:
+    async with linked() as (transport, device):
         assert await transport.read() == (2,) * 8
         await transport.write((0x0900, 0x0C00, 0, 0, 0, 0, 0, 0))
     probe, read, write = device.requests
@@ -115,10 +127,11 @@ async def test_read_and_write_use_the_addresses_of_the_serial_gripper(tmp_path: 
     assert write[:11] == bytes.fromhex("09 10 03e8 0008 10 0900 0c00")
 
 
+@pytest.mark.virtual_time
 @pytest.mark.parametrize("late", [1, 2, 3, 8])
 @pytest.mark.parametrize("first", ["read", "write"])
-async def test_late_replies_never_answer_a_later_request(tmp_path: Path, late: int, first: str) -> None:
-    async with linked(tmp_path) as (transport, device):
+async def test_late_replies_never_answer_a_later_request(late: int, first: str) -> None:
+    async with linked() as (transport, device):
         await transport.read()
         device.keep = late
         with pytest.raises(ResponseTimeoutError):
@@ -130,8 +143,9 @@ async def test_late_replies_never_answer_a_later_request(tmp_path: Path, late: i
         assert await transport.read() == (len(device.requests),) * 8
 
 
-async def test_a_late_reply_is_found_out_while_the_port_is_opened(tmp_path: Path) -> None:
-    async with linked(tmp_path) as (transport, device):
+@pytest.mark.virtual_time
+async def test_a_late_reply_is_found_out_while_the_port_is_opened() -> None:
+    async with linked() as (transport, device):
         device.keep = 2  # the read, and what was asked when it was not answered
         with pytest.raises(ResponseTimeoutError):
             await transport.read()
@@ -140,8 +154,9 @@ async def test_a_late_reply_is_found_out_while_the_port_is_opened(tmp_path: Path
         assert not transport.is_open
 
 
-async def test_a_wrong_check_sum_is_no_answer(tmp_path: Path) -> None:
-    async with linked(tmp_path) as (transport, device):
+@pytest.mark.virtual_time
+async def test_a_wrong_check_sum_is_no_answer() -> None:
+    async with linked() as (transport, device):
         device.spoil, device.spoils_all = wrong_checksum, True
         with pytest.raises(ProtocolError, match="a wrong checksum"):
             await transport.read()
@@ -166,9 +181,10 @@ SPOILT = {
 }
 
 
+@pytest.mark.virtual_time
 @pytest.mark.parametrize("how", SPOILT)
-async def test_a_read_is_asked_again_when_its_answer_is_lost_or_damaged(tmp_path: Path, how: str) -> None:
-    async with linked(tmp_path) as (transport, device):
+async def test_a_read_is_asked_again_when_its_answer_is_lost_or_damaged(how: str) -> None:
+    async with linked() as (transport, device):
         await transport.read()
         for number in (1, 2):
             asked = len(device.requests)
@@ -182,9 +198,10 @@ async def test_a_read_is_asked_again_when_its_answer_is_lost_or_damaged(tmp_path
         assert await transport.read() == (len(device.requests),) * 8
 
 
+@pytest.mark.virtual_time
 @pytest.mark.parametrize("how", SPOILT)
-async def test_a_write_is_never_sent_again(tmp_path: Path, how: str) -> None:
-    async with linked(tmp_path) as (transport, device):
+async def test_a_write_is_never_sent_again(how: str) -> None:
+    async with linked() as (transport, device):
         asked = len(device.requests)
         device.spoil = SPOILT[how]
         with pytest.raises(RobotiqConnectionError):
@@ -194,10 +211,11 @@ async def test_a_write_is_never_sent_again(tmp_path: Path, how: str) -> None:
         assert transport.repeats == 0
 
 
+@pytest.mark.virtual_time
 @pytest.mark.parametrize("spoilt", range(1, 3))
-async def test_a_read_is_asked_once_more_and_no_oftener(tmp_path: Path, spoilt: int) -> None:
+async def test_a_read_is_asked_once_more_and_no_oftener(spoilt: int) -> None:
     """The second time nothing may be wrong, neither with what brings the line in step nor with the answer."""
-    async with linked(tmp_path) as (transport, device):
+    async with linked() as (transport, device):
         counts: list[int] = []
 
         def spoil(reply: bytes) -> bytes:
@@ -212,9 +230,10 @@ async def test_a_read_is_asked_once_more_and_no_oftener(tmp_path: Path, spoilt: 
         assert not transport.is_open
 
 
+@pytest.mark.virtual_time
 @pytest.mark.parametrize("after", ["the silence", "the probe"])
-async def test_the_first_answer_that_was_only_late_is_not_the_second(tmp_path: Path, after: str) -> None:
-    async with linked(tmp_path) as (transport, device):
+async def test_the_first_answer_that_was_only_late_is_not_the_second(after: str) -> None:
+    async with linked() as (transport, device):
         await transport.read()
         asked = len(device.requests)
         device.keep = 1
@@ -223,7 +242,7 @@ async def test_the_first_answer_that_was_only_late_is_not_the_second(tmp_path: P
             await asyncio.sleep(0.001)
         if after == "the silence":
             await asyncio.sleep(0.055)  # the time-out has passed, and the silence has begun
-            os.write(device.descriptor, device.kept.pop())
+            device.send(device.kept.pop())
             assert await reading == (asked + 3,) * 8
             assert transport.is_open
         else:
@@ -234,41 +253,45 @@ async def test_the_first_answer_that_was_only_late_is_not_the_second(tmp_path: P
         assert await transport.read() == (len(device.requests),) * 8
 
 
-async def test_the_rest_of_a_damaged_answer_is_no_part_of_the_next(tmp_path: Path) -> None:
-    async with linked(tmp_path) as (transport, device):
+@pytest.mark.virtual_time
+async def test_the_rest_of_a_damaged_answer_is_no_part_of_the_next() -> None:
+    async with linked() as (transport, device):
         device.spoil = lambda reply: b"\xff" + reply[:10]
         reading = asyncio.ensure_future(transport.read())
         for _ in range(4):
             await asyncio.sleep(0.005)
-            os.write(device.descriptor, bytes.fromhex("09 03 10 00 00"))
+            device.send(bytes.fromhex("09 03 10 00 00"))
         assert await reading == (len(device.requests),) * 8
 
 
-async def test_who_talks_all_the_time_is_given_up(tmp_path: Path) -> None:
-    async with linked(tmp_path) as (transport, device):
+@pytest.mark.virtual_time
+async def test_who_talks_all_the_time_is_given_up() -> None:
+    async with linked() as (transport, device):
         device.spoil = lambda reply: b"\xff" + reply[:0]
         reading = asyncio.ensure_future(transport.read())
-        began = time.monotonic()
+        began = asyncio.get_running_loop().time()
         while not reading.done():
-            os.write(device.descriptor, b"\xff")
+            device.send(b"\xff")
             await asyncio.sleep(0.005)
-        assert time.monotonic() - began < 0.5
+        assert asyncio.get_running_loop().time() - began < 0.5
         with pytest.raises(ProtocolError):
             await reading
         assert not transport.is_open
 
 
-async def test_a_read_that_is_never_answered_takes_two_response_timeouts(tmp_path: Path) -> None:
-    async with linked(tmp_path) as (transport, device):
+@pytest.mark.virtual_time
+async def test_a_read_that_is_never_answered_takes_two_response_timeouts() -> None:
+    async with linked() as (transport, device):
         device.spoil, device.spoils_all = SPOILT["lost"], True
-        began = time.monotonic()
+        began = asyncio.get_running_loop().time()
         with pytest.raises(ResponseTimeoutError):
             await transport.read()
-        assert 0.099 <= time.monotonic() - began < 0.15
+        assert 0.099 <= asyncio.get_running_loop().time() - began < 0.15
 
 
-async def test_cancelled_while_the_line_falls_silent(tmp_path: Path) -> None:
-    async with linked(tmp_path) as (transport, device):
+@pytest.mark.virtual_time
+async def test_cancelled_while_the_line_falls_silent() -> None:
+    async with linked() as (transport, device):
         device.spoil = wrong_checksum
         reading = asyncio.ensure_future(transport.read())
         while len(device.requests) < 2:  # noqa: ASYNC110
@@ -280,11 +303,10 @@ async def test_cancelled_while_the_line_falls_silent(tmp_path: Path) -> None:
         assert not transport.is_open
 
 
-async def test_reads_asked_again_are_told_once_in_a_while(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+@pytest.mark.virtual_time
+async def test_reads_asked_again_are_told_once_in_a_while(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.WARNING, "robotiq_async")
-    async with linked(tmp_path) as (transport, device):
+    async with linked() as (transport, device):
         for _ in range(3):
             device.spoil = wrong_checksum
             await transport.read()
@@ -293,20 +315,22 @@ async def test_reads_asked_again_are_told_once_in_a_while(
     assert "a wrong checksum" in said[0]
 
 
-async def test_two_frames_keep_the_silence_of_the_standard(tmp_path: Path) -> None:
-    async with linked(tmp_path) as (transport, device):
+@pytest.mark.virtual_time
+async def test_two_frames_keep_the_silence_of_the_standard() -> None:
+    async with linked() as (transport, device):
         for _ in range(20):
             await transport.read()
-            answered = time.monotonic()
+            answered = asyncio.get_running_loop().time()
             await transport.write((0,) * 8)
             assert device.asked_at - answered >= 0.0016
 
 
+@pytest.mark.virtual_time
 @pytest.mark.parametrize("size", [600, 3000])
-async def test_a_burst_between_two_requests_is_found_out(tmp_path: Path, size: int) -> None:
-    async with linked(tmp_path) as (transport, device):
+async def test_a_burst_between_two_requests_is_found_out(size: int) -> None:
+    async with linked() as (transport, device):
         await transport.read()
-        os.write(device.descriptor, bytes(size))
+        device.send(bytes(size))
         for _ in range(20):
             await asyncio.sleep(0)
         with pytest.raises(ProtocolError, match=r"nobody asked for|not the answer"):  # as it arrives
@@ -333,9 +357,12 @@ async def test_what_is_no_port_is_told_from_what_is_not_there(device: str, why: 
 
 
 async def test_a_port_of_another_program_is_told(tmp_path: Path) -> None:
-    async with linked(tmp_path) as (_, _device):
-        with pytest.raises(ConnectFailedError) as caught:
-            await unopened(f"{tmp_path}/ttyNEAR").open()
+    with (
+        SerialLine(tmp_path) as line,
+        serial.Serial(str(line.near), exclusive=True),
+        pytest.raises(ConnectFailedError) as caught,
+    ):
+        await unopened(str(line.near)).open()
     assert TAKEN in str(caught.value)
 
 
