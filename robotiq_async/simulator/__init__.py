@@ -3,7 +3,8 @@
 ==============  ===========================================================================
 room            what it holds
 ==============  ===========================================================================
-``physics``     :class:`SimulatedGripper`: axes, contacts, faults, power, and the words it reports
+``physics``     :class:`SimulatedGripper`: axes, contacts, faults, power, and the words it reports;
+                :class:`Habits`: how it does what the manual leaves open
 ``server``      :class:`SimulatorServer` (Modbus TCP), :class:`SerialSimulatorServer` (Modbus RTU),
                 :class:`RtuOverTcpSimulatorServer` (Modbus RTU behind a serial server)
 ``troubles``    what can go wrong, as data and as words: :class:`Trouble`, :func:`parse_troubles`
@@ -14,12 +15,14 @@ The physics imports neither pymodbus nor asyncio.
 """
 
 from .physics.gripper import SimulatedGripper
+from .physics.habits import Habits
 from .server.rtu_tcp_server import RtuOverTcpSimulatorServer
 from .server.serial_server import SerialSimulatorServer
 from .server.tcp_server import SimulatorServer
 from .troubles.trouble import Trouble, parse_troubles
 
 __all__ = [
+    "Habits",
     "RtuOverTcpSimulatorServer",
     "SerialSimulatorServer",
     "SimulatedGripper",

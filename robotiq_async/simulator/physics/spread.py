@@ -44,8 +44,8 @@ class Spread:
         return self._figure("closed", -1, 1)
 
     def overshoot(self, position: int) -> int:
-        """Counts by which the axis goes too far when it is asked for a position between its stops."""
-        return self._figure(f"stop at {position}", 1, _TOLERANCE)
+        """Counts, or none, by which the axis goes too far when it is asked for a place between its stops."""
+        return self._figure(f"stop at {position}", 0, _TOLERANCE)
 
     def contact(self, position: int) -> int:
         """Counts from where an object is to where the axis feels it."""

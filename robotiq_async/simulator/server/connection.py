@@ -49,6 +49,9 @@ class Endpoint(Protocol):
     def undelivered(self, part: bytes) -> None:
         """Take what was to be sent to a client that is gone."""
 
+    def lets_in(self, client: Connection) -> bool:
+        """Whether a client that has come may stay."""
+
     def left_over(self) -> Iterable[bytes]:
         """What a new client is sent before it has asked for anything."""
 
@@ -77,6 +80,9 @@ class Connection(ServerRequestHandler):
     def callback_connected(self) -> None:
         """A client is there."""
         super().callback_connected()
+        if not self._endpoint.lets_in(self):
+            self.hang_up(reset=True)
+            return
         for part in self._endpoint.left_over():
             self.pass_on(part)
 

@@ -80,7 +80,8 @@ class RtuOverTcpSimulatorServer(SimulatorServer):
 
 class _RtuOverTcpServer(ModbusTcpServer):
     def __init__(self, endpoint: RtuOverTcpSimulatorServer) -> None:
-        super().__init__(RegisterBank(endpoint.gripper).device(), framer=FramerType.RTU)
+        bank = RegisterBank(endpoint.gripper, endpoint.fault_injector)
+        super().__init__(bank.device(), framer=FramerType.RTU)
         self._endpoint = endpoint
 
     def callback_new_connection(self) -> SerialConnection:

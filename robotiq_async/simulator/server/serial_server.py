@@ -124,7 +124,7 @@ class SerialSimulatorServer(SimulatorEndpoint):
 class _SerialServer(ModbusSerialServer):
     def __init__(self, endpoint: SerialSimulatorServer) -> None:
         super().__init__(
-            RegisterBank(endpoint.gripper).device(),
+            RegisterBank(endpoint.gripper, endpoint.fault_injector).device(),
             port=endpoint.port,
             baudrate=115200,
             bytesize=8,

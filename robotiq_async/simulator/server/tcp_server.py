@@ -158,7 +158,7 @@ class SimulatorServer(SimulatorEndpoint):
 
 class _TcpServer(ModbusTcpServer):
     def __init__(self, endpoint: SimulatorServer) -> None:
-        super().__init__(RegisterBank(endpoint.gripper).device())
+        super().__init__(RegisterBank(endpoint.gripper, endpoint.fault_injector).device())
         self._endpoint = endpoint
 
     def callback_new_connection(self) -> Connection:
