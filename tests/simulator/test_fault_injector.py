@@ -758,9 +758,9 @@ class SerialClient:
     def __init__(self, port: serial.Serial) -> None:
         self._port = port
 
-    async def ask(self) -> bytes:
+    async def ask(self, frame: bytes = bytes.fromhex("09 04 07d0 0001 300f")) -> bytes:
         """Read the first status register; the answer is empty when none comes."""
-        self._port.write(bytes.fromhex("09 04 07d0 0001 300f"))
+        self._port.write(frame)
         answer = b""
         for _ in range(10):
             await asyncio.sleep(0.05)

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, ClassVar, Final, Self
 
 from ..functions import READ_INPUT
 from ..physics.gripper import SimulatedGripper
-from ..physics.habits import REAL_ACTIVATION, Habits
 from ..troubles.corruption import ReplyPolicy, unchanged
 from ..troubles.fault_injector import FaultInjector
+from ..troubles.like_hardware import OWN_HABITS
 from ..troubles.replies import Replies
 from .connection import Connection
 
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from .framing import Frame
 
 
-_USUAL: Final = Habits(activation_time=REAL_ACTIVATION)
-"""Those of a gripper that is not given: who connects to a server waits as with a real one."""
 _MOST_LEFT_OVER: Final = 100
 """Parts of replies that a multiplexer keeps for its next client."""
 
@@ -48,7 +46,7 @@ class SimulatorEndpoint(ABC):
 
     def __init__(self, gripper: SimulatedGripper | None) -> None:
         """A server that is not started."""
-        self.gripper = SimulatedGripper(habits=_USUAL) if gripper is None else gripper
+        self.gripper = SimulatedGripper(habits=OWN_HABITS) if gripper is None else gripper
         self.policy: ReplyPolicy = unchanged
         self.fault_injector = FaultInjector(self)
         self.replies = Replies(self)
