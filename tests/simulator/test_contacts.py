@@ -66,14 +66,14 @@ def test_an_axis_grips_while_it_is_driven_against_what_it_touches(individual: Be
     individual.settle()
     assert individual.gripper.grips == Finger.A | Finger.B
     individual.write(go=False)
-    kept = NO_AXES if lets_go else Finger.A | Finger.B
-    assert individual.gripper.grips == kept
+    assert not individual.gripper.grips
+    assert individual.gripper.holds == (NO_AXES if lets_go else Finger.A | Finger.B)
     assert where(individual, Finger.A) == (150, CLOSING), "it stands where it was, and still tells of it"
     individual.write(go=True)
     individual.settle()
-    assert individual.gripper.grips == Finger.A | Finger.B
+    assert individual.gripper.grips == individual.gripper.holds == Finger.A | Finger.B
     individual.go({Finger.A: 150})
-    assert individual.gripper.grips == Finger.B, "to be asked to be where it is lets go"
+    assert individual.gripper.grips == individual.gripper.holds == Finger.B, "asked to be where it is: let go"
 
 
 def test_a_request_that_ends_at_the_object_is_no_contact(individual: Bench) -> None:

@@ -391,23 +391,23 @@ def test_a_fault_is_a_halt_for_a_grip(individual: Bench, fault: Fault, lets_go: 
     individual.gripper.place_object(Finger.ABC, 150)
     individual.close()
     individual.gripper.inject_fault(fault)
-    assert bool(individual.gripper.grips) is not lets_go
+    assert bool(individual.gripper.holds) is not lets_go
     individual.write(activate=False)
-    assert not individual.gripper.grips
+    assert not individual.gripper.holds
 
 
 def test_a_grip_that_stays_ends_with_the_power_and_with_a_new_request(individual: Bench) -> None:
     individual.gripper.place_object(Finger.ABC, 150)
     individual.close()
     individual.write(go=False)
-    assert individual.gripper.grips == Finger.ABC
+    assert individual.gripper.holds == Finger.ABC
     individual.write(go=True, axes=(AxisRequest(150, 255, 0),) * 4)
     individual.settle()
-    assert not individual.gripper.grips
+    assert not individual.gripper.holds
     individual.close()
     individual.write(go=False)
     individual.gripper.power_off()
-    assert not individual.gripper.grips
+    assert not individual.gripper.holds
 
 
 # Values.

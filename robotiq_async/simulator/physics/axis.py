@@ -86,8 +86,13 @@ class Axis:
 
     @property
     def grips(self) -> bool:
-        """Whether the axis is driven against what it touches, or was and has locked itself there."""
-        return self._is_locked or (self._goal is not None and self._is_latched_against(self._goal))
+        """Whether the axis is driven against what it touches."""
+        return self._goal is not None and self._is_latched_against(self._goal)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the axis grips, or did when it was stopped and has locked itself."""
+        return self.grips or self._is_locked
 
     @property
     def target(self) -> int:
@@ -129,8 +134,8 @@ class Axis:
             self._plan(time)
 
     def hold(self, time: float, *, locks: bool) -> None:
-        """Stop on the count the axis reads now, and forget the goal; an axis that locks keeps its grip."""
-        self._is_locked = locks and self.grips
+        """Stop on the count the axis reads now, and forget the goal; one that locks holds what it held."""
+        self._is_locked = locks and self.holds
         self._rest(time, float(round(self.position(time))))
         self._goal = None
 

@@ -203,14 +203,23 @@ class SimulatedGripper(Surroundings):
 
     @property
     def grips(self) -> Finger:
-        """The axes that are driven against what they touch, or have locked themselves there.
+        """The axes that are driven against what they touch: rGTO is set, and the request lies beyond it."""
+        self._catch_up()
+        return self._those(lambda axis: axis.grips)
 
-        Driven: rGTO is set, and the request lies beyond what it touches. Clearing rGTO leaves the grip,
-        unless the gripper ``lets_go_on_halt``; a reset, a loss of power and a request elsewhere end it.
+    @property
+    def holds(self) -> Finger:
+        """The axes that hold something: they grip, or did when rGTO was cleared or a fault came.
+
+        Such an axis locks itself, unless the gripper ``lets_go_on_halt``. A reset, a loss of power and a new
+        request end that.
         """
         self._catch_up()
-        gripping = (name for name, axis in zip(AXES, self._controller.axes, strict=True) if axis.grips)
-        return reduce(or_, gripping, NO_AXES)
+        return self._those(lambda axis: axis.holds)
+
+    def _those(self, wanted: Callable[[Axis], bool]) -> Finger:
+        named = zip(AXES, self._controller.axes, strict=True)
+        return reduce(or_, (name for name, axis in named if wanted(axis)), NO_AXES)
 
     def position(self, finger: Finger | int) -> int:
         """Where one axis is, in counts, as gPO reads.

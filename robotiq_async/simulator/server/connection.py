@@ -30,8 +30,8 @@ class Endpoint(Protocol):
     """What a connection asks of the simulator it belongs to."""
 
     @property
-    def functions(self) -> Collection[int]:
-        """The Modbus functions that are served."""
+    def served_functions(self) -> Collection[int]:
+        """The Modbus functions that are served now."""
 
     @property
     def answers_nobody(self) -> bool:
@@ -177,7 +177,7 @@ class Connection(ServerRequestHandler):
 
     def _answer(self, frame: Frame) -> None:
         self._answering = True
-        if (code := refusal(frame.pdu, self._endpoint.functions)) is not None:
+        if (code := refusal(frame.pdu, self._endpoint.served_functions)) is not None:
             self.pdu_send(ExceptionResponse(frame.pdu[0], code, frame.unit, frame.transaction))
             return
         self.recv_buffer = b""

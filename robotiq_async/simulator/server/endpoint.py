@@ -41,7 +41,7 @@ class SimulatorEndpoint(ABC):
     """
 
     link: ClassVar[Link]
-    _usual_functions: ClassVar[Collection[int]]
+    functions: ClassVar[Collection[int]]
     """The Modbus functions that are served without any trouble."""
 
     def __init__(self, gripper: SimulatedGripper | None) -> None:
@@ -123,11 +123,11 @@ class SimulatorEndpoint(ABC):
     # What connections ask (see connection.Endpoint).
 
     @property
-    def functions(self) -> Collection[int]:
-        """The Modbus functions that are served."""
+    def served_functions(self) -> Collection[int]:
+        """The Modbus functions that are served now."""
         if self.fault_injector.reads_only_with_function_3:
-            return set(self._usual_functions) - {READ_INPUT}
-        return self._usual_functions
+            return set(self.functions) - {READ_INPUT}
+        return self.functions
 
     def lets_in(self, client: Connection) -> bool:
         """Whether a client that has come may stay."""
