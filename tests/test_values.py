@@ -57,7 +57,7 @@ from robotiq_async.frozen_mapping import FrozenMapping
 from robotiq_async.link.address import parse_address
 from robotiq_async.link.simulation import Simulation
 from robotiq_async.session.statistics import Counters
-from robotiq_async.simulator import Trouble
+from robotiq_async.simulator import Habits, Trouble
 from robotiq_async.web.settings import PageSettings
 from robotiq_async.wire.registers import TCP_REGISTERS, gDT
 from robotiq_async.wire.request import AxisRequest, Request
@@ -103,6 +103,7 @@ VALUES: list[object] = [
     AxisRequest(1, 2, 3),
     ReconnectPolicy(give_up_after=3.0),
     Simulation(speedup=10.0, object=150),
+    Habits(status_lag=0.05),
     SpeedCalibration.thesis(),
     SpeedCalibration("mine", [[0, 9.0], [255, 2.0]]),  # type: ignore[arg-type]
     ForceCalibration.nominal(),

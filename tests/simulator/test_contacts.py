@@ -8,7 +8,7 @@ import pytest
 
 from robotiq_async.enums import AXES, NO_AXES, Fault, Finger, Initialization, Mode, ObjectStatus
 from robotiq_async.simulator import Habits
-from robotiq_async.simulator.physics.axis import PRESSING
+from robotiq_async.simulator.physics.mechanics.axis import PRESSING
 from tests.simulator.conftest import CYCLE
 
 if TYPE_CHECKING:

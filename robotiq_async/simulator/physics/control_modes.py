@@ -5,7 +5,7 @@ All of it is data: a :data:`Goals` tuple says where each axis goes, a sequence i
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from robotiq_async.calibration.closing_time import closing_time
 from robotiq_async.enums import (
@@ -14,41 +14,17 @@ from robotiq_async.enums import (
     OPEN_READING,
     SPEED_MAX,
     SPEED_MIN,
-    STROKE_COUNTS,
     WIDTH_WIDE,
     Mode,
 )
 from robotiq_async.wire.checks import check_int
 
+from .mechanics.goal import Goal
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from robotiq_async.wire.request import AxisRequest, Request
-
-
-class Goal(NamedTuple):
-    """Where an axis goes, how fast and with what force, in counts.
-
-    Attributes:
-        position: where to.
-        speed: 0..255.
-        force: 0..255.
-        is_reading: the axis ends where it reads the position, and not beside it as after a request.
-        stroke_time: seconds of a full stroke, if not those of the speed.
-        clears: what is in the way and not fixed has been taken out.
-    """
-
-    position: int
-    speed: int
-    force: int
-    is_reading: bool = False
-    stroke_time: float = 0.0
-    clears: bool = False
-
-    @property
-    def rate(self) -> float:
-        """Counts a second."""
-        return STROKE_COUNTS / (self.stroke_time or closing_time(self.speed))
 
 
 Goals = tuple[Goal | None, ...]

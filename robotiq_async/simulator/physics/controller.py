@@ -23,12 +23,12 @@ from robotiq_async.enums import (
 )
 
 from . import control_modes as control
-from .axis import Axis
 from .emergency_stop import EmergencyStop
 from .faults import PresentFaults
 from .inbox import REST
-from .motor import MOTORS, Motor
-from .spread import Spread
+from .mechanics.axis import Axis
+from .mechanics.motor import MOTORS, Motor
+from .mechanics.spread import Spread
 from .status_trail import NOTHING, Statuses, StatusTrail
 
 if TYPE_CHECKING:

@@ -18,14 +18,14 @@ from .control_modes import SCISSOR_HIGH, SCISSOR_LOW, check_scissor_limit
 from .controller import Controller
 from .habits import Habits
 from .inbox import Inbox, Write
-from .spread import SEED
+from .mechanics.spread import SEED
 from .status_report import status_registers
 from .surroundings import Surroundings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from .axis import Axis
+    from .mechanics.axis import Axis
 
 _LONGEST: Final = 1e9
 
@@ -39,8 +39,8 @@ class SimulatedGripper(Surroundings):
 
     A write takes effect one device cycle later, as on the device. Speeds are the measured ones of
     :mod:`robotiq_async.calibration.closing_time`; the scissor moves the same counts a second, as none are
-    published. What the motors draw stands in :mod:`.motor`, and by how much axes miss what they are asked in
-    :mod:`.spread`: as with a real gripper, who waits for gPO = rPR waits for ever.
+    published. What the motors draw stands in :mod:`.mechanics.motor`, and by how much axes miss what they are
+    asked in :mod:`.mechanics.spread`: as with a real gripper, who waits for gPO = rPR may wait for ever.
 
     Choices where no source settles the behaviour; those that can be made otherwise stand in :class:`Habits`:
 

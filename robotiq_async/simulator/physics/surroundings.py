@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 from robotiq_async.enums import AXES, Fault, Finger
 from robotiq_async.wire.checks import check_byte, check_int, check_mask, check_seconds
 
-from .axis import Axis, Obstacle
+from .mechanics.axis import Axis, Obstacle
 
 if TYPE_CHECKING:
     from .controller import Controller

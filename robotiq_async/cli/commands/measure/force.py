@@ -182,7 +182,7 @@ def _scale(
         return from_table
     if not address.startswith("sim:"):
         return typed
-    from ....simulator.physics.scale import SimulatedScale
+    from ....simulator.physics.mechanics.scale import SimulatedScale
 
     simulated = SimulatedScale(surface)
 

@@ -14,7 +14,7 @@ from robotiq_async.enums import ObjectStatus
 from .motor import Motor, peak
 
 if TYPE_CHECKING:
-    from .control_modes import Goal
+    from .goal import Goal
     from .spread import Spread
 
 PRESSING: Final = 0.05
