@@ -45,7 +45,7 @@ class Spread:
 
     def overshoot(self, position: int) -> int:
         """Counts, or none, by which the axis goes too far when it is asked for a place between its stops."""
-        return self._figure(f"stop at {position}", 0, _TOLERANCE)
+        return self._figure(f"goes past {position}", 0, _TOLERANCE)
 
     def contact(self, position: int) -> int:
         """Counts from where an object is to where the axis feels it."""
