@@ -149,4 +149,4 @@ def _list_troubles() -> None:
         usual = "" if kind.value is None else f" (VALUE: {kind.value:g} unless given)"
         lasts = "" if kind.lasts == 0 else "; goes on unless it is said for how long"
         link = "" if kind.link is None else f"; {kind.link} only"
-        print(f"{name:18} {kind.meaning}{usual}{lasts}{link}")
+        print(f"{name:19} {kind.meaning}{usual}{lasts}{link}")
