@@ -17,7 +17,7 @@ from ..failures import usage
 from ..output.notices import tell
 
 if TYPE_CHECKING:
-    from ...simulator import Trouble
+    from ...simulator import SimulatedGripper, Trouble
 
 
 async def simulate(
@@ -98,10 +98,7 @@ async def simulate(
         gripper = SimulatedGripper(
             speedup=speedup, spread=not exact, habits=OWN_HABITS if like_hardware else None
         )
-        if object_ is not None:
-            gripper.place_object(Finger.ABC, object_, fixed=fixed)
-        elif fixed:
-            raise ValueError("--fixed is about an object: give it with --object")
+        _place(gripper, object_, fixed=fixed)
         if serial is not None and rtu_over_tcp:
             raise ValueError("--serial and --rtu-over-tcp contradict each other")
         if unpaced and serial is None and not rtu_over_tcp:
@@ -136,6 +133,14 @@ async def simulate(
         if serial is not None:
             raise RobotiqError(f"cannot listen on {serial}: {why_no_port(error)}") from error
         raise RobotiqError(f"cannot listen on {host}:{port}: {error.strerror or error}") from error
+
+
+def _place(gripper: SimulatedGripper, position: int | None, *, fixed: bool) -> None:
+    """Put something in the way of the fingers, if there is something."""
+    if position is not None:
+        gripper.place_object(Finger.ABC, position, fixed=fixed)
+    elif fixed:
+        raise ValueError("--fixed is about an object: give it with --object")
 
 
 def _tell(trouble: Trouble) -> None:
