@@ -9,7 +9,7 @@ from typing import Final
 from ....description import HandModel, Pose
 from ....description.geometry import Vector
 from ....enums import Finger
-from ....kinematics import PREFIX
+from ....kinematics import FINGER_NAMES
 
 ALONE_M: Final = 0.02
 """How far something reaches from a finger that nobody helps to hold it."""
@@ -20,7 +20,7 @@ HALF_TIP_M: Final = 0.011
 def pads(model: HandModel, poses: Mapping[str, Pose]) -> dict[Finger, Pose]:
     """The face of each fingertip; y looks to the other side of the hand."""
     faces = {}
-    for finger, prefix in PREFIX.items():
+    for finger, prefix in FINGER_NAMES.items():
         link = f"{prefix}_link_3"
         pad = model.pad(link)
         face = poses[link] @ pad.origin

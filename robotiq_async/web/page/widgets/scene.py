@@ -12,7 +12,7 @@ from nicegui.elements.scene.scene_object3d import Object3D
 from ....description import HandModel, Pose, Shape, hand_model
 from ....description.geometry import turned
 from ....enums import AXES, Finger, ObjectStatus
-from ....kinematics import JOINTS, PREFIX, finger_angles, palm_angle
+from ....kinematics import JOINTS, FINGER_NAMES, finger_angles, palm_angle
 from ....wire.status import RobotiqStatus
 from ..mirror import HandMirror
 from .held import held, pads
@@ -148,7 +148,7 @@ class HandScene:
 
     def _show_ghost(self, ghost: Figure, hand: HandMirror, status: RobotiqStatus) -> Calls:
         away = _away(status) if status.go_echo and status.is_activated and not hand.is_lost else Finger(0)
-        for finger, prefix in PREFIX.items():
+        for finger, prefix in FINGER_NAMES.items():
             ghost.show(f"{prefix}_link_0", is_shown=bool(finger & away))
         return ghost.turn(_angles(status, requested=True)) if away else []
 
@@ -157,7 +157,7 @@ class HandScene:
         glowing = Finger(0) if hand.is_lost else status.contacts
         if glowing & Finger.SCISSOR:
             glowing |= Finger.B | Finger.C
-        fingers = {f"{prefix}_link_{n}": finger for finger, prefix in PREFIX.items() for n in (2, 3)}
+        fingers = {f"{prefix}_link_{n}": finger for finger, prefix in FINGER_NAMES.items() for n in (2, 3)}
         for link in self._model.links:
             is_hot = bool(fingers.get(link, Finger(0)) & glowing)
             self._figure.look(link, GLOW if is_hot else None, opacity)
@@ -175,8 +175,8 @@ class HandScene:
 
     def _letters(self) -> None:
         for axis, color in zip(AXES, COLORS, strict=True):
-            if axis in PREFIX:
-                with self._figure.group(f"{PREFIX[axis]}_link_3"):
+            if axis in FINGER_NAMES:
+                with self._figure.group(f"{FINGER_NAMES[axis]}_link_3"):
                     style = f"color:{color};font:bold 17px sans-serif;{HALO}"
                     ui.scene.text(str(axis.name), style).move(0.052, 0.032, 0.0)
 
@@ -195,7 +195,7 @@ def _away(status: RobotiqStatus) -> Finger:
 def _angles(status: RobotiqStatus, *, requested: bool) -> dict[str, float]:
     where = status.requested_position if requested else status.position
     palm = palm_angle(where(Finger.SCISSOR))
-    one, two, middle = (finger_angles(where(finger)) for finger in PREFIX)
+    one, two, middle = (finger_angles(where(finger)) for finger in FINGER_NAMES)
     return dict(zip(JOINTS, (palm, *one, -palm, *two, *middle), strict=True))
 
 
