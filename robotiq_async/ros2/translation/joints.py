@@ -17,7 +17,7 @@ from types import MappingProxyType
 from typing import Final
 
 from ...enums import Finger
-from ...kinematics import BASE, JOINTS, MIDDLE, PALM, FINGER_NAMES, Points, joint_angles
+from ...kinematics import BASE, FINGER_NAMES, JOINTS, MIDDLE, PALM, Points, joint_angles
 from ...wire.status import RobotiqStatus
 
 FINGERS: Final = "fingers"

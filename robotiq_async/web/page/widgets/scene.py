@@ -12,7 +12,7 @@ from nicegui.elements.scene.scene_object3d import Object3D
 from ....description import HandModel, Pose, Shape, hand_model
 from ....description.geometry import turned
 from ....enums import AXES, Finger, ObjectStatus
-from ....kinematics import JOINTS, FINGER_NAMES, finger_angles, palm_angle
+from ....kinematics import FINGER_NAMES, JOINTS, finger_angles, palm_angle
 from ....wire.status import RobotiqStatus
 from ..mirror import HandMirror
 from .held import held, pads
