@@ -195,14 +195,14 @@ def is_at(browser: Browser, link: str, position: tuple[float, float, float]) -> 
 
 async def test_what_it_holds_is_drawn_and_what_touches_glows(browser: Browser, stage: Stage) -> None:
     await browser.until(lambda: browser.link("finger_1_link_3"))
-    assert not await browser.run(VISIBLE, "object")
+    assert not await browser.run(VISIBLE, "bar")
     stage.gripper.place_object(Finger.ABC, position=90)
     await stage.hand.close()
-    await browser.until(lambda: browser.driver.execute_script(VISIBLE, "object"))
+    await browser.until(lambda: browser.driver.execute_script(VISIBLE, "bar"))
     await browser.until(lambda: "ff5a1f" in browser.driver.execute_script(COLORS, "finger_middle_link_3"))
     assert await browser.says("axes", "contact while closing")
     await stage.hand.open()
-    await browser.until(lambda: not browser.driver.execute_script(VISIBLE, "object"))
+    await browser.until(lambda: not browser.driver.execute_script(VISIBLE, "bar"))
 
 
 async def test_what_it_shows_of_a_gripper_that_dies_and_comes_back(browser: Browser, stage: Stage) -> None:

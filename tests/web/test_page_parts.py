@@ -1,10 +1,9 @@
-"""What the page is made of, without a browser: commands, news, the mirror, being in touch, what is held."""
+"""What the page is made of, without a browser: commands, news, the mirror, being in touch."""
 
 from __future__ import annotations
 
 import asyncio
 import json
-from math import dist
 from time import monotonic
 from typing import Any
 
@@ -14,14 +13,11 @@ pytest.importorskip("nicegui", reason="the page needs the extra web")
 
 from robotiq_async import CLOSED, Fault, Finger, RobotiqHand, State
 from robotiq_async.actions import Operator
-from robotiq_async.description import hand_model
-from robotiq_async.kinematics import JOINTS, joint_angles
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.web.commands import FRESH_S, MAX_COMMANDS, PageCommands
 from robotiq_async.web.news import HandNews
 from robotiq_async.web.page.heartbeat import LOST_S, Heartbeat
 from robotiq_async.web.page.mirror import HISTORY_S, Mirror
-from robotiq_async.web.page.widgets.held import held, pads
 from robotiq_async.web.page.widgets.words import event_words, fault_words, state_words
 from robotiq_async.web.server import PageServer
 from robotiq_async.web.settings import PageSettings
@@ -292,21 +288,3 @@ def test_a_browser_that_comes_back_has_caught_up_when_it_knows_a_time_since() ->
     heartbeat.heard(monotonic())
     assert heartbeat.has_caught_up()
     assert not heartbeat.has_caught_up(), "told once"
-
-
-# -- what is held ------------------------------------------------------------------------------------------
-
-
-async def test_what_is_held_lies_between_the_fingers(hand: RobotiqHand, gripper: SimulatedGripper) -> None:
-    gripper.place_object(Finger.ABC, position=70)
-    await hand.close()
-    model = hand_model()
-    faces = pads(model, model.link_poses(dict(zip(JOINTS, joint_angles(hand.status), strict=True))))
-    assert held(faces, Finger(0)) is None
-    ball = held(faces, hand.status.contacts)
-    assert ball is not None
-    middle, radius = ball
-    assert abs(middle[2]) < 1e-6, "B and C are level, so it lies in the plane of A"
-    assert dist(middle, faces[Finger.A].position) == pytest.approx(radius)
-    for axes in (Finger.A, Finger.B | Finger.C, Finger.SCISSOR):
-        assert held(faces, axes) is not None
