@@ -12,7 +12,7 @@ from ...telemetry.state_words import STATE_WORDS
 
 KEYS: Final = """\
 o open  c close  1 wide  2 normal  3 pinch  SPACE halt  + - speed  ] [ force
-a activate  r reset  l release  v recover                             q quit"""
+a activate  r reset  l release  v recover  p position of axes         q quit"""
 
 HINTS: Final = {
     State.FAULT: "v does what it needs",
