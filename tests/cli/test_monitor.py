@@ -25,11 +25,12 @@ from robotiq_async.actions import Operator
 from robotiq_async.cli.tui.asking import NO, Question, Target
 from robotiq_async.cli.tui.screen import Monitor
 from robotiq_async.cli.tui.widgets import Axes, position_bar, sparkline
-from robotiq_async.cli.tui.words import refusal_words
+from robotiq_async.cli.tui.words import HINTS
 from robotiq_async.control.state_machine import refusal
 from robotiq_async.control.triggers import Trigger
 from robotiq_async.enums import AXES
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.telemetry.refusal_words import refusal_words
 from tests.grippers import active_gripper
 
 if TYPE_CHECKING:
@@ -390,7 +391,7 @@ async def test_it_speaks_of_keys_and_not_of_methods_and_states(active: Operator)
     ],
 )
 def test_a_refusal_names_the_key_that_helps(error: RobotiqError, words: str) -> None:
-    assert refusal_words(error) == words
+    assert refusal_words(error, HINTS) == words
 
 
 async def test_the_log_keeps_clear_of_its_scroll_bar(operator: Operator) -> None:

@@ -13,8 +13,11 @@ pytest.importorskip("nicegui", reason="the page needs the extra web")
 
 from robotiq_async import CLOSED, Fault, Finger, RobotiqHand, State
 from robotiq_async.actions import Operator
+from robotiq_async.control.state_machine import TABLE, Verdict, refusal
+from robotiq_async.control.triggers import Trigger
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.web.commands import FRESH_S, MAX_COMMANDS, PageCommands
+from robotiq_async.telemetry.refusal_words import refusal_words
+from robotiq_async.web.commands import BUTTONS, FRESH_S, MAX_COMMANDS, PageCommands
 from robotiq_async.web.news import HandNews
 from robotiq_async.web.page.heartbeat import LOST_S, Heartbeat
 from robotiq_async.web.page.mirror import HISTORY_S, Mirror
@@ -63,6 +66,42 @@ async def test_what_there_is_not_is_refused(name: str, hand: int) -> None:
     pages.do(name, hand=hand)
     answer = await pages.answer()
     assert (answer["ok"], answer["words"]) == (False, f"there is no {name} of hand {hand}")
+
+
+async def test_it_speaks_of_buttons_and_not_of_python() -> None:
+    """ "call activate() or recover()" stood under a button named activate."""
+    gripper = SimulatedGripper(speedup=20)
+    async with SimulatorServer(gripper) as server:
+        hand = RobotiqHand(server.address, name="left")
+        await hand.start(activate=False)
+        pages, said = Pages(hand), []
+        for name, arguments in (("close", {}), ("move", {"position": 9}), ("release", {"confirm": True})):
+            pages.do(name, **arguments)
+            said.append((await pages.answer())["words"])
+        await hand.activate()
+        gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+        await hand.wait_for_state(State.FAULT)
+        pages.do("close")
+        said.append((await pages.answer())["words"])
+        await hand.stop()
+        pages.do("close")
+        said.append((await pages.answer())["words"])
+    assert said == [
+        "the gripper is not activated; press activate",
+        "the gripper is not activated; press activate",
+        "not now, as it is 'reset: not active'; only when 'fault'",
+        f"major fault 0x0E: {Fault.SCISSOR_BLOCKED.description}; press recover",
+        "the hand is not started",
+    ]
+
+
+@pytest.mark.parametrize("trigger", [each for each in Trigger if each.name.startswith("ASK_")])
+@pytest.mark.parametrize("state", State)
+def test_no_refusal_has_a_method_or_a_state_of_the_library(trigger: Trigger, state: State) -> None:
+    if isinstance(TABLE[state][trigger], Verdict):
+        words = refusal_words(refusal(trigger, state), BUTTONS)
+        assert "()" not in words
+        assert not [each.name for each in State if "_" in each.name and each.name in words]
 
 
 async def test_without_operators_nothing_is_carried_out() -> None:

@@ -21,11 +21,12 @@ from ...enums import AXES, Fault, Finger, State
 from ...errors import RobotiqError
 from ...session.timing.clock import now
 from ...telemetry.payloads import fault_fields, title
+from ...telemetry.refusal_words import refusal_words
 from ...wire.status import RobotiqStatus
 from ..output.text import clock, event_line
 from .asking import Asking, Question, Target
 from .widgets import Axes, Line, link_text, state_text
-from .words import KEYS, refusal_words, transition_words
+from .words import HINTS, KEYS, transition_words
 
 if sys.platform == "win32":
     DRIVER, NONBLOCKING = None, ()
@@ -225,6 +226,6 @@ class Monitor(App[None]):
             try:
                 self.write_log(f"{name}: {await work()}", "bold")
             except RobotiqError as error:
-                self.write_log(f"{name}: {refusal_words(error)}", "bold red")
+                self.write_log(f"{name}: {refusal_words(error, HINTS)}", "bold red")
 
         _: Worker[None] = self.run_worker(carry_out)
