@@ -69,7 +69,7 @@ async def test_what_there_is_not_is_refused(name: str, hand: int) -> None:
 
 
 async def test_it_speaks_of_buttons_and_not_of_python() -> None:
-    """ "call activate() or recover()" stood under a button named activate."""
+    """It said: call activate() or recover(). The button is named activate."""
     gripper = SimulatedGripper(speedup=20)
     async with SimulatorServer(gripper) as server:
         hand = RobotiqHand(server.address, name="left")
