@@ -6,7 +6,8 @@ room            what it holds
 ``physics``     :class:`SimulatedGripper`: axes, contacts, faults, power, and the words it reports
 ``server``      :class:`SimulatorServer` (Modbus TCP), :class:`SerialSimulatorServer` (Modbus RTU),
                 :class:`RtuOverTcpSimulatorServer` (Modbus RTU behind a serial server)
-``troubles``    what can go wrong, as data and as words: :class:`Trouble`, :func:`parse_troubles`
+``troubles``    what can go wrong, as data and as words: :class:`Trouble`, :func:`parse_troubles`;
+                :class:`FaultInjector`, ``server.fault_injector``, makes it happen
 ``functions``   the Modbus functions that are served
 ==============  ===========================================================================
 
@@ -17,9 +18,11 @@ from .physics.gripper import SimulatedGripper
 from .server.rtu_tcp_server import RtuOverTcpSimulatorServer
 from .server.serial_server import SerialSimulatorServer
 from .server.tcp_server import SimulatorServer
+from .troubles.fault_injector import FaultInjector
 from .troubles.trouble import Trouble, parse_troubles
 
 __all__ = [
+    "FaultInjector",
     "RtuOverTcpSimulatorServer",
     "SerialSimulatorServer",
     "SimulatedGripper",
