@@ -29,8 +29,8 @@ STAGE: Final = "#b9c3cf"
 HALO: Final = "text-shadow:0 0 2px #fff,0 0 2px #fff,0 0 4px #fff"
 """Around a letter, wherever it is before."""
 LETTER: Final = "font:bold 17px sans-serif"
-NAME: Final = "font:11px sans-serif;padding-top:2.2em"
-"""Below the letter, which stands in the same place."""
+NAME: Final = "font:11px sans-serif;font-size:clamp(0px,(100vw - 640px) * 9,11px);padding-top:2.2em"
+"""Below the letter, which stands in the same place; on a phone there is no room for it."""
 HELD: Final = "#f2c230"
 STALE: Final = 0.25
 APART: Final = 3
