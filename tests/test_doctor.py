@@ -280,9 +280,9 @@ async def test_a_device_that_is_no_gripper(byte: bytes) -> None:
 
 
 def test_an_extra_that_is_missing_is_no_question_of_cables() -> None:
-    assert _advice_for_opening(parse_address("rtu:///dev/x"), "pip install 'robotiq-async[serial]'") == (
-        "Install that, and look again."
-    )
+    assert _advice_for_opening(
+        parse_address("rtu:///dev/x"), "pip install 'pyserial>=3.5' (the extra serial)"
+    ) == ("Install that, and look again.")
 
 
 @virtual_time

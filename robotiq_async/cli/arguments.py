@@ -11,6 +11,7 @@ from typing import Annotated, Final
 from cyclopts import Parameter, Token
 
 from ..enums import Finger
+from ..extras import install
 from ..session.options import RESPONSE_TIMEOUT_S
 from ..wire.checks import parse_fingers
 from .failures import CommandError, UsageError, usage
@@ -23,7 +24,7 @@ def need(module: str, extra: str, instead: str = "") -> None:
         CommandError: it is not.
     """
     if find_spec(module) is None:
-        raise CommandError(f"this needs {module}: pip install 'robotiq-async[{extra}]'{instead}")
+        raise CommandError(f"this needs {module}: {install(extra)}{instead}")
 
 
 def _integer(name: str, low: int, high: int) -> Callable[[object, Sequence[Token]], int]:

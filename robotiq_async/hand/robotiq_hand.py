@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from ..calibration import ForceCalibration, SpeedCalibration
 from ..control.state_machine import StateMachine
@@ -129,6 +129,22 @@ class RobotiqHand(Commands):
     ) -> None:
         """Stop, also when the block failed or was cancelled."""
         await self.stop()
+
+    if not TYPE_CHECKING:  # type checkers tell the mistake themselves
+
+        def __enter__(self) -> None:
+            """Refuse ``with``.
+
+            Raises:
+                TypeError: always.
+            """
+            raise TypeError(
+                "a RobotiqHand is used with 'async with', in a coroutine; for 'with' there is the hand that "
+                "blocks: robotiq_async.sync.RobotiqHand"
+            )
+
+        def __exit__(self, *_: object) -> None:
+            """Never called; without it Python would not call the other one."""
 
     @tells_its_hand
     async def start(self, activate: bool = True, *, wait: float = 0.0) -> None:

@@ -92,8 +92,10 @@ def _make(address: Address, host: str, options: dict[str, Any]) -> Client:
         try:
             import serial  # noqa: F401, PLC0415
         except ImportError:
+            from ..extras import install  # noqa: PLC0415  # nothing else needs it
+
             raise ConnectFailedError(
-                str(address), "serial ports need pyserial: pip install 'robotiq-async[serial]'"
+                str(address), f"serial ports need pyserial: {install('serial')}"
             ) from None
         form: dict[str, Any] = {"baudrate": BAUD, "bytesize": 8, "parity": "N", "stopbits": 1}
         client = AsyncModbusSerialClient(host, framer=FramerType.RTU, **form, **options)

@@ -13,7 +13,9 @@ try:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 except ModuleNotFoundError as error:
-    raise ImportError("pictures need matplotlib: pip install 'robotiq-async[plot]'") from error
+    from ..extras import install
+
+    raise ImportError(f"pictures need matplotlib: {install('plot')}") from error
 
 from ..calibration.csv_tables import Table
 from ..calibration.scales import ForceCalibration, SpeedCalibration, mean, newton

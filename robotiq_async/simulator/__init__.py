@@ -7,7 +7,8 @@ room            what it holds
                 :class:`Habits`: how it does what the manual leaves open
 ``server``      :class:`SimulatorServer` (Modbus TCP), :class:`SerialSimulatorServer` (Modbus RTU),
                 :class:`RtuOverTcpSimulatorServer` (Modbus RTU behind a serial server)
-``troubles``    what can go wrong, as data and as words: :class:`Trouble`, :func:`parse_troubles`
+``troubles``    what can go wrong, as data and as words: :class:`Trouble`, :func:`parse_troubles`;
+                :class:`FaultInjector`, ``server.fault_injector``, makes it happen
 ``functions``   the Modbus functions that are served
 ==============  ===========================================================================
 
@@ -19,9 +20,11 @@ from .physics.habits import Habits
 from .server.rtu_tcp_server import RtuOverTcpSimulatorServer
 from .server.serial_server import SerialSimulatorServer
 from .server.tcp_server import SimulatorServer
+from .troubles.fault_injector import FaultInjector
 from .troubles.trouble import Trouble, parse_troubles
 
 __all__ = [
+    "FaultInjector",
     "Habits",
     "RtuOverTcpSimulatorServer",
     "SerialSimulatorServer",

@@ -20,7 +20,9 @@ try:
     from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
     from prometheus_client.registry import Collector
 except ModuleNotFoundError as error:
-    raise ImportError("metrics need prometheus-client: pip install 'robotiq-async[metrics]'") from error
+    from ..extras import install
+
+    raise ImportError(f"metrics need prometheus-client: {install('metrics')}") from error
 
 from ..enums import State
 from ..protocol import Hand

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from ..enums import AXES, Fault, Finger, State
 from ..errors import NotStartedError
-from ..kinematics import PREFIX
+from ..kinematics import FINGER_NAMES
 from ..protocol import Hand
 from ..session.streams import Transition
 from ..wire.status import RobotiqStatus
@@ -171,5 +171,5 @@ def state_fields(hand: Hand, now: float) -> Fields:
 def efforts(status: RobotiqStatus) -> list[float]:
     """Motor currents in ampere, each at the joint its motor drives first; torques are not known."""
     scissor = status.current_ma(Finger.SCISSOR) / 1000
-    one, two, middle = (status.current_ma(finger) / 1000 for finger in PREFIX)
+    one, two, middle = (status.current_ma(finger) / 1000 for finger in FINGER_NAMES)
     return [scissor, one, 0.0, 0.0, scissor, two, 0.0, 0.0, middle, 0.0, 0.0]

@@ -27,7 +27,9 @@ from typing import Any, Final, Self
 try:
     from mcap.writer import CompressionType, Writer
 except ModuleNotFoundError as error:
-    raise ImportError("recordings need mcap: pip install 'robotiq-async[record]'") from error
+    from ..extras import install
+
+    raise ImportError(f"recordings need mcap: {install('record')}") from error
 
 from ..concurrency import in_a_thread, wait_shielded
 from ..errors import RecordingError

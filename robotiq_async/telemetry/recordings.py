@@ -21,7 +21,9 @@ try:
     from mcap.stream_reader import StreamReader, breakup_chunk
     from mcap.writer import Writer
 except ModuleNotFoundError as error:
-    raise ImportError("recordings need mcap: pip install 'robotiq-async[record]'") from error
+    from ..extras import install
+
+    raise ImportError(f"recordings need mcap: {install('record')}") from error
 
 from ..errors import RecordingError
 from ..log import log

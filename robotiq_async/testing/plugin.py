@@ -14,8 +14,7 @@ import pytest
 
 if TYPE_CHECKING:
     from ..hand import RobotiqHand
-    from ..simulator import SimulatedGripper, SimulatorServer
-    from ..simulator.troubles.fault_injector import FaultInjector
+    from ..simulator import FaultInjector, SimulatedGripper, SimulatorServer
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -9,13 +9,21 @@ from time import monotonic
 from typing import Final
 
 from ..actions import Operator
+from ..enums import State
 from ..errors import RobotiqError
 from ..telemetry.payloads import Fields
+from ..telemetry.refusal_words import refusal_words
 from ..telemetry.services import SERVICES
 
 MAX_COMMANDS: Final = 16
 """Of one page at a time; a halt is never refused."""
 HALT: Final = "halt"
+BUTTONS: Final = {
+    State.FAULT: "press recover",
+    State.ATR_DONE: "press reset",
+    State.RESET: "press activate",
+}
+"""The button that helps in a state."""
 FRESH_S: Final = 1.5
 """A command that was asked for longer ago moves nothing; a halt is never too old."""
 
@@ -108,5 +116,7 @@ def _outcome(task: asyncio.Task[str]) -> tuple[bool, str]:
         return True, task.result()
     except asyncio.CancelledError:
         return False, "the page was gone: the axes are held"
-    except (RobotiqError, ValueError, TypeError) as error:
+    except RobotiqError as error:
+        return False, refusal_words(error, BUTTONS)
+    except (ValueError, TypeError) as error:
         return False, str(error)

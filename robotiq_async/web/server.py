@@ -31,7 +31,9 @@ from .news import HandNews
 from .settings import PageSettings
 
 if find_spec("nicegui") is None:
-    raise ImportError("the page needs nicegui: pip install 'robotiq-async[web]'")
+    from ..extras import install
+
+    raise ImportError(f"the page needs nicegui: {install('web')}")
 
 UPDATE_S: Final = 0.05
 START_S: Final = 30.0

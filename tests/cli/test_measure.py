@@ -162,7 +162,7 @@ def test_without_matplotlib_nothing_is_begun(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     without("matplotlib")
-    call("measure", "speed").assert_failed(1, "pip install 'robotiq-async[plot]'", "--no-plot")
+    call("measure", "speed").assert_failed(1, "pip install 'matplotlib", "--no-plot")
     assert files_in(tmp_path) == []
 
 

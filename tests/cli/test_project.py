@@ -60,7 +60,7 @@ def test_every_dependency_is_pinned() -> None:
 EXTRAS: dict[str, list[str]] = PROJECT["optional-dependencies"]
 NEED = re.compile(r'need\("(\w+)", "(\w+)"')
 """A command refuses to go on without a module of an extra."""
-ADVICE = re.compile(r"needs? ([a-z-]+): pip install 'robotiq-async\[(\w+)\]'")
+ADVICE = re.compile(r"needs? ([a-z-]+): \{install\('(\w+)'\)\}")
 """A module of the package does."""
 
 

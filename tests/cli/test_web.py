@@ -105,7 +105,7 @@ def test_bad_input_is_one_clear_line(
 def test_without_nicegui_one_line_names_the_extra(call: Call, without: Callable[[str], None]) -> None:
     without("nicegui")
     for command in (["web"], ["demo", "--show"]):
-        call(*command).assert_failed(1, "pip install 'robotiq-async[web]'")
+        call(*command).assert_failed(1, "pip install 'nicegui")
 
 
 async def test_the_demo_waits_until_somebody_looks(shell: Shell) -> None:

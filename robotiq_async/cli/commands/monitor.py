@@ -42,6 +42,7 @@ async def monitor(
         SPACE    halt
         + -      speed
         ] [      force
+        p        any position of any axes: asks for them
         a r l v  activate, reset, release, recover: ask first
         q        quit
 

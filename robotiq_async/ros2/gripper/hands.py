@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 
 from ...errors import RobotiqError
+from ...extras import install
 from ...fleet.network.route import is_remote
 from ...fleet.remote.remote_hand import RemoteHand
 from ...hand import RobotiqHand
@@ -24,7 +25,7 @@ def make_hand(settings: Settings) -> Hand:
     """
     if is_remote(settings.address):
         if find_spec("zenoh") is None:
-            raise RobotiqError("a gripper on another host needs zenoh: pip install 'robotiq-async[fleet]'")
+            raise RobotiqError(f"a gripper on another host needs zenoh: {install('fleet')}")
         return RemoteHand(settings.address, control=None)
     return RobotiqHand(
         settings.address,

@@ -91,7 +91,9 @@ class SerialSimulatorServer(SimulatorEndpoint):
             OSError: the serial port cannot be opened.
         """
         if importlib.util.find_spec("serial") is None:
-            raise ImportError("a serial line needs pyserial: pip install 'robotiq-async[serial]'")
+            from robotiq_async.extras import install  # noqa: PLC0415  # nothing else needs it
+
+            raise ImportError(f"a serial line needs pyserial: {install('serial')}")
         await super().start()
 
     @property
