@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from robotiq_async import Finger, NotStartedError, RobotiqHand, State
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.simulator import Habits, SimulatedGripper, SimulatorServer
 from robotiq_async.wire.request import Request
 from tests.contract.bench import until
 from tests.grippers import activate_beforehand
@@ -289,3 +289,30 @@ async def test_waiting_for_the_end_is_no_request(hand: RobotiqHand) -> None:
     await asyncio.sleep(0)
     assert await hand.wait_for_state(State.SHUTDOWN) is State.SHUTDOWN
     await stopping
+
+
+# -- a gripper that forgets writes -------------------------------------------------------------------------
+
+SPACING_S = 0.01
+"""By the manual of 2014 a write that comes sooner after another one may be dropped."""
+
+
+@pytest.mark.parametrize("later", [0.001, 0.004, 0.006, 0.009])
+@pytest.mark.parametrize("options", [{}, {"keep_grip": True}], ids=str)
+async def test_a_stop_that_was_acknowledged_and_forgotten_is_sent_again(
+    options: dict[str, bool], later: float
+) -> None:
+    """It returned with a warning after 1.2 s, and the axis went on to its target."""
+    loop = asyncio.get_running_loop()
+    gripper = SimulatedGripper(loop.time, habits=Habits(write_spacing=SPACING_S))
+    await activate_beforehand(gripper)
+    async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
+        await hand.set_speed(0)
+        await asyncio.sleep(1)
+        await hand.set_position(255, A)
+        await asyncio.sleep(later)
+        before = loop.time()
+        await hand.stop(**options)
+        assert loop.time() - before < 2.0
+        assert not gripper.is_moving
+        assert gripper.position(A) < 60
