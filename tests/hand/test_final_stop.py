@@ -316,3 +316,19 @@ async def test_a_stop_that_was_acknowledged_and_forgotten_is_sent_again(
         assert loop.time() - before < 2.0
         assert not gripper.is_moving
         assert gripper.position(A) < 60
+
+
+@pytest.mark.parametrize("later", [0.001, 0.004, 0.006, 0.009])
+async def test_a_halt_that_was_acknowledged_and_forgotten_is_sent_again(later: float) -> None:
+    """It returned half a second later, and the axis went on."""
+    loop = asyncio.get_running_loop()
+    gripper = SimulatedGripper(loop.time, habits=Habits(write_spacing=SPACING_S))
+    await activate_beforehand(gripper)
+    async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
+        await hand.set_speed(0)
+        await asyncio.sleep(1)
+        await hand.set_position(255, A)
+        await asyncio.sleep(later)
+        await hand.halt()
+        assert not gripper.is_moving
+        assert hand.state is State.RUNNING_IDLE
