@@ -75,7 +75,7 @@ STROKE_COUNTS: Final = CLOSED_READING - OPEN_READING
 class Code(IntEnum):
     """A field of the status: it prints as its name, and is its number everywhere else.
 
-    ``print(fault)`` and ``f"{fault}"`` show ``NONE``; ``f"{fault:02X}"``, arithmetic and JSON have the number.
+    ``print(fault)`` and ``f"{fault}"`` show ``NONE``; ``f"{fault:02X}"`` and JSON have the number.
     """
 
     def __str__(self) -> str:

@@ -15,7 +15,8 @@ TCP_PORT: Final = 502
 FORMS: Final = (
     "tcp://HOST[:PORT] (or bare HOST or HOST:PORT), "
     "rtu:///dev/ttyUSB0 (a serial port; rtu://COM3 on Windows), "
-    "rtu+tcp://HOST:PORT (a serial line behind a TCP socket), sim:// (or sim://?speedup=10&object=150)"
+    "rtu+tcp://HOST:PORT (a serial line behind a TCP socket), sim:// (or sim://?speedup=10&object=150), "
+    "zenoh://SITE/HOST/GRIPPER (on another host: for robotiq_async.fleet.RemoteHand and for commands)"
 )
 
 
@@ -63,6 +64,7 @@ def parse_address(address: object) -> Address:
     if not isinstance(address, str):
         raise TypeError(f"address must be a string, got {address!r}; accepted: {FORMS}")
     scheme, separator, rest = address.partition("://")
+    scheme = scheme.lower()
     if not separator:
         scheme, rest = "tcp", address
     if scheme == "sim" and rest[:1] in ("", "?"):
@@ -80,6 +82,10 @@ def parse_address(address: object) -> Address:
             raise ValueError(f"malformed address {address!r}: {what}; accepted: {FORMS}")
         if host and port is not None:
             return Address("tcp" if scheme == "tcp" else "rtu+tcp", host, port)
+    if scheme == "zenoh":
+        raise ValueError(
+            f"{address!r} is a gripper on another host: use robotiq_async.fleet.RemoteHand; accepted: {FORMS}"
+        )
     raise ValueError(f"malformed address {address!r}; accepted: {FORMS}")
 
 

@@ -64,7 +64,8 @@ def test_everything(tmp_path: Path) -> None:
     assert settings.grippers["left"].speed == 255
     assert settings.grippers["right"].status_address == 2000
     assert [each.keep_grip for each in settings.grippers.values()] == [False, True]
-    assert settings.grippers["left"].make_hand().address == "tcp://192.168.1.11:502"
+    hand = settings.grippers["left"].make_hand("left")
+    assert (hand.name, hand.address) == ("left", "tcp://192.168.1.11:502")
 
 
 def test_with_keys_it_listens_encrypted(tmp_path: Path) -> None:

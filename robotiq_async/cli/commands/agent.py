@@ -89,7 +89,7 @@ async def _serve(settings: AgentSettings) -> None:
     )
     if settings.insecure:
         tell("anyone who reaches this host can command its grippers: there are no keys")
-    hands = {name: gripper.make_hand() for name, gripper in settings.grippers.items()}
+    hands = {name: gripper.make_hand(name) for name, gripper in settings.grippers.items()}
     try:
         bus = await _open(configuration, ", ".join(settings.listen or settings.connect))
         try:

@@ -13,8 +13,11 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
-import zenoh
-from zenoh.handlers import Callback
+try:
+    import zenoh
+    from zenoh.handlers import Callback
+except ModuleNotFoundError as error:
+    raise ImportError("hands on other hosts need zenoh: pip install 'robotiq-async[fleet]'") from error
 
 from ...concurrency import in_a_thread
 from ...errors import ConnectFailedError

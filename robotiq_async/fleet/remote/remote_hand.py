@@ -106,6 +106,7 @@ class RemoteHand(RemoteCommands):
             RuntimeError: not in a running asyncio event loop.
             InvalidStateError: this hand is started already.
             ConnectFailedError: no agent that serves this gripper.
+            ImportError: the extra fleet is not installed.
             NotAllowedError: the agent's access rules say no.
             ControlLostError: another client commands the gripper.
             RobotiqError: as for a hand of this process, where the gripper is.

@@ -71,7 +71,7 @@ async def gripper(
     """
     from ...connect import make_hand
 
-    if not address.startswith("sim:"):
+    if not is_simulated(address):
         async with make_hand(address) as hand:
             yield hand
         return

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ....enums import Finger
-from ...addresses import full_address
+from ...addresses import full_address, is_simulated
 from ...arguments import Address, Fingers, Yes
 from ...consent import consent
 from ...failures import UsageError
@@ -87,6 +87,6 @@ async def _measure(address: str, campaign: Campaign, fingers: Finger, speedup: f
     if plot:
         from ....measure.plots import plot_speed
 
-        label = "simulated" if address.startswith("sim:") else "measured"
+        label = "simulated" if is_simulated(address) else "measured"
         with refused():
             told(plot_speed(output.with_suffix(""), campaign.table, label))
