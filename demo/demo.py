@@ -33,7 +33,7 @@ from robotiq_async import (
     State,
     Transition,
 )
-from robotiq_async.cli.addresses import is_simulated
+from robotiq_async.cli.addresses import gripper_words, is_simulated
 from robotiq_async.cli.consent import consent
 from robotiq_async.cli.failures import CommandError, UsageError
 from robotiq_async.cli.output.log_capture import forget
@@ -64,6 +64,7 @@ async def run(
     Raises:
         RobotiqError: the gripper or the link failed.
     """
+    print(gripper_words(address), flush=True)
     async with gripper(address) as (where, simulated):
         kind: type[RemoteHand | RobotiqHand] = RemoteHand if is_remote(where) else RobotiqHand
         hand: Hand = kind(where)

@@ -32,12 +32,14 @@ COMMANDS: Final = (
 
 _HELP = """Control a Robotiq 3-Finger gripper, or a simulated one.
 
-Every command that talks to a gripper takes its address as the last argument:
+Every command that talks to a gripper takes its address as the last argument, and names it first:
 
     tcp://192.168.1.11    Modbus TCP; tcp:// and the port (:502) may be left out
     rtu:///dev/ttyUSB0    Modbus RTU on a serial line (extra serial)
     zenoh://lab/cell/left one that an agent on another host serves (extra fleet)
-    sim://                the default: a gripper simulated inside the command
+    sim://                a gripper simulated inside the command
+
+Without an address it is sim://; doctor and measure want one.
 
 Nothing here has run on real hardware yet.
 """

@@ -101,8 +101,12 @@ SCHEMAS: Final = {
 
 
 def title(hand: Hand) -> str:
-    """Which hand, for people: its name and its address, where the one is not the other."""
-    return hand.address if hand.name == hand.address else f"{hand.name} ({hand.address})"
+    """Which hand, for people: its name and its address, where the one is not the other.
+
+    A simulated one is called that.
+    """
+    words = hand.address if hand.name == hand.address else f"{hand.name} ({hand.address})"
+    return f"{words}, simulated" if hand.address.startswith("sim:") else words
 
 
 def initial_state_fields(state: State, now: float) -> Fields:

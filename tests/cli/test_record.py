@@ -56,6 +56,7 @@ async def test_ctrl_c_ends_a_recording_that_is_whole_and_touches_nothing(
     gripper = SimulatedGripper(speedup=20)
     async with SimulatorServer(gripper) as server:
         process = await shell.start("record", str(file), server.address)
+        assert await shell.read_line(process) == f"Gripper {server.address}"
         assert (await shell.read_line(process)).startswith("Recording ")
         async with asyncio.timeout(20):
             while os.stat(file).st_size < 3000:  # noqa: ASYNC110  # another process writes it

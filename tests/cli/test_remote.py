@@ -104,6 +104,15 @@ def test_status_move_and_the_demo(
     agent.finish(signal.SIGINT).assert_succeeded()
 
 
+def test_an_agent_says_which_gripper_is_simulated(
+    beside: Callable[..., Beside], endpoint: str, tmp_path: Path
+) -> None:
+    agent = beside("agent", str(fleet_file(tmp_path, endpoint, "sim://")))
+    assert agent.read_line() == ADDRESS
+    assert agent.read_error() == "robotiq-async: left: Simulated gripper sim://"
+    agent.finish(signal.SIGINT).assert_succeeded()
+
+
 def test_the_log_of_an_agent_calls_each_gripper_by_its_name(
     beside: Callable[..., Beside], endpoint: str, tmp_path: Path
 ) -> None:

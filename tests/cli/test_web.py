@@ -110,7 +110,7 @@ def test_without_nicegui_one_line_names_the_extra(call: Call, without: Callable[
 
 async def test_the_demo_waits_until_somebody_looks(shell: Shell) -> None:
     process = await shell.start("demo", "--show")
-    lines = [await shell.read_line(process) for _ in range(2)]
+    lines = [await shell.read_line(process) for _ in range(3)]
     url = next(line.partition(": ")[2] for line in lines if line.startswith("Watch it move: "))
     assert await asyncio.to_thread(status, url) == 303
     process.send_signal(signal.SIGINT)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ...log import log
+from ..addresses import gripper_words, is_simulated
 from ..arguments import Flag, need
 from ..failures import UsageError
 from ..output.log_capture import forget, forwarded_warnings
@@ -95,7 +96,7 @@ async def _serve(settings: AgentSettings) -> None:
         try:
             with forwarded_warnings(tell):
                 served = Agent(settings.site, settings.host, hands, bus, window=settings.window)
-                await served.run(lambda: _announce(served))
+                await served.run(lambda: _announce(served, settings))
         finally:
             await bus.close()
     except asyncio.CancelledError:
@@ -112,7 +113,10 @@ async def _open(configuration: dict[str, object], where: str) -> ZenohBus:
         saying.cancel()
 
 
-def _announce(served: Agent) -> None:
+def _announce(served: Agent, settings: AgentSettings) -> None:
+    for name, gripper in settings.grippers.items():
+        if is_simulated(gripper.address):
+            tell(f"{name}: {gripper_words(gripper.address)}")
     try:
         for each in served.hands.values():
             print(each.name, flush=True)

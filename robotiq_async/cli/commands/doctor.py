@@ -8,7 +8,7 @@ from ...fleet.network.route import is_remote
 from ...link.address import parse_address
 from ...log import printable
 from ...session.options import registers_of
-from ..addresses import full_address
+from ..addresses import full_address, gripper_words
 from ..arguments import Address, Unit, need
 from ..failures import CommandError, UsageError, usage
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 async def doctor(
-    address: Address = "sim://",
+    address: Address,
     /,
     *,
     device_id: Unit | None = None,
@@ -57,10 +57,13 @@ async def doctor(
         need("cryptography", "fleet")
         if device_id is not None:
             raise UsageError("a gripper on another host is set up there: its agent's file has device_id")
-        await examine_remote(address, report)
     else:
         with usage():
             registers_of(parse_address(address), device_id=device_id)
+    print(gripper_words(address), flush=True)
+    if is_remote(address):
+        await examine_remote(address, report)
+    else:
         await examine(parse_address(address), report, device_id=device_id)
     if bad:
         raise CommandError(f"{full}: {', '.join(bad)}: see above")

@@ -9,6 +9,7 @@ from cyclopts import Parameter
 
 from ...enums import Finger
 from ...wire.checks import check_timeout
+from ..addresses import gripper_words
 from ..arguments import USUAL, Address, Byte, Fingers, Flag, Link, Position, Yes
 from ..consent import consent
 from ..failures import usage
@@ -83,6 +84,7 @@ async def _move(
     from ..connect import connected
     from ..output.tables import print_outcomes
 
+    print(gripper_words(address), flush=True)
     async with connected(address, link, halt=True, keep_grip=keep) as hand:
         if not hand.is_activated:
             print("Activating: the fingers open and close.", flush=True)

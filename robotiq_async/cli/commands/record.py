@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ...log import printable
-from ...telemetry.payloads import title
+from ..addresses import gripper_words
 from ..arguments import USUAL, Address, Flag, Link, need
 from ..failures import CommandError, UsageError
 from ..output.text import FORMATTERS, clock
@@ -63,12 +63,13 @@ async def record(
 
     if seconds is not None and not 0 < seconds < 1e9:
         raise UsageError(f"--seconds must be seconds above 0, got {seconds:g}")
+    print(gripper_words(address), flush=True)
     try:
         async with connected(address, link, halt=False) as hand:
             recorder = Recorder(hand, file, ros2=ros2)
             try:
                 async with recorder:
-                    print(f"Recording {title(hand)} in {file}; Ctrl-C ends it.", flush=True)
+                    print(f"Recording in {file}; Ctrl-C ends it.", flush=True)
                     with suppress(TimeoutError):
                         async with asyncio.timeout(seconds):
                             await _watch(recorder)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from ....enums import DEFAULT_SPEED
-from ...addresses import full_address, is_simulated
+from ...addresses import full_address, gripper_words, is_simulated
 from ...arguments import Address, Byte, Yes
 from ...consent import consent
 from ...failures import CommandError, UsageError
@@ -28,7 +28,7 @@ MOST_GRAMS = 100_000
 
 
 def force(
-    address: Address = "sim://",
+    address: Address,
     /,
     *,
     surface: Literal["foam", "rigid"] = "foam",
@@ -52,7 +52,7 @@ def force(
 
     For example:
 
-        robotiq-async measure force --surface rigid
+        robotiq-async measure force sim:// --surface rigid
         robotiq-async measure force 192.168.1.11 --runs 1
 
     Args:
@@ -107,6 +107,7 @@ async def _measure(
     if not campaign.left:
         print(f"{output} is complete: nothing is measured again.")
     if campaign.left:
+        print(gripper_words(address), flush=True)
         load_rich()
         async with gripper(address, speedup, lambda simulated: _place_scale(simulated, surface)) as hand:
 
