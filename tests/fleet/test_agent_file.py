@@ -148,9 +148,9 @@ def test_a_bad_file_is_told_in_one_line(text: str, words: list[str], tmp_path: P
 def test_a_gripper_on_a_serial_line_gets_its_defaults_unless_told(tmp_path: Path) -> None:
     line = '[grippers.left]\naddress = "rtu+tcp://192.168.1.20:54321"\nread_function = 4\n'
     grippers = read(tmp_path, f'site = "lab"\n{line}').grippers
-    assert grippers["left"].make_hand()._options.poll_interval == 0.015
+    assert grippers["left"].make_hand("left")._options.poll_interval == 0.015
     grippers = read(tmp_path, f'site = "lab"\n{line}poll_interval = 0.005\n').grippers
-    assert grippers["left"].make_hand()._options.poll_interval == 0.005
+    assert grippers["left"].make_hand("left")._options.poll_interval == 0.005
     assert grippers["left"].read_function == 4
 
 
