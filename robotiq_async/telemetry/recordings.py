@@ -47,7 +47,7 @@ class Entry:
     Attributes:
         topic: the channel's name.
         nanoseconds: since 1970.
-        sequence: of a status; 0 for the others.
+        sequence: the number of the status; of commands, and of events, counted from 1.
         data: the bytes.
         is_json: whether they are said to be JSON.
         path: the file.
