@@ -17,7 +17,8 @@ from .commands.measure.force import force as measure_force
 from .commands.measure.speed import speed as measure_speed
 from .commands.monitor import monitor
 from .commands.move import move
-from .commands.record import plot, record, recover, replay
+from .commands.recording.record import record
+from .commands.recording.recordings import export, plot, recover, replay
 from .commands.simulate import simulate
 from .commands.status import status
 from .commands.view import view
@@ -26,7 +27,7 @@ from .output.reflow import reflow
 
 COMMANDS: Final = (
     *(demo, simulate, status, move, monitor, web, view, doctor),
-    *(record, replay, recover, plot, agent),
+    *(record, replay, export, plot, recover, agent),
 )
 """A new sub-command is a module with a function of its name, and an entry here."""
 

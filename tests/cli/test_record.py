@@ -133,7 +133,7 @@ def test_of_a_broken_one_it_is_said_that_it_is(
     assert capsys.readouterr().err == ""
     whole = grasp.read_bytes()
     grasp.write_bytes(whole[: len(whole) * 2 // 3])
-    assert main([command, str(grasp)]) == 0
+    assert main([command, str(grasp), "--overwrite"]) == 0
     out, err = capsys.readouterr()
     assert out
     assert err.count("\n") == 1
