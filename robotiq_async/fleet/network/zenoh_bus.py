@@ -17,7 +17,9 @@ try:
     import zenoh
     from zenoh.handlers import Callback
 except ModuleNotFoundError as error:
-    raise ImportError("hands on other hosts need zenoh: pip install 'robotiq-async[fleet]'") from error
+    from ...extras import install
+
+    raise ImportError(f"hands on other hosts need zenoh: {install('fleet')}") from error
 
 from ...concurrency import in_a_thread
 from ...errors import ConnectFailedError
