@@ -37,10 +37,21 @@ Every command that talks to a gripper takes its address as the last argument, an
 
     tcp://192.168.1.11    Modbus TCP; tcp:// and the port (:502) may be left out
     rtu:///dev/ttyUSB0    Modbus RTU on a serial line (extra serial)
+    rtu+tcp://HOST:PORT   Modbus RTU through a serial server
     zenoh://lab/cell/left one that an agent on another host serves (extra fleet)
     sim://                a gripper simulated inside the command
 
 Without an address it is sim://; doctor and measure want one.
+
+What the extras beside cli are for:
+
+    monitor   monitor
+    web       web, demo --show
+    view      view
+    record    record (not of a table, .csv), replay, export, plot, recover
+    plot      plot, the pictures of measure
+    fleet     agent, fleet, doctor and all others with zenoh:// addresses
+    serial    rtu:// addresses
 
 Nothing here has run on real hardware yet.
 """

@@ -64,7 +64,10 @@ def test_the_monitor_names_it_too(beside: Callable[..., Beside], option: str) ->
     command = beside("monitor", option)
     if option == "--json":
         assert command.read_error() == f"robotiq-async: {SIMULATED}"
-        assert json.loads(command.read_line())["kind"] in ("status", "log")  # of late polls, on a busy machine
+        assert json.loads(command.read_line())["kind"] in (
+            "status",
+            "log",
+        )  # of late polls, on a busy machine
     else:
         assert command.read_line() == SIMULATED
 
