@@ -230,6 +230,7 @@ NO_VALUES = {
     "Recovered": "work in progress",
     "Reply": "internal",
     "Entry": "bytes on their way",
+    "Thing": "what is drawn between the fingers",
     "Service": "what may be asked by name, with the function that does it",
     "Topic": "bytes on their way",
 }
