@@ -243,7 +243,7 @@ def test_in_brief_there_are_states_faults_and_contacts(
     assert set(kinds) == {"state", "contact", "fault"}
     assert not any("RUNNING_CC" in line for line in lines)
     contacts = [line.split(maxsplit=2)[2] for line in lines if " contact " in line]
-    assert set("ABC") <= set(contacts[-1])
+    assert any(set("ABC") <= set(each) for each in contacts)
     assert any("fault    0x09" in line for line in lines)
     polls, commands = (len(recorded(grasp, f"/gripper/{each}")) for each in ("status", "command"))
     assert lines[-1].startswith(f"{polls} polls and {commands} commands in ")
