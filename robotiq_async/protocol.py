@@ -159,7 +159,8 @@ class Hand(Protocol):
             timeout: seconds; None for twice the expected time plus 2 s.
 
         Raises:
-            MoveTimeoutError: an axis still moved when the time was over.
+            MoveTimeoutError: an axis still moved when the time was over; as MoveIgnoredError: the first
+                motion on a connection was echoed, and nothing has moved for a second.
             MoveSupersededError: another command, halt(), reset() or another client took over an axis.
             GripperFaultError: the gripper reports a minor or a major fault.
             RobotiqError: the hand takes no commands now, the link went down, or the hand was stopped.

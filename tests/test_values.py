@@ -47,6 +47,7 @@ from robotiq_async.calibration import ForceCalibration, SpeedCalibration
 from robotiq_async.calibration.csv_tables import SPEED, TableError
 from robotiq_async.control.motion import Move
 from robotiq_async.doctor import Finding, Level
+from robotiq_async.errors import MoveIgnoredError
 from robotiq_async.fleet import ControlLostError, GripperName, Member, NotAllStoppedError, Route
 from robotiq_async.fleet.agent.agent_file import GripperSettings
 from robotiq_async.fleet.control.lease import Holder
@@ -137,6 +138,7 @@ ERRORS: list[Exception] = [
     GripperFaultError(Fault.SCISSOR_BLOCKED),
     GripperFaultError(Fault(0x0C), "as told"),
     MoveTimeoutError("too slow", status_of(0x39, 0xC0)),
+    MoveIgnoredError("asleep", status_of(0xF9, 0xFF)),
     ConnectFailedError("tcp://192.168.1.11:502", "refused"),
     ControlLostError("somebody commands the gripper", "held"),
     NotAllStoppedError("not stopped", {LEFT: "no answer"}, ["tls/cell-2:7447"]),

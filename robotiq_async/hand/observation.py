@@ -102,7 +102,8 @@ class Observation:
         """How the polling went since the last start."""
         if self._session is None:
             return Counters().snapshot(0)
-        return self._session.counters.snapshot(self._session.controller.foreign_commands)
+        controller = self._session.controller
+        return self._session.counters.snapshot(controller.foreign_commands, controller.passing_faults)
 
     def statuses(self, buffer: int = 1) -> Stream[RobotiqStatus]:
         """Every status from now on, for one reader; newest wins.

@@ -182,10 +182,13 @@ class Poller:
         return connected
 
     async def _connect(self) -> None:
-        """Open the link and see the first status."""
+        """Open the link and see the first status, or what it takes to decide about one."""
         await self._transport.open()
         self._last_poll = 0.0  # no period counts that the link was lost in
         await self._poll_once()
+        while self._controller.is_undecided:  # the silence before may show as a fault, once
+            await asyncio.sleep(self._options.poll_interval)
+            await self._poll_once()
         self._tick.start()
         self._counters.tick = self._tick.source
 

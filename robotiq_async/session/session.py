@@ -13,7 +13,7 @@ from ..control.controller import Controller
 from ..control.state_machine import RUNNING, SEQUENCES, StateMachine
 from ..control.triggers import Trigger
 from ..control.waiters import Waiter
-from ..enums import State
+from ..enums import Fault, State
 from ..errors import (
     ActivationTimeoutError,
     ConnectionLostError,
@@ -26,6 +26,7 @@ from ..errors import (
     StateTimeoutError,
 )
 from ..wire.status import RobotiqStatus
+from .activation_progress import ActivationProgress
 from .claims import Claims
 from .options import Options
 from .poller import Poller
@@ -80,6 +81,7 @@ class Session:
         self.counters = Counters()
         self._channels = channels
         self._waiters = StateWaiters()
+        self._progress = ActivationProgress(self._loop, options.log)
         channels.reopen(self._loop)
         machine.changed = self._on_transition
         self._poller = Poller(
@@ -302,7 +304,9 @@ class Session:
                 what="the activation was not finished",
             )
         except StateTimeoutError as error:
-            raise ActivationTimeoutError(str(error)) from None
+            fault = Fault.NONE if self.controller.status is None else self.controller.status.fault
+            why = f": {fault.description} (gFLT 0x{int(fault):02X}); recover() resets it" if fault else ""
+            raise ActivationTimeoutError(f"{error}{why}") from None
 
     async def next_status(self) -> None:
         """Wait for the next status, which may tell more.
@@ -335,4 +339,5 @@ class Session:
     def _on_transition(self, source: State, target: State, trigger: Trigger) -> None:
         self.counters.faults += target is State.FAULT
         self._waiters.reached(target)
+        self._progress.reached(target)
         self._channels.changes.append(Transition(source, target, trigger, now()))

@@ -84,6 +84,7 @@ class RobotiqHand(Commands):
             force_calibration: what :attr:`units` labels force values with. None for the manual's figures.
             keep_grip: what :meth:`stop` does unless told: False stops the fingers for certain (rGTO = 0),
                 True holds what moves and lets a grip stay in force. It is also what leaving the block does.
+                A gripper that is not polled afterwards may lose its activation, and with it the grip.
 
         Raises:
             TypeError: an option of the wrong type.
@@ -113,11 +114,14 @@ class RobotiqHand(Commands):
         """Connect, read the status, activate if the gripper is reset, and poll from then on.
 
         An activation MOVES the fingers: they open and close to their stops. A gripper that is active
-        already is adopted: nothing is written. One that is in fault already is left there, so that
-        :meth:`atr` and :meth:`recover` can run.
+        already is adopted: nothing is written. (A gripper that has to be woken on a new connection follows
+        its second motion: the first ends with MoveIgnoredError.) One that is in fault already is left there,
+        so that :meth:`atr` and :meth:`recover` can run.
 
         With ``wait`` there may be no gripper yet, for a program that starts before its gripper is switched
         on: it is tried until it answers. It is activated only then, and its fingers MOVE long after the call.
+
+        Fault 0x09, which some grippers show once after a second without a poll, is looked past first.
 
         A failed or cancelled start leaves nothing running; an activation that it began is taken back.
 
@@ -157,7 +161,8 @@ class RobotiqHand(Commands):
         doubt (within half a second one has not come to rest; the link is or goes down; a fault; a sequence;
         another client commands the gripper; ``halt()`` was asked) rGTO is cleared as ever, and the log says
         why. Who sets the fingers going between the last look at them and the end of the connection is not
-        seen. What a real gripper does with a part, either way, is not known.
+        seen. What a real gripper does with a part, either way, is not known; and one that is not polled may
+        lose its activation, and the part: the next program finds it in RESET then.
 
         Args:
             halt: False disconnects and leaves the fingers to what they do; for programs that only look.

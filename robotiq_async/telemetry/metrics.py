@@ -40,6 +40,7 @@ _COUNTERS: Final = {
     "reconnects": "Times the link was opened again.",
     "foreign_commands": "Times another client was seen commanding the gripper.",
     "faults": "Times the gripper reported a minor or a major fault.",
+    "passing_faults": "Times fault 0x09 was shown for a moment and looked past.",
 }
 _GAUGES: Final = {
     "period_p50": "Median time between two polls.",

@@ -95,6 +95,7 @@ SCHEMAS: Final = {
         tick=_STRING,
         faults=_INTEGER,
         moves={"type": "object", "additionalProperties": _INTEGER},
+        passing_faults=_INTEGER,
     ),
 }
 """A JSON Schema for each kind of object."""
