@@ -55,7 +55,9 @@ def build() -> list[Path]:
     with zipfile.ZipFile(wheel) as archive:
         files = {*archive.namelist()}
     _need(wheel, files, (*IN_THE_WHEEL, f"{name}.dist-info/licenses/LICENSE"))
-    strange = [each for each in files if not each.startswith(("robotiq_async/", f"{name}."))]
+    strange = [
+        each for each in files if not each.startswith(("robotiq_async/", "pytest_robotiq_async/", f"{name}."))
+    ]
     if strange:
         raise FailedError(f"{wheel.name} installs {strange}")
     return [sdist, wheel]
