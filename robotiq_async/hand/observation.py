@@ -228,9 +228,7 @@ class Observation:
         One that was refused leaves no trace.
         """
         session = self._session
-        return session is not None and (
-            session.counters.has_begun_to_write or session.controller.has_request
-        )
+        return session is not None and (session.counters.has_begun_to_write or session.controller.has_request)
 
     # -- inside ----------------------------------------------------------------------------------------
 

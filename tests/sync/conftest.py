@@ -46,7 +46,7 @@ class Wire:
         if self.breaks:
             self.breaks = self.is_open = False
             raise ConnectionLostError("unplugged")
-        while self.is_slow:
+        while self.is_slow:  # noqa: ASYNC110  # another thread sets it
             await asyncio.sleep(0.001)
         return self.look(lambda gripper: gripper.status_registers())
 
