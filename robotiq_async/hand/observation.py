@@ -224,8 +224,12 @@ class Observation:
 
     @property
     def _has_commanded(self) -> bool:
-        """Whether a request was written since the last start: one that was refused leaves no trace."""
-        return self._session is not None and self._session.counters.has_begun_to_write
+        """Whether a request was written since the last start, or waits for that.
+
+        One that was refused leaves no trace.
+        """
+        session = self._session
+        return session is not None and (session.counters.has_begun_to_write or session.controller.has_request)
 
     # -- inside ----------------------------------------------------------------------------------------
 

@@ -59,6 +59,8 @@ SETTLE_S: Final = 0.02
 SILENCE_S: Final = 0.00175
 """Between two frames on a serial line, at least: 3.5 characters, above 19200 baud so much (Modbus over Serial
 Line 2.5.1.1)."""
+TIMER_S: Final = 0.0001
+"""So much before its time a timer may come."""
 HUSH_S: Final = 0.02
 """Silence after which the rest of a damaged reply does not come any more: a USB adapter may keep bytes for
 16 ms (the usual latency timer of FTDI's)."""
@@ -176,6 +178,15 @@ class ModbusTransport:
             answer = await self._read_again(ended.reason)
         return tuple(answer.registers)
 
+    async def ready(self) -> None:
+        """Wait until the line takes a request: on a serial line frames are kept apart.
+
+        Raises:
+            RobotiqConnectionError: something arrived meanwhile that nobody had asked for.
+        """
+        if self._keeps_silence:
+            await self._pause()
+
     async def write(self, registers: Sequence[int]) -> None:
         """Write the eight request registers with one FC16, exactly once.
 
@@ -216,8 +227,7 @@ class ModbusTransport:
                 caller gets the line back in step.
         """
         client = self._connected()
-        if self._keeps_silence:
-            await self._pause()
+        await self.ready()
         self._watchdog.watch(by)
         try:
             response: ModbusPDU = await client.execute(False, request)
@@ -383,7 +393,7 @@ class ModbusTransport:
     async def _pause(self) -> None:
         """Keep the silence that ends a frame: what follows too soon may be taken for a part of it."""
         left = self._heard + SILENCE_S - self._loop.time()
-        if left > 0:
+        if left > TIMER_S:
             await self._settle(left)
 
 

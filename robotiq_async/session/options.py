@@ -13,7 +13,7 @@ from ..link.canonical import canonical_address
 from ..link.guard import GuardedTransport
 from ..link.modbus import ModbusTransport
 from ..link.sim_transport import SimulatedTransport, new_gripper
-from ..link.transport import Transport
+from ..link.transport import Link, Transport
 from ..log import Log, log
 from ..wire.checks import check_byte, check_flag, check_int, check_seconds
 from ..wire.registers import REGISTER_COUNT, RTU_REGISTERS, TCP_REGISTERS, RegisterMap
@@ -61,7 +61,7 @@ _NOMINAL: Final = ForceCalibration.nominal()
 class Options:
     """Everything a hand is constructed with, checked."""
 
-    make_transport: Callable[[], Transport]
+    make_transport: Callable[[], Link]
     """A transport for one start of the hand."""
     address: str
     gripper: Callable[[], Gripper]
@@ -176,7 +176,7 @@ class _Way(NamedTuple):
 
     address: str
     gripper: Callable[[], Gripper]
-    make: Callable[..., Transport]
+    make: Callable[..., Link]
     is_rtu: bool = False
 
 

@@ -24,7 +24,7 @@ from ..errors import (
     ResponseTimeoutError,
     RobotiqConnectionError,
 )
-from ..link.transport import Transport
+from ..link.transport import Link
 from ..link.watchdog import HELD_S
 from ..wire.status import RobotiqStatus
 from .ending import Ending
@@ -65,7 +65,7 @@ class Poller:
 
     def __init__(
         self,
-        transport: Transport,
+        transport: Link,
         controller: Controller,
         counters: Counters,
         channels: Channels,
@@ -243,6 +243,8 @@ class Poller:
 
     async def _write(self) -> None:
         """Write what the controller decides on, if anything."""
+        # First: what is decided on leaves in this turn, and no stop comes between.
+        await self._transport.ready()
         now = self._tick.time()
         request = self._controller.decide(now)
         if request is None:

@@ -70,6 +70,21 @@ class Caller:
 
         return self.wait(call)
 
+    def start(self, function: Function[None]) -> None:
+        """Make the call that starts the hand, unless the program ends.
+
+        Raises:
+            RuntimeError: it ends.
+            BaseException: as :meth:`wait`.
+        """
+
+        async def start() -> None:
+            # In the loop: what begins before the end there is in use, and stopped after it has begun.
+            LOOP_THREAD.check_begins()
+            await function()
+
+        self.wait(start)
+
     def stop(self, function: Function[None]) -> None:
         """Make the call that stops the hand; of one that does not run, without the event loop.
 
@@ -91,7 +106,7 @@ class Caller:
 
     @property
     def has_commanded(self) -> bool:
-        """Whether the hand has written to the gripper since its start.
+        """Whether the hand has written to the gripper since its start, or is about to.
 
         Of one that only looks nothing is written when the program is interrupted or ends.
         """
@@ -160,10 +175,12 @@ def _stop_all() -> None:
     for each in left:
         log.warning("%s still running at exit: stopping it", each.hand.address)
 
+    async def stop_one(caller: Caller) -> None:
+        # Whether it has commanded is asked in the turn that ends its requests.
+        await caller.hand.stop(halt=caller.has_commanded)
+
     async def stop() -> None:
-        await asyncio.gather(
-            *(each.hand.stop(halt=each.has_commanded) for each in left), return_exceptions=True
-        )
+        await asyncio.gather(*map(stop_one, left), return_exceptions=True)
 
     if left and LOOP_THREAD.is_running:
         with contextlib.suppress(LateError):

@@ -139,7 +139,7 @@ class RobotiqHand(Commands):
             NotActivatedError: the gripper was reset during the activation that was begun.
             ActivationTimeoutError: the activation was not finished in time.
         """
-        self._caller.wait(lambda: self._inner.start(activate, wait=wait))
+        self._caller.start(lambda: self._inner.start(activate, wait=wait))
 
     def stop(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:
         """Stop the fingers (rGTO = 0), keep the activation, disconnect. Idempotent.

@@ -33,6 +33,9 @@ class PageCommands:
 
     A page that is gone has its commands cancelled, and that holds the axes that still move; what cannot be
     held half-way (an activation, a release, a reset) goes on, as it does whenever it is cancelled.
+
+    Attributes:
+        is_ending: whether nothing but halts is taken.
     """
 
     def __init__(self, operators: Sequence[Operator], answer: Callable[[Fields], None]) -> None:
@@ -46,7 +49,7 @@ class PageCommands:
         self._answer = answer
         self._tasks: dict[str, set[asyncio.Task[str]]] = {}
         self._halts: set[asyncio.Task[str]] = set()
-        self._is_ending = False
+        self.is_ending = False
 
     @property
     def under_way(self) -> bool:
@@ -85,7 +88,7 @@ class PageCommands:
 
     def refuse(self) -> None:
         """Take nothing but halts from now on: the hands are about to be stopped."""
-        self._is_ending = True
+        self.is_ending = True
 
     async def close(self) -> None:
         """Hold whatever is under way, and take no more. Waits until all have ended."""
@@ -97,7 +100,7 @@ class PageCommands:
     async def _carry_out(self, request: Fields, page: str, name: str) -> str:
         if not self._operators:
             raise ValueError("this page only looks; to command from a page: robotiq-async web --control")
-        if name != HALT and self._is_ending:
+        if name != HALT and self.is_ending:
             raise ValueError("the page is ending: nothing is moved from here now")
         if name != HALT and not 0 <= monotonic() - request["at"] <= FRESH_S:
             raise ValueError("this came too late to be carried out: the connection was held up")

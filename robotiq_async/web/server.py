@@ -125,6 +125,11 @@ class PageServer:
         """Wait until the process of the page has ended by itself."""
         await self._over.wait()
 
+    @property
+    def is_ending(self) -> bool:
+        """Whether nothing but halts is taken: :meth:`refuse_commands` was called, or the block is left."""
+        return self._commands.is_ending
+
     def refuse_commands(self) -> None:
         """Take nothing but halts from now on: for a program that is about to stop the hands."""
         self._commands.refuse()

@@ -161,6 +161,8 @@ async def _try_again(page: PageServer, index: int, operator: Operator) -> None:
     news = page.news[index]
     while news.problem:
         await asyncio.sleep(AGAIN_S)
+        if page.is_ending:
+            return
         try:
             await operator.hand.start(activate=False)
         except RobotiqError as error:
