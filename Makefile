@@ -7,6 +7,7 @@ PYTHON ?= python3
 ADDRESS ?= sim://
 MINUTES ?= 30
 LINK ?= tcp
+HABITS ?= status-lag; silence-fault; write-spacing
 DISTROS ?= jazzy kilted
 PYTHONS ?= 3.12 3.13 3.14
 VENV := .venv
@@ -23,7 +24,7 @@ unexport VIRTUAL_ENV CONDA_PREFIX PYTHONHOME PYTHONPATH PYTHONSTARTUP PIP_USER P
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help demo show test test-web test-ros2 pages docs dist pythons canary soak fuzz explore bench lint check format constraints clean
+.PHONY: help demo show test test-web test-ros2 pages docs dist pythons canary soak habits fuzz explore bench lint check format constraints clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -61,6 +62,9 @@ canary: $(RELEASE)/.complete  ## Test with the newest of all dependencies, in an
 
 soak: $(STAMP)  ## Move under random faults for MINUTES=30 over LINK=tcp (or rtu), and print figures
 	@$(BIN)/python -m tests.adversity.soak --minutes $(MINUTES) --link $(LINK)
+
+habits: $(STAMP)  ## Everything under fault once more, with HABITS="status-lag; silence-fault; write-spacing"
+	@HABITS="$(HABITS)" $(BIN)/python -m pytest tests/adversity
 
 fuzz: $(STAMP)  ## A million mutated replies through the decoder, 100,000 through a live link
 	@$(BIN)/python -m tests.adversity.fuzz

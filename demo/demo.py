@@ -33,9 +33,11 @@ from robotiq_async import (
     State,
     Transition,
 )
+from robotiq_async.cli.addresses import gripper_words, is_simulated
 from robotiq_async.cli.consent import consent
 from robotiq_async.cli.failures import CommandError, UsageError
 from robotiq_async.cli.output.log_capture import forget
+from robotiq_async.fleet.network.route import is_remote
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.protocol import Hand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
@@ -62,8 +64,9 @@ async def run(
     Raises:
         RobotiqError: the gripper or the link failed.
     """
+    print(gripper_words(address), flush=True)
     async with gripper(address) as (where, simulated):
-        kind: type[RemoteHand | RobotiqHand] = RemoteHand if where.startswith("zenoh:") else RobotiqHand
+        kind: type[RemoteHand | RobotiqHand] = RemoteHand if is_remote(where) else RobotiqHand
         hand: Hand = kind(where)
         transitions = hand.transitions()  # Opened before start(), it misses nothing.
         print(f"async with {kind.__name__}({where!r}) as hand:  # connects and activates", flush=True)
@@ -80,7 +83,7 @@ async def run(
 @asynccontextmanager
 async def gripper(address: str) -> AsyncIterator[tuple[str, SimulatedGripper | None]]:
     """The address to connect to, and the gripper itself if it is a simulated one."""
-    if not address.startswith("sim:"):
+    if not is_simulated(address):
         yield address, None
         return
     # RobotiqHand("sim://") starts a server as well; with our own we can put an object between the fingers.

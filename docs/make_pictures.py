@@ -96,7 +96,7 @@ async def fault(screen: Monitor, operator: Operator, gripper: SimulatedGripper) 
     screen.action_act("recover")
     await asyncio.sleep(0.5)
     save(screen, "monitor_question")
-    screen.pop_screen()
+    screen.ask(None)
 
 
 async def loss(screen: Monitor, operator: Operator, server: SimulatorServer) -> None:

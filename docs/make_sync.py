@@ -151,7 +151,7 @@ class _Module:
         result, what = _result(node, kind), f"self._inner.{node.name}"
         if not decorators:
             way = "wait" if isinstance(node, ast.AsyncFunctionDef) else "tell"
-            way = "stop" if node.name == "stop" else way
+            way = node.name if node.name in ("start", "stop") else way
             what = f"self._caller.{way}(lambda: {what}({_arguments(node)}))"
         if result is not None:
             what = f"{result.__name__}({what}, self._caller)"

@@ -16,7 +16,6 @@ What a program needs is imported from here. Where it comes from, and what stands
     sync                     blocking hands, for scripts and notebooks
     fleet                    hands on other hosts: agents that serve them, remote hands
     ros2                     a lifecycle node of ROS 2 around a hand
-    testing                  fixtures for pytest: a simulated gripper in the tests of applications
     simulator, cli           a simulated gripper with its servers; the command line
 
 Nothing of this has run on real hardware yet.

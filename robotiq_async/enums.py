@@ -72,7 +72,18 @@ STROKE_COUNTS: Final = CLOSED_READING - OPEN_READING
 """Counts between the two: a full closing."""
 
 
-class Mode(IntEnum):
+class Code(IntEnum):
+    """A field of the status: it prints as its name, and is its number everywhere else.
+
+    ``print(fault)`` and ``f"{fault}"`` show ``NONE``; ``f"{fault:02X}"`` and JSON have the number.
+    """
+
+    def __str__(self) -> str:
+        """The name."""
+        return self.name
+
+
+class Mode(Code):
     """rMOD / gMOD: the grasping mode of simple control; ignored while the scissor has its own registers."""
 
     BASIC = 0
@@ -81,7 +92,7 @@ class Mode(IntEnum):
     SCISSOR = 3
 
 
-class ObjectStatus(IntEnum):
+class ObjectStatus(Code):
     """gDTA, gDTB, gDTC, gDTS: what an axis does, as the gripper says it.
 
     It says IN_MOTION of an axis at rest, too, if that was never asked to go: what people read is
@@ -104,7 +115,7 @@ class ObjectStatus(IntEnum):
         return self in (ObjectStatus.CONTACT_OPENING, ObjectStatus.CONTACT_CLOSING)
 
 
-class Initialization(IntEnum):
+class Initialization(Code):
     """gIMC: how far the activation or a mode change is."""
 
     RESET = 0
@@ -126,7 +137,7 @@ class Severity(Enum):
     """Needs a reset and a new activation."""
 
 
-class Fault(IntEnum):
+class Fault(Code):
     """gFLT: the fault codes of the thesis's table 4.
 
     A code the table does not know becomes a member of its own, ``Fault(0x0C).name == "UNKNOWN_0x0C"``,

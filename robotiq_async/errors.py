@@ -11,6 +11,7 @@
     |   +-- ActivationTimeoutError (TimeoutError)
     |   +-- StateTimeoutError (TimeoutError)    a state that was never reached
     |   +-- MoveTimeoutError (TimeoutError)     .status
+    |   |   +-- MoveIgnoredError                acknowledged, echoed, and nothing has moved
     |   +-- MoveSupersededError                 another command took over an axis of this move
     |   +-- ControlLostError                    on another host: somebody else commands the gripper, or nobody
     |   +-- NotAllowedError                     on another host: the fleet's access rules say no
@@ -26,7 +27,8 @@
     +-- NotAllStoppedError                      the halt of a fleet; .outcomes, .unreached
 
 The three before the last concern neither gripper nor link: the hand goes on. They, and those about other
-hosts, stand here and not among the names of the package.
+hosts, stand here and not among the names of the package;
+so does MoveIgnoredError, which is caught as what it is a kind of.
 
 Bad arguments are plain ValueError and TypeError: they are the program's mistake, not the gripper's.
 """
@@ -135,6 +137,15 @@ class MoveTimeoutError(RobotiqStateError, TimeoutError):
         """Keep the last status."""
         self.status = status
         super().__init__(message)
+
+
+class MoveIgnoredError(MoveTimeoutError):
+    """The gripper acknowledged and echoed the first motion on a connection, and moved nothing for a second.
+
+    Some grippers are said to need an image with rACT before they move on a new connection, or to lose their
+    activation while they are left alone. Its axes have been told to hold. The same move may do the next time;
+    if not, :meth:`reset` and :meth:`activate` (which DROPS the part, and MOVES the fingers).
+    """
 
 
 class MoveSupersededError(RobotiqStateError):

@@ -2,17 +2,23 @@
 
 Each finger has three phalanges and one motor: up to about 110 counts the base turns and the tip stays
 parallel to itself, to 140 the base turns alone, from there to 240 the middle one, and beyond nothing moves
-(Indiana University, technical report 711; slopes and limits from recordings of real hands, see the points
-below). The scissor turns the bases of B and C against each other.
+(Indiana University, technical report 711). The scissor turns the bases of B and C against each other.
 
-Angles are what a mechanism without load and play would have; nothing here has been checked on a real hand.
+The slopes and limits below are those of the joint state publisher for ROS 1 (robotiq_3f_gripper_joint_states
+of ros-industrial), which cites that report for the fingers and says of the scissor that its author measured
+it. They are one formula, and no second source confirms them: public recordings of real hands, that of TAMS
+among them, have joint angles which that same publisher computed from the positions.
+
+Angles are what a mechanism without load and play would have: a finger that closes around something bends
+earlier. Nothing here has been checked on a real hand.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache, lru_cache
 from math import radians
+from types import MappingProxyType
 from typing import Final
 
 from .enums import Finger
@@ -25,32 +31,33 @@ Points = tuple[tuple[int, float], ...]
 BASE: Final[Points] = ((0, 0.0), (140, 70.0))
 """joint_1. The ROS node has a slope of 70/148 with a jump at 140; a straight line to 70 degrees is meant."""
 MIDDLE: Final[Points] = ((140, 0.0), (240, 90.0))
-"""joint_2: still until the base stops, then up to its own stop (report and recordings as above)."""
+"""joint_2: still until the base stops, then up to its own stop."""
 TIP: Final[Points] = ((0, 0.0), (110, -55.0))
 """joint_3: against the base, for the tip stays parallel, until its stop."""
 PALM: Final[Points] = ((15, 11.0), (240, -11.0))
-"""The palm joint of finger_1 against the scissor; that of finger_2 is its negative. Measured on recordings;
-the manual says 32 degrees in all."""
+"""The palm joint of finger_1 against the scissor; that of finger_2 is its negative. The publisher's author
+measured about 11 degrees to each side, where the manual says 32 in all; where 15 and 240 are from is not
+said."""
 
-PREFIX: Final = {Finger.B: "finger_1", Finger.C: "finger_2", Finger.A: "finger_middle"}
-"""What the URDF of the hand (robotiq 3f description) calls the fingers. A stands alone opposite the other
-two and has no palm joint, so it is the middle one; the ROS node maps A to finger_1, against the hand's
-drawings."""
-
-JOINTS: Final = (
-    "palm_finger_1_joint",
-    "finger_1_joint_1",
-    "finger_1_joint_2",
-    "finger_1_joint_3",
-    "palm_finger_2_joint",
-    "finger_2_joint_1",
-    "finger_2_joint_2",
-    "finger_2_joint_3",
-    "finger_middle_joint_1",
-    "finger_middle_joint_2",
-    "finger_middle_joint_3",
+FINGER_NAMES: Final = MappingProxyType(
+    {Finger.C: "finger_1", Finger.B: "finger_2", Finger.A: "finger_middle"}
 )
-"""The eleven names, in the order of :func:`joint_angles`."""
+"""What the public ROS description of the hand calls the fingers, in the order of its joints.
+
+The one place that says so: joint states, goals, the URDF and every drawing follow it. Sources disagree about
+B and C, and a person has not looked yet: docs/decisions/finger-names.md.
+"""
+
+
+def _joints() -> Iterator[str]:
+    for name in FINGER_NAMES.values():
+        if name != "finger_middle":  # it does not turn on the palm
+            yield f"palm_{name}_joint"
+        yield from (f"{name}_joint_{number}" for number in (1, 2, 3))
+
+
+JOINTS: Final = tuple(_joints())
+"""The eleven names, in the order of :func:`joint_angles`: the palm joint of a finger before its own three."""
 
 
 def finger_angles(position: int) -> tuple[float, float, float]:
@@ -88,7 +95,7 @@ def palm_angle(scissor: int) -> float:
 
 def joint_angles(status: RobotiqStatus) -> tuple[float, ...]:
     """The eleven joints in radians, in the order of :data:`JOINTS`."""
-    return _joint_angles(*(status.position(axis) for axis in (Finger.SCISSOR, *PREFIX)))
+    return _joint_angles(*(status.position(axis) for axis in (Finger.SCISSOR, *FINGER_NAMES)))
 
 
 @lru_cache(maxsize=16)

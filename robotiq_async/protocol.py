@@ -70,7 +70,7 @@ class Hand(Protocol):
     ) -> None:
         """Stop, also when the block failed or was cancelled."""
 
-    async def start(self, activate: bool = True) -> None:
+    async def start(self, activate: bool = True, *, wait: float = 0.0) -> None:
         """Connect, read the status, and activate a gripper that is reset: its fingers MOVE then.
 
         An active gripper is adopted, and one in fault is left there. A failed or cancelled start leaves
@@ -78,6 +78,8 @@ class Hand(Protocol):
 
         Args:
             activate: False writes nothing to the gripper.
+            wait: seconds, 0..86400, for which there may be no gripper yet: it is tried until it answers, and
+                activated only then.
 
         Raises:
             InvalidStateError: started already, or another hand owns the gripper.
@@ -157,7 +159,8 @@ class Hand(Protocol):
             timeout: seconds; None for twice the expected time plus 2 s.
 
         Raises:
-            MoveTimeoutError: an axis still moved when the time was over.
+            MoveTimeoutError: an axis still moved when the time was over; as MoveIgnoredError: the first
+                motion on a connection was echoed, and nothing has moved for a second.
             MoveSupersededError: another command, halt(), reset() or another client took over an axis.
             GripperFaultError: the gripper reports a minor or a major fault.
             RobotiqError: the hand takes no commands now, the link went down, or the hand was stopped.

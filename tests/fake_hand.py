@@ -102,7 +102,7 @@ class FakeHand:
     async def __aexit__(self, *_: object) -> None:
         await self.stop()
 
-    async def start(self, activate: bool = True) -> None:  # noqa: ARG002
+    async def start(self, activate: bool = True, *, wait: float = 0.0) -> None:  # noqa: ARG002
         self._enter(State.RUNNING_IDLE, Trigger.SEEN_READY)
 
     async def stop(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:

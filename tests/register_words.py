@@ -7,6 +7,7 @@ from itertools import pairwise
 
 from robotiq_async.enums import AXES
 from robotiq_async.simulator import SimulatedGripper
+from robotiq_async.wire.registers import Registers
 from robotiq_async.wire.request import Request
 from robotiq_async.wire.status import RobotiqStatus
 
@@ -45,6 +46,11 @@ def status_of(
     axes = zip(four(echo), four(position), four(current), strict=True)
     content = [byte_0, byte_1, fault, *(byte for axis in axes for byte in axis), 0]
     return RobotiqStatus.from_registers(registers_of(content), timestamp=at, sequence=sequence)
+
+
+def with_object_status(status: Registers, old: Registers) -> Registers:
+    """A status with gSTA and gDT of an older one."""
+    return (status[0] & 0x3F00 | old[0] & 0xC0FF, *status[1:])
 
 
 def only_holds(gripper: SimulatedGripper, since: int) -> bool:

@@ -4,19 +4,29 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import random
+import re
 import socket
 import threading
 import time
 from collections.abc import AsyncIterator, Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from robotiq_async import RobotiqHand
 from robotiq_async.doctor import Finding, Level, examine
-from robotiq_async.doctor.gripper import _advice_for_opening
+from robotiq_async.doctor.answer import _advice_for_opening
+from robotiq_async.doctor.serial_line import report_adapter
 from robotiq_async.link.address import parse_address
-from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, Trouble
+from robotiq_async.simulator import (
+    RtuOverTcpSimulatorServer,
+    SerialSimulatorServer,
+    SimulatedGripper,
+    SimulatorServer,
+    Trouble,
+)
 from robotiq_async.wire.request import AxisRequest, Request
 from tests.serial_line import SerialLine
 from tests.virtual import run
@@ -26,9 +36,9 @@ virtual_time = pytest.mark.virtual_time
 HEALTHY = ["name", "port", "Modbus", "unit id", "registers", "round trip", "rate", "activation", "fault"]
 
 
-async def findings(address: str, **options: Any) -> dict[str, Finding]:
+async def findings(address: str, *, seconds: float = 30.0, **options: Any) -> dict[str, Finding]:
     told: list[Finding] = []
-    async with asyncio.timeout(30):
+    async with asyncio.timeout(seconds):
         await examine(parse_address(address), told.append, **options)
     assert all(finding.advice for finding in told if finding.level is not Level.GOOD)
     return {finding.what: finding for finding in told}
@@ -148,7 +158,7 @@ def registers_at(function: int, address: bytes) -> Callable[[bytes], bytes]:
 
     def answer(request: bytes) -> bytes:
         if request[7] == function and request[8:10] == address:
-            return registers_in(request, bytes(15) + b"\x06")
+            return registers_in(request, bytes(4) + b"\x06" + bytes(11))
         return reply(request, bytes((request[7] | 0x80, 2)))
 
     return answer
@@ -167,12 +177,90 @@ async def test_registers_of_the_serial_kind_over_tcp() -> None:
 
 
 @virtual_time
-@pytest.mark.parametrize("where", [b"\x07\xd0", b"\x00\x00"])
-async def test_a_function_that_no_option_helps_with(where: bytes) -> None:
+@pytest.mark.parametrize(
+    ("where", "options"),
+    [
+        (b"\x00\x00", {"read_function": 3}),
+        (b"\x07\xd0", {"request_address": 1000, "status_address": 2000, "read_function": 3}),
+    ],
+)
+async def test_firmware_that_reads_with_function_3_only(where: bytes, options: dict[str, int]) -> None:
     async with answering(registers_at(3, where)) as address:
         found = await findings(address)
-    assert found["registers"].level is Level.BAD
-    assert "a Transport of your own" in found["registers"].advice
+        hand = RobotiqHand(f"tcp://{address}", **options)  # type: ignore[arg-type]
+        await hand.start(activate=False)  # the advice helps
+        await hand.stop(halt=False)
+    assert found["registers"].level is Level.DOUBT
+    words = ", ".join(f"{name}={value}" for name, value in options.items())
+    assert found["registers"].advice.startswith(f"Pass {words}, or the options so called.")
+    assert "may be the requests" in found["registers"].advice
+
+
+@virtual_time
+async def test_a_gateway_that_is_slower_than_was_waited_for() -> None:
+    async with SimulatorServer() as server:
+        server.replies.delay(1.3)
+        found = await findings(server.address, seconds=60)
+        hand = RobotiqHand(server.address, response_timeout=2.6)
+        await hand.start(activate=False)  # the advice helps
+        await hand.stop(halt=False)
+    assert found["Modbus"].level is Level.DOUBT
+    assert re.search(r"response_timeout=2\.[67];", found["Modbus"].advice)
+
+
+# -- serial lines ------------------------------------------------------------------------------------------
+
+
+@virtual_time
+async def test_a_serial_server() -> None:
+    async with RtuOverTcpSimulatorServer() as server:
+        found = await findings(server.address)
+    assert list(found) == [*HEALTHY, "other clients"]
+    assert all(finding.level is Level.GOOD for finding in found.values()), found
+    assert found["unit id"].found == "9"
+
+
+@virtual_time
+async def test_the_other_kind_of_frames() -> None:
+    async with RtuOverTcpSimulatorServer() as server:
+        found = await findings(server.address.removeprefix("rtu+"), seconds=60)
+        assert found["Modbus"].level is Level.BAD
+        assert server.address in found["Modbus"].advice
+    async with SimulatorServer() as tcp:
+        found = await findings(f"rtu+{tcp.address}", seconds=60)
+        assert found["Modbus"].level is Level.BAD
+        assert f"write the address as {tcp.address}" in found["Modbus"].advice
+
+
+@virtual_time
+async def test_a_line_that_loses_bytes() -> None:
+    async with RtuOverTcpSimulatorServer() as server:
+        damage = Trouble("wrong-checksum", every=0.5, at=0.1)
+        plan = asyncio.create_task(server.fault_injector.run([damage], lambda _: None))
+        found = await findings(server.address)
+        plan.cancel()
+        await asyncio.wait({plan})
+    assert found["line"].level is Level.DOUBT
+    assert "had to be asked again" in found["line"].found
+    assert "link" not in found
+
+
+@pytest.mark.parametrize(("kept", "level"), [(1, Level.GOOD), (2, Level.GOOD), (16, Level.DOUBT)])
+def test_how_long_an_adapter_keeps_what_it_hears(kept: int, level: Level, tmp_path: Path) -> None:
+    (tmp_path / "ttyUSB7").mkdir()
+    (tmp_path / "ttyUSB7" / "latency_timer").write_text(f"{kept}\n", encoding="ascii")
+    told: list[Finding] = []
+    report_adapter(parse_address("rtu:///dev/ttyUSB7"), told.append, tmp_path)
+    (finding,) = told
+    assert finding.level is level
+    assert f"{kept} ms" in finding.found
+    assert (f"tee {tmp_path}/ttyUSB7/latency_timer" in finding.advice) is (level is Level.DOUBT)
+
+
+def test_a_port_without_an_adapter(tmp_path: Path) -> None:
+    told: list[Finding] = []
+    report_adapter(parse_address("rtu:///dev/ttyS0"), told.append, tmp_path)
+    assert not told
 
 
 @virtual_time
@@ -185,17 +273,151 @@ async def test_one_lost_reply_does_not_make_it_another_unit(words: str) -> None:
 
 
 @virtual_time
-@pytest.mark.parametrize("byte", [b"\0", b"\xff"])
-async def test_a_device_that_is_no_gripper(byte: bytes) -> None:
+@pytest.mark.parametrize(("byte", "level"), [(b"\0", Level.DOUBT), (b"\xff", Level.BAD)])
+async def test_a_device_that_is_no_gripper(byte: bytes, level: Level) -> None:
     async with answering(lambda request: registers_in(request, 16 * byte)) as address:
         found = await findings(address)
-    assert found["gripper"].level is Level.DOUBT
+    assert found["gripper"].level is level
+
+
+@virtual_time
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("changes", [True, False])
+async def test_the_memory_of_another_device_is_no_gripper(seed: int, changes: bool) -> None:
+    memory = random.Random(seed)
+    block = memory.randbytes(16)
+
+    def read(request: bytes) -> bytes:
+        return registers_in(request, memory.randbytes(16) if changes else block)
+
+    async with answering(read) as address:
+        found = await findings(address)
+    assert list(found) == ["name", "port", "Modbus", "gripper"], "of a state or a fault it knows nothing"
+    assert found["gripper"].level is Level.BAD
+    assert "that are 0 in a gripper" in found["gripper"].found
+    assert "Command nothing" in found["gripper"].advice
+
+
+@virtual_time
+async def test_a_gripper_beside_other_memory_is_found() -> None:
+    """A gateway with registers of its own at 0, and those of the gripper at 2000."""
+
+    def read(request: bytes) -> bytes:
+        is_gripper = request[8:10] == b"\x07\xd0"
+        return registers_in(request, bytes(16) if is_gripper else bytes(range(100, 116)))
+
+    async with answering(read) as address:
+        found = await findings(address)
+    assert found["registers"].found.startswith("status at 2000")
+
+
+class Gateway:
+    """Serves one client at a time: others wait, or it hangs up. It sees late that one has gone."""
+
+    def __init__(self, *, waits: bool, lag: float = 0.2, busy: float = 0.0) -> None:
+        self._waits = waits
+        self._lag = lag
+        self._loop = asyncio.get_running_loop()
+        self._client: object = None
+        if busy:
+            self._client = self
+            self._loop.call_later(busy, self._let_go, self)
+
+    def come(self, client: object) -> bool:
+        """Whether a client is served."""
+        if self._client is not None:
+            return False
+        self._client = client
+        return True
+
+    def go(self, client: object) -> None:
+        self._loop.call_later(self._lag, self._let_go, client)
+
+    def _let_go(self, client: object) -> None:
+        if self._client is client:
+            self._client = None
+
+    @contextlib.asynccontextmanager
+    async def serving(self) -> AsyncIterator[str]:
+        server = await self._loop.create_server(lambda: _Client(self, self._waits), "127.0.0.1", 0)
+        try:
+            yield f"127.0.0.1:{server.sockets[0].getsockname()[1]}"
+        finally:
+            server.close()
+
+
+class _Client(Device):
+    def __init__(self, gateway: Gateway, waits: bool) -> None:
+        super().__init__(lambda request: registers_in(request, bytes(16)))
+        self._gateway = gateway
+        self._waits = waits
+        self._is_served = False
+
+    def connection_made(self, transport: Any) -> None:
+        super().connection_made(transport)
+        self._is_served = self._gateway.come(self)
+        if not self._is_served and not self._waits:
+            transport.close()
+
+    def data_received(self, data: bytes) -> None:
+        if self._is_served:
+            super().data_received(data)
+
+    def connection_lost(self, _reason: object) -> None:
+        if self._is_served:
+            self._gateway.go(self)
+
+
+@virtual_time
+@pytest.mark.parametrize("waits", [True, False])
+async def test_a_gateway_for_one_client_is_no_bad_cable(waits: bool) -> None:
+    """The examination itself is one client."""
+    async with Gateway(waits=waits).serving() as address:
+        found = await findings(address)
+    assert found["Modbus"] == Finding(Level.GOOD, "Modbus", "answers")
+    assert found["port"].level is Level.GOOD
+
+
+@virtual_time
+@pytest.mark.parametrize("waits", [True, False])
+async def test_a_wait_for_another_client_is_told(waits: bool) -> None:
+    async with Gateway(waits=waits, busy=0.4).serving() as address:
+        found = await findings(address)
+    assert found["Modbus"].level is Level.DOUBT
+    assert "one client at a time" in found["Modbus"].advice
+
+
+@virtual_time
+async def test_slow_replies_are_no_lost_ones() -> None:
+    async with SimulatorServer() as server:
+        server.replies.delay(0.6)
+        found = await findings(server.address)
+    assert found["Modbus"].level is Level.DOUBT
+    assert found["Modbus"].found == "answers, after 0.6 s"
+    assert found["Modbus"].advice.startswith("Pass response_timeout=1.")
+    assert "cable" not in found["Modbus"].advice
+    assert "unit id" in found, "of a slow one there is as much to say"
+    assert found["rate"].level is Level.DOUBT
+    assert "No poll_interval is so long (at most 0.1 s)" in found["rate"].advice
+    assert "link" not in found
+
+
+@virtual_time
+async def test_replies_that_take_a_longer_timeout() -> None:
+    async with SimulatorServer() as server:
+        server.replies.delay(0.45)
+        found = await findings(server.address)
+        hand = RobotiqHand(server.address, response_timeout=1.0)
+        await hand.start(activate=False)  # the advice helps
+        await hand.stop(halt=False)
+    assert found["Modbus"].level is Level.GOOD
+    assert found["round trip"].advice.startswith("Pass response_timeout=")
 
 
 def test_an_extra_that_is_missing_is_no_question_of_cables() -> None:
-    assert _advice_for_opening(parse_address("rtu:///dev/x"), "pip install 'robotiq-async[serial]'") == (
-        "Install that, and look again."
-    )
+    assert _advice_for_opening(
+        parse_address("rtu:///dev/x"), "pip install 'pyserial>=3.5' (the extra serial)"
+    ) == ("Install that, and look again.")
 
 
 @virtual_time

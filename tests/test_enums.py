@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import copy
+import json
 import pickle
+from enum import IntEnum
 
 import pytest
 
@@ -174,3 +176,18 @@ def test_a_mask_prints_as_the_names_of_its_axes() -> None:
     assert f"holding it with {Finger.A | Finger.C}" == "holding it with A|C"
     assert str(Finger.ALL) == "A|B|C|SCISSOR"
     assert str(Finger(0)) == "none"
+
+
+@pytest.mark.parametrize("kind", [Fault, Initialization, Mode, ObjectStatus])
+def test_a_field_of_the_status_prints_as_its_name_and_is_its_number_elsewhere(kind: type[IntEnum]) -> None:
+    for member in kind:
+        assert (str(member), f"{member}", "%s" % member) == (member.name,) * 3  # noqa: UP031
+        assert (f"{member:02X}", "%d" % member) == (f"{member.value:02X}", str(member.value))  # noqa: UP031
+        assert json.loads(json.dumps({"it": member, member: 1})) == {"it": member.value, str(member.value): 1}
+        assert member == member.value
+        assert pickle.loads(pickle.dumps(member)) is member
+
+
+def test_an_unassigned_fault_prints_its_number() -> None:
+    assert str(Fault(0x0C)) == "UNKNOWN_0x0C"
+    assert json.dumps(Fault(0x0C)) == "12"

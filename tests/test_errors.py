@@ -26,6 +26,8 @@ TREE: dict[str, tuple[str, ...]] = {
     "ConnectionLostError": ("RobotiqConnectionError",),
     "ResponseTimeoutError": ("RobotiqConnectionError", "TimeoutError"),
     "ProtocolError": ("RobotiqConnectionError",),
+    # What a user may tell from other time-outs.
+    "MoveIgnoredError": ("MoveTimeoutError",),
     # Around a hand; not among the names of the package.
     "RecordingError": ("RobotiqError",),
     "ViewerError": ("RobotiqError",),
@@ -94,7 +96,7 @@ def test_a_failed_connection_tells_address_and_reason() -> None:
 
 def test_time_outs_and_lost_links_are_caught_by_the_names_python_has_for_them() -> None:
     timeouts = {name for name, each in classes().items() if issubclass(each, TimeoutError)}
-    assert timeouts == {name for name in TREE if "Timeout" in name}
+    assert timeouts == {name for name in TREE if "Timeout" in name} | {"MoveIgnoredError"}
     connection = {name for name, each in classes().items() if issubclass(each, ConnectionError)}
     assert connection == {
         "RobotiqConnectionError",

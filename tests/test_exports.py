@@ -248,7 +248,7 @@ def test_the_parameters_of_the_calls_are_those_of_the_contract() -> None:
     assert {"response_timeout", "activation_timeout", "reconnect"} <= {
         name for name, _, _ in parameters("__init__")
     }
-    assert parameters("start") == [("activate", True, False)]
+    assert parameters("start") == [("activate", True, False), ("wait", 0.0, True)]
     assert parameters("set_position") == [("value", empty, False), ("fingers", abc, False)]
     assert parameters("set_speed") == [("value", empty, False), ("fingers", every, False)]
     assert parameters("set_force") == [("value", empty, False), ("fingers", every, False)]

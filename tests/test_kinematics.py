@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from robotiq_async import Finger
 from robotiq_async.kinematics import (
+    FINGER_NAMES,
     JOINTS,
     finger_angles,
     joint_angles,
@@ -62,12 +63,23 @@ def test_every_axis_moves_its_own_joints(positions: tuple[int, int, int, int]) -
     status = status_of(0xF9, 0xFF, position=positions)
     angles = dict(zip(JOINTS, joint_angles(status), strict=True))
     assert len(set(JOINTS)) == len(angles) == 11
-    for name, finger in (("1", Finger.B), ("2", Finger.C), ("middle", Finger.A)):
+    for name, finger in (("1", Finger.C), ("2", Finger.B), ("middle", Finger.A)):
         mine = tuple(angles[f"finger_{name}_joint_{joint}"] for joint in (1, 2, 3))
         assert mine == finger_angles(status.position(finger))
     palm = palm_angle(status.position(Finger.SCISSOR))
     assert (angles["palm_finger_1_joint"], angles["palm_finger_2_joint"]) == (palm, -palm)
     assert all(abs(angle) < HALF_TURN for angle in angles.values())
+
+
+def test_one_map_names_the_fingers() -> None:
+    """docs/decisions/finger-names.md says why. A change of it changes the joints, too."""
+    assert list(FINGER_NAMES.items()) == [
+        (Finger.C, "finger_1"),
+        (Finger.B, "finger_2"),
+        (Finger.A, "finger_middle"),
+    ]
+    fingers = [name.partition("_joint_")[0] for name in JOINTS if not name.startswith("palm")]
+    assert fingers == [name for name in FINGER_NAMES.values() for _ in range(3)]
 
 
 def test_velocities() -> None:

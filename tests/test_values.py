@@ -47,6 +47,7 @@ from robotiq_async.calibration import ForceCalibration, SpeedCalibration
 from robotiq_async.calibration.csv_tables import SPEED, TableError
 from robotiq_async.control.motion import Move
 from robotiq_async.doctor import Finding, Level
+from robotiq_async.errors import MoveIgnoredError
 from robotiq_async.fleet import ControlLostError, GripperName, Member, NotAllStoppedError, Route
 from robotiq_async.fleet.agent.agent_file import GripperSettings
 from robotiq_async.fleet.control.lease import Holder
@@ -57,7 +58,7 @@ from robotiq_async.frozen_mapping import FrozenMapping
 from robotiq_async.link.address import parse_address
 from robotiq_async.link.simulation import Simulation
 from robotiq_async.session.statistics import Counters
-from robotiq_async.simulator import Trouble
+from robotiq_async.simulator import Habits, Trouble
 from robotiq_async.web.settings import PageSettings
 from robotiq_async.wire.registers import TCP_REGISTERS, gDT
 from robotiq_async.wire.request import AxisRequest, Request
@@ -103,6 +104,7 @@ VALUES: list[object] = [
     AxisRequest(1, 2, 3),
     ReconnectPolicy(give_up_after=3.0),
     Simulation(speedup=10.0, object=150),
+    Habits(status_lag=0.05),
     SpeedCalibration.thesis(),
     SpeedCalibration("mine", [[0, 9.0], [255, 2.0]]),  # type: ignore[arg-type]
     ForceCalibration.nominal(),
@@ -136,6 +138,7 @@ ERRORS: list[Exception] = [
     GripperFaultError(Fault.SCISSOR_BLOCKED),
     GripperFaultError(Fault(0x0C), "as told"),
     MoveTimeoutError("too slow", status_of(0x39, 0xC0)),
+    MoveIgnoredError("asleep", status_of(0xF9, 0xFF)),
     ConnectFailedError("tcp://192.168.1.11:502", "refused"),
     ControlLostError("somebody commands the gripper", "held"),
     NotAllStoppedError("not stopped", {LEFT: "no answer"}, ["tls/cell-2:7447"]),
@@ -229,6 +232,7 @@ NO_VALUES = {
     "Recovered": "work in progress",
     "Reply": "internal",
     "Entry": "bytes on their way",
+    "Thing": "what is drawn between the fingers",
     "Service": "what may be asked by name, with the function that does it",
     "Topic": "bytes on their way",
 }

@@ -14,6 +14,7 @@ import functools
 import gc
 import os
 import selectors
+import socket
 import threading
 import time
 from collections import deque
@@ -256,12 +257,15 @@ class MemoryTransport(asyncio.Transport):
     def is_closing(self) -> bool:
         return self._closing
 
+    def get_write_buffer_size(self) -> int:
+        return 0  # what is written is on its way
+
     def get_extra_info(self, name: str, default: Any = None) -> Any:
         return {"socket": self, "peername": ("memory", 1), "sockname": ("memory", 2)}.get(name, default)
 
-    def setsockopt(self, *_: Any) -> None:
-        """The simulator sets but one option: to reset the connection in place of closing it."""
-        self._resets = True
+    def setsockopt(self, _level: int, option: int, _value: object) -> None:
+        """One option counts here, the simulator's: to reset the connection in place of closing it."""
+        self._resets |= option == socket.SO_LINGER
 
 
 def run(main: Callable[[], Coroutine[Any, Any, T]]) -> T:

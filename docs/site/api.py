@@ -97,7 +97,7 @@ def parts() -> dict[str, Part]:
         "simulator.md": Part(
             "The simulator",
             "A gripper in memory, servers that put it on a wire, and fixtures for the tests of applications.",
-            (*exports(f"{PACKAGE}.simulator"), f"{PACKAGE}.testing.plugin"),
+            (*exports(f"{PACKAGE}.simulator"), f"pytest_{PACKAGE}.plugin"),
         ),
         "fleet.md": Part(
             "Hands on other hosts",

@@ -15,6 +15,8 @@ import contextlib
 import csv
 import os
 import re
+import secrets
+import stat
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -49,6 +51,8 @@ FORCE: Final = Layout("force_value", "g", 100_000)
 """Readings of a scale between the fingers."""
 LONGEST: Final = 10_000
 """Characters of a line; a file without line ends is no table."""
+NEW: Final = 0o666
+"""Mode of a file that was not there, before the umask."""
 
 
 class TableError(ValueError):
@@ -146,19 +150,37 @@ def integer(path: Path | str, line: int, name: str, text: str, high: int) -> int
 
 
 def write_rows(path: Path | str, rows: Iterable[Sequence[object]]) -> None:
-    """Write a CSV file, whole or not at all.
+    """Write a CSV file, whole or not at all. A file that is there keeps its mode.
 
     Raises:
         OSError: it cannot be written; the file is what it was.
     """
-    path = Path(os.path.realpath(path))
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    mode = _mode(path)
+    target = Path(os.path.realpath(path))  # a link to a table stays a link
+    beside = target.with_name(f".{target.name}.{secrets.token_hex(8)}")
+    # A new file, or none: where others write too, what has its name may be a link that they made.
+    descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, NEW if mode is None else mode)
     try:
-        with open(beside, "w", encoding="utf-8", newline="") as file:
+        with open(descriptor, "w", encoding="utf-8", newline="") as file:
+            if mode is not None:
+                # Of the mode above the umask has taken some.
+                os.chmod(descriptor if os.chmod in os.supports_fd else beside, mode)
             csv.writer(file, lineterminator="\n").writerows(rows)
             file.flush()
             os.fsync(file.fileno())
-        os.replace(beside, path)
+        os.replace(beside, target)
     finally:
         with contextlib.suppress(FileNotFoundError):
             beside.unlink()
+
+
+def _mode(path: Path | str) -> int | None:
+    """Who may read and write a file; None if it is not there.
+
+    Raises:
+        OSError: nobody may know, or follow the link.
+    """
+    try:
+        return stat.S_IMODE(os.stat(path).st_mode)
+    except FileNotFoundError:
+        return None

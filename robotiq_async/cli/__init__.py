@@ -25,10 +25,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ModuleNotFoundError as error:
         if error.name != "cyclopts":
             raise
-        print(
-            "robotiq-async: the command line needs cyclopts: pip install 'robotiq-async[cli]'",
-            file=sys.stderr,
-        )
+        from ..extras import install
+
+        print(f"robotiq-async: the command line needs cyclopts: {install('cli')}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         # Importing takes a quarter of a second, and nothing has happened yet.

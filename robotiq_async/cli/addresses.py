@@ -17,6 +17,12 @@ def full_address(address: str) -> str:
         return str(parse_remote_address(address)[0] if is_remote(address) else parse_address(address))
 
 
+def gripper_words(address: str) -> str:
+    """Which gripper an address means, for people: the first that a command says."""
+    kind = "Simulated gripper" if is_simulated(address) else "Gripper"
+    return f"{kind} {full_address(address)}"
+
+
 def is_simulated(address: str) -> bool:
     """Whether the gripper is a simulated one inside the command."""
     return full_address(address).startswith("sim:")

@@ -17,7 +17,8 @@ from .commands.measure.force import force as measure_force
 from .commands.measure.speed import speed as measure_speed
 from .commands.monitor import monitor
 from .commands.move import move
-from .commands.record import plot, record, recover, replay
+from .commands.recording.record import record
+from .commands.recording.recordings import export, plot, recover, replay
 from .commands.simulate import simulate
 from .commands.status import status
 from .commands.view import view
@@ -26,18 +27,31 @@ from .output.reflow import reflow
 
 COMMANDS: Final = (
     *(demo, simulate, status, move, monitor, web, view, doctor),
-    *(record, replay, recover, plot, agent),
+    *(record, replay, export, plot, recover, agent),
 )
 """A new sub-command is a module with a function of its name, and an entry here."""
 
 _HELP = """Control a Robotiq 3-Finger gripper, or a simulated one.
 
-Every command that talks to a gripper takes its address as the last argument:
+Every command that talks to a gripper takes its address as the last argument, and names it first:
 
     tcp://192.168.1.11    Modbus TCP; tcp:// and the port (:502) may be left out
     rtu:///dev/ttyUSB0    Modbus RTU on a serial line (extra serial)
+    rtu+tcp://HOST:PORT   Modbus RTU through a serial server
     zenoh://lab/cell/left one that an agent on another host serves (extra fleet)
-    sim://                the default: a gripper simulated inside the command
+    sim://                a gripper simulated inside the command
+
+Without an address it is sim://; doctor and measure want one.
+
+What the extras beside cli are for:
+
+    monitor   monitor
+    web       web, demo --show
+    view      view
+    record    record (not of a table, .csv), replay, export, plot, recover
+    plot      plot, the pictures of measure
+    fleet     agent, fleet, doctor and all others with zenoh:// addresses
+    serial    rtu:// addresses
 
 Nothing here has run on real hardware yet.
 """

@@ -11,6 +11,8 @@ from typing import Annotated, Final
 from cyclopts import Parameter, Token
 
 from ..enums import Finger
+from ..extras import install
+from ..session.options import RESPONSE_TIMEOUT_S
 from ..wire.checks import parse_fingers
 from .failures import CommandError, UsageError, usage
 
@@ -22,7 +24,7 @@ def need(module: str, extra: str, instead: str = "") -> None:
         CommandError: it is not.
     """
     if find_spec(module) is None:
-        raise CommandError(f"this needs {module}: pip install 'robotiq-async[{extra}]'{instead}")
+        raise CommandError(f"this needs {module}: {install(extra)}{instead}")
 
 
 def _integer(name: str, low: int, high: int) -> Callable[[object, Sequence[Token]], int]:
@@ -45,7 +47,10 @@ def _fingers(_type: object, tokens: Sequence[Token]) -> Finger:
 
 Address = Annotated[
     str,
-    Parameter(help="The gripper: tcp://HOST[:PORT], rtu:///dev/ttyUSB0, zenoh://SITE/HOST/NAME or sim://."),
+    Parameter(
+        help="The gripper: tcp://HOST[:PORT], rtu:///dev/ttyUSB0, rtu+tcp://HOST:PORT, "
+        "zenoh://SITE/HOST/NAME or sim://."
+    ),
 ]
 Flag = Annotated[bool, Parameter(negative=(), show_default=False)]
 """Off, unless it is given: there is no --no- form, and no default to be told."""
@@ -54,7 +59,9 @@ Host = Annotated[str, Parameter(metavar="HOST")]
 Position = Annotated[int, Parameter(converter=_integer("POSITION", 0, 255))]
 Byte = Annotated[int, Parameter(converter=_integer("the value", 0, 255), metavar="0..255")]
 Port = Annotated[int, Parameter(converter=_integer("the port", 0, 65535), metavar="0..65535")]
-Unit = Annotated[int, Parameter(converter=_integer("the unit id", 1, 247), metavar="1..247")]
+Unit = Annotated[int, Parameter(converter=_integer("the unit id", 0, 255), metavar="0..255")]
+ReadFunction = Annotated[int, Parameter(converter=_integer("the function", 3, 4), metavar="3|4")]
+Seconds = Annotated[float, Parameter(metavar="SECONDS")]
 Register = Annotated[int, Parameter(converter=_integer("the register", 0, 65528), metavar="0..65528")]
 Fingers = Annotated[
     Finger,
@@ -75,12 +82,18 @@ class Link:
     """How to reach a gripper that is not set up as usual; the command doctor finds out."""
 
     device_id: Annotated[Unit | None, Parameter(help="Modbus unit id (default: 2 on TCP, 9 serial).")] = None
+    read_function: Annotated[
+        ReadFunction | None, Parameter(help="Modbus function that reads (default: 4 on TCP, 3 serial).")
+    ] = None
     request_address: Annotated[
         Register | None, Parameter(help="First request register (default: 0 on TCP, 1000 serial).")
     ] = None
     status_address: Annotated[
         Register | None, Parameter(help="First status register (default: 0 on TCP, 2000 serial).")
     ] = None
+    response_timeout: Annotated[Seconds, Parameter(help="Seconds for one answer, up to 5.")] = (
+        RESPONSE_TIMEOUT_S
+    )
 
 
 USUAL: Final = Link()

@@ -48,6 +48,8 @@ def make_hand(
         return RobotiqHand(
             address,
             device_id=link.device_id,
+            read_function=link.read_function,
+            response_timeout=link.response_timeout,
             request_address=link.request_address,
             status_address=link.status_address,
             poll_interval=poll_interval,

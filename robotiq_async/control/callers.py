@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from ..enums import NO_AXES, Finger
 from ..errors import MoveSupersededError, RobotiqError
@@ -13,13 +13,28 @@ from .requests.pending import Command, PendingCommand
 from .waiters import Waiter, resolve
 
 
+@dataclass(slots=True, eq=False)
+class _Halt:
+    """One halt that waits until it shows.
+
+    Attributes:
+        number: of its write.
+        waiter: who asked.
+        is_second: whether it has been sent twice.
+    """
+
+    number: int
+    waiter: Waiter[None]
+    is_second: bool = False
+
+
 class Callers:
     """Commands, moves and halts: pending, on the line, or acknowledged and not seen to act.
 
     Attributes:
         pending: what the gripper has not been told yet.
         moves: the moves that somebody waits for.
-        halting: callers of halt() whose write was acknowledged, with its number.
+        halting: halts that were acknowledged and not seen to act.
     """
 
     def __init__(self) -> None:
@@ -28,7 +43,7 @@ class Callers:
         self.moves = LiveMoves()
         self._sent = PendingCommand()
         """What is on the line."""
-        self.halting: list[tuple[int, Waiter[None]]] = []
+        self.halting: list[_Halt] = []
 
     @property
     def has_undelivered_stop(self) -> bool:
@@ -80,18 +95,25 @@ class Callers:
         """What is on the line was acknowledged under this number."""
         sent, self._sent = self._sent, PendingCommand()
         resolve(sent.waiters)
-        self.halting += [(number, waiter) for waiter in sent.halting or ()]
+        if sent.halting is not None:
+            for halt in self.halting:
+                halt.number = number  # this write is the second one of those before it, or as good
+            self.halting += [_Halt(number, waiter) for waiter in sent.halting]
 
     def see_halt(self, status: RobotiqStatus, acts: Callable[[int], bool]) -> None:
-        """Tell those whose halt a status shows, or whose write acts by now."""
-        for number, waiter in self.halting[:]:
-            if not status.go_echo or acts(number):
-                self.halting.remove((number, waiter))
-                resolve([waiter])
+        """Tell those whose halt a status shows. One that should act and does not show is sent once more."""
+        for halt in self.halting[:]:
+            if not status.go_echo or (halt.is_second and acts(halt.number)):
+                self.halting.remove(halt)
+                resolve([halt.waiter])
+            elif acts(halt.number) and self.pending.halting is None:
+                # A gripper may acknowledge a write that comes soon after another one and forget it. Unlike a
+                # motion, a halt may be sent again; that it shows only then is not told twice.
+                halt.is_second, self.pending.halting = True, []
 
     def fail(self, error: RobotiqError) -> None:
         """Nothing asked so far will happen: tell everybody. The write may be on the line all the same."""
-        told = (self.pending, self._sent, PendingCommand(halting=[waiter for _, waiter in self.halting]))
+        told = (self.pending, self._sent, PendingCommand(halting=[halt.waiter for halt in self.halting]))
         self.pending, self._sent, self.halting = PendingCommand(), PendingCommand(), []
         for command in told:
             command.fail(error)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from ..enums import Finger, ObjectStatus
+from ..enums import NO_AXES, Finger, ObjectStatus
 from ..wire.request import Request
 from ..wire.status import RobotiqStatus
 
@@ -39,7 +39,9 @@ def agrees(request: int, what: ObjectStatus, position: int, direction: int) -> b
     return abs(request - position) <= TOLERANCE
 
 
-def drifts(axis: Finger, base: Request, status: RobotiqStatus, arrived: Finger) -> bool:
+def drifts(
+    axis: Finger, base: Request, status: RobotiqStatus, arrived: Finger, doubtful: Finger = NO_AXES
+) -> bool:
     """Whether an axis moves or is about to: then holding it means asking for where it is.
 
     An axis in contact keeps its request, and with it its grip; so does one that stands where it was asked
@@ -51,9 +53,12 @@ def drifts(axis: Finger, base: Request, status: RobotiqStatus, arrived: Finger) 
         status: the newest status.
         arrived: the axes that have come to rest under their requests. Another one that is at rest close by
             may not have begun yet.
+        doubtful: the axes that are shown at rest, and by what was asked a moment ago may move all the same.
     """
     if not base.go:
         return False
+    if axis in doubtful:
+        return base.position(axis) != status.position(axis)
     what, position, request = status.finger_status(axis), status.position(axis), base.position(axis)
     if what is ObjectStatus.AT_POSITION and axis not in arrived:
         return request != position

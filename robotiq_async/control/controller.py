@@ -16,6 +16,7 @@ from ..enums import NO_AXES, Finger, Severity, State
 from ..errors import (
     ConnectionLostError,
     GripperFaultError,
+    MoveIgnoredError,
     MoveSupersededError,
     NotActivatedError,
     NotStartedError,
@@ -24,8 +25,10 @@ from ..errors import (
 from ..wire.request import Request
 from ..wire.status import RobotiqStatus
 from .callers import Callers
+from .first_motion import IGNORED_S, FirstMotion
 from .grip_keeper import GripKeeper
 from .motion import Move
+from .passing_fault import PassingFault
 from .requests.merging import merged
 from .requests.pending import Command
 from .requests.shadow import NEVER, RequestShadow
@@ -60,10 +63,16 @@ class Controller:
         """Whether a gripper that is found reset is activated."""
         self.foreign_commands = 0
         """How often another client was seen to command the gripper."""
+        self.passing_faults = 0
+        """How often 0x09 was shown in passing."""
+        self._passing_fault = PassingFault(self._tell_of_passing_fault)
+        self._judged: RobotiqStatus | None = None
+        """The newest status, without a fault that has not lasted: what is decided on."""
         self._warned = NEVER
         self._closing_time = closing_time
-        self._shadow = RequestShadow(speed, force)
+        self._shadow = RequestShadow(speed, force, log=machine.log)
         self._callers = Callers()
+        self._first_motion = FirstMotion()
         self._step = 0
         """The write that carried the last step of a sequence: it sees only what came of it."""
         self._activating = False
@@ -230,11 +239,16 @@ class Controller:
 
         ``asked`` is when it was asked for, in monotonic seconds; None for the time of the reply.
         """
-        self.status = status
-        self._shadow.see(status, status.timestamp if asked is None else asked)
+        asked = status.timestamp if asked is None else asked
+        before, self.status = self.machine.state, status
+        self._shadow.see(status, asked)
+        self._judged, condition = status, classify(status)
+        if condition is Trigger.SEEN_FAULT or self._passing_fault.reads:
+            condition = self._look_past_fault(status, asked)
         if self.machine.sequence is not None:
             return  # the sequence decides what it means
-        before, condition = self.machine.state, classify(status)
+        if before is State.DISCONNECTED and self.is_undecided:
+            return  # the next status does
         if before is State.DISCONNECTED and condition is Trigger.SEEN_RESET and self.activates:
             self._begin_activation(Trigger.ACTIVATES)
             return
@@ -252,10 +266,18 @@ class Controller:
         if self._callers.halting:
             self._callers.see_halt(status, self._shadow.acts)
         if after in RUNNING:
-            self._shadow.see_contacts(status)
             self._shadow.see_arrivals(status)
+            self._shadow.see_contacts(status)
+            arrived = self._shadow.arrived
+            if self._first_motion.is_watched:
+                arrived &= ~self._see_first_motion(status)
             if self._callers.moves:
-                self._callers.moves.see(status, self._shadow.acts)
+                self._callers.moves.see(status, self._shadow.acts, arrived, self._shadow.limited)
+
+    @property
+    def is_undecided(self) -> bool:
+        """Whether the first status on a new link shows 0x09, which may be for the silence before."""
+        return self._passing_fault.is_open and self.machine.state is State.DISCONNECTED
 
     @property
     def has_request(self) -> bool:
@@ -265,17 +287,17 @@ class Controller:
     @property
     def is_urgent(self) -> bool:
         """Whether a stop is to be written. It does not wait for a status that may never come."""
-        if self.machine.sequence is None or self.status is None:
+        if self.machine.sequence is None or self._judged is None:
             return self._callers.pending.halting is not None
-        state, may_move = self.machine.state, self._activating or self._shadow.may_go(self.status)
-        if self._keeps_grip and self._grip_keeper.rests(self.status):
+        state, may_move = self.machine.state, self._activating or self._shadow.may_go(self._judged)
+        if self._keeps_grip and self._grip_keeper.rests(self._judged):
             may_move = False  # whether to leave it so is decided on what is read next
         stops = state is State.DO_RESET or (state is State.DO_SHUTDOWN and may_move)
         return stops and not self._step
 
     def decide(self, now: float) -> Request | None:
         """The image to write now, after the status just seen, or None. It counts as sent from here on."""
-        status, pending = self.status, self._callers.pending
+        status, pending = self._judged, self._callers.pending
         if status is None:
             return None
         if self.machine.sequence is not None:
@@ -284,9 +306,18 @@ class Controller:
         if pending.is_empty or self.machine.state not in _COMMANDED:
             return None
         shadow = self._shadow
+        if self._passing_fault.is_open and pending.halting is None and not pending.holds_at_most:
+            return None  # if it lasts, what would move is not sent at all
         if pending.halting is None and not shadow.is_ready(status, moves=bool(pending.positions)):
             return None  # for a halt it is never too early
-        image = merged(shadow.base, pending, status, gripping=shadow.gripping(status), arrived=shadow.arrived)
+        image = merged(
+            shadow.base,
+            pending,
+            status,
+            gripping=shadow.gripping(status),
+            arrived=shadow.arrived,
+            doubtful=shadow.doubtful(status) if pending.hold else NO_AXES,
+        )
         if pending.holds_at_most and image == shadow.base:
             # Nothing drifts; but what was written before may not act yet, and then something might.
             if shadow.is_settled:
@@ -297,6 +328,7 @@ class Controller:
         if image.go and not shadow.base.go:
             self._grip_keeper.tell_of_lost_grips(status, sent.moved)
         number = shadow.writing(image, sent.moved, now)
+        self._first_motion.written(number, sent.moved, status)
         if sent.positions:
             self._callers.moves.written(number)
         return image
@@ -335,6 +367,8 @@ class Controller:
         """What the sequence under way wants written; at its end, see where that leaves the hand."""
         if self._step and not self._shadow.acts(self._step):
             return None
+        if self._passing_fault.is_open and self.machine.state is State.DO_ACTIVATION:
+            return None
         image = self.machine.advance(status)
         if image is not None:
             self._step = self._shadow.writing(image, NO_AXES, now)
@@ -345,6 +379,7 @@ class Controller:
     def _after_sequence(self, status: RobotiqStatus) -> None:
         if self._step:
             is_ours = self._shadow.restart(status)
+            self._first_motion.over()
         else:  # what it was to begin from was gone: nothing was sent
             self._activating, is_ours = False, self._shadow.is_ours(status)
         if self.machine.state in _COMMANDED and not is_ours:
@@ -361,6 +396,21 @@ class Controller:
             or (condition is Trigger.SEEN_RESET and self._shadow.is_settled)
         )
 
+    def _look_past_fault(self, status: RobotiqStatus, asked: float) -> Trigger:
+        """The condition that a status shows without 0x09, as long as that has not lasted."""
+        judged = self._passing_fault.see(status, asked)
+        if self.machine.state is not State.FAULT:  # that one fault has passed says nothing of the next
+            self._judged = judged
+        return classify(self._judged or status)
+
+    def _tell_of_passing_fault(self) -> None:
+        self.passing_faults += 1
+        if self.passing_faults == 1:
+            self.machine.log.info(
+                "the gripper showed fault 0x09 for a moment, as some do after a second without a poll: "
+                "passed over, and only counted from here on"
+            )
+
     # -- what others do, and what was lost -------------------------------------------------------------
 
     def _go_on(self, before: State, status: RobotiqStatus) -> None:
@@ -375,10 +425,29 @@ class Controller:
     def _return(self, status: RobotiqStatus) -> None:
         """The link is back: go on from the image that the gripper shows, or adopt it."""
         self._shadow.returned(status)
+        self._first_motion.connected()
         if self.machine.state is State.FAULT and status.activation_echo:
             # As when a fault is seen to begin: nothing resumes by itself when it clears.
             self._hold_on_return = Finger.ALL
         self._hold_what_was_lost()
+
+    def _see_first_motion(self, status: RobotiqStatus) -> Finger:
+        """See whether the gripper follows the first motion on a new link; return the axes that do not."""
+        still, is_ignored = self._first_motion.see(
+            status, self._shadow.base, self._shadow.acts, self._shadow.moment
+        )
+        if is_ignored:
+            error = MoveIgnoredError(
+                f"the gripper acknowledged and echoed a motion of {still}, and nothing has moved for "
+                f"{IGNORED_S:g} s: it may not follow on a new connection. Try it again; if that is ignored, "
+                "too: reset() and activate()",
+                status,
+            )
+            self.machine.log.warning("%s", error)
+            self._callers.moves.fail(error, lambda move: bool(move.axes & still))
+            # Nothing may begin to move because the gripper wakes up later.
+            self._callers.hold(still, "the fingers are held")
+        return still
 
     def _hold_what_was_lost(self) -> None:
         """Hold what a lost link kept from being held, unless somebody else moves it by now."""
@@ -391,6 +460,8 @@ class Controller:
     def _take_over(self, status: RobotiqStatus) -> None:
         """Another client commands the gripper: take over its requests, or our next write undoes them."""
         self.foreign_commands += 1
+        limited = self._shadow.limited
+        self._shadow.see_others()
         if status.timestamp - self._warned >= WARNING_S:
             self._warned = status.timestamp
             self.machine.log.warning("another client commands the gripper: %r", status)
@@ -398,7 +469,7 @@ class Controller:
         self._callers.pending.hold &= self._shadow.ours | self._callers.pending.asked_to_hold
         self._callers.moves.fail(
             MoveSupersededError("another client commands the gripper"),
-            lambda move: move.write is not None and not move.is_under(status),
+            lambda move: move.write is not None and not move.is_under(status, limited),
         )
 
     def _leave(self, after: State, status: RobotiqStatus) -> None:

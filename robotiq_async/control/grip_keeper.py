@@ -26,8 +26,8 @@ KEEP_S: Final = 0.5
 """How long axes have to come to rest. What is left of the time of a stop is enough to clear rGTO also on the
 slowest gripper that is reckoned with (a device cycle of 0.2 s)."""
 REST_S: Final = 0.05
-"""How long every axis must have stood still: ten polls. A gDT that lags behind its echo by a reading or two
-leaves no motion unseen."""
+"""How long every axis must have stood still: ten polls. What was asked a moment ago, and gDT may not show
+yet, is waited for besides (see requests/standstill.py)."""
 
 
 class GripKeeper:
@@ -46,17 +46,22 @@ class GripKeeper:
         self.doubt = "halt() was asked for" if halts else running
 
     def rests(self, status: RobotiqStatus) -> bool:
-        """Whether a status shows every axis at rest under what it was asked last, and no fault."""
-        ready = classify(status) is Trigger.SEEN_READY and status.fault is Fault.NONE
-        return ready and status.go_echo and not status.moving and self._shadow.is_settled and not self.doubt
+        """Whether every axis is known to rest under what it was asked last, and there is no fault."""
+        shadow = self._shadow
+        ready = classify(status) is Trigger.SEEN_READY and status.fault is Fault.NONE and not self.doubt
+        rests = not status.moving and shadow.arrived is Finger.ALL and shadow.is_certain
+        return ready and status.go_echo and shadow.is_settled and rests
 
     def sequence(self) -> Sequence:
         """Hold what moves and leave rGTO set once everything rests; on any doubt, clear it and see it."""
         status = yield None
         # How long an axis has stood still is counted by when that was asked: replies may be looked at late.
         until, since, may_hold = status.timestamp + KEEP_S, math.inf, True
-        while not (doubt := self._doubt(status, until)):
-            image = self._held(status) if may_hold else None
+        while True:
+            self._shadow.see_arrivals(status)
+            if doubt := self._doubt(status, until):
+                break
+            image = self._held(status) if may_hold and self._shadow.is_certain else None
             if image is not None:
                 may_hold, since = False, math.inf
                 status = yield image
@@ -82,7 +87,9 @@ class GripKeeper:
             return "another client commands the gripper"
         if status.timestamp - self._shadow.asked > KEEP_S:
             return "the newest status is old: something holds up the event loop"
-        if not self._shadow.is_certain:
+        # An object status that may be late is worth a wait; what may come of a lost link is not.
+        is_late = self._shadow.is_adoption_late and not status.moving and status.timestamp < until
+        if not self._shadow.is_certain and not is_late:
             return "what the gripper was asked is not known for certain"
         if self._shadow.is_settled and not status.go_echo:
             return "rGTO was clear"
@@ -94,7 +101,14 @@ class GripKeeper:
         """The image in which everything that moves, or is about to, is held; None if nothing does."""
         shadow = self._shadow
         held = PendingCommand(hold=Finger.ALL)
-        image = merged(shadow.base, held, status, gripping=NO_AXES, arrived=shadow.arrived)
+        image = merged(
+            shadow.base,
+            held,
+            status,
+            gripping=NO_AXES,
+            arrived=shadow.arrived,
+            doubtful=shadow.doubtful(status),
+        )
         return None if image == shadow.base else image
 
     def tell_of_lost_grips(self, status: RobotiqStatus, moved: Finger) -> None:

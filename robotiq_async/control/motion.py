@@ -119,15 +119,26 @@ class Move:
         for axis, peak in self._peak.items():
             self._peak[axis] = max(peak, status.current_ma(axis))
 
-    def is_under(self, status: RobotiqStatus) -> bool:
-        """Whether a status echoes this request for every addressed axis."""
-        return status.go_echo and all(status.requested_position(axis) == self.position for axis in self._peak)
+    def is_under(self, status: RobotiqStatus, limited: Mapping[Finger, int]) -> bool:
+        """Whether a status echoes this request for every addressed axis, or the limit in place of it.
 
-    def has_arrived(self, status: RobotiqStatus) -> bool:
-        """Whether a status shows every addressed axis at rest under this request."""
-        return self.is_under(status) and all(
-            status.finger_status(axis) is not ObjectStatus.IN_MOTION for axis in self._peak
+        Args:
+            status: the newest one.
+            limited: the axes for which the gripper shows a limit, with that.
+        """
+        return status.go_echo and all(
+            status.requested_position(axis) == limited.get(axis, self.position) for axis in self._peak
         )
+
+    def has_arrived(self, status: RobotiqStatus, arrived: Finger, limited: Mapping[Finger, int]) -> bool:
+        """Whether a status shows every addressed axis at rest under this request, and it can be believed.
+
+        Args:
+            status: the newest one.
+            arrived: the axes that are known to rest under what they were asked last.
+            limited: the axes for which the gripper shows a limit, with that.
+        """
+        return self.axes in arrived and not status.moving & self.axes and self.is_under(status, limited)
 
     def end(self, status: RobotiqStatus) -> None:
         """Hand over the result, from the status that ended the move."""
@@ -178,13 +189,26 @@ class LiveMoves:
             if move.write is None:
                 move.write = number
 
-    def see(self, status: RobotiqStatus, acts: Callable[[int], bool]) -> None:
-        """End the moves that a status shows to have arrived, as far as their writes act."""
+    def see(
+        self,
+        status: RobotiqStatus,
+        acts: Callable[[int], bool],
+        arrived: Finger,
+        limited: Mapping[Finger, int],
+    ) -> None:
+        """End the moves that a status shows to have arrived, as far as their writes act.
+
+        Args:
+            status: the newest one.
+            acts: whether the write of a number acts.
+            arrived: the axes that are known to rest under what they were asked last.
+            limited: the axes for which the gripper shows a limit in place of the request, with that.
+        """
         for move in self._moves[:]:
             if move.write is None:
                 continue
             move.see(status)
-            if acts(move.write) and move.has_arrived(status):
+            if acts(move.write) and move.has_arrived(status, arrived, limited):
                 self._moves.remove(move)
                 move.end(status)
 

@@ -99,7 +99,11 @@ def shutdown(last_image: Callable[[RobotiqStatus], Request | None]) -> Sequence:
 
 
 def stop_fingers(last: Request) -> Sequence:
-    """Write the last image and wait until its echo is back: the end of a shutdown."""
+    """Write the last image, again if need be, until its echo is back: the end of a shutdown.
+
+    A gripper may acknowledge a write that comes soon after another one and forget it (manual of 2014: space
+    them by 10 ms). Unlike a motion, a stop may be sent again; the next status is one by which it should act.
+    """
     status = yield last
     while status.echo != last.echo:
-        status = yield None
+        status = yield last

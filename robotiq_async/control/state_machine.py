@@ -155,6 +155,8 @@ class StateMachine:
         self._state = State.DISCONNECTED
         self.sequence: Sequence | None = None
         """The one under way, for :meth:`begin`, :meth:`advance` and :meth:`drop_sequence` to change."""
+        self.why_down: object = None
+        """Why the link is down, for the error of what is refused then."""
 
     @property
     def state(self) -> State:
@@ -181,7 +183,7 @@ class StateMachine:
         if target is Verdict.IGNORED:
             return False
         if isinstance(target, Verdict):
-            raise refusal(trigger, source, status)
+            raise refusal(trigger, source, status, self.why_down)
         self._state = target
         # A control loop goes to RUNNING_CC and back with every command: that is for the curious.
         level = logging.DEBUG if {source, target} <= RUNNING else logging.INFO
@@ -223,11 +225,14 @@ class StateMachine:
         self.sequence = None
 
 
-def refusal(trigger: Trigger, state: State, status: RobotiqStatus | None = None) -> RobotiqError:
-    """The error for what the table refuses."""
+def refusal(
+    trigger: Trigger, state: State, status: RobotiqStatus | None = None, why_down: object = None
+) -> RobotiqError:
+    """The error for what the table refuses; ``why_down`` is why the link is, if that is known."""
     match TABLE[state][trigger]:
         case Verdict.LINK_DOWN:
-            return ConnectionLostError("the link is down and being opened again")
+            why = "" if why_down is None else f": {why_down}"
+            return ConnectionLostError(f"the link is down and being opened again{why}")
         case Verdict.NOT_STARTED:
             return NotStartedError("the hand is not started")
         case Verdict.NOT_ACTIVATED:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from ..control.contact import agrees
+from ..control.passing_fault import PassingFault
 from ..enums import Finger, ObjectStatus
 from ..wire.checks import check_int, check_mask
 from ..wire.status import RobotiqStatus
@@ -42,6 +43,10 @@ class _Grip:
         """Whether a request lies beyond the contact: it is what keeps an axis there."""
         return agrees(request, self.contact, self.touched, direction=0)
 
+    def is_left(self, moved: int) -> bool:
+        """Whether an axis that has moved so far has gone away from what it touched."""
+        return moved < 0 if self.contact is ObjectStatus.CONTACT_CLOSING else moved > 0
+
 
 class GripWatch:
     """Is fed statuses in their order, and says what has become of the grips of some axes.
@@ -75,6 +80,7 @@ class GripWatch:
             raise TypeError(f"since must be None or a RobotiqStatus, got {since!r}")
         self._grips: dict[Finger, _Grip] = {}
         self._last: RobotiqStatus | None = None
+        self._passing_fault = PassingFault()
         if since is not None:
             self.see(since)
 
@@ -93,7 +99,10 @@ class GripWatch:
         if last is not None and 0 < last.timestamp - status.timestamp < LATE_S:
             return []
         self._last = status
-        changes = [(axis, *change) for axis in self._axes for change in self._changes(axis, status)]
+        judged = status
+        if self._passing_fault.reads or status.fault.is_serious:
+            judged = self._passing_fault.see(status, status.timestamp)
+        changes = [(axis, *change) for axis in self._axes for change in self._changes(axis, judged)]
         if last is None:
             return []
         return [GripEvent(change, axis, moved, self.holds, status) for axis, change, moved in changes]
@@ -108,14 +117,17 @@ class GripWatch:
             return self._gain(axis, status)
         is_pressed = grip.is_pressed(status.requested_position(axis))
         grip.was_pressed |= is_pressed
+        lets_go = not is_pressed and _follows_requests(status)
         moved = status.position(axis) - grip.position
         if is_touching or (is_pressed and _moves(axis, status)):
-            if grip.is_slipping or abs(moved) <= self._slip:
+            # gDT may trail the echo: an axis that was asked to let go does so before its contact ends.
+            is_leaving = lets_go and grip.was_pressed
+            if grip.is_slipping or is_leaving or abs(moved) <= self._slip:
                 return []
             grip.position, grip.is_slipping = status.position(axis), not is_touching
             return [(GripChange.SLIPPED, moved)]
         del self._grips[axis]
-        is_released = grip.was_pressed and not is_pressed and _follows_requests(status)
+        is_released = lets_go and (grip.was_pressed or grip.is_left(moved))
         change = GripChange.RELEASED if is_released else GripChange.LOST
         return [(change, moved), *self._gain(axis, status)]
 

@@ -102,7 +102,8 @@ class Observation:
         """How the polling went since the last start."""
         if self._session is None:
             return Counters().snapshot(0)
-        return self._session.counters.snapshot(self._session.controller.foreign_commands)
+        controller = self._session.controller
+        return self._session.counters.snapshot(controller.foreign_commands, controller.passing_faults)
 
     def statuses(self, buffer: int = 1) -> Stream[RobotiqStatus]:
         """Every status from now on, for one reader; newest wins.
@@ -223,8 +224,12 @@ class Observation:
 
     @property
     def _has_commanded(self) -> bool:
-        """Whether a request was written since the last start: one that was refused leaves no trace."""
-        return self._session is not None and self._session.counters.has_begun_to_write
+        """Whether a request was written since the last start, or waits for that.
+
+        One that was refused leaves no trace.
+        """
+        session = self._session
+        return session is not None and (session.counters.has_begun_to_write or session.controller.has_request)
 
     # -- inside ----------------------------------------------------------------------------------------
 

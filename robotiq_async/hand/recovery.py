@@ -13,6 +13,7 @@ from ..errors import InvalidStateError, NotActivatedError, StateTimeoutError
 from ..wire.checks import check_timeout
 from .naming import tells_its_hand
 from .observation import Observation
+from .stall_watch import StallWatch
 
 RESET_TIMEOUT_S: Final = 5.0
 """A reset takes a device cycle or two; this leaves room for a slow one."""
@@ -20,6 +21,11 @@ RELEASE_TIMEOUT_S: Final = 60.0
 """A release opens slowly; no figure is published. A full stroke at the slowest speed takes 10 s."""
 RECOVER_TIMEOUT_S: Final = 90.0
 """Interference counts as minor for 20 s, a release may take a minute, a reset and an activation follow."""
+STALLED_S: Final = 5.0
+"""A gripper that waits for its activation (gFLT 0x05 to 0x07) and shows nothing new for so long gets nowhere.
+One that activates shows currents and positions; no figure is published."""
+RESETS: Final = 2
+"""After an emergency stop one reset has been seen to help, and sometimes a second."""
 
 
 class Recovery(Observation):
@@ -34,7 +40,8 @@ class Recovery(Observation):
         Raises:
             GripperFaultError: a fault is latched (see :meth:`recover`), or the activation ended in one.
             NotActivatedError: the gripper was reset meanwhile.
-            ActivationTimeoutError: not finished within the activation timeout.
+            ActivationTimeoutError: not finished within the activation timeout. It goes on: nothing is taken
+                back, for that would leave a hand that does not know where its fingers are.
             RobotiqError: not possible now, or the link went down.
         """
         session = self._asked()
@@ -98,13 +105,15 @@ class Recovery(Observation):
         """Do whatever the present fault needs, until the gripper is active again.
 
         Waits for a minor fault to clear, and for an activation, reset or release under way; resets and
-        activates after a major one. A reset DROPS the part, and an activation MOVES the fingers.
+        activates after a major one. A gripper that waits for its activation (0x05, as after an emergency
+        stop) and shows nothing new for 5 s is reset and activated as well, twice at most. A reset DROPS the
+        part, and an activation MOVES the fingers.
 
         Args:
             timeout: seconds for all of it; None for 90 s.
 
         Raises:
-            StateTimeoutError: not active in time.
+            StateTimeoutError: not active in time; or not after two resets: a person has to look at it.
             ActivationTimeoutError: the new activation took longer than the activation timeout.
             GripperFaultError: the new activation ended in a fault.
             NotActivatedError: the gripper was reset during the new activation.
@@ -112,11 +121,27 @@ class Recovery(Observation):
         """
         limit = check_timeout("timeout", timeout) or RECOVER_TIMEOUT_S
         self._asked()
-        with anyio.move_on_after(limit):
+        watch, resets = StallWatch(self._channels.listeners, self._machine, STALLED_S), 0
+        with anyio.move_on_after(limit), watch as stall:
             while self.state not in RUNNING:
-                await self._recover_step()
+                with stall.ends_early() as step:
+                    await self._recover_step()
+                if step.cancelled_caught:
+                    self._check_worth_a_reset(resets)
+                    resets += 1
+                    await self.reset()
             return
         raise StateTimeoutError(f"the gripper is not active after {limit:g} s: {self.state.name}")
+
+    def _check_worth_a_reset(self, resets: int) -> None:
+        fault = self.status.fault
+        what = f"the gripper gets nowhere: {fault.description} (gFLT 0x{int(fault):02X})"
+        if resets == RESETS:
+            raise StateTimeoutError(
+                f"{what}, also after {resets} resets. Is its emergency stop released, and is it powered? "
+                "Switch its power off and on, look at its LED, then call recover() again"
+            )
+        self._options.log.warning("%s for %g s; it is reset and activated", what, STALLED_S)
 
     async def _recover_step(self) -> None:
         session, state = self._asked(), self.state

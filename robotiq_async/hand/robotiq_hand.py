@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from ..calibration import ForceCalibration, SpeedCalibration
 from ..control.state_machine import StateMachine
@@ -13,6 +13,7 @@ from ..link.transport import Transport
 from ..session.options import (
     ACTIVATION_TIMEOUT_S,
     CONNECT_TIMEOUT_S,
+    LONGEST_WAIT_S,
     POLL_INTERVAL_S,
     RESPONSE_TIMEOUT_S,
     check_options,
@@ -21,7 +22,7 @@ from ..session.reconnecting import ReconnectPolicy
 from ..session.session import Session
 from ..session.streams import Channels
 from ..session.timing.event_loop import running_loop
-from ..wire.checks import check_flag
+from ..wire.checks import check_flag, check_seconds
 from .commands import Commands
 from .naming import tells_its_hand
 
@@ -43,6 +44,7 @@ class RobotiqHand(Commands):
         *,
         name: str | None = None,
         device_id: int | None = None,
+        read_function: int | None = None,
         poll_interval: float = POLL_INTERVAL_S,
         connect_timeout: float = CONNECT_TIMEOUT_S,
         response_timeout: float = RESPONSE_TIMEOUT_S,
@@ -63,15 +65,21 @@ class RobotiqHand(Commands):
         that matters to what it holds.
 
         Args:
-            address: ``tcp://HOST[:502]`` (or HOST, HOST:PORT), ``rtu:///dev/ttyUSB0``, ``sim://`` (or
-                ``sim://?speedup=10&object=150``), or a transport object.
+            address: ``tcp://HOST[:502]`` (or HOST, HOST:PORT), ``rtu:///dev/ttyUSB0``, ``rtu+tcp://HOST:PORT``
+                (a serial line behind a socket), ``sim://`` (or ``sim://?speedup=10&object=150``), or a
+                transport object.
             name: what to call this hand, in 1..64 printable characters: errors and the log begin with it,
                 metrics and recordings have it. None calls it by its address.
-            device_id: Modbus unit id, 1..247; by default 2 over TCP and 9 over RTU. Two hands on one TCP
-                address need one each: that of their gripper behind the gateway.
-            poll_interval: seconds between polls, 0.001..0.1.
+            device_id: Modbus unit id, 0..255 over TCP and 1..247 over RTU; by default 2 over TCP and 9 over
+                RTU. Two hands on one TCP address need one each: that of their gripper behind the gateway.
+            read_function: Modbus function that reads the status, 3 or 4; by default 4 over TCP and 3 over
+                RTU.
+            poll_interval: seconds between polls, 0.001..0.1; over RTU 0.015 unless given.
             connect_timeout: seconds for opening the link, 0.01..5.
-            response_timeout: seconds for one answer, 0.005..0.5.
+            response_timeout: seconds for one answer, 0.005..5. A write fails within twice that, and over RTU,
+                where a read may be asked again, within 0.15 s more (three times that if it is above 0.4).
+                :meth:`stop` ends within 2 s whatever it is; but a gripper that takes longer than 0.4 s to
+                answer may not have confirmed by then that the fingers were stopped, and the log says so.
             activation_timeout: seconds for an activation, 0.01..120.
             reconnect: whether a lost link is opened again, or a :class:`ReconnectPolicy`.
             speed: what the axes get until set otherwise, 0..255.
@@ -83,6 +91,7 @@ class RobotiqHand(Commands):
             force_calibration: what :attr:`units` labels force values with. None for the manual's figures.
             keep_grip: what :meth:`stop` does unless told: False stops the fingers for certain (rGTO = 0),
                 True holds what moves and lets a grip stay in force. It is also what leaving the block does.
+                A gripper that is not polled afterwards may lose its activation, and with it the grip.
 
         Raises:
             TypeError: an option of the wrong type.
@@ -92,6 +101,7 @@ class RobotiqHand(Commands):
             address,
             name=name,
             device_id=device_id,
+            read_function=read_function,
             poll_interval=poll_interval,
             connect_timeout=connect_timeout,
             response_timeout=response_timeout,
@@ -121,33 +131,60 @@ class RobotiqHand(Commands):
         """Stop, also when the block failed or was cancelled."""
         await self.stop()
 
+    if not TYPE_CHECKING:  # type checkers tell the mistake themselves
+
+        def __enter__(self) -> None:
+            """Refuse ``with``.
+
+            Raises:
+                TypeError: always.
+            """
+            raise TypeError(
+                "a RobotiqHand is used with 'async with', in a coroutine; for 'with' there is the hand that "
+                "blocks: robotiq_async.sync.RobotiqHand"
+            )
+
+        def __exit__(self, *_: object) -> None:
+            """Never called; without it Python would not call the other one."""
+
     @tells_its_hand
-    async def start(self, activate: bool = True) -> None:
+    async def start(self, activate: bool = True, *, wait: float = 0.0) -> None:
         """Connect, read the status, activate if the gripper is reset, and poll from then on.
 
         An activation MOVES the fingers: they open and close to their stops. A gripper that is active
-        already is adopted: nothing is written. One that is in fault already is left there, so that
-        :meth:`atr` and :meth:`recover` can run.
+        already is adopted: nothing is written. (A gripper that has to be woken on a new connection follows
+        its second motion: the first ends with MoveIgnoredError.) One that is in fault already is left there,
+        so that :meth:`atr` and :meth:`recover` can run.
+
+        With ``wait`` there may be no gripper yet, for a program that starts before its gripper is switched
+        on: it is tried until it answers. It is activated only then, and its fingers MOVE long after the call.
+
+        Fault 0x09, which some grippers show once after a second without a poll, is looked past first.
 
         A failed or cancelled start leaves nothing running; an activation that it began is taken back.
 
         Args:
             activate: False leaves a reset gripper in RESET.
+            wait: seconds for which nobody may answer, 0..86400. After that the error of the last try is
+                raised; with 0 that of the only one.
 
         Raises:
             RuntimeError: not in a running asyncio event loop.
             InvalidStateError: this hand is started already, or another one runs on the same gripper.
             NotStartedError: stop() was called meanwhile.
-            ConnectFailedError: nobody answers within the connect timeout.
+            ConnectFailedError: nobody answers within the connect timeout, or for as long as was waited.
             RobotiqConnectionError: somebody answers, but not a gripper; or the link went down again.
             GripperFaultError: the activation that was begun ended in a fault.
             NotActivatedError: the gripper was reset during the activation that was begun.
             ActivationTimeoutError: the activation was not finished in time.
         """
         check_flag("activate", activate)
+        wait = check_seconds("wait", wait, 0.0, LONGEST_WAIT_S)
         running_loop()
         self._abandon_if_loop_closed()
-        self._session = session = Session(self._options, self._machine, self._channels, activate=activate)
+        self._session = session = Session(
+            self._options, self._machine, self._channels, activate=activate, wait=wait
+        )
         try:
             await session.connected()
             if activate:
@@ -179,7 +216,8 @@ class RobotiqHand(Commands):
         doubt (within half a second one has not come to rest; the link is or goes down; a fault; a sequence;
         another client commands the gripper; ``halt()`` was asked) rGTO is cleared as ever, and the log says
         why. Who sets the fingers going between the last look at them and the end of the connection is not
-        seen. What a real gripper does with a part, either way, is not known.
+        seen. What a real gripper does with a part, either way, is not known; and one that is not polled may
+        lose its activation, and the part: the next program finds it in RESET then.
 
         Args:
             halt: False disconnects and leaves the fingers to what they do; for programs that only look.

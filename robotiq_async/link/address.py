@@ -14,7 +14,9 @@ TCP_PORT: Final = 502
 
 FORMS: Final = (
     "tcp://HOST[:PORT] (or bare HOST or HOST:PORT), "
-    "rtu:///dev/ttyUSB0 (a serial port; rtu://COM3 on Windows), sim:// (or sim://?speedup=10&object=150)"
+    "rtu:///dev/ttyUSB0 (a serial port; rtu://COM3 on Windows), "
+    "rtu+tcp://HOST:PORT (a serial line behind a TCP socket), sim:// (or sim://?speedup=10&object=150), "
+    "zenoh://SITE/HOST/GRIPPER (on another host: for robotiq_async.fleet.RemoteHand and for commands)"
 )
 
 
@@ -23,22 +25,32 @@ class Address:
     """A checked address.
 
     Attributes:
-        kind: "tcp", "rtu" or "sim".
-        host: host name or IP address (tcp), device of the serial port (rtu), empty (sim).
+        kind: "tcp", "rtu", "rtu+tcp" or "sim".
+        host: host name or IP address (tcp, rtu+tcp), device of the serial port (rtu), empty (sim).
         port: TCP port; 0 for the others.
         simulation: what the gripper is like (sim); nothing special for the others.
     """
 
-    kind: Literal["tcp", "rtu", "sim"]
+    kind: Literal["tcp", "rtu", "rtu+tcp", "sim"]
     host: str = ""
     port: int = 0
     simulation: Simulation = NOTHING_SPECIAL
 
+    @property
+    def is_rtu(self) -> bool:
+        """Whether a serial line leads to the gripper, from here or from a serial server."""
+        return self.kind in ("rtu", "rtu+tcp")
+
+    @property
+    def is_socket(self) -> bool:
+        """Whether it is reached through a network."""
+        return self.kind in ("tcp", "rtu+tcp")
+
     def __str__(self) -> str:
         """The address in its full form."""
-        if self.kind == "tcp":
+        if self.is_socket:
             host = f"[{self.host}]" if ":" in self.host else self.host
-            return f"tcp://{host}:{self.port}"
+            return f"{self.kind}://{host}:{self.port}"
         return f"{self.kind}://{self.host}{self.simulation}"
 
 
@@ -52,6 +64,7 @@ def parse_address(address: object) -> Address:
     if not isinstance(address, str):
         raise TypeError(f"address must be a string, got {address!r}; accepted: {FORMS}")
     scheme, separator, rest = address.partition("://")
+    scheme = scheme.lower()
     if not separator:
         scheme, rest = "tcp", address
     if scheme == "sim" and rest[:1] in ("", "?"):
@@ -61,17 +74,22 @@ def parse_address(address: object) -> Address:
             raise ValueError(f"malformed address {address!r}: {error}; accepted: {FORMS}") from None
     if scheme == "rtu" and rest.strip("/") and rest == rest.strip() and "\0" not in rest:
         return Address("rtu", rest)
-    if scheme == "tcp":
-        host, port = _host_and_port(rest)
+    if scheme in ("tcp", "rtu+tcp"):
+        # Serial servers have no usual port, so one must be given.
+        host, port = _host_and_port(rest, TCP_PORT if scheme == "tcp" else None)
         if ":" not in host and _ends_in_a_number(host) and not _is_ipv4(host):
             what = f"{host} is not an IPv4 address: four numbers in 0..255, without leading zeros"
             raise ValueError(f"malformed address {address!r}: {what}; accepted: {FORMS}")
         if host and port is not None:
-            return Address("tcp", host, port)
+            return Address("tcp" if scheme == "tcp" else "rtu+tcp", host, port)
+    if scheme == "zenoh":
+        raise ValueError(
+            f"{address!r} is a gripper on another host: use robotiq_async.fleet.RemoteHand; accepted: {FORMS}"
+        )
     raise ValueError(f"malformed address {address!r}; accepted: {FORMS}")
 
 
-def _host_and_port(text: str) -> tuple[str, int | None]:
+def _host_and_port(text: str, usual: int | None) -> tuple[str, int | None]:
     """Split HOST, HOST:PORT, [IPv6] or [IPv6]:PORT; the port is None where it is malformed."""
     if text.startswith("["):
         host, bracket, rest = text[1:].partition("]")
@@ -94,7 +112,7 @@ def _host_and_port(text: str) -> tuple[str, int | None]:
             return "", None
         host = host.lower()
     if not separator:
-        return host, TCP_PORT
+        return host, usual
     if not (port.isascii() and port.isdigit() and len(port) <= 5 and 1 <= int(port) <= 65535):
         return host, None
     return host, int(port)

@@ -18,10 +18,11 @@ HERE: Final = "localhost"
 def canonical_address(address: Address) -> str:
     """Where an address leads, the same for all ways to write it.
 
-    Whatever means this machine is localhost. The links to a serial port are that port, at this moment.
+    Whatever means this machine is localhost. The links to a serial port are that port, at this moment. A
+    socket is the same place whatever is spoken there.
     """
     host = _serial_port(address.host) if address.kind == "rtu" else _host(address.host)
-    return f"{address.kind}://{host}:{address.port}"
+    return f"{'tcp' if address.is_socket else address.kind}://{host}:{address.port}"
 
 
 def _host(host: str) -> str:

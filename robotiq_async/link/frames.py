@@ -8,9 +8,10 @@ at before pymodbus sees it. No I/O here: bytes in, a verdict out.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from ..errors import ProtocolError
+from ..wire.registers import REGISTER_COUNT
 
 _EXCEPTIONS = {
     1: "illegal function",
@@ -22,6 +23,16 @@ _EXCEPTIONS = {
     10: "gateway path unavailable",
     11: "gateway target does not respond",
 }
+
+
+_CHECKSUM: Final = 2
+"""Bytes of it at the end of a frame on a serial line."""
+_WRITE: Final = 16
+_WHOLE: Final = f": a hand writes all {REGISTER_COUNT} at once, and a gateway must let that through"
+
+
+class MisfitError(ProtocolError):
+    """Bytes that do not begin as the answer does; noise on a serial line may have made them of it."""
 
 
 class Expected(NamedTuple):
@@ -43,7 +54,8 @@ class Expected(NamedTuple):
         """Whether the bytes so far are the whole answer; False while more must come.
 
         Raises:
-            ProtocolError: the bytes can not become the answer, or the device refuses the request.
+            MisfitError: the bytes can not become the answer.
+            ProtocolError: they are more than that, or the device refuses the request.
         """
         if len(frame) == self.size and frame.startswith(self.start):
             return True  # the usual case, quickly
@@ -52,19 +64,26 @@ class Expected(NamedTuple):
                 raise ProtocolError(f"{len(frame) - self.size} bytes more than the answer: {show(frame)}")
             return len(frame) == self.size
         if not _agree(frame, self.refusal):
-            raise ProtocolError(f"not the answer: {show(frame)}, expected {show(self.start)}...")
+            raise self._misfit(frame)
         if len(frame) < self.refusal_size:
             return False
-        function, code = self.refusal[-1] & 0x7F, frame[len(self.refusal)]
-        raise ProtocolError(
-            f"the gripper refuses function {function}: exception {code} ({_EXCEPTIONS.get(code, 'unknown')})"
-        )
+        raise ProtocolError(_refused(self.refusal[-1] & 0x7F, frame[len(self.refusal)]))
+
+    def _misfit(self, frame: bytes) -> MisfitError:
+        """Why bytes are not the answer."""
+        function, at = self.refusal[-1] & 0x7F, len(self.start) - 2
+        count = int.from_bytes(frame[at : at + 2], "big")  # of registers, in the answer to a write
+        is_shorter = len(frame) == self.size and frame.startswith(self.start[:at]) and count < REGISTER_COUNT
+        if function == _WRITE and is_shorter:
+            what = f"it tells of {count} registers written, and not of {REGISTER_COUNT}{_WHOLE}"
+            return MisfitError(f"not the answer: {what}")
+        return MisfitError(f"not the answer: {show(frame)}, expected {show(self.start)}...")
 
 
 def expected_reply(request: bytes, *, serial: bool) -> Expected:
     """The reply that answers a request frame of function 3, 4 or 16."""
     if serial:
-        return _expected(request, 2)
+        return _expected(request, _CHECKSUM)
     # Over TCP a header comes first: transaction and protocol, to be repeated, then the length.
     start, size, refusal, refusal_size = _expected_over_tcp(request[6:])
     header = request[:4]
@@ -94,6 +113,16 @@ def _expected(request: bytes, checksum: int) -> Expected:
         refusal=request[:at] + bytes((function | 0x80,)),
         refusal_size=at + 2 + checksum,
     )
+
+
+def _refused(function: int, code: int) -> str:
+    """What an exception reply says, and what to do about it if that is known."""
+    said = f"the gripper refuses function {function}: exception {code} ({_EXCEPTIONS.get(code, 'unknown')})"
+    if function == _WRITE and code in (1, 2, 3):
+        return said + _WHOLE
+    if function != _WRITE and code == 1:
+        return f"{said}: read_function={7 - function} asks with the other one"
+    return said
 
 
 def _length(size: int) -> bytes:

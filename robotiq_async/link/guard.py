@@ -90,6 +90,9 @@ class GuardedTransport:
             self._drop()
             raise ProtocolError(f"{self._name}: {error}") from error
 
+    async def ready(self) -> None:
+        """What the transport may wait for is not known."""
+
     async def write(self, registers: Sequence[int]) -> None:
         """Write the eight request registers.
 

@@ -1,7 +1,5 @@
 """The link to one gripper: reads and writes over pymodbus.
 
-This module and pdus.py are the only ones of the client that use it.
-
 pymodbus does the framing and the transport; what it leaves to its user is done here:
 
 * One client object per connection, no retries and no reconnecting of its own: both would send a motion
@@ -15,23 +13,22 @@ pymodbus does the framing and the transport; what it leaves to its user is done 
 * Timeouts are a watchdog of ours that looks once in a while. pymodbus's own is ``asyncio.wait_for``,
   which on Python 3.11 swallows a cancellation that lands together with the reply, and which a loop that
   was held up takes for silence although the reply is waiting in the socket.
+* On a serial line a read whose answer is missing or damaged is asked once more; see :meth:`_read_again`.
 * Foreign exceptions stop here.
 """
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
+import math
 import secrets
-import sys
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Final
 
 import anyio
-from pymodbus import FramerType
-from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
 from pymodbus.exceptions import ModbusException
+from pymodbus.framer import FramerRTU
 from pymodbus.pdu import ModbusPDU
 
 from ..errors import (
@@ -41,12 +38,13 @@ from ..errors import (
     ResponseTimeoutError,
     RobotiqConnectionError,
 )
+from ..log import Log, log
 from ..wire.registers import REGISTER_COUNT, RegisterMap, Registers
 from .address import Address
-from .frames import Expected, expected_reply, show
-from .host_names import addresses_of, why_no_socket, why_unreachable
-from .pdus import ReadRequest, WriteRequest, register
-from .serial_ports import why_no_port
+from .connecting import Client, connected_client
+from .frames import Expected, MisfitError, expected_reply, show
+from .pdus import ReadRequest, WriteRequest
+from .watchdog import Watchdog
 
 # pymodbus logs its send and receive history at ERROR on every timeout; what matters of it is said in our
 # exceptions. Whoever sets a level on its logger gets what they ask for.
@@ -54,28 +52,44 @@ _pymodbus_log = logging.getLogger("pymodbus.logging")
 if _pymodbus_log.level == logging.NOTSET:
     _pymodbus_log.setLevel(logging.CRITICAL + 1)
 
-LARGEST_READ: Final = 4096
-"""Bytes taken from the socket at a time; the longest Modbus frame has 260."""
 LAST_NUMBER: Final = 0xFFFF
 """Transaction ids are 1 to this."""
 SETTLE_S: Final = 0.02
 """From connecting to the first request over TCP: a few round trips of a network in a building."""
-HELD_S: Final = 0.01
-"""A timer, or a tick, that comes so late was kept from coming: the loop was held up."""
-GRACE_S: Final = 0.02
-"""A peer in the same loop (the simulated gripper) was held up with it, and gets so much more time."""
+SILENCE_S: Final = 0.00175
+"""Between two frames on a serial line, at least: 3.5 characters, above 19200 baud so much (Modbus over Serial
+Line 2.5.1.1)."""
+TIMER_S: Final = 0.0001
+"""So much before its time a timer may come."""
+HUSH_S: Final = 0.02
+"""Silence after which the rest of a damaged reply does not come any more: a USB adapter may keep bytes for
+16 ms (the usual latency timer of FTDI's)."""
+LONGEST_HUSH_S: Final = 0.1
+"""For which silence is waited for; who talks on is no gripper that was asked once."""
+REPEAT_S: Final = 0.15
+"""For a read that is asked again, so that a write after it still fails within a second."""
+USUAL_RESPONSE_S: Final = 0.4
+"""With a longer response timeout a line is slow, and a read that is asked again has that time once more."""
+REPEAT_WARNING_S: Final = 60.0
+"""At most one line in the log about reads asked again in this time."""
 
 
 class _ExchangeEndedError(Exception):
     """Carries the reason through pymodbus, which would take a TimeoutError for its own."""
 
-    def __init__(self, reason: RobotiqConnectionError) -> None:
+    def __init__(self, reason: RobotiqConnectionError, *, may_be_noise: bool) -> None:
         self.reason = reason
+        self.may_be_noise = may_be_noise
+        """Whether a byte that was lost or damaged can be the reason."""
         super().__init__(str(reason))
 
 
 class ModbusTransport:
-    """A gripper behind Modbus TCP or a serial line (Modbus RTU)."""
+    """A gripper behind Modbus TCP or a serial line (Modbus RTU), of this machine or of a serial server.
+
+    Attributes:
+        repeats: reads that were asked once more, because the answer was missing or damaged.
+    """
 
     def __init__(
         self,
@@ -84,21 +98,27 @@ class ModbusTransport:
         *,
         connect_timeout: float,
         response_timeout: float,
+        log: Log = log,
     ) -> None:
         """Keep what is needed to connect; opens nothing.
 
         Args:
-            address: a tcp or rtu address.
+            address: a tcp, rtu or rtu+tcp address.
             registers: where the blocks lie, and the device id.
             connect_timeout: seconds for connecting.
-            response_timeout: seconds for one answer.
+            response_timeout: seconds for one answer; on a serial line a read may be asked again after that.
+            log: of the hand.
         """
+        self.repeats = 0
+        self._log = log
         self._address = address
         self._map = registers
         self._connect_timeout = connect_timeout
         self._response_timeout = response_timeout
-        self._serial = address.kind == "rtu"
-        self._client: AsyncModbusTcpClient | AsyncModbusSerialClient | None = None
+        self._rtu = address.is_rtu
+        self._keeps_silence = not address.is_socket
+        """Whether the pauses between frames are ours to keep, and not a serial server's."""
+        self._client: Client | None = None
         self._expected: Expected | None = None
         self._failure: RobotiqConnectionError | None = None
         self._number = secrets.randbelow(LAST_NUMBER)
@@ -108,10 +128,12 @@ class ModbusTransport:
         self._probe = 0
         self._poll = ReadRequest(registers)
         self._loop: asyncio.AbstractEventLoop
-        self._due = 0.0
-        """When the exchange in flight must be over, in the loop's time."""
-        self._has_grace = False
-        self._watchdog: asyncio.TimerHandle | None = None
+        self._watchdog: Watchdog
+        self._heard = -math.inf
+        """When bytes came last, in the loop's time; kept on a serial line."""
+        self._is_hushing = False
+        """Whether what comes is dropped: it is the rest of a damaged reply."""
+        self._warned = -math.inf
 
     @property
     def is_open(self) -> bool:
@@ -128,22 +150,18 @@ class ModbusTransport:
             ResponseTimeoutError: it can be opened, but nobody answers.
         """
         await self.close()
-        self._loop = asyncio.get_running_loop()
+        self._loop = loop = asyncio.get_running_loop()
+        self._watchdog = Watchdog(loop, self._response_timeout, lambda: self._is_waiting, self._too_long)
         self._failure = self._expected = None
         try:
             with anyio.fail_after(self._connect_timeout):
-                client = await self._connect()
+                self._client = await connected_client(self._address, self._trace_packet, self._trace_connect)
         except TimeoutError:
             raise ConnectFailedError(
                 str(self._address), f"no connection within {self._connect_timeout:g} s"
             ) from None
-        self._client = client
-        # asyncio asks the system for 256 KiB at a time, and taking and giving back that much memory costs
-        # several times what a reply does. Undocumented: where it is called otherwise, nothing is saved.
-        with contextlib.suppress(AttributeError):
-            client.ctx.transport.max_size = LARGEST_READ  # type: ignore[attr-defined]
-        if not self._serial:
-            await self._settle()
+        if self._address.is_socket:
+            await self._settle(SETTLE_S)
         await self._resynchronise()
 
     async def read(self) -> Registers:
@@ -152,7 +170,22 @@ class ModbusTransport:
         Raises:
             RobotiqConnectionError: no clean answer in time; the transport is closed.
         """
-        return tuple((await self._exchange(self._poll)).registers)
+        if not self._rtu:
+            return tuple((await self._exchange(self._poll)).registers)
+        try:
+            answer = await self._exchange(self._poll, bears_noise=True)
+        except _ExchangeEndedError as ended:
+            answer = await self._read_again(ended.reason)
+        return tuple(answer.registers)
+
+    async def ready(self) -> None:
+        """Wait until the line takes a request: on a serial line frames are kept apart.
+
+        Raises:
+            RobotiqConnectionError: something arrived meanwhile that nobody had asked for.
+        """
+        if self._keeps_silence:
+            await self._pause()
 
     async def write(self, registers: Sequence[int]) -> None:
         """Write the eight request registers with one FC16, exactly once.
@@ -168,7 +201,7 @@ class ModbusTransport:
 
     # -- one exchange ----------------------------------------------------------------------------------
 
-    def _connected(self) -> AsyncModbusTcpClient | AsyncModbusSerialClient:
+    def _connected(self) -> Client:
         if self._failure is not None:
             # The link broke, or something arrived that nobody had asked for, between two requests.
             failure, self._failure = self._failure, None
@@ -178,13 +211,29 @@ class ModbusTransport:
             raise ConnectionLostError(f"not connected to {self._address}")
         return self._client
 
-    async def _exchange(self, request: ModbusPDU) -> ModbusPDU:
-        """Send one request and wait for its answer; on anything else the connection is given up."""
+    async def _exchange(
+        self,
+        request: ModbusPDU,
+        *,
+        by: float = math.inf,
+        bears_noise: bool = False,
+    ) -> ModbusPDU:
+        """Send one request and wait for its answer; on anything else the connection is given up.
+
+        Args:
+            request: what to send.
+            by: when it must be over, in the loop's time, even if the response timeout is not.
+            bears_noise: after what may be noise the connection is kept, and _ExchangeEndedError raised: the
+                caller gets the line back in step.
+        """
         client = self._connected()
-        self._watch()
+        await self.ready()
+        self._watchdog.watch(by)
         try:
             response: ModbusPDU = await client.execute(False, request)
         except _ExchangeEndedError as ended:
+            if bears_noise and ended.may_be_noise:
+                raise
             self._drop()
             raise ended.reason from None
         except ModbusException as error:
@@ -201,50 +250,29 @@ class ModbusTransport:
             self._expected = None
         return response
 
-    def _watch(self) -> None:
-        """Fail the exchange that begins now when it takes too long.
-
-        Setting a timer for each exchange and cancelling it costs more than the exchange's own Python. So
-        one timer stands until it expires, and then looks when the exchange of that moment is due.
-        """
-        loop = self._loop
-        self._due = loop.time() + self._response_timeout
-        self._has_grace = False
-        if self._watchdog is None:
-            self._watchdog = loop.call_at(self._due, self._look, self._due)
-
-    def _look(self, when: float) -> None:
-        """The watchdog's timer has expired.
-
-        A loop that was held up reads before it looks at its timers: a reply that was waiting is in time.
-        """
-        self._watchdog = None
+    @property
+    def _is_waiting(self) -> bool:
+        """Whether an exchange is under way."""
         client = self._client
-        if client is None or self._expected is None or client.ctx.response_future.done():
-            return
-        now = self._loop.time()
-        if now >= self._due and now - when > HELD_S and not self._has_grace:
-            self._due, self._has_grace = now + GRACE_S, True
-        if now < self._due:
-            self._watchdog = self._loop.call_at(self._due, self._look, self._due)
-        else:
-            waited = f"{self._response_timeout:g} s"
-            self._fail(ResponseTimeoutError(f"{self._address} did not answer within {waited}"))
+        return client is not None and self._expected is not None and not client.ctx.response_future.done()
 
-    def _fail(self, error: RobotiqConnectionError) -> None:
+    def _too_long(self) -> None:
+        waited = f"{self._response_timeout:g} s"
+        late = ResponseTimeoutError(f"{self._address} did not answer within {waited}")
+        self._fail(late, may_be_noise=True)
+
+    def _fail(self, error: RobotiqConnectionError, *, may_be_noise: bool = False) -> None:
         """End the exchange in flight with an error; without one, keep the error for the next."""
-        client = self._client
-        if client is not None and self._expected is not None and not client.ctx.response_future.done():
-            client.ctx.response_future.set_exception(_ExchangeEndedError(error))
+        if self._client is not None and self._is_waiting:
+            ended = _ExchangeEndedError(error, may_be_noise=may_be_noise)
+            self._client.ctx.response_future.set_exception(ended)
         elif self._failure is None:
             self._failure = error
 
     def _drop(self) -> None:
         client, self._client = self._client, None
-        watchdog, self._watchdog = self._watchdog, None
-        if watchdog is not None:
-            watchdog.cancel()
         if client is not None:
+            self._watchdog.stop()
             client.close()
 
     # -- what pymodbus calls ---------------------------------------------------------------------------
@@ -252,19 +280,25 @@ class ModbusTransport:
     def _trace_packet(self, sending: bool, data: bytes) -> bytes:
         """Every frame that is sent, and the bytes received so far for one: returns what goes on from here."""
         if sending:
-            frame = data if self._serial else self._numbered(data)
-            self._expected = expected_reply(frame, serial=self._serial)
+            frame = data if self._rtu else self._numbered(data)
+            self._expected = expected_reply(frame, serial=self._rtu)
             return frame
+        if self._rtu:
+            self._heard = self._loop.time()
+            if self._is_hushing:
+                return b""
         try:
             if self._expected is None:
                 raise ProtocolError(f"{len(data)} bytes that nobody asked for: {show(data)}")
             complete = self._expected.is_complete(data)
+            if complete and self._rtu:
+                _check_sum(data)
         except ProtocolError as error:
-            self._fail(error)
+            self._fail(ProtocolError(error.message), may_be_noise=isinstance(error, MisfitError))
             return b""
         if not complete:
             return b""
-        return data if self._serial else self._their_number + data[len(self._their_number) :]
+        return data if self._rtu else self._their_number + data[len(self._their_number) :]
 
     def _numbered(self, frame: bytes) -> bytes:
         """The frame with a transaction id of ours; 0 is none, some devices answer it to anything."""
@@ -276,70 +310,9 @@ class ModbusTransport:
         if not connected:
             self._fail(ConnectionLostError(f"{self._address} closed the connection"))
 
-    # -- connecting ------------------------------------------------------------------------------------
+    # -- in step -----------------------------------------------------------------------------------------
 
-    async def _connect(self) -> AsyncModbusTcpClient | AsyncModbusSerialClient:
-        """A client that is connected, to the first address of the host that can be reached."""
-        reasons: list[OSError] = []
-        for host in await self._hosts():
-            client, connected = self._make_client(host), False
-            # pymodbus drops what does not fit without a word; whatever comes is for frames.py to judge.
-            client.ctx.max_buffer_size = sys.maxsize
-            _keep_reasons(client, reasons)
-            try:
-                connected = await client.connect()
-            except Exception as error:
-                raise ConnectFailedError(str(self._address), str(error)) from error
-            finally:
-                if not connected:
-                    client.close()
-            if connected:
-                return client
-        last = reasons[-1] if reasons else None
-        why = why_no_port(last) if self._serial else why_no_socket() or why_unreachable(last)
-        raise ConnectFailedError(str(self._address), why) from last
-
-    async def _hosts(self) -> list[str]:
-        if self._serial:
-            return [self._address.host]
-        try:
-            return await addresses_of(self._address.host, self._address.port)
-        except (OSError, UnicodeError) as error:
-            why = f"the name cannot be resolved: {getattr(error, 'strerror', None) or error}"
-            raise ConnectFailedError(str(self._address), why) from error
-
-    def _make_client(self, host: str) -> AsyncModbusTcpClient | AsyncModbusSerialClient:
-        # timeout=None: wait_for becomes a plain await, and the watchdogs above are the only timeouts.
-        options: dict[str, Any] = {
-            "retries": 0,
-            "reconnect_delay": 0,
-            "timeout": None,
-            "trace_packet": self._trace_packet,
-            "trace_connect": self._trace_connect,
-        }
-        if not self._serial:
-            tcp = AsyncModbusTcpClient(host, port=self._address.port, **options)
-            register(tcp)
-            return tcp
-        try:
-            import serial  # noqa: F401, PLC0415
-        except ImportError:
-            raise ConnectFailedError(
-                str(self._address), "serial ports need pyserial: pip install 'robotiq-async[serial]'"
-            ) from None
-        line = AsyncModbusSerialClient(
-            host,
-            framer=FramerType.RTU,
-            baudrate=115200,
-            bytesize=8,
-            parity="N",
-            stopbits=1,
-            **options,
-        )
-        register(line)
-        return line
-
-    async def _settle(self) -> None:
+    async def _settle(self, seconds: float) -> None:
         """Give what is left over from an earlier connection time to show itself before anything is asked.
 
         A gateway that keeps its own connection to the gripper may send late replies to whoever connects
@@ -347,13 +320,13 @@ class ModbusTransport:
         left over for the next connection, and so on without end.
         """
         try:
-            await asyncio.sleep(SETTLE_S)
+            await asyncio.sleep(seconds)
         except BaseException:
             self._drop()
             raise
         self._connected()
 
-    async def _resynchronise(self) -> None:
+    async def _resynchronise(self, by: float = math.inf) -> None:
         """Make sure that no answer to an earlier request is still on its way.
 
         Serial replies carry no number, and a gateway from TCP to a serial line gives a late one the number
@@ -362,18 +335,73 @@ class ModbusTransport:
         answers in order, so that once the right length is back nothing older can follow.
         """
         self._probe = self._probe % (REGISTER_COUNT - 1) + 1
-        await self._exchange(ReadRequest(self._map, self._probe))
+        await self._exchange(ReadRequest(self._map, self._probe), by=by)
 
+    async def _read_again(self, why: RobotiqConnectionError) -> ModbusPDU:
+        """Read once more on a line that has lost or damaged a byte, as USB adapters do now and then.
 
-def _keep_reasons(client: AsyncModbusTcpClient | AsyncModbusSerialClient, reasons: list[OSError]) -> None:
-    """Add to a list why a client could not connect, which pymodbus keeps to itself."""
-    create = client.ctx.call_create
+        The second answer cannot be the first one that was only late. First the line must fall silent: what
+        is left of a damaged reply is dropped. Then the line is brought in step as when it is opened, by a
+        read of another length: if the first answer comes now, it has the wrong length, and the link is given
+        up; if the right length comes, the gripper, which answers in order, has nothing older to send. Only
+        then the status is asked for. All of that must be quick. A write is never sent again:
+        whether the first was carried out cannot be known.
 
-    async def created() -> object:
+        Args:
+            why: the first answer did not come.
+
+        Raises:
+            RobotiqConnectionError: again no clean answer; it is the first reason. The connection is closed.
+        """
+        is_slow = self._response_timeout > USUAL_RESPONSE_S
+        by = self._loop.time() + (self._response_timeout if is_slow else REPEAT_S)
         try:
-            return await create()
-        except OSError as error:
-            reasons.append(error)
-            raise
+            await self._hush()
+            await self._resynchronise(by)
+            answer = await self._exchange(self._poll, by=by)
+        except RobotiqConnectionError as error:
+            raise why from error
+        self.repeats += 1
+        if self._heard - self._warned >= REPEAT_WARNING_S:
+            self._warned = self._heard
+            self._log.warning("a read was asked again: %s (%d times so far)", why, self.repeats)
+        return answer
 
-    client.ctx.call_create = created
+    async def _hush(self) -> None:
+        """Wait until nothing comes any more; that is dropped.
+
+        Raises:
+            ProtocolError: something comes all the time; the connection is closed.
+        """
+        loop = self._loop
+        began = loop.time()
+        self._is_hushing, until = True, began + HUSH_S
+        if isinstance(self._failure, ProtocolError):
+            self._failure = None  # more of the same came before this task had its turn
+        try:
+            while (left := until - loop.time()) > 0:
+                if loop.time() - began > LONGEST_HUSH_S:
+                    raise ProtocolError(f"{self._address} does not fall silent")
+                await asyncio.sleep(left)
+                until = max(until, self._heard + HUSH_S)
+        except BaseException:
+            self._drop()
+            raise
+        finally:
+            self._is_hushing = False
+
+    async def _pause(self) -> None:
+        """Keep the silence that ends a frame: what follows too soon may be taken for a part of it."""
+        left = self._heard + SILENCE_S - self._loop.time()
+        if left > TIMER_S:
+            await self._settle(left)
+
+
+def _check_sum(frame: bytes) -> None:
+    """Refuse a frame of a serial line that was damaged; pymodbus would wait for another.
+
+    Raises:
+        MisfitError: its checksum does not fit.
+    """
+    if not FramerRTU.check_CRC(frame[:-2], int.from_bytes(frame[-2:], "big")):
+        raise MisfitError(f"a wrong checksum: {show(frame)}")

@@ -83,6 +83,9 @@ class SimulatedTransport:
         """
         return await self._connected().read()
 
+    async def ready(self) -> None:
+        """There is nothing to wait for."""
+
     async def write(self, registers: Sequence[int]) -> None:
         """Write the eight request registers, exactly once.
 

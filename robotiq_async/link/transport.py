@@ -43,3 +43,14 @@ class Transport(Protocol):
 
     async def close(self) -> None:
         """Disconnect; never fails, and does nothing when closed."""
+
+
+class Link(Transport, Protocol):
+    """A transport of ours, which can be asked to be ready: what is written then does not wait."""
+
+    async def ready(self) -> None:
+        """Wait until the line takes a request.
+
+        Raises:
+            RobotiqConnectionError: the link went down meanwhile; the transport is closed.
+        """

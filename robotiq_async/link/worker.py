@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any, Final, TypeVar
 
 from ..concurrency import LateError
-from .modbus import GRACE_S, HELD_S
+from .watchdog import GRACE_S, HELD_S
 
 T = TypeVar("T")
 

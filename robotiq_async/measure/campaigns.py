@@ -241,11 +241,12 @@ class Campaign:
                 if not 0 <= reading <= self.layout.high:
                     raise TableError(self.path, None, f"a reading of {reading} is beyond {limit}")
                 readings.append(reading)
-            self.table[value] = tuple(readings)
+            table = {**self.table, value: tuple(readings)}
             if not origin_beside(self.path).exists():
                 await asyncio.to_thread(write_origin, self.path, self.origin)
             # In a thread: a disk may take its time, and the hand polls meanwhile.
-            await asyncio.to_thread(write_table, self.path, self.layout, self.table)
+            await asyncio.to_thread(write_table, self.path, self.layout, table)
+            self.table = table
 
 
 def speed_campaign(path: Path, step: int = 4, runs: int = 3, **origin: str) -> Campaign:

@@ -13,7 +13,9 @@ try:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 except ModuleNotFoundError as error:
-    raise ImportError("pictures need matplotlib: pip install 'robotiq-async[plot]'") from error
+    from ..extras import install
+
+    raise ImportError(f"pictures need matplotlib: {install('plot')}") from error
 
 from ..calibration.csv_tables import Table
 from ..calibration.scales import ForceCalibration, SpeedCalibration, mean, newton
@@ -39,7 +41,7 @@ LONGEST: Final = 40
 STRIP: Final = 0.075
 """Height of a character of a label, where that of the positions is 3."""
 SHOWN_FORCES: Final = (0, 125, 250)
-"""Force values whose currents are drawn over time."""
+"""Force values whose currents are drawn over time, or the nearest to them."""
 
 Event = tuple[float, str, bool]
 """When, what, and whether it is about a fault."""
@@ -238,9 +240,9 @@ def _short(words: str) -> str:
 
 
 def _shown(currents: Currents) -> list[int]:
-    """The force values to draw: the usual ones, or what there is."""
-    usual: list[int] = [force for force in SHOWN_FORCES if force in currents]
-    return usual or sorted(currents)[: len(COLOURS)]
+    """The force values to draw: of those that were measured the nearest to the usual ones."""
+    nearest = {min(currents, key=lambda force: abs(force - usual)) for usual in SHOWN_FORCES}
+    return sorted(nearest)
 
 
 @contextmanager

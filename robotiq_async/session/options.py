@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 from typing import Final, NamedTuple
 
@@ -13,28 +13,44 @@ from ..link.canonical import canonical_address
 from ..link.guard import GuardedTransport
 from ..link.modbus import ModbusTransport
 from ..link.sim_transport import SimulatedTransport, new_gripper
-from ..link.transport import Transport
+from ..link.transport import Link, Transport
 from ..log import Log, log
 from ..wire.checks import check_byte, check_flag, check_int, check_seconds
 from ..wire.registers import REGISTER_COUNT, RTU_REGISTERS, TCP_REGISTERS, RegisterMap
 from .claims import Gripper
 from .reconnecting import ReconnectPolicy
 
-POLL_INTERVAL_S: Final = 0.005
+
+class Usual(float):
+    """A default that stands for the network; on a serial line it is another.
+
+    The same figure given on purpose is a plain float, and is kept on any link.
+    """
+
+    __slots__ = ()
+
+
+POLL_INTERVAL_S: Final = Usual(0.005)
 """200 Hz, as the thesis polled; the manual names 200 Hz for RTU and 100 Hz for TCP."""
+SERIAL_POLL_INTERVAL_S: Final = 0.015
+"""The bytes of a read and a write take 5.38 ms at 115200 baud, and the silences that the standard wants
+after each of the four frames 7 ms: 12.4 ms. In 15 ms they fit, with what an adapter needs to pass on two
+replies, so that a stream of commands misses no polls."""
 CONNECT_TIMEOUT_S: Final = 2.0
 RESPONSE_TIMEOUT_S: Final = 0.4
-"""Two of these, a read in flight and a write, still end within the second that a write may take."""
-ACTIVATION_TIMEOUT_S: Final = 20.0
-"""What drivers that ran on hardware wait for."""
+"""Two of these, a read in flight and a write, still end within the second that a write may take; on a serial
+line also with the time in which the read may be asked once more."""
+LONGEST_RESPONSE_S: Final = 5.0
+"""For gateways that are slow; a write may take more than a second then."""
+LONGEST_WAIT_S: Final = 86400.0
+"""For which a start may wait for its gripper: a day."""
+ACTIVATION_TIMEOUT_S: Final = 40.0
+"""Drivers that ran on hardware saw about 15 s, and wait for 20 to 30 s; one has noted that 25 s were not
+enough. What ends an activation early leaves a hand that does not know where its fingers are."""
 LONGEST_NAME: Final = 64
 """Characters of a hand's name: it begins every line of the log."""
-HINTS: Final = {
-    "tcp": " (two grippers behind one gateway: give each of the hands its device_id)",
-    "rtu": " (a serial port has one owner, whatever the device_id: two would read each other's replies)",
-}
-"""For people who meant two grippers. A gateway takes several connections; on a serial line replies carry no
-number, and whoever has it open gets part of what arrives."""
+_GATEWAY: Final = " (two grippers behind one gateway: give each of the hands its device_id)"
+_LINE: Final = " (a serial port has one owner, whatever the device_id: two would read each other's replies)"
 
 # Read when this is imported: a hand may be made in a running loop, and that waits for no disk.
 _THESIS: Final = SpeedCalibration.thesis()
@@ -45,7 +61,7 @@ _NOMINAL: Final = ForceCalibration.nominal()
 class Options:
     """Everything a hand is constructed with, checked."""
 
-    make_transport: Callable[[], Transport]
+    make_transport: Callable[[], Link]
     """A transport for one start of the hand."""
     address: str
     gripper: Callable[[], Gripper]
@@ -74,6 +90,7 @@ def check_options(
     address: object,
     *,
     device_id: object,
+    read_function: object = None,
     poll_interval: object,
     connect_timeout: object,
     response_timeout: object,
@@ -96,13 +113,22 @@ def check_options(
     """
     given_name = _check_name(name)
     connect_s = check_seconds("connect_timeout", connect_timeout, 0.01, 5.0)
-    response_s = check_seconds("response_timeout", response_timeout, 0.005, 0.5)
-    way = _way_to(address, device_id, request_address, status_address, given_name)
+    response_s = check_seconds("response_timeout", response_timeout, 0.005, LONGEST_RESPONSE_S)
+    interval = check_seconds("poll_interval", poll_interval, 0.001, 0.1)
+    registers = {
+        "device_id": device_id,
+        "read_function": read_function,
+        "request_address": request_address,
+        "status_address": status_address,
+    }
+    way = _way_to(address, registers, given_name)
+    if way.is_rtu:
+        interval = SERIAL_POLL_INTERVAL_S if isinstance(poll_interval, Usual) else interval
     return Options(
         make_transport=partial(way.make, connect_timeout=connect_s, response_timeout=response_s),
         address=way.address,
         gripper=way.gripper,
-        poll_interval=check_seconds("poll_interval", poll_interval, 0.001, 0.1),
+        poll_interval=interval,
         activation_timeout=check_seconds("activation_timeout", activation_timeout, 0.01, 120.0),
         policy=_check_reconnect(reconnect),
         speed=check_byte("speed", speed),
@@ -114,20 +140,51 @@ def check_options(
     )
 
 
+def registers_of(
+    address: Address,
+    *,
+    device_id: object = None,
+    read_function: object = None,
+    request_address: object = None,
+    status_address: object = None,
+) -> RegisterMap:
+    """How the registers of a gripper are asked for; None for what is usual on its kind of link.
+
+    Raises:
+        TypeError: an option is no int.
+        ValueError: an option is outside its range.
+    """
+    usual = RTU_REGISTERS if address.is_rtu else TCP_REGISTERS
+    last = 0x10000 - REGISTER_COUNT
+    # On a line 0 is everybody, who do not answer, and more than 247 are reserved. Over TCP units in the
+    # field answer to any, and drivers have used 0 and 255.
+    units = (1, 247) if address.is_rtu else (0, 255)
+    return RegisterMap(
+        request=_int_or("request_address", request_address, 0, last, usual.request),
+        status=_int_or("status_address", status_address, 0, last, usual.status),
+        read_function=_int_or("read_function", read_function, 3, 4, usual.read_function),
+        device_id=_int_or("device_id", device_id, *units, usual.device_id),
+    )
+
+
+def _int_or(name: str, value: object, low: int, high: int, usual: int) -> int:
+    return usual if value is None else check_int(name, value, low, high)
+
+
 class _Way(NamedTuple):
     """How a gripper is reached: the address that is shown, which one it is, and what makes its transport."""
 
     address: str
     gripper: Callable[[], Gripper]
-    make: Callable[..., Transport]
+    make: Callable[..., Link]
+    is_rtu: bool = False
 
 
-def _way_to(address: object, device_id: object, request: object, status: object, name: str) -> _Way:
+def _way_to(address: object, registers: Mapping[str, object], name: str) -> _Way:
     if isinstance(address, str):
         parsed = parse_address(address)
-        return _over_modbus(
-            parsed, _check_registers(parsed, device_id, request, status), device_id is not None
-        )
+        names_unit = registers["device_id"] is not None
+        return _over_modbus(parsed, registers_of(parsed, **registers), names_unit, name)
     if isinstance(address, Transport):
         shown = f"<{type(address).__name__} at {id(address):#x}>"
         guarded = partial(GuardedTransport, address, shown, log=Log(name or shown))
@@ -135,28 +192,20 @@ def _way_to(address: object, device_id: object, request: object, status: object,
     raise TypeError(f"address must be a string or a Transport, got {address!r}")
 
 
-def _check_registers(address: Address, device_id: object, request: object, status: object) -> RegisterMap:
-    registers = RTU_REGISTERS if address.kind == "rtu" else TCP_REGISTERS
-    if device_id is not None:
-        registers = replace(registers, device_id=check_int("device_id", device_id, 1, 247))
-    last = 0x10000 - REGISTER_COUNT
-    if request is not None:
-        registers = replace(registers, request=check_int("request_address", request, 0, last))
-    if status is not None:
-        registers = replace(registers, status=check_int("status_address", status, 0, last))
-    return registers
-
-
-def _over_modbus(address: Address, registers: RegisterMap, names_unit: bool) -> _Way:
+def _over_modbus(address: Address, registers: RegisterMap, names_unit: bool, name: str) -> _Way:
     if address.kind == "sim":
         simulated = new_gripper(address.simulation)
         shown = f"{address}#{id(simulated):x}"  # every sim:// is a gripper of its own
         return _Way(shown, partial(Gripper, shown), partial(SimulatedTransport, simulated, registers))
-    unit = registers.device_id if names_unit and address.kind == "tcp" else None
+    # A gateway takes several connections; on a serial line replies carry no number, and whoever has it open
+    # gets part of what arrives.
+    unit = registers.device_id if names_unit and not address.is_rtu else None
+    hint = _LINE if address.is_rtu else _GATEWAY  # for people who meant two grippers
     return _Way(
         str(address),
-        lambda: Gripper(canonical_address(address), unit, HINTS[address.kind]),
-        partial(ModbusTransport, address, registers),
+        lambda: Gripper(canonical_address(address), unit, hint),
+        partial(ModbusTransport, address, registers, log=Log(name or str(address))),
+        address.is_rtu,
     )
 
 

@@ -2,8 +2,9 @@
 
 Every cycle reads the status, decides, and writes at once, as the scan of a PLC: what is decided is decided
 on what the gripper has just shown. Nobody else touches the transport; callers leave what they want with
-the controller and wait beside it. So no request is ever cancelled in flight, the link stays in step, and
-start() and stop() may be called from different tasks.
+the controller and wait beside it. So no request is cancelled in flight (but one that a stop has waited for
+long enough, and the link with it), the link stays in step, and start() and stop() may be called from
+different tasks.
 """
 
 from __future__ import annotations
@@ -19,18 +20,16 @@ import anyio
 from ..control.controller import Controller
 from ..control.waiters import fail, resolve
 from ..errors import (
-    ConnectFailedError,
-    ConnectionLostError,
     NotStartedError,
     ResponseTimeoutError,
     RobotiqConnectionError,
 )
-from ..link.modbus import HELD_S
-from ..link.transport import Transport
+from ..link.transport import Link
+from ..link.watchdog import HELD_S
 from ..wire.status import RobotiqStatus
 from .ending import Ending
+from .opening import Opener
 from .options import Options
-from .reconnecting import Backoff
 from .statistics import Counters
 from .streams import Channels, SentRequest
 from .timing.tick import Tick
@@ -43,6 +42,8 @@ with contextlib.suppress(ImportError):
 STOP_S: Final = 1.4
 """From stop() until disconnecting at the latest, whatever is in flight. Promised are 2 s; a transport object
 may take the last half second to close."""
+IN_FLIGHT_S: Final = 0.9
+"""Of that, time for what is in flight at stop() to be answered, before the link is opened anew."""
 SHUTDOWN_S: Final = 1.2
 """Of that, time to reach the gripper and to see the fingers stop."""
 SHUTDOWN_PAUSE_S: Final = 0.05
@@ -64,11 +65,13 @@ class Poller:
 
     def __init__(
         self,
-        transport: Transport,
+        transport: Link,
         controller: Controller,
         counters: Counters,
         channels: Channels,
         options: Options,
+        *,
+        wait: float = 0.0,
     ) -> None:
         """Prepare; must be made inside a running event loop.
 
@@ -78,7 +81,9 @@ class Poller:
             counters: what is counted.
             channels: are told of each status, after the controller has seen it, and of what is written.
             options: of the hand.
+            wait: seconds for which there may be no gripper yet.
         """
+        self._wait = wait
         self._transport = transport
         self._controller = controller
         self._counters = counters
@@ -90,11 +95,14 @@ class Poller:
         """Done when the first status has been taken in; holds the error when there was none."""
         self.failure: RobotiqConnectionError | None = None
         """Why the hand gave up, if it did."""
+        self.why_lost: RobotiqConnectionError | None = None
+        """Why the link is down, if it went down and is being opened again."""
         self._stopping = False
         self._end_by = math.inf
         self._ending = Ending.HALT
         """The strongest that was asked for; a task that ends by itself stops the fingers."""
-        self._interruptible: anyio.CancelScope | None = None
+        self._opener = Opener(self._connect, options)
+        self._polling: anyio.CancelScope | None = None
         self._tick = Tick(options.poll_interval)
         self._last_poll = 0.0
         self._warned = -math.inf
@@ -111,6 +119,8 @@ class Poller:
             # A hold or a halt that is not delivered yet is dropped with the rest: this one makes up for it.
             self._ending = max(ending, Ending.KEEP) if self._controller.has_undelivered_stop else ending
             self._end_by = self._loop.time() + STOP_S
+            if self._polling is not None:
+                self._polling.deadline = self._loop.time() + IN_FLIGHT_S
             self._refuse_requests()
         elif ending > self._ending:
             self._log.info("a stronger stop came meanwhile: the fingers are %s", ending.done)
@@ -120,8 +130,7 @@ class Poller:
                 self._controller.keep_no_grip("a stop() without keep_grip came meanwhile")
         elif ending < self._ending:
             self._log.warning("a stop that is under way is stronger: the fingers are %s", self._ending.done)
-        if self._interruptible is not None:
-            self._interruptible.cancel()
+        self._opener.end()
 
     def _refuse_requests(self) -> None:
         """Take no more requests, and drop those that were not sent.
@@ -146,7 +155,10 @@ class Poller:
         """Own the link until asked to stop, or until the policy gives up."""
         try:
             if await self._connect_first():
-                await self._poll()
+                with anyio.CancelScope() as self._polling:
+                    await self._poll()
+                if self._polling.cancelled_caught:
+                    self._controller.lost(ResponseTimeoutError("no answer until the hand was stopped"))
         finally:
             # An abandoned task is ended when it is collected: the hand may have been started again by then.
             if not self._loop.is_closed():
@@ -157,14 +169,10 @@ class Poller:
 
     async def _connect_first(self) -> bool:
         try:
-            connected = await self._connect()
+            connected = await self._opener.first(self._wait)
         except RobotiqConnectionError as error:
-            failure = error
-            if isinstance(error, (ResponseTimeoutError, ConnectionLostError)):
-                failure = ConnectFailedError(self._options.address, f"connected, but nobody answers: {error}")
-                failure.__cause__ = error
             if not self.connected.done():  # start() may have been cancelled
-                self.connected.set_exception(failure)
+                self.connected.set_exception(error)
             return False
         if connected:
             resolve([self.connected])
@@ -173,43 +181,37 @@ class Poller:
             self._controller.activates = policy is not None and policy.activate
         return connected
 
-    async def _connect(self) -> bool:
-        """Open the link and see the first status; False when asked to stop meanwhile."""
-        with anyio.CancelScope() as self._interruptible:
-            if not self._stopping:
-                await self._transport.open()
-                self._last_poll = 0.0  # no period counts that the link was lost in
-                await self._poll_once()
-                self._tick.start()
-                self._counters.tick = self._tick.source
-                return True
-        return False
+    async def _connect(self) -> None:
+        """Open the link and see the first status, or what it takes to decide about one."""
+        await self._transport.open()
+        self._last_poll = 0.0  # no period counts that the link was lost in
+        await self._poll_once()
+        while self._controller.is_undecided:  # the silence before may show as a fault, once
+            await asyncio.sleep(self._options.poll_interval)
+            await self._poll_once()
+        self._tick.start()
+        self._counters.tick = self._tick.source
 
     async def _reconnect(self, why: RobotiqConnectionError) -> bool:
         """Open the link again; False when that is given up, or when asked to stop."""
         self._log.warning("link lost: %s", why)
+        self.why_lost = self._controller.machine.why_down = why
         self._controller.lost(why)
         self._channels.publish_changes()
-        if self._options.policy is None:
+        policy, since = self._options.policy, self._loop.time()
+        if policy is None:
             self.failure = why
             return False
-        backoff = Backoff(self._options.policy, self._loop.time())
-        while not self._stopping:
-            with anyio.CancelScope() as self._interruptible:
-                await asyncio.sleep(backoff.delay)
-            try:
-                connected = await self._connect()
-            except RobotiqConnectionError as error:
-                self._log.debug("still no link: %s", error)
-                if backoff.gives_up(self._loop.time()):
-                    self.failure = error
-                    return False
-                continue
-            if connected:
-                self._counters.reconnects += 1
-                self._log.warning("link back after %.2f s", self._loop.time() - backoff.since)
-                return True
-        return False
+        try:
+            connected = await self._opener.again(policy)
+        except RobotiqConnectionError as error:
+            self.failure = error
+            return False
+        if connected:
+            self.why_lost = None
+            self._counters.reconnects += 1
+            self._log.warning("link back after %.2f s", self._loop.time() - since)
+        return connected
 
     # -- polling ---------------------------------------------------------------------------------------
 
@@ -241,6 +243,8 @@ class Poller:
 
     async def _write(self) -> None:
         """Write what the controller decides on, if anything."""
+        # First: what is decided on leaves in this turn, and no stop comes between.
+        await self._transport.ready()
         now = self._tick.time()
         request = self._controller.decide(now)
         if request is None:

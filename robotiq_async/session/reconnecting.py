@@ -62,7 +62,14 @@ class Backoff:
         self.delay = policy.first_delay
 
     def gives_up(self, now: float) -> bool:
-        """A try has failed: whether that was the last one. If not, the next delay is longer."""
+        """A try has failed: whether that was the last one. If not, the next delay is longer.
+
+        The last try comes when it is time to give up, and no later.
+        """
         limit = self._policy.give_up_after
         self.delay = min(max(2 * self.delay, SHORTEST_S), self._policy.max_delay)
-        return limit is not None and now - self.since >= limit
+        if limit is None:
+            return False
+        left = self.since + limit - now
+        self.delay = min(self.delay, max(left, 0.0))
+        return left <= 0

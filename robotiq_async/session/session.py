@@ -13,7 +13,7 @@ from ..control.controller import Controller
 from ..control.state_machine import RUNNING, SEQUENCES, StateMachine
 from ..control.triggers import Trigger
 from ..control.waiters import Waiter
-from ..enums import State
+from ..enums import Fault, State
 from ..errors import (
     ActivationTimeoutError,
     ConnectionLostError,
@@ -26,6 +26,7 @@ from ..errors import (
     StateTimeoutError,
 )
 from ..wire.status import RobotiqStatus
+from .activation_progress import ActivationProgress
 from .claims import Claims
 from .options import Options
 from .poller import Poller
@@ -48,7 +49,13 @@ class Session:
     """Who owns which gripper in this process."""
 
     def __init__(
-        self, options: Options, machine: StateMachine, channels: Channels, *, activate: bool
+        self,
+        options: Options,
+        machine: StateMachine,
+        channels: Channels,
+        *,
+        activate: bool,
+        wait: float = 0.0,
     ) -> None:
         """Claim the address and begin to connect; must be made in a running event loop.
 
@@ -57,6 +64,7 @@ class Session:
             machine: of the hand: its state outlives the session.
             channels: of the hand: they were opened before, perhaps, and are read afterwards.
             activate: whether a gripper that is found reset is activated.
+            wait: seconds for which there may be no gripper yet.
 
         Raises:
             InvalidStateError: the address is owned already.
@@ -66,15 +74,19 @@ class Session:
         """Whether nothing runs any more."""
         self._loop = asyncio.get_running_loop()
         self.machine = machine
+        machine.why_down = None
         self._claim()
         self.controller = Controller(machine, options.speed, options.force, options.units.closing_s)
         self.controller.activates = activate
         self.counters = Counters()
         self._channels = channels
         self._waiters = StateWaiters()
+        self._progress = ActivationProgress(self._loop, options.log)
         channels.reopen(self._loop)
         machine.changed = self._on_transition
-        self._poller = Poller(options.make_transport(), self.controller, self.counters, channels, options)
+        self._poller = Poller(
+            options.make_transport(), self.controller, self.counters, channels, options, wait=wait
+        )
         machine.fire(Trigger.ASK_START)
         channels.publish_changes()
         self.is_over = False
@@ -186,7 +198,7 @@ class Session:
 
     def link_lost(self) -> RobotiqConnectionError:
         """The error that tells that the link is down, and why if that is known."""
-        failure = self._poller.failure
+        failure = self._poller.failure or self._poller.why_lost
         error = ConnectionLostError(f"the link is down{'' if failure is None else f': {failure}'}")
         error.__cause__ = failure
         error.hand = self.options.given_name
@@ -292,7 +304,9 @@ class Session:
                 what="the activation was not finished",
             )
         except StateTimeoutError as error:
-            raise ActivationTimeoutError(str(error)) from None
+            fault = Fault.NONE if self.controller.status is None else self.controller.status.fault
+            why = f": {fault.description} (gFLT 0x{int(fault):02X}); recover() resets it" if fault else ""
+            raise ActivationTimeoutError(f"{error}{why}") from None
 
     async def next_status(self) -> None:
         """Wait for the next status, which may tell more.
@@ -325,4 +339,5 @@ class Session:
     def _on_transition(self, source: State, target: State, trigger: Trigger) -> None:
         self.counters.faults += target is State.FAULT
         self._waiters.reached(target)
+        self._progress.reached(target)
         self._channels.changes.append(Transition(source, target, trigger, now()))

@@ -36,6 +36,8 @@ class Statistics:
         faults: times the gripper reported a minor or a major fault.
         moves: how often :meth:`RobotiqHand.move` ended how: "reached", "contact", "cancelled", or the name
             of the error.
+        passing_faults: times fault 0x09 was shown for a moment, as some grippers do after a second without a
+            poll: looked past.
     """
 
     polls: int
@@ -51,6 +53,7 @@ class Statistics:
     tick: str
     faults: int
     moves: Mapping[str, int]
+    passing_faults: int = 0
 
     def __post_init__(self) -> None:
         """Keep a mapping of our own."""
@@ -95,8 +98,8 @@ class Counters:
         finally:
             self.moves[outcome] += 1
 
-    def snapshot(self, foreign_commands: int) -> Statistics:
-        """The figures so far."""
+    def snapshot(self, foreign_commands: int, passing_faults: int = 0) -> Statistics:
+        """The figures so far, with those that the controller counts."""
         periods, round_trips = sorted(self.periods), sorted(self.round_trips)
         return Statistics(
             polls=self.polls,
@@ -112,6 +115,7 @@ class Counters:
             tick=self.tick,
             faults=self.faults,
             moves=self.moves,
+            passing_faults=passing_faults,
         )
 
 

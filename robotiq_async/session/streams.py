@@ -13,7 +13,7 @@ import weakref
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass
-from typing import Any, Generic, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
 
 from ..control.triggers import Trigger
 from ..enums import AXES, State
@@ -112,6 +112,16 @@ class Stream(Generic[T]):
     def __aiter__(self) -> Self:
         """The stream itself."""
         return self
+
+    if not TYPE_CHECKING:  # type checkers tell the mistake themselves
+
+        def __iter__(self) -> None:
+            """Refuse ``for``.
+
+            Raises:
+                TypeError: always.
+            """
+            raise TypeError("a stream of a hand is read with 'async for', in a coroutine")
 
     async def __anext__(self) -> T:
         """The next item. A cancelled wait loses nothing.

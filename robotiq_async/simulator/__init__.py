@@ -3,9 +3,12 @@
 ==============  ===========================================================================
 room            what it holds
 ==============  ===========================================================================
-``physics``     :class:`SimulatedGripper`: axes, contacts, faults, power, and the words it reports
-``server``      :class:`SimulatorServer` (Modbus TCP), :class:`SerialSimulatorServer` (Modbus RTU)
-``troubles``    what can go wrong, as data and as words: :class:`Trouble`, :func:`parse_troubles`
+``physics``     :class:`SimulatedGripper`: axes, contacts, faults, power, and the words it reports;
+                :class:`Habits`: how it does what the manual leaves open
+``server``      :class:`SimulatorServer` (Modbus TCP), :class:`SerialSimulatorServer` (Modbus RTU),
+                :class:`RtuOverTcpSimulatorServer` (Modbus RTU behind a serial server)
+``troubles``    what can go wrong, as data and as words: :class:`Trouble`, :func:`parse_troubles`;
+                :class:`FaultInjector`, ``server.fault_injector``, makes it happen
 ``functions``   the Modbus functions that are served
 ==============  ===========================================================================
 
@@ -13,8 +16,20 @@ The physics imports neither pymodbus nor asyncio.
 """
 
 from .physics.gripper import SimulatedGripper
+from .physics.habits import Habits
+from .server.rtu_tcp_server import RtuOverTcpSimulatorServer
 from .server.serial_server import SerialSimulatorServer
 from .server.tcp_server import SimulatorServer
+from .troubles.fault_injector import FaultInjector
 from .troubles.trouble import Trouble, parse_troubles
 
-__all__ = ["SerialSimulatorServer", "SimulatedGripper", "SimulatorServer", "Trouble", "parse_troubles"]
+__all__ = [
+    "FaultInjector",
+    "Habits",
+    "RtuOverTcpSimulatorServer",
+    "SerialSimulatorServer",
+    "SimulatedGripper",
+    "SimulatorServer",
+    "Trouble",
+    "parse_troubles",
+]

@@ -6,6 +6,7 @@ import asyncio
 import atexit
 import contextlib
 import os
+import sys
 from collections.abc import Callable, Coroutine
 from typing import Any, Final, TypeVar
 
@@ -13,7 +14,7 @@ from ..concurrency import LateError
 from ..enums import State
 from ..errors import NotStartedError, RobotiqError
 from ..hand import RobotiqHand as AsyncRobotiqHand
-from ..log import log
+from ..log import Log, log
 from .loop_thread import LOOP_THREAD
 
 T = TypeVar("T")
@@ -36,6 +37,7 @@ class Caller:
         self._calls: set[object] = set()
         """Those that are being made: what they do cannot be told yet."""
         self._is_left_behind = False
+        self._has_warned = False
 
     def wait(self, function: Function[T]) -> T:
         """Make a call, and wait for it.
@@ -43,6 +45,7 @@ class Caller:
         Raises:
             BaseException: whatever it raises, or strikes this thread meanwhile.
         """
+        self._warn_of_a_running_loop()
         call = object()
         self._calls.add(call)
         _IN_USE.add(self)  # also when the program drops it: it runs on
@@ -67,6 +70,21 @@ class Caller:
 
         return self.wait(call)
 
+    def start(self, function: Function[None]) -> None:
+        """Make the call that starts the hand, unless the program ends.
+
+        Raises:
+            RuntimeError: it ends.
+            BaseException: as :meth:`wait`.
+        """
+
+        async def start() -> None:
+            # In the loop: what begins before the end there is in use, and stopped after it has begun.
+            LOOP_THREAD.check_begins()
+            await function()
+
+        self.wait(start)
+
     def stop(self, function: Function[None]) -> None:
         """Make the call that stops the hand; of one that does not run, without the event loop.
 
@@ -88,11 +106,23 @@ class Caller:
 
     @property
     def has_commanded(self) -> bool:
-        """Whether the hand has written to the gripper since its start.
+        """Whether the hand has written to the gripper since its start, or is about to.
 
         Of one that only looks nothing is written when the program is interrupted or ends.
         """
         return self.hand._has_commanded  # noqa: SLF001  # both are the hand
+
+    def _warn_of_a_running_loop(self) -> None:
+        """Once: the loop stands still during each call, and whatever else runs in it, as other hands do."""
+        if self._has_warned or LOOP_THREAD.is_here or "ipykernel" in sys.modules:
+            return  # the cells of a notebook run in its kernel's loop, and are meant to hold it up
+        with contextlib.suppress(RuntimeError):
+            asyncio.get_running_loop()
+            self._has_warned = True
+            Log(self.hand.name).warning(
+                "an event loop runs in this thread, and stands still at every call of the blocking hand: in "
+                "coroutines use robotiq_async.RobotiqHand, or call this one with asyncio.to_thread()"
+            )
 
     def check_process(self) -> None:
         """Refuse a hand that runs in the process that this one was forked from.
@@ -145,10 +175,12 @@ def _stop_all() -> None:
     for each in left:
         log.warning("%s still running at exit: stopping it", each.hand.address)
 
+    async def stop_one(caller: Caller) -> None:
+        # Whether it has commanded is asked in the turn that ends its requests.
+        await caller.hand.stop(halt=caller.has_commanded)
+
     async def stop() -> None:
-        await asyncio.gather(
-            *(each.hand.stop(halt=each.has_commanded) for each in left), return_exceptions=True
-        )
+        await asyncio.gather(*map(stop_one, left), return_exceptions=True)
 
     if left and LOOP_THREAD.is_running:
         with contextlib.suppress(LateError):

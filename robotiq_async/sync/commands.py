@@ -108,7 +108,8 @@ class Commands(Recovery):
         Raises:
             TypeError: an argument of the wrong type; nothing is sent.
             ValueError: an argument outside its range; nothing is sent.
-            MoveTimeoutError: an axis still moved when the time was over.
+            MoveTimeoutError: an axis still moved when the time was over; as MoveIgnoredError: the first
+                motion on a connection was echoed, and nothing has moved for a second.
             MoveSupersededError: another command, halt(), reset() or another client took over an axis.
             GripperFaultError: the gripper reports a minor or a major fault.
             NotActivatedError: the gripper is not activated, or lost its activation.
@@ -174,7 +175,8 @@ class Commands(Recovery):
         Raises:
             TypeError: an argument of the wrong type; nothing is sent.
             ValueError: an argument outside its range; nothing is sent.
-            MoveTimeoutError: an axis still moved when the time was over.
+            MoveTimeoutError: an axis still moved when the time was over; as MoveIgnoredError: the first
+                motion on a connection was echoed, and nothing has moved for a second.
             MoveSupersededError: another command, halt(), reset() or another client took over an axis.
             GripperFaultError: the gripper reports a minor or a major fault.
             RobotiqError: as :meth:`move`.

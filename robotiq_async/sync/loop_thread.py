@@ -43,7 +43,7 @@ class LoopThread:
     def forget(self) -> None:
         """There is no thread: that of a parent process is not ours."""
         self.begins_no_more = False
-        """Whether the program ends: a hand that starts now would not be stopped at its end."""
+        """Whether the program ends: see :meth:`check_begins`."""
         self._beginning = threading.Lock()
         """Only threads that Ctrl-C cannot strike take it."""
         self._server: _Server | None = None
@@ -59,6 +59,15 @@ class LoopThread:
         with contextlib.suppress(RuntimeError):  # no loop runs in this thread
             return self._server is not None and asyncio.get_running_loop() is self._server.loop
         return False
+
+    def check_begins(self) -> None:
+        """Refuse what begins while the program ends: a hand that starts now would not be stopped at its end.
+
+        Raises:
+            RuntimeError: it ends.
+        """
+        if self.begins_no_more:
+            raise RuntimeError("the program is ending: a blocking hand that starts now would not be stopped")
 
     def call(
         self, function: Function[T], *, interrupted: Function[None] | None = None, limit: float | None = None
@@ -118,8 +127,7 @@ class LoopThread:
 
     def _serving(self, call: _Call[Any]) -> _Server:
         """Begin a thread with a call, unless another thread does so at this moment."""
-        if self.begins_no_more:
-            raise RuntimeError("the program is ending: a blocking hand that starts now would not be stopped")
+        self.check_begins()
         answer: SimpleQueue[_Server | OSError] = SimpleQueue()
         threading.Thread(target=self._serve, args=(call, answer), name=NAME, daemon=True).start()
         server = answer.get()

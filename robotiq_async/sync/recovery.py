@@ -19,7 +19,8 @@ class Recovery(Observation):
         Raises:
             GripperFaultError: a fault is latched (see :meth:`recover`), or the activation ended in one.
             NotActivatedError: the gripper was reset meanwhile.
-            ActivationTimeoutError: not finished within the activation timeout.
+            ActivationTimeoutError: not finished within the activation timeout. It goes on: nothing is taken
+                back, for that would leave a hand that does not know where its fingers are.
             RobotiqError: not possible now, or the link went down.
         """
         self._caller.wait(lambda: self._inner.activate())
@@ -54,13 +55,15 @@ class Recovery(Observation):
         """Do whatever the present fault needs, until the gripper is active again.
 
         Waits for a minor fault to clear, and for an activation, reset or release under way; resets and
-        activates after a major one. A reset DROPS the part, and an activation MOVES the fingers.
+        activates after a major one. A gripper that waits for its activation (0x05, as after an emergency
+        stop) and shows nothing new for 5 s is reset and activated as well, twice at most. A reset DROPS the
+        part, and an activation MOVES the fingers.
 
         Args:
             timeout: seconds for all of it; None for 90 s.
 
         Raises:
-            StateTimeoutError: not active in time.
+            StateTimeoutError: not active in time; or not after two resets: a person has to look at it.
             ActivationTimeoutError: the new activation took longer than the activation timeout.
             GripperFaultError: the new activation ended in a fault.
             NotActivatedError: the gripper was reset during the new activation.

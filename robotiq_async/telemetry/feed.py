@@ -83,7 +83,7 @@ class Message:
         topic: where it belongs.
         nanoseconds: since 1970: when it happened.
         data: encoded as the topic says.
-        sequence: the number of the status it was made from; 0 for commands and events.
+        sequence: the number of the status it was made from; commands, and events, are counted from 1.
     """
 
     topic: Topic
@@ -139,6 +139,7 @@ class Feed:
         self._before: list[RobotiqStatus] = []
         self._fault = Fault.NONE
         self._epoch = 0.0
+        self._counts = {COMMAND: 0, EVENT: 0}
         self._sources: tuple[_Source, ...] = (
             _Source(lambda: hand.statuses(BUFFER), self._publish_status),
             _Source(hand.requests, self._publish_request),
@@ -180,11 +181,13 @@ class Feed:
         """Nanoseconds since 1970, of a timestamp in monotonic seconds."""
         return round((timestamp + self._epoch) * 1e9)
 
-    def _publish_json(self, topic: Topic, timestamp: float, fields: Fields, sequence: int = 0) -> None:
-        self._publish(Message(topic, self.nanoseconds(timestamp), compact(fields), sequence))
+    def _publish_json(self, topic: Topic, timestamp: float, fields: Fields) -> None:
+        self._counts[topic] += 1
+        self._publish(Message(topic, self.nanoseconds(timestamp), compact(fields), self._counts[topic]))
 
     def _publish_status(self, status: RobotiqStatus) -> None:
-        self._publish_json(STATUS, status.timestamp, status.as_dict(), status.sequence)
+        stamp, data = self.nanoseconds(status.timestamp), compact(status.as_dict())
+        self._publish(Message(STATUS, stamp, data, status.sequence))
         self._publish_joints(status)
         if status.fault != self._fault:
             self._fault = status.fault

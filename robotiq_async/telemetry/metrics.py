@@ -20,7 +20,9 @@ try:
     from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
     from prometheus_client.registry import Collector
 except ModuleNotFoundError as error:
-    raise ImportError("metrics need prometheus-client: pip install 'robotiq-async[metrics]'") from error
+    from ..extras import install
+
+    raise ImportError(f"metrics need prometheus-client: {install('metrics')}") from error
 
 from ..enums import State
 from ..protocol import Hand
@@ -38,6 +40,7 @@ _COUNTERS: Final = {
     "reconnects": "Times the link was opened again.",
     "foreign_commands": "Times another client was seen commanding the gripper.",
     "faults": "Times the gripper reported a minor or a major fault.",
+    "passing_faults": "Times fault 0x09 was shown for a moment and looked past.",
 }
 _GAUGES: Final = {
     "period_p50": "Median time between two polls.",

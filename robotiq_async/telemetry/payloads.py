@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from ..enums import AXES, Fault, Finger, State
 from ..errors import NotStartedError
-from ..kinematics import PREFIX
+from ..kinematics import FINGER_NAMES
 from ..protocol import Hand
 from ..session.streams import Transition
 from ..wire.status import RobotiqStatus
@@ -95,14 +95,19 @@ SCHEMAS: Final = {
         tick=_STRING,
         faults=_INTEGER,
         moves={"type": "object", "additionalProperties": _INTEGER},
+        passing_faults=_INTEGER,
     ),
 }
 """A JSON Schema for each kind of object."""
 
 
 def title(hand: Hand) -> str:
-    """Which hand, for people: its name and its address, where the one is not the other."""
-    return hand.address if hand.name == hand.address else f"{hand.name} ({hand.address})"
+    """Which hand, for people: its name and its address, where the one is not the other.
+
+    A simulated one is called that.
+    """
+    words = hand.address if hand.name == hand.address else f"{hand.name} ({hand.address})"
+    return f"{words}, simulated" if hand.address.startswith("sim:") else words
 
 
 def initial_state_fields(state: State, now: float) -> Fields:
@@ -171,5 +176,5 @@ def state_fields(hand: Hand, now: float) -> Fields:
 def efforts(status: RobotiqStatus) -> list[float]:
     """Motor currents in ampere, each at the joint its motor drives first; torques are not known."""
     scissor = status.current_ma(Finger.SCISSOR) / 1000
-    one, two, middle = (status.current_ma(finger) / 1000 for finger in PREFIX)
+    one, two, middle = (status.current_ma(finger) / 1000 for finger in FINGER_NAMES)
     return [scissor, one, 0.0, 0.0, scissor, two, 0.0, 0.0, middle, 0.0, 0.0]

@@ -1,4 +1,4 @@
-"""Records everything about a hand in an MCAP file. Needs the extra ``record`` (mcap).
+"""Records everything about a hand in an MCAP file (extra ``record``), or its polls in a table, ``.csv``.
 
     hand = RobotiqHand(address)
     async with Recorder(hand, "grasp.mcap"), hand:
@@ -8,7 +8,8 @@ In this order the start and the stop are in it too, and nothing that concerns th
 
 Four channels: ``/gripper/status`` (every poll), ``/gripper/command`` (every request that was written) and
 ``/gripper/event`` (transitions and faults) as JSON with a JSON Schema; ``/joint_states`` as ROS 2 encodes it.
-Tools of ROS 2 refuse a file with channels that are not ROS's: ``ros2=True`` leaves them out.
+Tools of ROS 2 refuse a file with channels that are not ROS's: ``ros2=True`` leaves them out. A table has a
+row for every poll (:mod:`.files.table`), and no commands.
 What is recorded reaches the disk twice a second, from a thread: a program that is killed loses no more than
 that, and ``robotiq-async recover`` makes its file whole.
 """
@@ -22,19 +23,20 @@ import os
 from io import FileIO
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Self
-
-try:
-    from mcap.writer import CompressionType, Writer
-except ModuleNotFoundError as error:
-    raise ImportError("recordings need mcap: pip install 'robotiq-async[record]'") from error
+from typing import Final, Protocol, Self
 
 from ..concurrency import in_a_thread, wait_shielded
 from ..errors import RecordingError
 from ..protocol import Hand
-from ..version import __version__
-from .feed import JOINTS, TOPICS, Feed, Message, Topic
+from .feed import JOINTS, Feed, Message
+from .files.csv_file import CsvFile
 from .raw_output import write_all
+
+_missing = ""
+try:  # Here and not in a constructor: it takes a tenth of a second, in which a hand could not poll.
+    from .files.mcap_file import McapFile
+except ImportError as error:
+    _missing = str(error)
 
 FLUSH_S: Final = 0.5
 """Seconds between two writes to the disk."""
@@ -43,7 +45,7 @@ DISK_S: Final = 10.0
 
 
 class _Outbox:
-    """What the MCAP writer writes to: keeps the bytes until a thread writes them to the disk."""
+    """What the file is made in: keeps the bytes until a thread writes them to the disk."""
 
     def __init__(self) -> None:
         self._waiting: list[bytes] = []
@@ -65,6 +67,21 @@ class _Outbox:
         return data
 
 
+class _Format(Protocol):
+    """Makes the bytes of a file, in memory."""
+
+    def take(self, message: Message) -> None: ...
+
+    def flush(self) -> None: ...
+
+    def finish(self) -> None: ...
+
+
+def is_table(path: Path | str) -> bool:
+    """Whether a recording of this name is a table, and no MCAP file."""
+    return Path(path).suffix.lower() == ".csv"
+
+
 class Recorder:
     """Records a hand while a block runs. It only listens: the gripper is not touched, whatever fails.
 
@@ -79,20 +96,23 @@ class Recorder:
 
         Args:
             hand: started before or while it is recorded.
-            path: a file that is not there yet.
+            path: a file that is not there yet; with the suffix ``.csv`` it is a table, else MCAP.
             ros2: write the joint states alone, in the profile ``ros2``: a file that tools of ROS 2 open.
+
+        Raises:
+            ImportError: MCAP without the extra ``record``.
+            ValueError: a table of ROS 2's.
         """
+        if ros2 and is_table(path):
+            raise ValueError(f"ros2 is for MCAP files, and {path} is a table")
         self.path = Path(path)
         self.recorded = 0
         self.saved = 0
-        self._profile = "ros2" if ros2 else ""
-        self._topics: tuple[Topic, ...] = (JOINTS,) if ros2 else TOPICS
         self._hand = hand
         self._feed = Feed(hand, self._take)
         self._outbox = _Outbox()
+        self._format = self._make_format(ros2=ros2)
         self._file: FileIO
-        self._writer: Any
-        self._channels: dict[Topic, int] = {}
         self._saving: asyncio.Task[None]
         self._over: asyncio.Event
         self._failed: asyncio.Future[RecordingError]
@@ -133,7 +153,6 @@ class Recorder:
             self._file = opening.result()
         except OSError as error:
             raise RecordingError(f"{self.path}: {error.strerror}") from error
-        self._begin()
         self._feed.start()
         self._saving = loop.create_task(self._save_again_and_again(), name="robotiq_async recorder")
         return self
@@ -154,32 +173,24 @@ class Recorder:
         """Wait until the recording fails (a full disk, say); what was saved before stays readable."""
         return await asyncio.shield(self._failed)
 
-    def _begin(self) -> None:
-        self._writer = writer = Writer(self._outbox, compression=CompressionType.ZSTD)  # type: ignore[arg-type]
-        writer.start(profile=self._profile, library=f"robotiq_async {__version__}")
-        metadata = {
-            "version": __version__,
-            "name": self._hand.name,
-            "address": self._hand.address,
-            "note": "never run on real hardware",
-        }
-        writer.add_metadata("robotiq_async", metadata)
-        for topic in self._topics:
-            schema = writer.register_schema(topic.schema_name, topic.schema_encoding, topic.schema)
-            self._channels[topic] = writer.register_channel(topic.name, topic.encoding, schema)
+    def _make_format(self, *, ros2: bool) -> _Format:
+        if is_table(self.path):
+            return CsvFile(self._outbox.write)
+        if _missing:
+            raise ImportError(_missing)
+        return McapFile(self._hand, self._outbox, ros2=ros2)
 
     def _take(self, message: Message) -> None:
-        if self._failed.done() or message.topic not in self._channels:
+        if self._failed.done():
             return
-        channel, stamp = self._channels[message.topic], message.nanoseconds
-        self._writer.add_message(channel, stamp, message.data, stamp, message.sequence & 0xFFFFFFFF)
+        self._format.take(message)
         self.recorded += message.topic is JOINTS  # the last that is told of a poll
 
     # -- the disk --------------------------------------------------------------------------------------
 
     async def _save_again_and_again(self) -> None:
         while not (self._over.is_set() or self._failed.done()):
-            self._writer.flush()
+            self._format.flush()
             await self._save()
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(FLUSH_S):
@@ -192,7 +203,7 @@ class Recorder:
             async with asyncio.timeout(DISK_S):
                 await self._saving
                 if not self._failed.done():
-                    self._writer.finish()
+                    self._format.finish()
                     await self._save()
                 await in_a_thread(self._file.close)
         except TimeoutError:

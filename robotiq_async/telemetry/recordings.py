@@ -21,7 +21,9 @@ try:
     from mcap.stream_reader import StreamReader, breakup_chunk
     from mcap.writer import Writer
 except ModuleNotFoundError as error:
-    raise ImportError("recordings need mcap: pip install 'robotiq-async[record]'") from error
+    from ..extras import install
+
+    raise ImportError(f"recordings need mcap: {install('record')}") from error
 
 from ..errors import RecordingError
 from ..log import log
@@ -45,7 +47,7 @@ class Entry:
     Attributes:
         topic: the channel's name.
         nanoseconds: since 1970.
-        sequence: of a status; 0 for the others.
+        sequence: the number of the status; of commands, and of events, counted from 1.
         data: the bytes.
         is_json: whether they are said to be JSON.
         path: the file.

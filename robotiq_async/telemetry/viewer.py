@@ -28,7 +28,9 @@ try:
     from foxglove import Channel, Context, MessageSchema, Schema, ServiceRequest, ServiceSchema
     from foxglove.websocket import Capability, ChannelView, Client, ServerListener, WebSocketServer
 except ModuleNotFoundError as error:
-    raise ImportError("viewers need foxglove-sdk: pip install 'robotiq-async[view]'") from error
+    from ..extras import install
+
+    raise ImportError(f"viewers need foxglove-sdk: {install('view')}") from error
 
 from ..actions import Operator
 from ..concurrency import in_a_thread, wait_shielded

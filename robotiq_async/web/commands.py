@@ -9,13 +9,21 @@ from time import monotonic
 from typing import Final
 
 from ..actions import Operator
+from ..enums import State
 from ..errors import RobotiqError
 from ..telemetry.payloads import Fields
+from ..telemetry.refusal_words import refusal_words
 from ..telemetry.services import SERVICES
 
 MAX_COMMANDS: Final = 16
 """Of one page at a time; a halt is never refused."""
 HALT: Final = "halt"
+BUTTONS: Final = {
+    State.FAULT: "press recover",
+    State.ATR_DONE: "press reset",
+    State.RESET: "press activate",
+}
+"""The button that helps in a state."""
 FRESH_S: Final = 1.5
 """A command that was asked for longer ago moves nothing; a halt is never too old."""
 
@@ -25,6 +33,9 @@ class PageCommands:
 
     A page that is gone has its commands cancelled, and that holds the axes that still move; what cannot be
     held half-way (an activation, a release, a reset) goes on, as it does whenever it is cancelled.
+
+    Attributes:
+        is_ending: whether nothing but halts is taken.
     """
 
     def __init__(self, operators: Sequence[Operator], answer: Callable[[Fields], None]) -> None:
@@ -38,7 +49,7 @@ class PageCommands:
         self._answer = answer
         self._tasks: dict[str, set[asyncio.Task[str]]] = {}
         self._halts: set[asyncio.Task[str]] = set()
-        self._is_ending = False
+        self.is_ending = False
 
     @property
     def under_way(self) -> bool:
@@ -77,7 +88,7 @@ class PageCommands:
 
     def refuse(self) -> None:
         """Take nothing but halts from now on: the hands are about to be stopped."""
-        self._is_ending = True
+        self.is_ending = True
 
     async def close(self) -> None:
         """Hold whatever is under way, and take no more. Waits until all have ended."""
@@ -89,7 +100,7 @@ class PageCommands:
     async def _carry_out(self, request: Fields, page: str, name: str) -> str:
         if not self._operators:
             raise ValueError("this page only looks; to command from a page: robotiq-async web --control")
-        if name != HALT and self._is_ending:
+        if name != HALT and self.is_ending:
             raise ValueError("the page is ending: nothing is moved from here now")
         if name != HALT and not 0 <= monotonic() - request["at"] <= FRESH_S:
             raise ValueError("this came too late to be carried out: the connection was held up")
@@ -108,5 +119,7 @@ def _outcome(task: asyncio.Task[str]) -> tuple[bool, str]:
         return True, task.result()
     except asyncio.CancelledError:
         return False, "the page was gone: the axes are held"
-    except (RobotiqError, ValueError, TypeError) as error:
+    except RobotiqError as error:
+        return False, refusal_words(error, BUTTONS)
+    except (ValueError, TypeError) as error:
         return False, str(error)

@@ -31,7 +31,9 @@ from .news import HandNews
 from .settings import PageSettings
 
 if find_spec("nicegui") is None:
-    raise ImportError("the page needs nicegui: pip install 'robotiq-async[web]'")
+    from ..extras import install
+
+    raise ImportError(f"the page needs nicegui: {install('web')}")
 
 UPDATE_S: Final = 0.05
 START_S: Final = 30.0
@@ -122,6 +124,11 @@ class PageServer:
     async def ended(self) -> None:
         """Wait until the process of the page has ended by itself."""
         await self._over.wait()
+
+    @property
+    def is_ending(self) -> bool:
+        """Whether nothing but halts is taken: :meth:`refuse_commands` was called, or the block is left."""
+        return self._commands.is_ending
 
     def refuse_commands(self) -> None:
         """Take nothing but halts from now on: for a program that is about to stop the hands."""

@@ -91,6 +91,8 @@ gFLT: Final = Field(2, 0, 4, "fault code; the high nibble is not part of it")
 gPR: Final = tuple(Field(3 + 3 * n, doc=f"echo of the position of {name}") for n, name in enumerate("ABCS"))
 gPO: Final = tuple(Field(4 + 3 * n, doc=f"position of {name}") for n, name in enumerate("ABCS"))
 gCU: Final = tuple(Field(5 + 3 * n, doc=f"current of {name}, 10 mA a count") for n, name in enumerate("ABCS"))
+STATUS_RESERVED: Final = (Field(2, 4, 4), Field(15))
+"""What the manual gives no meaning: the bits read 0."""
 
 MILLIAMPERE_PER_COUNT: Final = 10
 """gCU: the manual's worked example reads 0x0F as 150 mA; two editions print the relation upside down."""

@@ -33,11 +33,26 @@ def cells() -> Iterator[Cell]:
     )
     phases = {phase.name: phase for phase in PHASES}
     assert head[1:] == list(phases), "a column for each phase"
+    of_lines = {words for troubles, *_ in rows if is_of_lines(troubles) for words in words_in(troubles)}
     for troubles, *outcomes in rows:
-        for trouble in re.findall(r"`(.+?)`", troubles):
+        for trouble in words_in(troubles):
             for words, link in variants(trouble):
+                if link == "rtu" and words in of_lines and not is_of_lines(troubles):
+                    continue
+                if link == "tcp" and is_of_lines(troubles):
+                    continue
                 for name, outcome in zip(head[1:], outcomes, strict=True):
                     yield Cell(words, link, phases[name], outcome)
+
+
+def is_of_lines(troubles: str) -> bool:
+    """Whether a row is about serial lines; what it lists is not meant by the others there."""
+    return troubles.startswith("on a serial line:")
+
+
+def words_in(troubles: str) -> list[str]:
+    """The troubles of a row."""
+    return re.findall(r"`(.+?)`", troubles)
 
 
 def variants(trouble: str) -> Iterator[tuple[str, str]]:

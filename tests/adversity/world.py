@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from bisect import bisect_left, bisect_right
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager, suppress
@@ -13,8 +14,9 @@ import pytest
 
 from robotiq_async import Finger, RobotiqConnectionError, RobotiqHand, RobotiqStatus, State
 from robotiq_async.enums import AXES
-from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
+from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, parse_troubles
 from robotiq_async.simulator.server.framing import Frame
+from robotiq_async.simulator.troubles.fault_injector import FaultInjector
 from robotiq_async.wire.registers import Registers
 from robotiq_async.wire.request import Request
 from tests.grippers import activate_beforehand
@@ -22,6 +24,8 @@ from tests.virtual import VirtualLoop
 from tests.virtual_line import VirtualLine
 
 LONGEST_HOLD_S = 0.020
+HABITS = parse_troubles(os.environ.get("HABITS", ""))
+"""Troubles that every gripper here has besides, as the environment says. The promises stay the same."""
 SPEEDUP = 5.0
 """Of the gripper only: the link and the hand keep to their own times."""
 
@@ -56,13 +60,19 @@ class StampedGripper(SimulatedGripper):
 
 
 class Heard:
-    """Notes when each request came in, understood or not."""
+    """Notes when each request came in, understood or not; has the habits that are asked for."""
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.heard: list[float] = []
         self.asked = asyncio.Event()
         """Set as soon as the first has come, before it is answered."""
+
+    async def start(self) -> None:
+        await super().start()  # type: ignore[misc]
+        injector: FaultInjector = self.fault_injector  # type: ignore[attr-defined]
+        for habit in HABITS:
+            await injector.begin(habit)
 
     def take(self, inbox: bytearray) -> Frame | None:
         frame: Frame | None = super().take(inbox)  # type: ignore[misc]

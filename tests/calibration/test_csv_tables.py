@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import stat
 from pathlib import Path
 
 import pytest
@@ -117,6 +119,46 @@ def test_a_failed_write_leaves_what_was_there_and_nothing_else(file: Path) -> No
         write_table(file, SPEED, {0: (2,), 4: Unwritable()})
     assert read_table(file, SPEED) == {0: (1,)}
     assert [path.name for path in file.parent.iterdir()] == [file.name]
+
+
+def mode_of(file: Path) -> int:
+    return stat.S_IMODE(file.stat().st_mode)
+
+
+def test_a_file_keeps_its_mode(file: Path) -> None:
+    write_table(file, SPEED, {0: (1,)})
+    for mode in (0o600, 0o640):
+        file.chmod(mode)
+        write_table(file, SPEED, {0: (2,)})
+        assert mode_of(file) == mode
+
+
+def test_a_new_file_has_the_mode_that_the_umask_leaves(file: Path) -> None:
+    before = os.umask(0o027)
+    try:
+        write_table(file, SPEED, {0: (1,)})
+    finally:
+        os.umask(before)
+    assert mode_of(file) == 0o640
+
+
+def test_a_link_that_somebody_has_planted_is_not_followed(file: Path) -> None:
+    """In a folder where others write, too: the name of the file beside can be guessed."""
+    victim = file.with_name("victim")
+    victim.write_text("precious", encoding="utf-8")
+    file.with_name(f".{file.name}.{os.getpid()}").symlink_to(victim)
+    write_table(file, SPEED, {0: (1,)})
+    assert victim.read_text(encoding="utf-8") == "precious"
+    assert read_table(file, SPEED) == {0: (1,)}
+
+
+def test_a_link_to_the_table_stays_one(file: Path) -> None:
+    write_table(file, SPEED, {0: (1,)})
+    link = file.with_name("link.csv")
+    link.symlink_to(file)
+    write_table(link, SPEED, {0: (2,)})
+    assert link.is_symlink()
+    assert read_table(file, SPEED) == {0: (2,)}
 
 
 class Unwritable(tuple[int, ...]):

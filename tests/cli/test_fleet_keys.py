@@ -92,4 +92,4 @@ def test_without_the_extra_one_line_names_it(
 ) -> None:
     without("cryptography")
     outcome = call("fleet", "keys", str(tmp_path / "keys"))
-    outcome.assert_failed(1, "cryptography", "pip install 'robotiq-async[fleet]'")
+    outcome.assert_failed(1, "cryptography", "pip install 'cryptography")

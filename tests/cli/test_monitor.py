@@ -22,13 +22,15 @@ from robotiq_async import (
     State,
 )
 from robotiq_async.actions import Operator
+from robotiq_async.cli.tui.asking import NO, Question, Target
 from robotiq_async.cli.tui.screen import Monitor
-from robotiq_async.cli.tui.widgets import Axes, Question, position_bar, sparkline
-from robotiq_async.cli.tui.words import refusal_words
+from robotiq_async.cli.tui.widgets import Axes, position_bar, sparkline
+from robotiq_async.cli.tui.words import HINTS
 from robotiq_async.control.state_machine import refusal
 from robotiq_async.control.triggers import Trigger
 from robotiq_async.enums import AXES
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.telemetry.refusal_words import refusal_words
 from tests.grippers import active_gripper
 
 if TYPE_CHECKING:
@@ -73,6 +75,14 @@ def log(pilot: Screen) -> str:
 
 def text(pilot: Screen, where: str) -> str:
     return str(pilot.app.query_one(where, Static).render())
+
+
+def asked(pilot: Screen) -> Question | None:
+    """The question that waits for a key."""
+    assert isinstance(pilot.app, Monitor)
+    asking = pilot.app.asking
+    assert asking is None or isinstance(asking, Question)
+    return asking
 
 
 def axes(pilot: Screen) -> list[str]:
@@ -249,18 +259,18 @@ async def test_what_is_dangerous_asks_first(
     requests = active.hand.requests()
     async with shown(active) as pilot:
         await pilot.press(key)
-        await until(pilot, lambda: isinstance(pilot.app.screen, Question))
-        assert warning in str(pilot.app.screen.query_one("#question", Static).render())
+        await until(pilot, lambda: asked(pilot) is not None)
+        assert warning in text(pilot, "#question")
         await pilot.press("o", "r")  # nothing else works meanwhile
-        assert isinstance(pilot.app.screen, Question)
+        assert asked(pilot) is not None
         await pilot.press(answer)
-        await until(pilot, lambda: not isinstance(pilot.app.screen, Question))
+        await until(pilot, lambda: asked(pilot) is None)
     assert requests.take_nowait() is None
 
 
 async def confirmed(pilot: Screen, key: str) -> None:
     await pilot.press(key)
-    await until(pilot, lambda: isinstance(pilot.app.screen, Question) and pilot.app.screen.is_open)
+    await until(pilot, lambda: (question := asked(pilot)) is not None and question.is_open)
     await pilot.press("y")
 
 
@@ -272,6 +282,16 @@ async def test_a_yes_resets_and_activates(active: Operator) -> None:
         await until(pilot, lambda: "activate: the gripper is active" in log(pilot))
 
 
+async def test_a_question_lies_on_the_same_screen(operator: Operator) -> None:
+    """Over a screen of its own every paint drew both: 9 ms twelve times a second, 10 to 50 polls a second."""
+    async with shown(operator) as pilot:
+        await pilot.press("r")
+        assert pilot.app.query_one("#question").display
+        assert asked(pilot) is not None
+        assert pilot.app.screen_stack == [pilot.app.screen]
+        assert pilot.app.query_one("#question").region.bottom == pilot.app.size.height
+
+
 async def test_halt_works_while_a_question_is_open() -> None:
     async with SimulatorServer(active_gripper()) as slow:
         hand = RobotiqHand(slow.address, poll_interval=SLOWLY)
@@ -279,10 +299,61 @@ async def test_halt_works_while_a_question_is_open() -> None:
             await pilot.press("c")
             await until(pilot, lambda: hand.is_moving)
             await pilot.press("r")
-            await until(pilot, lambda: isinstance(pilot.app.screen, Question))
+            await until(pilot, lambda: asked(pilot) is not None)
             await pilot.press("space")
             await until(pilot, lambda: not hand.is_moving)
-            assert isinstance(pilot.app.screen, Question)
+            assert asked(pilot) is not None
+
+
+async def test_any_axes_are_sent_to_any_position(active: Operator) -> None:
+    hand = active.hand
+    async with shown(active) as pilot:
+        await pilot.press("p")
+        assert "Enter MOVES them" in text(pilot, "#question")
+        await pilot.press("enter", "b", "enter")  # neither axes nor position; no position
+        await pilot.press("1", "3", "7")
+        assert "position 137" in text(pilot, "#question")
+        assert not active.has_moved
+        await pilot.press("enter")
+        await until(pilot, lambda: "B to 137: B at 137" in log(pilot))
+        await pilot.press("p", "s", "a", "a", "9", "9", "9", "backspace", "enter")
+        await until(pilot, lambda: "SCISSOR to 9: SCISSOR at" in log(pilot))
+        await pilot.press("p", "a", "c", "6", "0", "enter")
+        await until(pilot, lambda: "A|C to 60: A at 60, C at 60" in log(pilot))
+        positions = [hand.status.requested_position(axis) for axis in AXES]
+        assert positions == [60, 137, 60, 9]
+
+
+@pytest.mark.parametrize("key", sorted(NO))
+async def test_a_position_that_is_not_entered_moves_nothing(key: str, active: Operator) -> None:
+    requests = active.hand.requests()
+    async with shown(active) as pilot:
+        await pilot.press("p", "a", "9", key)
+        assert not pilot.app.query_one("#question").display
+        assert pilot.app.is_running, "it ends the question and not the monitor"
+    assert requests.take_nowait() is None
+
+
+async def test_halt_works_while_a_position_is_written() -> None:
+    async with SimulatorServer(active_gripper()) as slow:
+        hand = RobotiqHand(slow.address, poll_interval=SLOWLY)
+        async with hand, shown(Operator(hand)) as pilot:
+            await pilot.press("c")
+            await until(pilot, lambda: hand.is_moving)
+            await pilot.press("p", "a", "1", "space")
+            await until(pilot, lambda: not hand.is_moving)
+
+
+def test_a_position_is_in_its_range() -> None:
+    """A digit that would leave it is not taken, and is not moved to its end either."""
+    moved: list[tuple[Finger, int]] = []
+    target = Target(lambda axes, position: moved.append((axes, position)))
+    for key in ("a", "b", "2", "5", "6", "x", "²"):
+        assert not target.press(key)
+    assert "position 25_" in target.text.plain
+    assert not target.press("5")
+    assert target.press("enter")
+    assert moved == [(Finger.A | Finger.B, 255)]
 
 
 async def test_what_is_refused_is_told(operator: Operator) -> None:
@@ -320,7 +391,7 @@ async def test_it_speaks_of_keys_and_not_of_methods_and_states(active: Operator)
     ],
 )
 def test_a_refusal_names_the_key_that_helps(error: RobotiqError, words: str) -> None:
-    assert refusal_words(error) == words
+    assert refusal_words(error, HINTS) == words
 
 
 async def test_the_log_keeps_clear_of_its_scroll_bar(operator: Operator) -> None:

@@ -64,6 +64,7 @@ async def test_watch_prints_what_changes(
 ) -> None:
     async with RobotiqHand(server.address) as hand:
         process = await shell.start("monitor", "--watch", server.address)
+        assert await shell.read_line(process) == f"Gripper {server.address}"
         assert (await shell.read_line(process)).endswith(" state    RUNNING_IDLE")
         assert "A=6 - B=6 - C=6" in await shell.read_line(process)
         await hand.move(100, Finger.A)

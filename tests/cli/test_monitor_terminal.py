@@ -110,5 +110,5 @@ async def test_keys_of_before_the_screen_are_no_commands(server: SimulatorServer
 
 async def test_without_textual_one_line_names_the_extra_and_another_way() -> None:
     terminal = Terminal("-c", WITHOUT.format("textual", ["monitor"]))
-    await terminal.shows(b"pip install 'robotiq-async[monitor]', or pass --watch")
+    await terminal.shows(b"(the extra monitor), or pass --watch")
     assert await terminal.end() == 1

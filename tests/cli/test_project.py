@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import robotiq_async
 from robotiq_async import Finger
 from robotiq_async.cli import main
+from robotiq_async.cli.app import build
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ def test_every_dependency_is_pinned() -> None:
 EXTRAS: dict[str, list[str]] = PROJECT["optional-dependencies"]
 NEED = re.compile(r'need\("(\w+)", "(\w+)"')
 """A command refuses to go on without a module of an extra."""
-ADVICE = re.compile(r"needs? ([a-z-]+): pip install 'robotiq-async\[(\w+)\]'")
+ADVICE = re.compile(r"needs? ([a-z-]+): \{install\('(\w+)'\)\}")
 """A module of the package does."""
 
 
@@ -93,6 +94,19 @@ def test_whoever_misses_a_module_is_told_the_extra_that_brings_it() -> None:
     }
     for name, extra in told:
         assert {name, package.get(name, name)} & packages_of(extra), f"{extra} does not bring {name}"
+
+
+def test_the_help_says_which_extra_each_command_needs() -> None:
+    lines = (line.split(maxsplit=1) for line in str(build().help).splitlines())
+    told = {words[0]: words[1] for words in lines if len(words) == 2}
+    commands = ROOT / "robotiq_async" / "cli" / "commands"
+    for file in commands.rglob("*.py"):
+        needed = {extra for _, extra in NEED.findall(file.read_text())}
+        names = {"recordings": "replay", "campaign": "measure", "fleet_keys": "fleet"}
+        assert all(names.get(file.stem, file.stem) in told[extra] for extra in needed - {"plot"}), file
+    for extra, words in {"record": "record replay export plot recover", "plot": "plot measure"}.items():
+        assert set(words.split()) <= set(re.findall(r"\w+", told[extra]))
+    assert "rtu://" in told["serial"]
 
 
 def test_the_extra_that_is_a_command_brings_the_command_line() -> None:

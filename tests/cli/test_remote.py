@@ -104,6 +104,26 @@ def test_status_move_and_the_demo(
     agent.finish(signal.SIGINT).assert_succeeded()
 
 
+def test_an_agent_says_which_gripper_is_simulated(
+    beside: Callable[..., Beside], endpoint: str, tmp_path: Path
+) -> None:
+    agent = beside("agent", str(fleet_file(tmp_path, endpoint, "sim://")))
+    assert agent.read_line() == ADDRESS
+    assert agent.read_error() == "robotiq-async: left: Simulated gripper sim://"
+    agent.finish(signal.SIGINT).assert_succeeded()
+
+
+def test_the_log_of_an_agent_calls_each_gripper_by_its_name(
+    beside: Callable[..., Beside], endpoint: str, tmp_path: Path
+) -> None:
+    with socket.socket() as reserved:  # and nobody listens there
+        reserved.bind(("127.0.0.1", 0))
+        address = f"tcp://127.0.0.1:{reserved.getsockname()[1]}"
+        agent = beside("agent", str(fleet_file(tmp_path, endpoint, address)))
+        assert agent.read_error().startswith(f"robotiq-async: left: cannot connect to {address}: ")
+        agent.finish(signal.SIGINT)
+
+
 def test_an_agent_whose_list_nobody_reads_serves_all_the_same(
     call: Call, beside: Callable[..., Beside], endpoint: str, there: SimulatorServer, tmp_path: Path
 ) -> None:

@@ -51,17 +51,55 @@ def test_it_prints_its_address_serves_ends_cleanly_and_is_exact_only_on_request(
 
 
 def test_it_keeps_the_gripper_between_two_clients(call: Call, beside: Callable[..., Beside]) -> None:
-    address = beside("simulate", "--port", "0", "--speedup", "20").read_line()
+    address = beside("simulate", "--port", "0", "--speedup", "20", "--plain").read_line()
     assert call("move", "255", "--yes", address).code == 0
     assert json.loads(call("status", "--json", address).out)["C"]["position"] >= 240
     assert "Activating" not in call("move", "0", "--yes", address).out
 
 
 def test_something_may_be_in_the_way(call: Call, beside: Callable[..., Beside]) -> None:
-    address = beside("simulate", "--port", "0", "--speedup", "20", "--object", "150", "--exact").read_line()
+    options = ("--speedup", "20", "--object", "150", "--exact", "--plain")
+    address = beside("simulate", "--port", "0", *options).read_line()
     assert call("move", "255", "--yes", address).code == 0
     reading = json.loads(call("status", "--json", address).out)
     assert [reading[name]["position"] for name in ("A", "B", "C")] == [150] * 3
+
+
+def test_something_fixed_fails_an_activation(call: Call, beside: Callable[..., Beside]) -> None:
+    options = ("--speedup", "20", "--object", "150", "--fixed", "--plain")
+    address = beside("simulate", "--port", "0", *options).read_line()
+    call("move", "255", "--yes", address).assert_failed(1, "0x0D")
+    call("simulate", "--fixed").assert_failed(2, "--fixed is about an object")
+
+
+@pytest.mark.parametrize(
+    ("options", "second_status", "seconds"),
+    [(("--like-hardware",), [9, 0], 12), ((), [0, 0], 4.2), (("--plain",), [0, 0], 4.2)],
+)
+async def test_the_habits_of_real_grippers_if_they_are_asked_for(
+    shell: Shell, options: tuple[str, ...], second_status: list[int], seconds: float
+) -> None:
+    process = await shell.start("simulate", "--port", "0", "--speedup", "4", *options)
+    port = int((await shell.read_line(process)).rpartition(":")[2])
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+
+    async def ask(pdu: str) -> bytes:
+        request = bytes.fromhex(pdu)
+        writer.write(b"\0\1\0\0" + (len(request) + 1).to_bytes(2) + b"\2" + request)
+        header = await reader.readexactly(7)
+        return await reader.readexactly(int.from_bytes(header[4:6]) - 1)
+
+    async with asyncio.timeout(30):
+        await asyncio.sleep(1.1)
+        faults = [(await ask("04 0001 0001"))[2] & 0x0F for _ in range(2)]
+        assert faults == second_status
+        began = asyncio.get_running_loop().time()
+        await ask("10 0000 0001 02 0100")
+        while (await ask("04 0000 0001"))[2] & 0x30 != 0x30:  # noqa: ASYNC110  # a client can only ask
+            await asyncio.sleep(0.02)
+        took = 4 * (asyncio.get_running_loop().time() - began)
+    assert seconds - 0.1 <= took <= seconds + 2
+    writer.close()
 
 
 @pytest.mark.parametrize(
@@ -106,10 +144,30 @@ def test_the_unit_id_over_tcp(call: Call, beside: Callable[..., Beside]) -> None
     call("status", address).assert_failed(1, "nobody answers")
 
 
-@pytest.mark.parametrize("unit", ["0", "248", "nine", "9.5"])
+@pytest.mark.parametrize("unit", ["-1", "256", "nine", "9.5"])
 def test_a_unit_id_that_no_unit_can_have(call: Call, unit: str) -> None:
-    outcome = call("simulate", "--serial", "/dev/no-such-port", "--device-id", unit)
-    outcome.assert_failed(2, f"--device-id must be an integer in 1..247, got '{unit}'")
+    outcome = call("simulate", "--serial", "/dev/no-such-port", f"--device-id={unit}")
+    outcome.assert_failed(2, f"--device-id must be an integer in 0..255, got '{unit}'")
+
+
+@pytest.mark.parametrize("unit", ["0", "248", "255"])
+@pytest.mark.parametrize("line", [("--serial", "/dev/no-such-port"), ("--rtu-over-tcp",)])
+def test_a_unit_id_that_no_unit_on_a_line_can_have(call: Call, line: tuple[str, ...], unit: str) -> None:
+    call("simulate", *line, "--device-id", unit).assert_failed(2, f"device_id must be in 1..247, got {unit}")
+
+
+def test_rtu_over_tcp(call: Call, beside: Callable[..., Beside]) -> None:
+    address = beside("simulate", "--rtu-over-tcp", "--port", "0").read_line()
+    assert address.startswith("rtu+tcp://127.0.0.1:")
+    call("status", address).assert_succeeded()
+    call("status", "--read-function", "4", address).assert_succeeded()
+    call("status", "--device-id", "12", address).assert_failed(1, "nobody answers")
+    call("status", address.removeprefix("rtu+")).assert_failed(1, "nobody answers")
+
+
+@pytest.mark.parametrize("words", [("--serial", "/dev/ttyS0", "--rtu-over-tcp"), ("--unpaced",)])
+def test_what_does_not_go_together(call: Call, words: tuple[str, ...]) -> None:
+    call("simulate", *words).assert_failed(2, words[-1])
 
 
 def test_other_than_loopback_is_warned_about(call: Call) -> None:

@@ -151,4 +151,4 @@ def test_the_layout_is_handed_out(call: Call, tmp_path: Path) -> None:
 
 def test_without_the_sdk_one_line_names_the_extra(call: Call, without: Callable[[str], None]) -> None:
     without("foxglove")
-    call("view").assert_failed(1, "pip install 'robotiq-async[view]'")
+    call("view").assert_failed(1, "pip install 'foxglove-sdk")

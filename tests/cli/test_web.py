@@ -24,7 +24,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
 pytest.importorskip("nicegui", reason="the page needs the extra web")
 
-from robotiq_async.cli.commands.web import _leave_all
+from robotiq_async.cli.commands.web import AGAIN_S, _leave_all, _try_again
 from robotiq_async.web.server import PageServer
 from robotiq_async.web.settings import PageSettings
 
@@ -105,12 +105,12 @@ def test_bad_input_is_one_clear_line(
 def test_without_nicegui_one_line_names_the_extra(call: Call, without: Callable[[str], None]) -> None:
     without("nicegui")
     for command in (["web"], ["demo", "--show"]):
-        call(*command).assert_failed(1, "pip install 'robotiq-async[web]'")
+        call(*command).assert_failed(1, "pip install 'nicegui")
 
 
 async def test_the_demo_waits_until_somebody_looks(shell: Shell) -> None:
     process = await shell.start("demo", "--show")
-    lines = [await shell.read_line(process) for _ in range(2)]
+    lines = [await shell.read_line(process) for _ in range(3)]
     url = next(line.partition(": ")[2] for line in lines if line.startswith("Watch it move: "))
     assert await asyncio.to_thread(status, url) == 303
     process.send_signal(signal.SIGINT)
@@ -194,3 +194,24 @@ async def test_all_hands_are_stopped_at_once(server: SimulatorServer, gripper: S
         await leaving
         await asyncio.wait({moving})
         assert isinstance(moving.exception(), NotStartedError)
+
+
+@pytest.mark.virtual_time
+async def test_a_hand_that_can_be_reached_again_is_not_started_once_the_page_ends(
+    server: SimulatorServer,
+) -> None:
+    """It was reached while the others were stopped, and left running."""
+    async with SimulatorServer(SimulatedGripper(asyncio.get_running_loop().time, speedup=20)) as dead:
+        operators = [Operator(RobotiqHand(each.address)) for each in (dead, server)]
+        await operators[0].hand.start()
+        await operators[0].move(10, Finger.A)
+        page = PageServer([each.hand for each in operators], SETTINGS, operators=operators)
+        page.news[1].problem = "nobody was there"
+        trying = asyncio.create_task(_try_again(page, 1, operators[1]))
+        await asyncio.sleep(AGAIN_S - 0.5)
+        dead.replies.silence()
+        leaving = asyncio.create_task(_leave_all(operators, page))
+        await trying
+        assert not leaving.done()
+        await leaving
+        assert [each.hand.state for each in operators] == [State.SHUTDOWN, State.DISCONNECTED]

@@ -20,7 +20,7 @@ from robotiq_async import (
 from robotiq_async.fleet.network.bus import Bus
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.protocol import Hand
-from tests.contract.bench import LOCAL, REMOTE, A, B, C, bench, contract, ended, statuses
+from tests.contract.bench import LOCAL, REMOTE, A, B, Bench, C, bench, contract, ended, statuses, until
 
 
 @pytest.mark.parametrize("where", [LOCAL, REMOTE])
@@ -371,3 +371,42 @@ async def test_flags_are_flags(where: str, value: object) -> None:
         if value is not None:  # what the hand was made with
             with pytest.raises(TypeError, match="keep_grip"):
                 await hand.stop(keep_grip=value)  # type: ignore[arg-type]
+
+
+@contract
+async def test_a_start_waits_for_a_gripper_that_has_no_power_yet(where: str) -> None:
+    async with bench(where) as here:
+        await cut_off(here, where)
+        hand = here.make()
+        starting = asyncio.create_task(hand.start(activate=False, wait=60.0))
+        await asyncio.sleep(20.0)
+        assert not starting.done()
+        await here.server.accept()
+        async with asyncio.timeout(5.0):
+            await starting
+        assert hand.state is State.RUNNING_IDLE
+        await hand.stop()
+
+
+@contract
+@pytest.mark.parametrize("how", ["stop", "cancel"])
+async def test_the_wait_of_a_start_ends_at_once(where: str, how: str) -> None:
+    async with bench(where) as here:
+        await cut_off(here, where)
+        hand = here.make()
+        starting = asyncio.create_task(hand.start(activate=False, wait=3600.0))
+        await asyncio.sleep(20.0)
+        began = asyncio.get_running_loop().time()
+        await hand.stop() if how == "stop" else starting.cancel()
+        await asyncio.wait({starting}, timeout=10.0)
+        assert starting.done()
+        assert asyncio.get_running_loop().time() - began <= 2.0
+        assert starting.cancelled() if how == "cancel" else isinstance(starting.exception(), NotStartedError)
+        await hand.stop()
+
+
+async def cut_off(here: Bench, where: str) -> None:
+    """Nobody answers from here on, and who was connected knows."""
+    here.server.refuse()
+    here.server.cut()
+    await until(lambda: where == LOCAL or here.lab is None or here.lab.local.state is State.DISCONNECTED)

@@ -1,7 +1,12 @@
-"""Cycles of read, decide and write without I/O: the controller, an exact simulated gripper, one clock."""
+"""Cycles of read, decide and write without I/O: the controller, an exact simulated gripper, one clock.
+
+The object status may be late: every scan's by ``STATUS_LAG`` reads, if that is in the environment.
+"""
 
 from __future__ import annotations
 
+import os
+from collections import deque
 from collections.abc import Callable
 
 from robotiq_async import Finger, MoveResult, RobotiqStatus, State
@@ -16,8 +21,10 @@ from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.wire.registers import Registers
 from robotiq_async.wire.request import Request
 from tests.control.outcome import Outcome
+from tests.register_words import with_object_status
 
 POLL_S = 0.005
+LAG = int(os.environ.get("STATUS_LAG", "0"))
 
 
 class Scan:
@@ -30,8 +37,13 @@ class Scan:
         gripper: SimulatedGripper | None = None,
         speed: int = 128,
         after: Scan | None = None,
+        lag: int = LAG,
     ) -> None:
-        """``after`` is the program before this one: the gripper is its, and so is the time."""
+        """``after`` is the program before this one: the gripper is its, and so is the time.
+
+        ``lag`` is by how many reads gDT and gSTA come late.
+        """
+        self._late: deque[Registers] = deque(maxlen=lag + 1)
         self._time: list[float] = [100.0] if after is None else after._time
         self.gripper: SimulatedGripper
         if after is not None:
@@ -55,11 +67,15 @@ class Scan:
 
     def status(self) -> RobotiqStatus:
         self.polls += 1
-        return RobotiqStatus(self.gripper.status_registers(), self.now, self.polls)
+        self._late.append(self.gripper.status_registers())
+        return RobotiqStatus(with_object_status(self._late[-1], self._late[0]), self.now, self.polls)
 
     def connect(self, *, activate: bool = True) -> None:
         self.controller.activates = activate
         self.controller.see(self.status())
+        while self.controller.is_undecided:
+            self.now += POLL_S
+            self.controller.see(self.status())
         self.controller.activates = False
 
     def step(self, *, answer: bool = True) -> None:
@@ -162,8 +178,8 @@ class Scan:
         return {axis: status.position(axis) for axis in AXES}
 
 
-def started(device_cycle: float = 0.005) -> Scan:
+def started(device_cycle: float = 0.005, *, lag: int = LAG) -> Scan:
     """A hand that has activated its gripper."""
-    scan = Scan(device_cycle=device_cycle)
+    scan = Scan(device_cycle=device_cycle, lag=lag)
     scan.start()
     return scan

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async.control.requests.adoption import DIRECTION_WAIT_S, Adoption
+from robotiq_async.control.requests.standstill import LAG_READS, LAG_S, Moment
 from robotiq_async.enums import AXES, Finger, Mode, ObjectStatus
 from robotiq_async.wire.request import AxisRequest, Request
 from robotiq_async.wire.status import RobotiqStatus
@@ -153,9 +154,27 @@ def test_a_slow_axis_has_the_time_to_show_its_direction() -> None:
 
 
 @pytest.mark.parametrize("byte_0", [GO, HALTED])
-@pytest.mark.parametrize("what", [OPENING, CLOSING, THERE])
-def test_a_gripper_at_rest_is_certain_at_once(byte_0: int, what: ObjectStatus) -> None:
-    assert Adoption(gripper(what, what, what, what, byte_0=byte_0)).is_certain
+@pytest.mark.parametrize(("what", "echo"), [(OPENING, 0), (CLOSING, 255), (THERE, 100)])
+def test_a_gripper_at_rest_is_certain_at_once(byte_0: int, what: ObjectStatus, echo: int) -> None:
+    at_rest = gripper(what, what, what, what, byte_0=byte_0, echo=(echo,) * 4, position=(100,) * 4)
+    assert Adoption(at_rest).is_certain
+
+
+@pytest.mark.parametrize(("what", "echo"), [(OPENING, 255), (CLOSING, 0), (THERE, 255)])
+def test_an_axis_at_rest_that_contradicts_its_echo_may_show_what_was_before_it(
+    what: ObjectStatus, echo: int
+) -> None:
+    """Another client may have opened the hand just before we came: our first write must not close it."""
+    shown = gripper(THERE, what, THERE, THERE, echo=(100, echo, 100, 100), position=(100,) * 4)
+    adoption = Adoption(shown)
+    assert not adoption.is_certain
+    adoption.see(gripper(THERE, MOVING, THERE, THERE, echo=(100, echo, 100, 100), position=(100,) * 4))
+    assert not adoption.is_certain, "its direction is not known yet"
+    for reads in range(1, LAG_READS):
+        adoption.see(shown, Moment(LAG_S, reads))
+        assert not adoption.is_certain
+    adoption.see(shown, Moment(LAG_S, LAG_READS))
+    assert adoption.is_certain, "it is so, and not late"
 
 
 def test_a_gripper_that_was_never_told_to_go_is_certain_at_once() -> None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async import Fault, Finger, GripperFaultError, NotActivatedError, State
+from robotiq_async.control.passing_fault import LASTS_READS
 from robotiq_async.wire.request import Request
 from tests.control.other_client import moved_by_another
-from tests.control.scan import Scan
+from tests.control.scan import POLL_S, Scan
 
+UNKNOWN = Fault(0x0C)
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 
 
@@ -17,7 +19,7 @@ def test_a_serious_or_unknown_fault_ends_a_move_at_once(scan: Scan, code: int) -
     _, outcome = scan.move(255)
     scan.run(0.3)
     scan.gripper.inject_fault(code)
-    scan.step()
+    scan.run((LASTS_READS + 1) * POLL_S if code == 0x09 else POLL_S)
     assert scan.state is State.FAULT
     assert isinstance(outcome.error, GripperFaultError)
     assert outcome.error.fault == code
@@ -178,7 +180,7 @@ def test_what_waits_in_fault_is_not_written_to_a_gripper_that_lost_its_activatio
     """A hold or a halt carries rACT = 1: written after a power cycle it would activate."""
     scan.move(255)
     scan.run(0.5)
-    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
+    scan.gripper.inject_fault(UNKNOWN)
     scan.step()
     assert scan.state is State.FAULT
     halted = scan.halt()

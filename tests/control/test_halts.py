@@ -99,7 +99,7 @@ def test_halt_in_fault_is_told_while_the_fault_lasts(scan: Scan, code: int, movi
 def test_a_halt_outlives_a_fault_in_the_same_poll() -> None:
     scan = moved_by_another()
     halted = scan.halt()
-    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.1)
+    scan.gripper.inject_fault(Fault(0x0C), 0.1)
     scan.controller.see(scan.status())
     assert scan.state is State.FAULT
     at = scan.positions()[A]

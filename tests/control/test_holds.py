@@ -195,7 +195,7 @@ def test_a_hold_is_told_in_a_fault(scan: Scan, when: str) -> None:
     scan.move(200, A)
     scan.run(0.5)
     asked = scan.hold(A) if when == "before" else None
-    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 1.0)
+    scan.gripper.inject_fault(Fault(0x0C), 1.0)
     scan.controller.see(scan.status())
     assert scan.state is State.FAULT
     asked = asked or scan.hold(A)

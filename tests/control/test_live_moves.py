@@ -37,10 +37,10 @@ def test_a_move_that_was_not_written_yet_does_not_end() -> None:
     """The axes may rest where a move before this one has brought them."""
     each, outcome = move()
     moves = live(each)
-    moves.see(ARRIVED, acts)
+    moves.see(ARRIVED, acts, Finger.ALL, {})
     assert not outcome.told
     moves.written(1)
-    moves.see(ARRIVED, acts)
+    moves.see(ARRIVED, acts, Finger.ALL, {})
     assert outcome.result.positions == {A: 0, B: 0, C: 0}
     assert not moves
 
@@ -49,19 +49,19 @@ def test_a_move_whose_write_does_not_act_yet_does_not_end() -> None:
     each, outcome = move()
     moves = live(each)
     moves.written(7)
-    moves.see(ARRIVED, lambda number: number < 7)
+    moves.see(ARRIVED, lambda number: number < 7, Finger.ALL, {})
     assert not outcome.told
-    moves.see(ARRIVED, lambda number: number <= 7)
+    moves.see(ARRIVED, lambda number: number <= 7, Finger.ALL, {})
     assert outcome.is_told
 
 
 def test_a_move_takes_in_currents_from_its_write_on() -> None:
     each, outcome = move()
     moves = live(each)
-    moves.see(status_of(0x39, 0x00, echo=255, current=99), acts)
+    moves.see(status_of(0x39, 0x00, echo=255, current=99), acts, Finger.ALL, {})
     moves.written(1)
-    moves.see(MOVING, acts)
-    moves.see(ARRIVED, acts)
+    moves.see(MOVING, acts, Finger.ALL, {})
+    moves.see(ARRIVED, acts, Finger.ALL, {})
     assert set(outcome.result.peak_current_ma.values()) == {90}
 
 
@@ -78,7 +78,7 @@ def test_every_move_that_has_arrived_ends_and_the_others_go_on() -> None:
     (first, one), (second, other), (third, goes_on) = move(axes=A), move(axes=B), move(100, C)
     moves = live(first, second, third)
     moves.written(1)
-    moves.see(ARRIVED, acts)
+    moves.see(ARRIVED, acts, Finger.ALL, {})
     assert one.is_told
     assert other.is_told
     assert not goes_on.told
@@ -120,7 +120,7 @@ def test_a_move_has_left_when_its_outcome_is_handed_over(how: str) -> None:
     moves = live(each)
     moves.written(1)
     if how == "end":
-        moves.see(ARRIVED, acts)
+        moves.see(ARRIVED, acts, Finger.ALL, {})
     else:
         moves.fail(MoveSupersededError("now"))
     assert was_under_way == [False]

@@ -37,44 +37,44 @@ def ended(each: tuple[Move, Outcome], status: RobotiqStatus) -> MoveResult:
 
 def test_a_move_has_arrived_when_every_addressed_axis_rests_under_its_request() -> None:
     each, _ = move(255)
-    assert each.has_arrived(status_of(0xF9, 0xFF, echo=255))
-    assert each.has_arrived(status_of(0xB9, 0xEA, echo=(255, 255, 255, 0)))
+    assert each.has_arrived(status_of(0xF9, 0xFF, echo=255), Finger.ALL, {})
+    assert each.has_arrived(status_of(0xB9, 0xEA, echo=(255, 255, 255, 0)), Finger.ALL, {})
 
 
 @pytest.mark.parametrize("byte_1", [0b11_11_11_00, 0b11_11_00_11, 0b11_00_11_11])
 def test_a_move_has_not_arrived_while_one_addressed_axis_moves(byte_1: int) -> None:
     each, _ = move(255)
-    assert not each.has_arrived(status_of(0x39, byte_1, echo=255))
+    assert not each.has_arrived(status_of(0x39, byte_1, echo=255), Finger.ALL, {})
 
 
 def test_an_axis_that_is_not_addressed_may_move_on() -> None:
     each, _ = move(255, A | B)
-    assert each.has_arrived(status_of(0x39, 0b00_00_11_11, echo=(255, 255, 0, 0)))
+    assert each.has_arrived(status_of(0x39, 0b00_00_11_11, echo=(255, 255, 0, 0)), Finger.ALL, {})
 
 
 @pytest.mark.parametrize("echo", [(254, 255, 255, 0), (255, 0, 255, 0), (255, 255, 100, 0)])
 def test_a_move_has_not_arrived_while_one_echo_shows_another_request(echo: tuple[int, ...]) -> None:
     each, _ = move(255)
-    assert not each.is_under(status_of(0xF9, 0xFF, echo=echo))
-    assert not each.has_arrived(status_of(0xF9, 0xFF, echo=echo))
+    assert not each.is_under(status_of(0xF9, 0xFF, echo=echo), {})
+    assert not each.has_arrived(status_of(0xF9, 0xFF, echo=echo), Finger.ALL, {})
 
 
 def test_a_halted_gripper_is_not_under_a_move() -> None:
     each, _ = move(255)
-    assert not each.is_under(status_of(0xF1, 0xFF, echo=255))
-    assert not each.has_arrived(status_of(0xF1, 0xFF, echo=255))
+    assert not each.is_under(status_of(0xF1, 0xFF, echo=255), {})
+    assert not each.has_arrived(status_of(0xF1, 0xFF, echo=255), Finger.ALL, {})
 
 
 def test_a_moving_gripper_is_under_its_move() -> None:
     each, _ = move(255)
-    assert each.is_under(status_of(0x39, 0xC0, echo=255))
-    assert not each.has_arrived(status_of(0x39, 0xC0, echo=255))
+    assert each.is_under(status_of(0x39, 0xC0, echo=255), {})
+    assert not each.has_arrived(status_of(0x39, 0xC0, echo=255), Finger.ALL, {})
 
 
 def test_arriving_does_not_depend_on_the_position_reached() -> None:
     """Open stops at 6-7 although 0 was asked, closed at 240 or above."""
     each, _ = move(0)
-    assert each.has_arrived(status_of(0xF9, 0xFF, echo=0, position=7))
+    assert each.has_arrived(status_of(0xF9, 0xFF, echo=0, position=7), Finger.ALL, {})
 
 
 # -- the outcome is handed over once -----------------------------------------------------------------------

@@ -101,7 +101,7 @@ class RandomUse(RuleBasedStateMachine):
     @precondition(lambda self: self.running)
     def fault(self, fault: int) -> None:
         self.scan.gripper.inject_fault(fault)
-        self.scan.step()
+        self.scan.run(0.02)  # 0x09 is one when it lasts
         assert self.scan.state is State.FAULT
         self.scan.run(1.0)
         assert all(told.is_told for _, told in self.told), "somebody waits for ever"

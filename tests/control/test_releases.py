@@ -88,7 +88,7 @@ def test_a_release_that_is_called_off_leaves_the_hand_where_the_gripper_is(scan:
     scan.gripper.write(0, [0x0000])
     scan.now += 0.02
     scan.gripper.status_registers()
-    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
+    scan.gripper.inject_fault(Fault(0x0C))
     scan.step()
     assert len(scan.written) == written
     assert (scan.state, scan.latest.activation_echo) == (State.FAULT, False)

@@ -56,6 +56,12 @@ def waits(sequence: Sequence, *statuses: RobotiqStatus) -> None:
         assert sequence.send(status) is None
 
 
+def stops_again(sequence: Sequence, last: Request, *statuses: RobotiqStatus) -> None:
+    """A stop that does not show by when it should act was forgotten, perhaps."""
+    for status in statuses:
+        assert sequence.send(status) == last
+
+
 def ends(sequence: Sequence, status: RobotiqStatus) -> None:
     """The sequence sees this and ends with it."""
     with pytest.raises(StopIteration):
@@ -262,8 +268,7 @@ def test_a_shutdown_with_nothing_to_stop_writes_nothing() -> None:
 
 def test_a_shutdown_ends_when_the_complete_last_image_is_echoed() -> None:
     sequence = shutdown(last_image)
-    first(sequence, RUNNING)
-    waits(sequence, status_of(0x39, 0xC0, echo=ECHO))
+    stops_again(sequence, first(sequence, RUNNING), status_of(0x39, 0xC0, echo=ECHO))
     ends(sequence, status_of(0x31, 0xC0, echo=ECHO))
 
 
@@ -272,15 +277,13 @@ def test_a_shutdown_ends_when_the_complete_last_image_is_echoed() -> None:
 )
 def test_a_cleared_go_bit_alone_does_not_end_a_shutdown(echo: tuple[int, ...]) -> None:
     sequence = shutdown(last_image)
-    first(sequence, RUNNING)
-    waits(sequence, status_of(0x31, echo=echo), status_of(0x39, echo=ECHO))
+    stops_again(sequence, first(sequence, RUNNING), status_of(0x31, echo=echo), status_of(0x39, echo=ECHO))
     ends(sequence, status_of(0x31, echo=ECHO))
 
 
 def test_a_shutdown_does_not_end_while_the_activation_bit_differs() -> None:
     sequence = shutdown(last_image)
-    first(sequence, RUNNING)
-    waits(sequence, status_of(0x30, echo=ECHO))
+    stops_again(sequence, first(sequence, RUNNING), status_of(0x30, echo=ECHO))
     ends(sequence, status_of(0x31, echo=ECHO))
 
 

@@ -76,6 +76,8 @@ def test_a_write_acts_once_it_shows(shadow: Shadow) -> None:
     assert shadow.is_ours(shadow.shown(shows(200, 1.02), 1.02))
     assert shadow.acts(number)
     assert shadow.is_settled
+    assert shadow.may_begin_to_move, "until gDT can be believed"
+    shadow.see_arrivals(shows(200, 1.02))
     assert not shadow.may_begin_to_move
 
 

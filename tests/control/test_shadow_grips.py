@@ -54,7 +54,7 @@ def test_a_grip_ends(ours: Shadow, how: str) -> None:
 
 def test_an_axis_has_arrived_when_it_was_seen_at_rest_under_what_it_was_asked_last(ours: Shadow) -> None:
     assert ours.arrived == NO_AXES
-    ours.see_arrivals(status_of(0x39, 0b11_11_10_00, echo=200))
+    ours.see_arrivals(status_of(0x39, 0b11_11_10_00, echo=200, position=(100, 150, 199, 200)))
     assert ours.arrived == B | C | S
     ours.write(image(200).with_positions({B: 190}), moved=B)
     assert ours.arrived == C | S

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import re
 import xml.etree.ElementTree as ET
 from math import cos, dist, isclose, pi, sin, sqrt
 
@@ -12,11 +13,11 @@ from hypothesis import strategies as st
 
 from robotiq_async.description import HandModel, Pose, hand_model, urdf
 from robotiq_async.description.geometry import Vector, from_rpy, turned
-from robotiq_async.kinematics import JOINTS, finger_angles, palm_angle
+from robotiq_async.kinematics import FINGER_NAMES, JOINTS, finger_angles, palm_angle
 
 MODEL = hand_model()
 ANGLE = st.floats(-pi, pi)
-FINGERS = ("finger_1", "finger_2", "finger_middle")
+FINGERS = tuple(FINGER_NAMES.values())
 
 
 def at(position: int, scissor: int = 137) -> dict[str, float]:
@@ -50,6 +51,17 @@ def test_the_links_form_one_tree_on_the_frame_that_joint_states_name() -> None:
         chain = [joint for joint in MODEL.joints if joint.child.startswith(finger)]
         assert [joint.child for joint in chain] == [f"{finger}_link_{number}" for number in range(4)]
         assert [joint.parent for joint in chain] == ["palm", *[f"{finger}_link_{n}" for n in range(3)]]
+
+
+def test_its_comments_name_the_fingers_as_the_map_does() -> None:
+    comments = re.findall(r"<!-- Finger ([ABC]) -->(.*?)(?=<!-- Finger|</robot>)", urdf(), re.DOTALL)
+    named = {name: str(finger.name) for finger, name in FINGER_NAMES.items()}
+    assert len(comments) == 3
+    for letter, text in comments:
+        links = set(re.findall(r'<link name="(\w+)_link_0"', text))
+        assert [named[link] for link in links] == [letter]
+    words = ", ".join(f"{name} is {letter}" for name, letter in named.items())
+    assert words in " ".join(urdf().split())
 
 
 def test_no_position_of_the_gripper_leaves_the_limits() -> None:

@@ -52,4 +52,4 @@ def prose(text: str) -> str:
 
 def requirements(text: str) -> str:
     """What a page has its reader install, as it is typed behind ``pip install``."""
-    return " ".join(re.findall(r"\bpip install ((?!'robotiq-async)[^`\n]+)", text))
+    return " ".join(re.findall(r"\bpip install (?!'robotiq-async|\.\.\. )([^`\n]+)", text))

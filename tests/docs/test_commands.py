@@ -52,6 +52,8 @@ def test_it_can_be_typed(line: str) -> None:
     elif program == "pip" and words[1] == "install":
         wanted = re.findall(r"\.\[(.*)\]", " ".join(words))
         assert {extra for each in wanted for extra in each.split(",")} <= set(EXTRAS)
+    elif program == "pip" and words[1] == "wheel":
+        assert words[-1] == ".", "of the clone"
     elif program == "python":
         named = [
             word for word in words[1:] if word.endswith(".py") and "/" in word and not word.startswith("..")

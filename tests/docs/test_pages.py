@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import inspect
 import re
 from contextlib import AsyncExitStack, redirect_stdout
@@ -13,6 +14,7 @@ from typing import Any
 import pytest
 
 from docs import make_diagram, make_pages
+from robotiq_async import Finger, RobotiqHand
 from robotiq_async.control.state_machine import TABLE, Verdict
 from robotiq_async.control.triggers import Trigger
 from robotiq_async.enums import State
@@ -159,6 +161,22 @@ async def test_code_runs(
         assert shown is None or agree(shown.text, printed.getvalue()), printed.getvalue()
         for function in [value for key, value in names.items() if key.startswith("test_")]:
             await function()
+
+
+@pytest.mark.virtual_time
+@pytest.mark.parametrize("closed", [False, True])
+async def test_the_first_move_of_a_real_gripper_ends_wherever_its_fingers_are(closed: bool) -> None:
+    """At life's own speed: from closed fingers it takes twice the five seconds that it had."""
+    page = DOCS / "how-to" / "real-gripper.md"
+    (block,) = [block for _, block in CODE if "Finger.A" in block.text and _ == page]
+    gripper = SimulatedGripper(asyncio.get_running_loop().time)
+    async with SimulatorServer(gripper) as server:
+        async with RobotiqHand(server.address) as hand:
+            await (hand.close if closed else hand.open)()
+        with redirect_stdout(StringIO()) as printed:
+            await prompt.run(compiled(page, block, server.address), {})
+    assert printed.getvalue().count("<MoveResult A=") == block.text.count("await hand.") > 0
+    assert gripper.position(Finger.B) > 200 or not closed, "only A has moved"
 
 
 @pytest.mark.parametrize("page", dict.fromkeys([*(page for page, _ in CODE), FIXTURES]), ids=name)

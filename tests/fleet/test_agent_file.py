@@ -64,7 +64,8 @@ def test_everything(tmp_path: Path) -> None:
     assert settings.grippers["left"].speed == 255
     assert settings.grippers["right"].status_address == 2000
     assert [each.keep_grip for each in settings.grippers.values()] == [False, True]
-    assert settings.grippers["left"].make_hand().address == "tcp://192.168.1.11:502"
+    hand = settings.grippers["left"].make_hand("left")
+    assert (hand.name, hand.address) == ("left", "tcp://192.168.1.11:502")
 
 
 def test_with_keys_it_listens_encrypted(tmp_path: Path) -> None:
@@ -107,10 +108,11 @@ def test_two_grippers_behind_one_gateway_and_any_number_of_simulated_ones(tmp_pa
         (GOOD + "sped = 1\n", ["line 5", "[grippers.left]", "'sped'", "did you mean speed?"]),
         (GOOD + "speed = 300\n", ["line 5", "[grippers.left]", "speed", "0..255", "300"]),
         (GOOD + "force = true\n", ["line 5", "force", "0..255", "True"]),
-        (GOOD + "device_id = 0\n", ["line 5", "device_id", "1..247"]),
+        (GOOD + "device_id = 256\n", ["line 5", "device_id", "0..255"]),
+        (GOOD + "read_function = 6\n", ["line 5", "read_function", "3..4"]),
         (GOOD + 'poll_interval = "fast"\n', ["line 5", "poll_interval", "0.001..0.1", "'fast'"]),
         (GOOD + "connect_timeout = 9\n", ["line 5", "connect_timeout", "0.01..5"]),
-        (GOOD + "response_timeout = 9\n", ["line 5", "response_timeout", "0.005..0.5"]),
+        (GOOD + "response_timeout = 9\n", ["line 5", "response_timeout", "0.005..5"]),
         (GOOD + "activation_timeout = 0\n", ["line 5", "activation_timeout", "0.01..120"]),
         (GOOD + "request_address = 70000\n", ["line 5", "request_address", "0..65528"]),
         (GOOD + "reconnect = false\n", ["line 5", "'reconnect'"]),
@@ -141,6 +143,15 @@ def test_a_bad_file_is_told_in_one_line(text: str, words: list[str], tmp_path: P
     assert "\n" not in message
     for word in ("FLEET.toml", *words):
         assert word in message
+
+
+def test_a_gripper_on_a_serial_line_gets_its_defaults_unless_told(tmp_path: Path) -> None:
+    line = '[grippers.left]\naddress = "rtu+tcp://192.168.1.20:54321"\nread_function = 4\n'
+    grippers = read(tmp_path, f'site = "lab"\n{line}').grippers
+    assert grippers["left"].make_hand("left")._options.poll_interval == 0.015
+    grippers = read(tmp_path, f'site = "lab"\n{line}poll_interval = 0.005\n').grippers
+    assert grippers["left"].make_hand("left")._options.poll_interval == 0.005
+    assert grippers["left"].read_function == 4
 
 
 def test_a_line_that_is_not_certain_is_not_told(tmp_path: Path) -> None:

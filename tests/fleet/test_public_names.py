@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from robotiq_async import errors, fleet
+from robotiq_async.extras import install
 
 WITHOUT = """\
 import sys
@@ -25,6 +26,25 @@ print(Agent.__name__)
 def test_the_names_are_there_without_zenoh_and_cryptography() -> None:
     done = subprocess.run([sys.executable, "-c", WITHOUT], capture_output=True, text=True, timeout=60)
     assert done.stdout == "Agent\n", done.stderr
+
+
+@pytest.mark.parametrize("use", ['RemoteHand("zenoh://lab/cell/left")', 'Fleet("lab")'])
+def test_what_needs_zenoh_names_the_extra_that_brings_it(use: str) -> None:
+    program = f"""\
+import asyncio, sys
+
+sys.modules["zenoh"] = None
+from robotiq_async.fleet import Fleet, RemoteHand
+
+async def main():
+    async with {use}:
+        pass
+
+asyncio.run(main())
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    last = done.stderr.splitlines()[-1]
+    assert last == f"ImportError: hands on other hosts need zenoh: {install('fleet')}"
 
 
 def test_they_are_sorted() -> None:

@@ -70,8 +70,10 @@ def test_an_empty_environment_is_none(monkeypatch: pytest.MonkeyPatch, value: st
     ],
 )
 def test_malformed(address: str) -> None:
-    with pytest.raises(ValueError, match=r"malformed address .* accepted: zenoh://SITE/HOST/GRIPPER"):
+    with pytest.raises(ValueError, match=r"malformed .* accepted: zenoh://SITE/HOST/GRIPPER") as caught:
         parse_remote_address(address)
+    assert repr(address) in str(caught.value)
+    assert (str(caught.value).count("malformed"), str(caught.value).count("accepted")) == (1, 1)
 
 
 def test_no_string() -> None:
@@ -81,7 +83,7 @@ def test_no_string() -> None:
 
 @pytest.mark.parametrize(
     ("address", "remote"),
-    [(PLAIN, True), ("zenoh://", True), ("tcp://a", False), ("zenoh:/a", False), (3, False), (None, False)],
+    [(PLAIN, True), ("ZENOH://", True), ("tcp://a", False), ("zenoh:/a", False), (3, False), (None, False)],
 )
 def test_which_is_remote(address: object, remote: bool) -> None:
     assert is_remote(address) is remote

@@ -111,18 +111,19 @@ async def test_it_is_given_again_until_the_gripper_has_it() -> None:
 
 
 @virtual
-async def test_in_the_same_run_it_is_not_given_again() -> None:
-    """Somebody else has set another force since, and grips with it."""
+async def test_it_is_given_again_after_somebody_else_has_set_another() -> None:
     async with lab() as here, here.client() as hand:
         await hand.set_force(5)
         async with here.client("other", control=False) as other:
             await other.take()
             await other.set_force(200)
+            await other.set_speed(3)
             await other.release()
         await hand.acquire()
         await hand.set_position(30, A)
         image = Request.from_registers(here.gripper.request_registers)
-        assert [axis.force for axis in image.axes] == [200] * 4
+        assert [axis.force for axis in image.axes] == [5] * 4
+        assert [axis.speed for axis in image.axes] == [3] * 4, "of that it has asked for nothing"
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -81,17 +82,20 @@ async def test_states_and_buffers(hand: RobotiqHand) -> None:
 @pytest.mark.parametrize(
     ("option", "value"),
     [
-        ("device_id", 0),
-        ("device_id", 248),
+        ("device_id", -1),
+        ("device_id", 256),
         ("device_id", "2"),
         ("device_id", True),
+        ("read_function", 6),
+        ("read_function", "3"),
+        ("read_function", 3.0),
         ("poll_interval", 0),
         ("poll_interval", 1.0),
         ("poll_interval", "5ms"),
         ("connect_timeout", 0),
         ("connect_timeout", float("nan")),
         ("response_timeout", -1),
-        ("response_timeout", 2),
+        ("response_timeout", 5.1),
         ("activation_timeout", 0),
         ("reconnect", "yes"),
         ("reconnect", 1),
@@ -109,6 +113,35 @@ def test_options(option: str, value: Any) -> None:
     with pytest.raises((TypeError, ValueError), match=option) as caught:
         RobotiqHand("sim://", **{option: value})
     assert repr(value) in str(caught.value)
+
+
+@pytest.mark.parametrize("address", ["rtu:///dev/ttyUSB0", "rtu+tcp://127.0.0.1:54321"])
+@pytest.mark.parametrize("unit", [0, 248, 255])
+def test_units_that_nobody_has_on_a_line(address: str, unit: int) -> None:
+    with pytest.raises(ValueError, match=rf"device_id must be in 1\.\.247, got {unit}"):
+        RobotiqHand(address, device_id=unit)
+
+
+def test_intervals_and_time_outs_of_a_line_and_of_a_network() -> None:
+    def figures(address: str, **given: Any) -> tuple[float, float]:
+        options = RobotiqHand(address, **given)._options
+        transport: Any = options.make_transport()
+        return options.poll_interval, transport._response_timeout
+
+    assert figures("tcp://192.168.1.11") == (0.005, 0.4)
+    assert figures("tcp://192.168.1.11", response_timeout=5) == (0.005, 5.0)
+    for line in ("rtu:///dev/ttyUSB0", "rtu+tcp://192.168.1.11:54321"):
+        assert figures(line) == (0.015, 0.4)
+        assert figures(line, poll_interval=0.005, response_timeout=0.3) == (0.005, 0.3), "as asked"
+        assert figures(line, poll_interval=0.1) == (0.1, 0.4)
+
+
+@pytest.mark.parametrize("wait", [-1, 86401, math.inf, math.nan, "1", None, True])
+async def test_how_long_a_start_waits(wait: Any) -> None:
+    hand = RobotiqHand("sim://")
+    with pytest.raises((TypeError, ValueError), match="wait"):
+        await hand.start(wait=wait)
+    assert hand.state is State.DISCONNECTED
 
 
 def test_options_that_are_numbers_of_numpy() -> None:

@@ -10,10 +10,11 @@ from typing import Any
 import pytest
 
 from robotiq_async import Finger, NotStartedError, RobotiqHand, State
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.simulator import Habits, SerialSimulatorServer, SimulatedGripper, SimulatorServer
 from robotiq_async.wire.request import Request
 from tests.contract.bench import until
 from tests.grippers import activate_beforehand
+from tests.virtual_line import VirtualLine
 
 pytestmark = pytest.mark.virtual_time
 
@@ -289,3 +290,76 @@ async def test_waiting_for_the_end_is_no_request(hand: RobotiqHand) -> None:
     await asyncio.sleep(0)
     assert await hand.wait_for_state(State.SHUTDOWN) is State.SHUTDOWN
     await stopping
+
+
+# -- a gripper that forgets writes -------------------------------------------------------------------------
+
+SPACING_S = 0.01
+"""By the manual of 2014 a write that comes sooner after another one may be dropped."""
+
+
+@pytest.mark.parametrize("later", [0.001, 0.004, 0.006, 0.009])
+@pytest.mark.parametrize("options", [{}, {"keep_grip": True}], ids=str)
+async def test_a_stop_that_was_acknowledged_and_forgotten_is_sent_again(
+    options: dict[str, bool], later: float
+) -> None:
+    """It returned with a warning after 1.2 s, and the axis went on to its target."""
+    loop = asyncio.get_running_loop()
+    gripper = SimulatedGripper(loop.time, habits=Habits(write_spacing=SPACING_S))
+    await activate_beforehand(gripper)
+    async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
+        await hand.set_speed(0)
+        await asyncio.sleep(1)
+        await hand.set_position(255, A)
+        await asyncio.sleep(later)
+        before = loop.time()
+        await hand.stop(**options)
+        assert loop.time() - before < 2.0
+        assert not gripper.is_moving
+        assert gripper.position(A) < 60
+
+
+@pytest.mark.parametrize("later", [0.001, 0.004, 0.006, 0.009])
+async def test_a_halt_that_was_acknowledged_and_forgotten_is_sent_again(later: float) -> None:
+    """It returned half a second later, and the axis went on."""
+    loop = asyncio.get_running_loop()
+    gripper = SimulatedGripper(loop.time, habits=Habits(write_spacing=SPACING_S))
+    await activate_beforehand(gripper)
+    async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
+        await hand.set_speed(0)
+        await asyncio.sleep(1)
+        await hand.set_position(255, A)
+        await asyncio.sleep(later)
+        await hand.halt()
+        assert not gripper.is_moving
+        assert hand.state is State.RUNNING_IDLE
+
+
+class WatchedLine(VirtualLine):
+    """A serial line that knows when the hand has written what."""
+
+    def __init__(self, patch: pytest.MonkeyPatch) -> None:
+        super().__init__(patch)
+        self.written: list[tuple[float, Request]] = []
+
+    def carry(self, sender: str, data: bytes) -> None:
+        if sender == self.NEAR and data[1] == 16:
+            words = [int.from_bytes(data[at : at + 2], "big") for at in range(7, 23, 2)]
+            self.written.append((asyncio.get_running_loop().time(), Request.from_registers(words)))
+        super().carry(sender, data)
+
+
+async def test_what_waits_for_the_silence_of_a_serial_line_is_not_sent_after_a_stop(
+    gripper: SimulatedGripper, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """1.75 ms lay between the decision and the wire: an image that began a motion left after stop()."""
+    line, loop = WatchedLine(monkeypatch), asyncio.get_running_loop()
+    await activate_beforehand(gripper)
+    async with SerialSimulatorServer(line.FAR, gripper):
+        for step in range(40):
+            async with RobotiqHand(f"rtu://{line.NEAR}") as hand:
+                hand.command(position=200 - 100 * (step % 2), speed=0)
+                await asyncio.sleep(step * 0.0005)
+                called = loop.time()
+            late = [image for when, image in line.written if when > called and image.go]
+            assert late == [], f"stopped {step * 0.5:g} ms after the command"

@@ -57,7 +57,10 @@ class Bench:
     @property
     def word(self) -> str:
         assert not self.gripper.is_moving
-        return {HELD: "grip", Finger(0): "let go"}[self.gripper.grips]
+        if self.gripper.grips == HELD:
+            return "grip"
+        assert not self.gripper.grips
+        return {HELD: "stays", Finger(0): "let go"}[self.gripper.holds]
 
 
 # -- the rows ----------------------------------------------------------------------------------------------
@@ -202,7 +205,7 @@ async def next_ends(here: Bench) -> str:
         pass
     async with RobotiqHand(here.server.address, keep_grip=here.keeps):
         pass
-    assert here.word == ("grip" if here.keeps else "let go"), "unless it keeps the grip as well"
+    assert here.word == ("grip" if here.keeps else "stays"), "unless it keeps the grip as well"
     async with RobotiqHand(here.server.address):
         pass
     return here.word

@@ -36,6 +36,7 @@ PORTS = st.integers(1, 65535)
         ("tcp://gripper-2.cell_1.example.org:502", "gripper-2.cell_1.example.org", 502),
         ("localhost", "localhost", 502),
         ("tcp://Gripper.LOCAL", "gripper.local", 502),
+        ("TCP://192.168.1.11", "192.168.1.11", 502),
         ("[::1]", "::1", 502),
         ("[::1]:5020", "::1", 5020),
         ("tcp://[::1]", "::1", 502),
@@ -87,6 +88,8 @@ def test_the_address_of_a_simulated_gripper_may_say_what_it_is_like(
         ("[::1]", "tcp://[::1]:502"),
         ("rtu:///dev/ttyUSB0", "rtu:///dev/ttyUSB0"),
         ("rtu://COM3", "rtu://COM3"),
+        ("RTU://COM3", "rtu://COM3"),
+        ("Sim://?object=150", "sim://?object=150"),
         ("sim://", "sim://"),
         ("sim://?object=150&speedup=010.0", "sim://?speedup=10&object=150"),
         ("sim://?speedup=1.0", "sim://"),
@@ -133,8 +136,15 @@ def test_any_text_is_an_address_or_a_value_error_that_shows_the_forms(text: str)
 
 
 def test_the_forms_are_those_of_the_contract() -> None:
-    for form in ("tcp://HOST", "HOST:PORT", "rtu:///dev/ttyUSB0", "sim://"):
+    for form in ("tcp://HOST", "HOST:PORT", "rtu:///dev/ttyUSB0", "sim://", "zenoh://SITE/HOST/GRIPPER"):
         assert form in FORMS
+
+
+def test_that_of_a_hand_on_another_host_is_sent_to_what_takes_it() -> None:
+    with pytest.raises(ValueError, match=r"robotiq_async\.fleet\.RemoteHand") as caught:
+        parse_address("Zenoh://lab/cell-1/left")
+    assert "malformed" not in str(caught.value)
+    assert str(caught.value).endswith(f"accepted: {FORMS}")
 
 
 @pytest.mark.parametrize(
@@ -150,7 +160,6 @@ def test_the_forms_are_those_of_the_contract() -> None:
         "://host",
         "http://192.168.1.11",
         "udp://192.168.1.11",
-        "TCP://192.168.1.11",
         " tcp://192.168.1.11",
         "tcp ://192.168.1.11",
         "tcp:// 192.168.1.11",
@@ -250,7 +259,6 @@ def test_a_malformed_ipv6_address_is_a_value_error_that_shows_the_forms(text: st
         "rtu:////",
         "rtu:",
         "rtu:/dev/ttyUSB0",
-        "RTU:///dev/ttyUSB0",
         "rtu:// ",
         "rtu:// /dev/ttyUSB0",
         "rtu:///dev/ttyUSB0 ",
@@ -261,7 +269,6 @@ def test_a_malformed_ipv6_address_is_a_value_error_that_shows_the_forms(text: st
         "sim:///",
         "sim:// ",
         "sim:",
-        "SIM://",
     ],
 )
 def test_a_malformed_serial_or_simulated_address_is_a_value_error_that_shows_the_forms(text: str) -> None:
@@ -351,3 +358,31 @@ def test_an_ipv4_address_is_four_numbers(host: str) -> None:
 def test_a_label_of_a_name_has_1_to_63_characters(name: str) -> None:
     with pytest.raises(ValueError, match="malformed address"):
         parse_address(name)
+
+
+# -- a serial line behind a socket -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "host", "port"),
+    [
+        ("rtu+tcp://192.168.1.20:54321", "192.168.1.20", 54321),
+        ("rtu+tcp://Arm.local:4001", "arm.local", 4001),
+        ("rtu+tcp://[::1]:54321", "::1", 54321),
+    ],
+)
+def test_a_serial_server_is_a_host_and_a_port(text: str, host: str, port: int) -> None:
+    address = parse_address(text)
+    assert address == Address("rtu+tcp", host, port)
+    assert str(address) == text.lower()
+    assert parse_address(str(address)) == address
+    assert (address.is_rtu, address.is_socket) == (True, True)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["rtu+tcp://192.168.1.20", "rtu+tcp://", "rtu+tcp://[::1]", "rtu+tcp://host:0", "rtu+tcp:///dev/ttyUSB0"],
+)
+def test_a_serial_server_has_no_usual_port(text: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(FORMS)):
+        parse_address(text)

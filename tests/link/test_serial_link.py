@@ -8,8 +8,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
-import os
-from collections.abc import AsyncIterator
+import logging
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from robotiq_async.link.modbus import ModbusTransport
 from robotiq_async.link.serial_ports import FORBIDDEN, MISSING, NO_PORT, TAKEN
 from robotiq_async.wire.registers import RTU_REGISTERS
 from tests.serial_line import SerialLine
+from tests.virtual_line import VirtualLine
 
 
 def with_crc(frame: bytes) -> bytes:
@@ -36,35 +37,48 @@ def with_crc(frame: bytes) -> bytes:
 class Device:
     """Answers reads with the number of the request in every register; replies can be kept back."""
 
-    def __init__(self, descriptor: int) -> None:
-        self.descriptor = descriptor
+    def __init__(self, port: serial.Serial) -> None:
+        self._port = port
         self.requests: list[bytes] = []
+        self.asked_at = 0.0
         self.keep = 0
         """Replies to be kept back from here on."""
         self.kept: list[bytes] = []
-        self.spoil = False
-        """Whether checksums are wrong from here on."""
-        asyncio.get_running_loop().add_reader(descriptor, self._ready)
+        self.spoil: Callable[[bytes], bytes] | None = None
+        """What becomes of the next reply; of every one, if :attr:`spoils_all`."""
+        self.spoils_all = False
         self._inbox = b""
+        self._loop = asyncio.get_running_loop()
+        self._loop.add_reader(port.fileno(), self._ready)
+
+    def send(self, data: bytes) -> None:
+        """Put bytes on the line."""
+        self._port.write(data)
+
+    def close(self) -> None:
+        self._loop.remove_reader(self._port.fileno())
+        self._port.close()
 
     def _ready(self) -> None:
-        self._inbox += os.read(self.descriptor, 4096)
+        self._inbox += self._port.read(4096)
         while len(self._inbox) >= 8:
             size = 8 if self._inbox[1] == 3 else 9 + self._inbox[6]
             if len(self._inbox) < size:
                 return
             request, self._inbox = self._inbox[:size], self._inbox[size:]
             self.requests.append(request)
+            self.asked_at = self._loop.time()
             reply = self._reply(request)
-            if self.spoil:
-                reply = reply[:-1] + bytes((reply[-1] ^ 1,))
+            if self.spoil is not None:
+                reply = self.spoil(reply)
+                self.spoil = self.spoil if self.spoils_all else None
             if self.keep:
                 self.keep -= 1
                 self.kept.append(reply)
             else:
                 # A serial device answers in order: what was late comes first.
                 kept, self.kept = self.kept, []
-                os.write(self.descriptor, b"".join(kept) + reply)
+                self.send(b"".join(kept) + reply)
 
     def _reply(self, request: bytes) -> bytes:
         if request[1] == 16:
@@ -74,20 +88,23 @@ class Device:
 
 
 @asynccontextmanager
-async def linked(folder: Path) -> AsyncIterator[tuple[ModbusTransport, Device]]:
-    with SerialLine(folder) as line:
-        far = os.open(line.far, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-        device = Device(far)
+async def linked() -> AsyncIterator[tuple[ModbusTransport, Device]]:
+    """A transport and a device at the two ends of a line, in virtual time."""
+    with pytest.MonkeyPatch.context() as patch:
+        VirtualLine(patch)
+        device = Device(serial.serial_for_url(VirtualLine.FAR))
         transport = ModbusTransport(
-            parse_address(f"rtu://{line.near}"), RTU_REGISTERS, connect_timeout=1.0, response_timeout=0.05
+            parse_address(f"rtu://{VirtualLine.NEAR}"),
+            RTU_REGISTERS,
+            connect_timeout=1.0,
+            response_timeout=0.05,
         )
         try:
             await transport.open()
             yield transport, device
         finally:
             await transport.close()
-            asyncio.get_running_loop().remove_reader(far)
-            os.close(far)
+            device.close()
 
 
 async def reopened(transport: ModbusTransport) -> int:
@@ -99,8 +116,9 @@ async def reopened(transport: ModbusTransport) -> int:
     raise AssertionError("never in step again")
 
 
-async def test_read_and_write_use_the_addresses_of_the_serial_gripper(tmp_path: Path) -> None:
-    async with linked(tmp_path) as (transport, device):
+@pytest.mark.virtual_time
+async def test_read_and_write_use_the_addresses_of_the_serial_gripper() -> None:
+    async with linked() as (transport, device):
         assert await transport.read() == (2,) * 8
         await transport.write((0x0900, 0x0C00, 0, 0, 0, 0, 0, 0))
     probe, read, write = device.requests
@@ -109,10 +127,11 @@ async def test_read_and_write_use_the_addresses_of_the_serial_gripper(tmp_path: 
     assert write[:11] == bytes.fromhex("09 10 03e8 0008 10 0900 0c00")
 
 
+@pytest.mark.virtual_time
 @pytest.mark.parametrize("late", [1, 2, 3, 8])
 @pytest.mark.parametrize("first", ["read", "write"])
-async def test_late_replies_never_answer_a_later_request(tmp_path: Path, late: int, first: str) -> None:
-    async with linked(tmp_path) as (transport, device):
+async def test_late_replies_never_answer_a_later_request(late: int, first: str) -> None:
+    async with linked() as (transport, device):
         await transport.read()
         device.keep = late
         with pytest.raises(ResponseTimeoutError):
@@ -124,9 +143,10 @@ async def test_late_replies_never_answer_a_later_request(tmp_path: Path, late: i
         assert await transport.read() == (len(device.requests),) * 8
 
 
-async def test_a_late_reply_is_found_out_while_the_port_is_opened(tmp_path: Path) -> None:
-    async with linked(tmp_path) as (transport, device):
-        device.keep = 1
+@pytest.mark.virtual_time
+async def test_a_late_reply_is_found_out_while_the_port_is_opened() -> None:
+    async with linked() as (transport, device):
+        device.keep = 2  # the read, and what was asked when it was not answered
         with pytest.raises(ResponseTimeoutError):
             await transport.read()
         with pytest.raises(ProtocolError):
@@ -134,18 +154,183 @@ async def test_a_late_reply_is_found_out_while_the_port_is_opened(tmp_path: Path
         assert not transport.is_open
 
 
-async def test_a_wrong_check_sum_is_no_answer(tmp_path: Path) -> None:
-    async with linked(tmp_path) as (transport, device):
-        device.spoil = True
+@pytest.mark.virtual_time
+async def test_a_wrong_check_sum_is_no_answer() -> None:
+    async with linked() as (transport, device):
+        device.spoil, device.spoils_all = wrong_checksum, True
+        with pytest.raises(ProtocolError, match="a wrong checksum"):
+            await transport.read()
+        assert not transport.is_open
+
+
+# -- a read that is asked once more ------------------------------------------------------------------------
+
+
+def wrong_checksum(reply: bytes) -> bytes:
+    return reply[:-1] + bytes((reply[-1] ^ 1,))
+
+
+SPOILT = {
+    "lost": lambda reply: reply[:0],
+    "wrong checksum": wrong_checksum,
+    "first byte": lambda reply: bytes((reply[0] ^ 4,)) + reply[1:],
+    "byte count": lambda reply: reply[:2] + bytes((reply[2] ^ 1,)) + reply[3:],
+    "last byte lost": lambda reply: reply[:-1],
+    "first byte lost": lambda reply: reply[1:],
+    "all but one byte lost": lambda reply: reply[:1],
+}
+
+
+@pytest.mark.virtual_time
+@pytest.mark.parametrize("how", SPOILT)
+async def test_a_read_is_asked_again_when_its_answer_is_lost_or_damaged(how: str) -> None:
+    async with linked() as (transport, device):
+        await transport.read()
+        for number in (1, 2):
+            asked = len(device.requests)
+            device.spoil = SPOILT[how]
+            assert await transport.read() == (len(device.requests),) * 8, "the last request is answered"
+            assert transport.repeats == number
+            first, probe, again = device.requests[asked:]
+            assert first == again
+            assert probe[:5] == first[:5], "a read, of the same registers"
+            assert probe[5] < 8, "and of fewer"
+        assert await transport.read() == (len(device.requests),) * 8
+
+
+@pytest.mark.virtual_time
+@pytest.mark.parametrize("how", SPOILT)
+async def test_a_write_is_never_sent_again(how: str) -> None:
+    async with linked() as (transport, device):
+        asked = len(device.requests)
+        device.spoil = SPOILT[how]
+        with pytest.raises(RobotiqConnectionError):
+            await transport.write((0x0900,) * 8)
+        assert [request[1] for request in device.requests[asked:]] == [16]
+        assert not transport.is_open
+        assert transport.repeats == 0
+
+
+@pytest.mark.virtual_time
+@pytest.mark.parametrize("spoilt", range(1, 3))
+async def test_a_read_is_asked_once_more_and_no_oftener(spoilt: int) -> None:
+    """The second time nothing may be wrong, neither with what brings the line in step nor with the answer."""
+    async with linked() as (transport, device):
+        counts: list[int] = []
+
+        def spoil(reply: bytes) -> bytes:
+            counts.append(reply[2] // 2)
+            return wrong_checksum(reply) if len(counts) in (1, 1 + spoilt) else reply
+
+        device.spoil, device.spoils_all = spoil, True
+        with pytest.raises(ProtocolError, match="a wrong checksum"):
+            await transport.read()
+        assert len(counts) == 1 + spoilt
+        assert counts[0] == 8
+        assert not transport.is_open
+
+
+@pytest.mark.virtual_time
+@pytest.mark.parametrize("after", ["the silence", "the probe"])
+async def test_the_first_answer_that_was_only_late_is_not_the_second(after: str) -> None:
+    async with linked() as (transport, device):
+        await transport.read()
+        asked = len(device.requests)
+        device.keep = 1
+        reading = asyncio.ensure_future(transport.read())
+        while not device.kept:  # noqa: ASYNC110
+            await asyncio.sleep(0.001)
+        if after == "the silence":
+            await asyncio.sleep(0.055)  # the time-out has passed, and the silence has begun
+            device.send(device.kept.pop())
+            assert await reading == (asked + 3,) * 8
+            assert transport.is_open
+        else:
+            with pytest.raises(ResponseTimeoutError):  # the device answers in order: the late one comes first
+                await reading
+            assert not transport.is_open
+        await reopened(transport)
+        assert await transport.read() == (len(device.requests),) * 8
+
+
+@pytest.mark.virtual_time
+async def test_the_rest_of_a_damaged_answer_is_no_part_of_the_next() -> None:
+    async with linked() as (transport, device):
+        device.spoil = lambda reply: b"\xff" + reply[:10]
+        reading = asyncio.ensure_future(transport.read())
+        for _ in range(4):
+            await asyncio.sleep(0.005)
+            device.send(bytes.fromhex("09 03 10 00 00"))
+        assert await reading == (len(device.requests),) * 8
+
+
+@pytest.mark.virtual_time
+async def test_who_talks_all_the_time_is_given_up() -> None:
+    async with linked() as (transport, device):
+        device.spoil = lambda reply: b"\xff" + reply[:0]
+        reading = asyncio.ensure_future(transport.read())
+        began = asyncio.get_running_loop().time()
+        while not reading.done():
+            device.send(b"\xff")
+            await asyncio.sleep(0.005)
+        assert asyncio.get_running_loop().time() - began < 0.5
+        with pytest.raises(ProtocolError):
+            await reading
+        assert not transport.is_open
+
+
+@pytest.mark.virtual_time
+async def test_a_read_that_is_never_answered_takes_two_response_timeouts() -> None:
+    async with linked() as (transport, device):
+        device.spoil, device.spoils_all = SPOILT["lost"], True
+        began = asyncio.get_running_loop().time()
         with pytest.raises(ResponseTimeoutError):
             await transport.read()
+        assert 0.099 <= asyncio.get_running_loop().time() - began < 0.15
 
 
+@pytest.mark.virtual_time
+async def test_cancelled_while_the_line_falls_silent() -> None:
+    async with linked() as (transport, device):
+        device.spoil = wrong_checksum
+        reading = asyncio.ensure_future(transport.read())
+        while len(device.requests) < 2:  # noqa: ASYNC110
+            await asyncio.sleep(0.001)
+        await asyncio.sleep(0.005)
+        reading.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await reading
+        assert not transport.is_open
+
+
+@pytest.mark.virtual_time
+async def test_reads_asked_again_are_told_once_in_a_while(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.WARNING, "robotiq_async")
+    async with linked() as (transport, device):
+        for _ in range(3):
+            device.spoil = wrong_checksum
+            await transport.read()
+    said = [each.getMessage() for each in caplog.records if "asked again" in each.getMessage()]
+    assert len(said) == 1
+    assert "a wrong checksum" in said[0]
+
+
+@pytest.mark.virtual_time
+async def test_two_frames_keep_the_silence_of_the_standard() -> None:
+    async with linked() as (transport, device):
+        for _ in range(20):
+            await transport.read()
+            answered = asyncio.get_running_loop().time()
+            await transport.write((0,) * 8)
+            assert device.asked_at - answered >= 0.0016
+
+
+@pytest.mark.virtual_time
 @pytest.mark.parametrize("size", [600, 3000])
-async def test_a_burst_between_two_requests_is_found_out(tmp_path: Path, size: int) -> None:
-    async with linked(tmp_path) as (transport, device):
+async def test_a_burst_between_two_requests_is_found_out(size: int) -> None:
+    async with linked() as (transport, device):
         await transport.read()
-        os.write(device.descriptor, bytes(size))
+        device.send(bytes(size))
         for _ in range(20):
             await asyncio.sleep(0)
         with pytest.raises(ProtocolError, match=r"nobody asked for|not the answer"):  # as it arrives
@@ -172,9 +357,12 @@ async def test_what_is_no_port_is_told_from_what_is_not_there(device: str, why: 
 
 
 async def test_a_port_of_another_program_is_told(tmp_path: Path) -> None:
-    async with linked(tmp_path) as (_, _device):
-        with pytest.raises(ConnectFailedError) as caught:
-            await unopened(f"{tmp_path}/ttyNEAR").open()
+    with (
+        SerialLine(tmp_path) as line,
+        serial.Serial(str(line.near), exclusive=True),
+        pytest.raises(ConnectFailedError) as caught,
+    ):
+        await unopened(str(line.near)).open()
     assert TAKEN in str(caught.value)
 
 

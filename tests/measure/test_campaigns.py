@@ -27,9 +27,9 @@ from robotiq_async.measure.campaigns import (
     write_currents,
 )
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.simulator.physics.axis import PRESSING
-from robotiq_async.simulator.physics.motor import peak
-from robotiq_async.simulator.physics.scale import SimulatedScale
+from robotiq_async.simulator.physics.mechanics.axis import PRESSING
+from robotiq_async.simulator.physics.mechanics.motor import peak
+from robotiq_async.simulator.physics.mechanics.scale import SimulatedScale
 from tests.virtual import VirtualLoop, run
 
 POLL_S = 0.005

@@ -7,9 +7,17 @@ import re
 from itertools import pairwise
 from pathlib import Path
 
+import pytest
+
 from robotiq_async import Finger
 from robotiq_async.enums import AXES
-from robotiq_async.measure.plots import LONGEST, plot_peak_currents, plot_recording
+from robotiq_async.measure.campaigns import force_values
+from robotiq_async.measure.plots import (
+    LONGEST,
+    plot_current_over_time,
+    plot_peak_currents,
+    plot_recording,
+)
 from robotiq_async.telemetry.recordings import Entry
 
 
@@ -28,6 +36,18 @@ def test_fingers_that_are_alike_are_one_curve_that_says_so(tmp_path: Path) -> No
     assert peaks(tmp_path, (10, 10, 10), (20, 20, 20)) == ["fingers A, B, C: the same"]
     assert peaks(tmp_path, (10, 10, 10), (20, 30, 20)) == ["fingers A, C: the same", "finger B"]
     assert peaks(tmp_path, (10, 20, 30), (20, 30, 40)) == ["finger A", "finger B", "finger C"]
+
+
+@pytest.mark.parametrize(
+    ("step", "drawn"),
+    [(25, [0, 125, 250]), (85, [0, 85, 255]), (128, [0, 128]), (255, [0, 255]), (1, [0, 125, 250])],
+)
+def test_currents_over_time_are_drawn_near_the_usual_force_values(
+    step: int, drawn: list[int], tmp_path: Path
+) -> None:
+    currents = {force: [[(0, 1, 1, 1), (9, 2, 2, 2)]] for force in force_values(step)}
+    _, picture = plot_current_over_time(tmp_path / "it", {"foam": currents}, "simulated")
+    assert [int(each.split()[1]) for each in words(picture) if each.startswith("force ")] == drawn
 
 
 def test_what_happens_is_written_above_the_curves(tmp_path: Path) -> None:

@@ -55,7 +55,9 @@ def build() -> list[Path]:
     with zipfile.ZipFile(wheel) as archive:
         files = {*archive.namelist()}
     _need(wheel, files, (*IN_THE_WHEEL, f"{name}.dist-info/licenses/LICENSE"))
-    strange = [each for each in files if not each.startswith(("robotiq_async/", f"{name}."))]
+    strange = [
+        each for each in files if not each.startswith(("robotiq_async/", "pytest_robotiq_async/", f"{name}."))
+    ]
     if strange:
         raise FailedError(f"{wheel.name} installs {strange}")
     return [sdist, wheel]
@@ -80,7 +82,7 @@ def try_base(artifact: Path, folder: Path) -> list[str]:
         raise FailedError(f"{artifact.name} installed {said}")
     _demo(str(python), "-m", "robotiq_async._demo", folder=folder)
     said = run(str(python), "-m", "robotiq_async", "demo", folder=folder, code=1)
-    if "pip install 'robotiq-async[cli]'" not in said or said.count("\n") != 1:
+    if "pip install 'cyclopts" not in said or said.count("\n") != 1:
         raise FailedError(f"{artifact.name} without cli says {said}")
     return installed(python)
 

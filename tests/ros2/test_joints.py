@@ -73,7 +73,7 @@ def test_what_is_inside_anyway_is_left_alone(finger: int, scissor: int) -> None:
 
 def test_a_limit_says_where_it_bites() -> None:
     base, palm = JOINTS.index("finger_1_joint_1"), JOINTS.index("palm_finger_1_joint")
-    assert joint_angles(reading(b=5))[base] < positions(reading(b=5))[base] == 0.0495
+    assert joint_angles(reading(c=5))[base] < positions(reading(c=5))[base] == 0.0495
     assert joint_angles(reading(scissor=240))[palm] < positions(reading(scissor=240))[palm] == -0.1784
 
 
@@ -108,14 +108,14 @@ def test_velocities_forget_what_was_before_a_lost_link() -> None:
 @pytest.mark.parametrize(
     ("names", "angles", "counts"),
     [
-        (["finger_1_joint_1"], [0.0], [(0, B)]),
-        (["finger_2_joint_1"], [math.radians(35)], [(70, C)]),
+        (["finger_1_joint_1"], [0.0], [(0, C)]),
+        (["finger_2_joint_1"], [math.radians(35)], [(70, B)]),
         (["finger_middle_joint_1"], [1.2218], [(140, A)]),
         (["finger_middle_joint_2"], [math.radians(45)], [(190, A)]),
         (["finger_middle_joint_2"], [1.5708], [(240, A)]),
         (["finger_middle_joint_2"], [0.0], [(140, A)]),
-        (["finger_1_joint_1", "finger_1_joint_2"], [1.2, 0.9], [(197, B)]),
-        (["finger_1_joint_1", "finger_1_joint_2"], [0.5, 0.0], [(57, B)]),
+        (["finger_1_joint_1", "finger_1_joint_2"], [1.2, 0.9], [(197, C)]),
+        (["finger_1_joint_1", "finger_1_joint_2"], [0.5, 0.0], [(57, C)]),
         (["palm_finger_1_joint"], [0.192], [(15, S)]),
         (["palm_finger_1_joint"], [0.0], [(128, S)]),
         (["palm_finger_1_joint"], [-0.1784], [(232, S)]),
@@ -124,9 +124,9 @@ def test_velocities_forget_what_was_before_a_lost_link() -> None:
         (["fingers"], [math.radians(70)], [(140, A | B | C)]),
         ([], [math.radians(115)], [(190, A | B | C)]),
         (["fingers", "palm_finger_1_joint"], [0.0, 0.0], [(0, A | B | C), (128, S)]),
-        (["finger_1_joint_1", "finger_2_joint_1"], [0.5, 0.7], [(57, B), (80, C)]),
+        (["finger_1_joint_1", "finger_2_joint_1"], [0.5, 0.7], [(57, C), (80, B)]),
         (["finger_1_joint_1", "finger_2_joint_1"], [0.5, 0.5], [(57, B | C)]),
-        (["finger_1_joint_1"], [-0.0005], [(0, B)]),  # others round, too
+        (["finger_1_joint_1"], [-0.0005], [(0, C)]),  # others round, too
     ],
 )
 def test_what_a_goal_asks_of_the_axes(
@@ -137,9 +137,9 @@ def test_what_a_goal_asks_of_the_axes(
 
 @given(st.integers(6, 240))
 def test_a_joint_state_sent_back_as_a_goal_leads_there(counts: int) -> None:
-    state = dict(zip(JOINTS, positions(reading(b=counts)), strict=True))
+    state = dict(zip(JOINTS, positions(reading(c=counts)), strict=True))
     names = ["finger_1_joint_1", "finger_1_joint_2"]
-    assert targets(names, [state[name] for name in names]).counts == ((counts, B),)
+    assert targets(names, [state[name] for name in names]).counts == ((counts, C),)
 
 
 @given(st.integers(15, 232))
@@ -149,7 +149,7 @@ def test_so_does_that_of_the_palm(counts: int) -> None:
 
 
 def test_the_prefix_is_taken_off() -> None:
-    assert targets(["left_finger_1_joint_1"], [0.0], "left_").counts == ((0, B),)
+    assert targets(["left_finger_1_joint_1"], [0.0], "left_").counts == ((0, C),)
     assert targets([], [0.0], "left_").axes == Finger.ABC
     with pytest.raises(GoalError, match="there is no joint 'finger_1_joint_1'; these take goals: left_"):
         targets(["finger_1_joint_1"], [0.0], "left_")

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 import re
+from typing import Any
 
 import pytest
 
+from robotiq_async.ros2.gripper.hands import make_hand
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_parameter, check_settings
 
 USUAL = {name: parameter.default for name, parameter in PARAMETERS.items()}
@@ -43,6 +45,10 @@ def test_an_integer_will_do_for_a_float() -> None:
         ("publish_rate", "fast", "publish_rate must be a number in 1.0..200.0, got 'fast'"),
         ("publish_rate", True, "must be a number"),
         ("poll_interval", 1, "poll_interval must be seconds in 0.001..0.1, got 1"),
+        ("response_timeout", 6, "response_timeout must be seconds in 0.005..5.0, got 6"),
+        ("device_id", 256, "device_id must be in -1..255, got 256"),
+        ("read_function", 0, "read_function must be 3, 4 or -1, got 0"),
+        ("read_function", 5, "read_function must be in -1..4, got 5"),
         ("speed", 256, "speed must be in 0..255, got 256"),
         ("force", 64.0, "force must be an int in 0..255, got 64.0"),
         ("allow_stalling", 1, "allow_stalling must be true or false, got 1"),
@@ -53,3 +59,26 @@ def test_an_integer_will_do_for_a_float() -> None:
 def test_what_will_not_do_is_told(name: str, value: object, reason: str) -> None:
     with pytest.raises(ValueError, match=re.escape(reason)):
         check_parameter(name, value)
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({}, (2, 4, 0.005, 0.4)),
+        ({"device_id": 0, "read_function": 3, "response_timeout": 5.0}, (0, 3, 0.005, 5.0)),
+        ({"address": "rtu:///dev/ttyUSB0"}, (9, 3, 0.015, 0.4)),
+        ({"address": "rtu:///dev/ttyUSB0", "poll_interval": 0.01}, (9, 3, 0.01, 0.4)),
+    ],
+)
+def test_the_hand_of_the_parameters(
+    given: dict[str, object], expected: tuple[int, int, float, float]
+) -> None:
+    hand: Any = make_hand(check_settings({**USUAL, "address": "tcp://192.168.1.11", **given}))
+    transport: Any = hand._options.make_transport()
+    registers = transport._map
+    assert expected == (
+        registers.device_id,
+        registers.read_function,
+        hand._options.poll_interval,
+        transport._response_timeout,
+    )

@@ -26,6 +26,7 @@ def test_before_the_first_poll_every_figure_is_zero() -> None:
         tick="",
         faults=0,
         moves={},
+        passing_faults=0,
     )
 
 
@@ -41,7 +42,7 @@ def test_a_snapshot_tells_each_counter_under_its_own_name() -> None:
     counters.moves["reached"] = 10
     counters.periods.append(0.006)
     counters.round_trips.append(0.007)
-    assert dataclasses.asdict(counters.snapshot(8)) == {
+    assert dataclasses.asdict(counters.snapshot(8, 11)) == {
         "polls": 1,
         "writes": 2,
         "overruns": 3,
@@ -55,6 +56,7 @@ def test_a_snapshot_tells_each_counter_under_its_own_name() -> None:
         "tick": "timerfd",
         "faults": 9,
         "moves": {"reached": 10},
+        "passing_faults": 11,
     }
 
 

@@ -41,6 +41,9 @@ class Wire:
         await self._carry("read")
         return self.gripper.status_registers()
 
+    async def ready(self) -> None:
+        """There is nothing to wait for."""
+
     async def write(self, registers: Sequence[int]) -> None:
         await self._carry("write")
         self.gripper.write(0, registers)

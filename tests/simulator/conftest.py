@@ -63,9 +63,9 @@ class Bench:
         self.go({axis: self.gripper.position(axis) for axis in AXES})
 
     def settle(self, limit: float = 60.0) -> None:
-        """Let time pass until nothing moves."""
+        """Let time pass until nothing moves, and no activation is under way."""
         end = self.now + limit
-        while self.gripper.is_moving:
+        while self.gripper.is_moving or self._is_activating:
             self.wait(0.05)
             assert self.now < end, "it never stops moving"
 
@@ -73,6 +73,10 @@ class Bench:
         """Go there and wait for the end of the motion."""
         self.go(position, **options)
         self.settle()
+
+    @property
+    def _is_activating(self) -> bool:
+        return self.status.initialization is Initialization.ACTIVATING and not self.fault.is_serious
 
     @property
     def status(self) -> RobotiqStatus:

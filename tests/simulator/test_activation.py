@@ -30,7 +30,7 @@ def test_activation_closes_and_opens_the_fingers(bench: Bench) -> None:
     assert 2 < bench.now - began < 20
 
 
-@pytest.mark.parametrize(("mode", "scissor"), [(0, 137), (1, 219), (2, 24), (3, 6)])
+@pytest.mark.parametrize(("mode", "scissor"), [(0, 137), (1, 219), (2, 24), (3, 15)])
 def test_activation_takes_the_scissor_to_the_mode(bench: Bench, mode: int, scissor: int) -> None:
     bench.activate(mode=Mode(mode))
     assert bench.gripper.position(Finger.SCISSOR) == scissor

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from robotiq_async.enums import AXES, Finger, ObjectStatus
-from robotiq_async.simulator.physics.axis import PRESSING
+from robotiq_async.enums import AXES, NO_AXES, Fault, Finger, Initialization, Mode, ObjectStatus
+from robotiq_async.simulator import Habits
+from robotiq_async.simulator.physics.mechanics.axis import PRESSING
 from tests.simulator.conftest import CYCLE
 
 if TYPE_CHECKING:
@@ -51,8 +52,10 @@ def test_every_axis_feels_both_directions(individual: Bench, axis: Finger) -> No
     assert where(individual, axis) == (60, OPENING)
 
 
-def test_an_axis_grips_while_it_is_driven_against_what_it_touches(individual: Bench) -> None:
-    """An assumption: what becomes of a grip when rGTO is cleared no public source says."""
+@pytest.mark.parametrize("lets_go", [False, True])
+def test_an_axis_grips_while_it_is_driven_against_what_it_touches(individual: Bench, lets_go: bool) -> None:
+    """By the vendor a part stays held when rGTO is cleared; as no one measured it, it may be otherwise."""
+    individual.gripper.habits = Habits(lets_go_on_halt=lets_go)
     individual.gripper.place_object(Finger.A, 150)
     individual.gripper.place_object(Finger.B, 60, opening=True)
     individual.go({Finger.B: 255})
@@ -64,12 +67,13 @@ def test_an_axis_grips_while_it_is_driven_against_what_it_touches(individual: Be
     assert individual.gripper.grips == Finger.A | Finger.B
     individual.write(go=False)
     assert not individual.gripper.grips
+    assert individual.gripper.holds == (NO_AXES if lets_go else Finger.A | Finger.B)
     assert where(individual, Finger.A) == (150, CLOSING), "it stands where it was, and still tells of it"
     individual.write(go=True)
     individual.settle()
-    assert individual.gripper.grips == Finger.A | Finger.B
+    assert individual.gripper.grips == individual.gripper.holds == Finger.A | Finger.B
     individual.go({Finger.A: 150})
-    assert individual.gripper.grips == Finger.B, "to be asked to be where it is lets go"
+    assert individual.gripper.grips == individual.gripper.holds == Finger.B, "asked to be where it is: let go"
 
 
 def test_a_request_that_ends_at_the_object_is_no_contact(individual: Bench) -> None:
@@ -267,10 +271,32 @@ def test_an_object_dropped_into_the_way_stops_a_motion(individual: Bench) -> Non
     assert where(individual, Finger.A) == (180, CLOSING)
 
 
-def test_activation_with_an_object_in_the_way_succeeds(bench: Bench) -> None:
+def test_for_an_activation_an_object_is_taken_out_and_put_back(bench: Bench) -> None:
     bench.gripper.place_object(Finger.ABC, 150)
     bench.activate()
-    assert bench.gripper.travel(Finger.A) == 2 * (150 - 6)
+    assert bench.gripper.travel(Finger.A) == 2 * 235
+    bench.close()
+    assert bench.positions[:3] == (150, 150, 150)
+
+
+@pytest.mark.parametrize(
+    ("axis", "position", "opening"),
+    [(Finger.A, 90, False), (Finger.B, 8, False), (Finger.C, 90, True), (Finger.SCISSOR, 180, False)],
+)
+def test_activation_with_something_fixed_in_the_way_fails(
+    bench: Bench, axis: Finger, position: int, opening: bool
+) -> None:
+    bench.gripper.place_object(axis, position, opening=opening, fixed=True)
+    bench.write(activate=True, mode=Mode.PINCH)
+    bench.settle()
+    assert bench.fault is Fault.ACTIVATION_FAULT
+    assert bench.status.initialization is Initialization.ACTIVATING
+    bench.gripper.remove_object()
+    bench.wait(60)
+    assert bench.fault is Fault.ACTIVATION_FAULT, "only a reset helps"
+    bench.write(activate=False)
+    bench.activate()
+    assert bench.fault is Fault.NONE
 
 
 @pytest.mark.parametrize(

@@ -155,7 +155,7 @@ def test_scissor_mode_grips_with_the_scissor_alone(active: Bench) -> None:
     assert active.positions == (6, 6, 6, 232)
     assert active.outcomes == (ObjectStatus.AT_POSITION,) * 4
     active.close(0)
-    assert active.positions == (6, 6, 6, 6)
+    assert active.positions == (6, 6, 6, 15)
     assert [active.gripper.travel(axis) for axis in AXES[:3]] == fingers
 
 

@@ -208,7 +208,7 @@ def test_release_opens_all_axes_slowly(releasing: Bench) -> None:
         releasing.wait(0.05)
     assert releasing.now - began == pytest.approx(closing_time(0), rel=0.02)
     assert releasing.fault is Fault.AUTOMATIC_RELEASE_DONE
-    assert releasing.positions == (6, 6, 6, 6)
+    assert releasing.positions == (6, 6, 6, 15)
     assert releasing.status.is_reset
 
 
@@ -216,10 +216,10 @@ def test_release_ignores_everything_but_the_activation_bit(releasing: Bench) -> 
     releasing.go(255, release=False, mode=2, individual_fingers=False)
     releasing.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 1)
     releasing.settle()
-    assert releasing.positions == (6, 6, 6, 6)
+    assert releasing.positions == (6, 6, 6, 15)
     releasing.go(100)
     releasing.wait(10)
-    assert releasing.positions == (6, 6, 6, 6)
+    assert releasing.positions == (6, 6, 6, 15)
     assert releasing.fault is Fault.AUTOMATIC_RELEASE_DONE
 
 
@@ -255,11 +255,11 @@ def test_release_ends_at_an_obstacle_too(active: Bench) -> None:
     active.write(release=True)
     active.settle()
     assert active.fault is Fault.AUTOMATIC_RELEASE_DONE
-    assert active.positions == (100, 6, 6, 6)
+    assert active.positions == (100, 6, 6, 15)
     active.gripper.remove_object()
     active.write()
     active.wait(5)
-    assert active.positions == (100, 6, 6, 6), "one release is all there is"
+    assert active.positions == (100, 6, 6, 15), "one release is all there is"
 
 
 def test_release_while_reset_does_nothing(bench: Bench) -> None:

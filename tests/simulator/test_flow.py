@@ -113,7 +113,7 @@ async def test_replies_that_nobody_takes_from_a_serial_line_are_lost(line: Line)
         answered += 1
         return [(0.0, reply)]
 
-    async with SerialSimulatorServer(line.port) as server:
+    async with SerialSimulatorServer(line.port, paced=False) as server:
         server.policy = policy
         (connection,) = connections(server._running())
         transport: Any = connection.transport
@@ -138,7 +138,7 @@ async def test_requests_that_come_faster_than_they_are_answered_are_lost(
 ) -> None:
     cable = VirtualLine(monkeypatch)
     gripper = SimulatedGripper(asyncio.get_running_loop().time)
-    async with SerialSimulatorServer(cable.FAR, gripper) as server:
+    async with SerialSimulatorServer(cable.FAR, gripper, paced=False) as server:
         (connection,) = connections(server._running())
         for _ in range(1000):
             connection.data_received(100 * READ)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robotiq_async.enums import AXES, Fault, Initialization, Mode
-from robotiq_async.simulator import SimulatedGripper
+from robotiq_async.simulator import Habits, SimulatedGripper
 from robotiq_async.wire.request import AxisRequest, Request
 from robotiq_async.wire.status import RobotiqStatus
 
@@ -36,6 +36,8 @@ _ACTION: st.SearchStrategy[Action] = st.one_of(
     st.tuples(st.just("remove_object"), st.tuples(st.integers(1, 15))),
     st.tuples(st.just("inject_fault"), st.tuples(st.sampled_from(list(Fault)[1:]), st.floats(0, 30))),
     st.tuples(st.just("clear_faults"), st.just(())),
+    st.tuples(st.just("emergency_stop"), st.tuples(st.integers(1, 2))),
+    st.tuples(st.just("end_emergency_stop"), st.just(())),
     st.tuples(st.just("power_cycle"), st.tuples(st.floats(0, 2))),
 )
 
@@ -52,12 +54,28 @@ _EVENTS = st.lists(st.builds(Event, _MOMENT, _ACTION), max_size=8).map(
 )
 
 
+_USUAL = Habits()
+_OTHERWISE = Habits(
+    activation_time=12.0,
+    status_lag=0.2,
+    write_spacing=0.01,
+    echoes_limits=True,
+    lets_go_on_halt=True,
+    keeps_status_on_halt=False,
+    opens_without_rics=False,
+)
+"""All but a fault after silence, which goes by when somebody looks."""
+
+
 def _run(
-    events: list[Event], looks: list[float], look: Callable[[SimulatedGripper], object]
+    events: list[Event],
+    looks: list[float],
+    look: Callable[[SimulatedGripper], object],
+    habits: Habits = _USUAL,
 ) -> tuple[object, ...]:
     """Play events to a gripper, looking at it in between; how it ends."""
     now = 0.0
-    gripper = SimulatedGripper(lambda: now)
+    gripper = SimulatedGripper(lambda: now, habits=habits)
     gripper.write(0, Request(activate=True).registers)
     schedule = [(event.time + 5, 1, event) for event in events] + [(time, 0, None) for time in looks]
     for time, _, event in sorted(schedule, key=lambda entry: entry[:2]):
@@ -72,10 +90,14 @@ def _run(
 
 
 @settings(deadline=None, max_examples=200)
-@given(events=_EVENTS, looks=st.lists(st.floats(0, 70), max_size=30))
-def test_looking_changes_nothing(events: list[Event], looks: list[float]) -> None:
-    unseen = _run(events, [], lambda _: None)
-    watched = _run(events, looks, lambda gripper: gripper.status_registers())
+@given(
+    events=_EVENTS,
+    looks=st.lists(st.floats(0, 70), max_size=30),
+    habits=st.sampled_from([_USUAL, _OTHERWISE]),
+)
+def test_looking_changes_nothing(events: list[Event], looks: list[float], habits: Habits) -> None:
+    unseen = _run(events, [], lambda _: None, habits)
+    watched = _run(events, looks, lambda gripper: gripper.status_registers(), habits)
     assert watched == unseen
 
 

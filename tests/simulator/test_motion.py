@@ -81,7 +81,7 @@ def test_finger_readings(individual: Bench, asked: int, reading: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("asked", "reading"), [(0, 6), (11, 11), (24, 24), (100, 100), (232, 232), (255, 232)]
+    ("asked", "reading"), [(0, 15), (11, 15), (24, 24), (100, 100), (232, 232), (255, 232)]
 )
 def test_scissor_readings(individual: Bench, asked: int, reading: int) -> None:
     individual.go({Finger.SCISSOR: asked})

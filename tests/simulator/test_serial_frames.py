@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from typing import Any
 
 import pytest
 import serial
@@ -44,7 +45,7 @@ class Client:
 
 @asynccontextmanager
 async def line(
-    patch: pytest.MonkeyPatch, **options: int
+    patch: pytest.MonkeyPatch, **options: Any
 ) -> AsyncIterator[tuple[SerialSimulatorServer, Client]]:
     cable = VirtualLine(patch)
     gripper = SimulatedGripper(asyncio.get_running_loop().time)

@@ -235,5 +235,5 @@ async def test_a_port_that_does_not_exist() -> None:
 
 async def test_without_pyserial(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
-    with pytest.raises(ImportError, match=r"robotiq-async\[serial\]"):
+    with pytest.raises(ImportError, match=r"needs pyserial: pip install .*the extra serial"):
         await SerialSimulatorServer(line.port).start()

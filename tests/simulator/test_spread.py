@@ -50,16 +50,16 @@ def test_open_and_closed_read_what_real_ones_read(make_bench: Callable[..., Benc
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_who_waits_for_the_position_that_was_asked_for_waits_for_ever(real: Bench, axis: Finger) -> None:
-    """111 was asked and 112 reached, 208 and 210 (TAMS): past it, by one or two."""
+def test_who_waits_for_the_position_that_was_asked_for_may_wait_for_ever(real: Bench, axis: Finger) -> None:
+    """111 was asked and 112 reached, 208 and 210 (TAMS): past it, by up to two (manual); some it meets."""
     beside = set()
-    for position in (111, 208, 60, 111, 30, 150):
+    for position in (111, 208, 60, *range(100, 200, 10), *range(105, 45, -10)):
         way = 1 if position > real.gripper.position(axis) else -1
         real.go({axis: position})
         real.settle()
         assert real.status.finger_status(axis) is ObjectStatus.AT_POSITION
         beside.add(way * (real.gripper.position(axis) - position))
-    assert beside == {1, 2}
+    assert beside == {0, 1, 2}
 
 
 def test_what_is_done_again_ends_in_the_same_way(make_bench: Callable[..., Bench]) -> None:
@@ -128,7 +128,7 @@ def test_the_scissor_reads_what_belongs_to_its_mode(make_bench: Callable[..., Be
     for seed in SEEDS:
         bench = make_bench(spread=True, seed=seed)
         bench.activate(mode=mode)
-        assert bench.positions[3] == {0: 137, 1: 219, 2: 24, 3: 6}[mode]
+        assert bench.positions[3] == {0: 137, 1: 219, 2: 24, 3: 15}[mode]
 
 
 @pytest.mark.parametrize("speed", [0, 128, 255])

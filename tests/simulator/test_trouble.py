@@ -16,7 +16,9 @@ from robotiq_async.simulator.troubles.trouble import KINDS
 INF = math.inf
 CONDITIONS = [
     *("accept-silence", "refuse", "multiplexer", "power-cut", "slow-device", "interference", "fault"),
-    "idle-reset",
+    *("idle-reset", "e-stop"),
+    *("status-lag", "silence-fault", "slow-activation", "echoed-limits", "write-spacing"),
+    *("wake-needed", "function-3-only", "one-connection-only"),
 ]
 """Kinds that cannot be for a single reply or moment."""
 REPLIES = [
@@ -152,6 +154,10 @@ def test_no_words_are_no_trouble(text: str) -> None:
         ("foreign inf", "the value of foreign must be a whole number in 0..255, got inf"),
         ("fault 0", "the value of fault must be a whole number in 1..15, got 0.0"),
         ("fault 16", "the value of fault must be a whole number in 1..15, got 16.0"),
+        ("e-stop 0", "the value of e-stop must be a whole number in 1..9, got 0.0"),
+        ("status-lag 1.1", "the value of status-lag must be seconds in 0..1, got 1.1"),
+        ("slow-activation 601", "the value of slow-activation must be seconds in 0..600, got 601.0"),
+        ("echoed-limits 1", "echoed-limits takes no value, got 1.0"),
         ("exception 0", "the value of exception must be a whole number in 1..255, got 0.0"),
         ("exception 256", "the value of exception must be a whole number in 1..255, got 256.0"),
         ("drop on both", "on must be read, write or any, got 'both'"),
@@ -253,6 +259,8 @@ def test_nothing_said() -> None:
     [
         *(("delay", 0.05), ("late", 0.7), ("pieces", 0.002), ("exception", 4), ("foreign", 128)),
         *(("multiplexer", 0.7), ("idle-reset", 5)),
+        *(("e-stop", 1), ("status-lag", 0.05), ("silence-fault", 1), ("slow-activation", 25)),
+        *(("write-spacing", 0.01), ("echoed-limits", 0), ("wake-needed", 0)),
         *(("slow-device", 0.2), ("fault", 9), ("drop", 0), ("silence", 0)),
     ],
 )

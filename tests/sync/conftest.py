@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import signal
 import threading
 import time
@@ -35,6 +36,8 @@ class Wire:
         self.is_open = False
         self.breaks = False
         """At the next reading, once."""
+        self.is_slow = False
+        """Whether answers are on their way until this is False again."""
 
     async def open(self) -> None:
         self.is_open = True
@@ -43,6 +46,8 @@ class Wire:
         if self.breaks:
             self.breaks = self.is_open = False
             raise ConnectionLostError("unplugged")
+        while self.is_slow:  # noqa: ASYNC110  # another thread sets it
+            await asyncio.sleep(0.001)
         return self.look(lambda gripper: gripper.status_registers())
 
     async def write(self, registers: Sequence[int]) -> None:

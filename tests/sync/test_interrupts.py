@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import random
+import threading
 import time
 from collections.abc import Callable
 
@@ -59,6 +60,33 @@ def test_what_moves_is_held_whatever_is_waited_for(hand: RobotiqHand, wire: Wire
         hand.wait_for_state(State.FAULT)
     until(lambda: not wire.is_moving())
     assert wire.targets()[1] < 100
+
+
+def test_what_was_asked_and_not_sent_yet_begins_no_more(
+    hand: RobotiqHand, wire: Wire, interrupt: Striker
+) -> None:
+    """Ctrl-C came before it was written, as on a slow link: the fingers began to move after it."""
+    is_caught = threading.Event()
+
+    def strike() -> None:
+        until(lambda: bool(hand._caller._calls))
+        interrupt()
+        controller = hand._inner._started().controller
+        until(lambda: is_caught.is_set() or controller.has_undelivered_stop)
+        wire.is_slow = False
+
+    before = wire.targets()
+    wire.is_slow = True
+    hand.command(position=255)
+    thread, _ = in_a_thread(strike)
+    with pytest.raises(Interrupt):
+        hand.wait_for_state(State.FAULT)
+    is_caught.set()
+    thread.join()
+    polls = hand.statistics.polls
+    until(lambda: hand.statistics.polls > polls + 3)
+    assert not wire.is_moving()
+    assert wire.targets() == before
 
 
 def test_a_grip_is_kept(hand: RobotiqHand, wire: Wire, interrupt: Striker) -> None:
@@ -145,8 +173,8 @@ def test_a_stop_ends_all_the_same(wire: Wire, interrupt: Striker) -> None:
 
 def test_a_hand_that_had_just_started_is_stopped(wire: Wire) -> None:
     class Late(RobotiqHand):
-        def start(self, activate: bool = True) -> None:
-            super().start(activate)
+        def start(self, activate: bool = True, *, wait: float = 0.0) -> None:
+            super().start(activate, wait=wait)
             raise Interrupt
 
     hand = Late(wire)

@@ -18,7 +18,7 @@ from robotiq_async.sync.loop_thread import LOOP_THREAD
 from robotiq_async.wire.request import Request
 from tests.conftest import Clock
 from tests.docs.pages import ROOT
-from tests.sync.conftest import Wire, until
+from tests.sync.conftest import Wire, in_a_thread, until
 
 PROGRAM = """
 import atexit, contextlib, gc, sys, threading, weakref
@@ -61,6 +61,22 @@ threading.Thread(target=hand.move, args=(255,), kwargs={"speed": 0}, daemon=True
 while not hand.is_moving:
     pass
 """
+OTHERS = """
+hand = RobotiqHand(ADDRESS)
+hand.start()
+
+def again():
+    while True:
+        try:
+            hand.command(position=255, speed=0)
+        except Exception:
+            with contextlib.suppress(Exception):
+                hand.start()
+
+threading.Thread(target=again, daemon=True).start()
+while not hand.is_moving:
+    pass
+"""
 ENDINGS = {
     "the end": ("", "Station(lambda hand: None)"),
     "an error": ("", "station = Station(lambda hand: None); raise SystemExit(0)"),
@@ -82,6 +98,7 @@ ENDINGS = {
     "atexit stops": (LATE.format("hand.stop()"), "hand = RobotiqHand(ADDRESS); hand.start()"),
     "atexit starts": (LATE.format("RobotiqHand(ADDRESS).start()"), ""),
     "a thread waits": ("", THREAD),
+    "a thread starts it again": (LATE.format("threading.Event().wait(0.5)"), OTHERS),
 }
 
 
@@ -122,6 +139,23 @@ def test_stopping_a_hand_that_never_started_needs_no_thread(monkeypatch: pytest.
     with pytest.raises(RuntimeError, match="the program is ending"):
         hand.start()
     assert hand.state is State.DISCONNECTED
+
+
+def test_a_hand_that_starts_while_the_others_are_stopped_at_exit_is_refused(
+    wire: Wire, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another thread had it move, and it was not among those that the end stops."""
+    monkeypatch.setattr(LOOP_THREAD, "begins_no_more", False)  # and is so again after the test
+    slow, other = RobotiqHand(wire), RobotiqHand(Wire())
+    slow.start()
+    wire.is_slow = True
+    ending, _ = in_a_thread(caller._at_exit)
+    until(lambda: slow.state is State.DO_SHUTDOWN)
+    with pytest.raises(RuntimeError, match="the program is ending"):
+        other.start()
+    wire.is_slow = False
+    ending.join()
+    assert other.state is State.DISCONNECTED
 
 
 REFUSED: dict[str, Callable[[RobotiqHand], Any]] = {

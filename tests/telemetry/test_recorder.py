@@ -83,6 +83,34 @@ async def test_commands_transitions_and_faults(
     assert all(before[1] == after[0] for before, after in pairwise(moves))
 
 
+async def test_commands_and_events_are_counted(hand: RobotiqHand, file: Path) -> None:
+    async with Recorder(hand, file):
+        await hand.move(120, Finger.A)
+        await hand.move(0, Finger.A)
+    for topic in ("/gripper/command", "/gripper/event"):
+        sequences = [entry.sequence for entry in read_recording(file) if entry.topic == topic]
+        assert len(sequences) > 1
+        assert sequences == list(range(1, len(sequences) + 1))
+
+
+async def test_an_event_has_the_time_of_what_it_tells(
+    hand: RobotiqHand, gripper: SimulatedGripper, file: Path
+) -> None:
+    """A fault that of the status that shows it, a transition its own: it follows within microseconds."""
+    transitions = hand.transitions()
+    async with Recorder(hand, file):
+        gripper.inject_fault(9)
+        await hand.wait_for_state(State.FAULT)
+    entries = [entry for entry in read_recording(file) if entry.is_json]
+    offsets = {entry.nanoseconds - round(entry.fields["timestamp"] * 1e9) for entry in entries}
+    assert max(offsets) - min(offsets) < 1000, "nanoseconds: all go by one clock"
+    told = {entry.fields["timestamp"] for entry in entries if entry.fields.get("kind") == "transition"}
+    assert {each.timestamp for each in transitions.drain()} == told
+    (fault,) = [entry.fields for entry in entries if entry.fields.get("kind") == "fault"]
+    shown = next(entry.fields for entry in entries if entry.fields.get("fault_code") == 9)
+    assert fault["timestamp"] == shown["timestamp"]
+
+
 async def test_it_tells_which_hand_it_is_of(file: Path) -> None:
     hand = RobotiqHand(name="left")
     async with Recorder(hand, file):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import tomllib
 from collections.abc import Callable
 from importlib.metadata import entry_points
@@ -13,11 +12,12 @@ from tests.docs.pages import DOCS, ROOT, blocks
 
 pytest_plugins = ["pytester"]
 
-PLUGIN = "robotiq_async.testing.plugin"
-IS_FOUND = any(each.name == "robotiq_async" for each in entry_points(group="pytest11"))
+PLUGIN = "pytest_robotiq_async.plugin"
+IS_FOUND = any(each.value == PLUGIN for each in entry_points(group="pytest11"))
 """Whether the library is installed here as it is now; else the tests name the plugin."""
 OTHERS = ("hypothesispytest", "xdist", "xdist.looponfail", "cacheprovider", "faulthandler", "rosbags")
 """Plugins that only take time here."""
+WITHOUT = [word for name in OTHERS for word in ("-p", f"no:{name}")]
 TESTS = """
 import asyncio
 import pytest
@@ -61,8 +61,7 @@ def run(pytester: pytest.Pytester) -> Run:
             ini += "\nasyncio_default_fixture_loop_scope = function"
         pytester.makeini(f"[pytest]\nfilterwarnings = error\n{ini}\n")
         pytester.makepyfile(tests)
-        without = [word for name in OTHERS for word in ("-p", f"no:{name}")]
-        return pytester.runpytest_inprocess(*(() if IS_FOUND else ("-p", PLUGIN)), *without, *options)
+        return pytester.runpytest_inprocess(*(() if IS_FOUND else ("-p", PLUGIN)), *WITHOUT, *options)
 
     return run
 
@@ -118,9 +117,48 @@ def test_the_wrong_places_are_told(run: Run) -> None:
     assert "trio is not supported" in printed
 
 
+WITH_TRIO = """
+import functools
+import pytest
+import trio
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_pyfunc_call(pyfuncitem):
+    if pyfuncitem.get_closest_marker("trio"):
+        names = pyfuncitem._fixtureinfo.argnames
+        trio.run(functools.partial(pyfuncitem.obj, **{name: pyfuncitem.funcargs[name] for name in names}))
+        return True
+"""
+"""What pytest-trio does."""
+
+
+@pytest.mark.parametrize("ini", ["asyncio_mode = strict", "asyncio_mode = auto"])
+def test_a_trio_test_gets_no_hand(run: Run, pytester: pytest.Pytester, ini: str) -> None:
+    pytest.importorskip("trio")
+    pytester.makeconftest(WITH_TRIO)
+    result = run(
+        """
+        import pytest
+
+        @pytest.mark.trio
+        async def test_under_trio(robotiq_hand):
+            await robotiq_hand.close()
+        """,
+        ini=f"{ini}\nmarkers = trio: run by trio",
+    )
+    result.assert_outcomes(errors=1)
+    assert "robotiq_server lives in asyncio's event loop, and trio runs this test" in result.stdout.str()
+
+
+def test_a_coroutine_that_nobody_runs_gets_no_hand(run: Run) -> None:
+    result = run("async def test_it(robotiq_hand): pass", ini="asyncio_mode = strict")
+    result.assert_outcomes(errors=1)
+    assert "mark it with pytest.mark.anyio" in result.stdout.str()
+
+
 def test_without_anybody_who_runs_coroutines_it_says_so(run: Run) -> None:
     result = run("async def test_it(robotiq_hand): pass", "-p", "no:asyncio", "-p", "no:anyio")
-    assert "mark it with pytest.mark.anyio, or install" in result.stdout.str()
+    assert "mark it with pytest.mark.anyio, or with pytest.mark.asyncio where" in result.stdout.str()
 
 
 def test_the_fixtures_are_listed_with_what_they_are(run: Run) -> None:
@@ -135,10 +173,29 @@ def test_pytest_finds_it() -> None:
     assert project["project"]["entry-points"]["pytest11"] == {"robotiq_async": PLUGIN}
 
 
-def test_it_imports_nothing_before_a_fixture_is_used() -> None:
-    """Every project whose environment has the library imports it with pytest."""
-    for name in ("plugin", "with_anyio", "with_asyncio"):
-        tree = ast.parse((ROOT / "robotiq_async" / "testing" / f"{name}.py").read_text(encoding="utf-8"))
-        imports = [each for each in tree.body if isinstance(each, ast.Import | ast.ImportFrom)]
-        assert not any(isinstance(each, ast.ImportFrom) and each.level for each in imports)
-        assert "robotiq_async" not in ast.unparse(ast.Module([*imports], []))
+def test_it_imports_nothing_of_the_library_before_a_fixture_is_used(pytester: pytest.Pytester) -> None:
+    """Every project whose environment has the library imports the plugin with pytest."""
+    pytester.makeini("[pytest]\nasyncio_default_fixture_loop_scope = function\n")
+    pytester.makepyfile(
+        """
+        import sys
+
+        def test_it():
+            assert "pytest_robotiq_async.with_anyio" in sys.modules
+            assert "pytest_robotiq_async.with_asyncio" in sys.modules
+            print([name for name in sys.modules if name.startswith(("robotiq_async", "pymodbus"))])
+            assert not any(name.startswith(("robotiq_async", "pymodbus")) for name in sys.modules)
+        """
+    )
+    found = () if IS_FOUND else ("-p", PLUGIN)
+    pytester.runpytest_subprocess(*found, *WITHOUT).assert_outcomes(passed=1)
+
+
+def test_a_test_that_two_plugins_claim_gets_no_hand(run: Run) -> None:
+    """pytest-asyncio's auto mode runs the tests that are marked for anyio, whose fixtures anyio makes."""
+    tests = TESTS.format(
+        marks="pytestmark = pytest.mark.anyio\n@pytest.fixture\ndef anyio_backend(): return 'asyncio'"
+    )
+    result = run(tests, ini="asyncio_mode = auto")
+    result.assert_outcomes(errors=3)
+    assert "set asyncio_mode = strict" in result.stdout.str()

@@ -23,7 +23,7 @@ from selenium.webdriver.common.keys import Keys
 
 from robotiq_async import OPEN, WIDTH_NORMAL, Fault, Finger, RobotiqHand, RobotiqStatus, State
 from robotiq_async.description import hand_model
-from robotiq_async.enums import DEFAULT_SPEED
+from robotiq_async.enums import AXES, DEFAULT_SPEED
 from robotiq_async.kinematics import JOINTS, joint_angles
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.web.server import PageServer
@@ -195,14 +195,14 @@ def is_at(browser: Browser, link: str, position: tuple[float, float, float]) -> 
 
 async def test_what_it_holds_is_drawn_and_what_touches_glows(browser: Browser, stage: Stage) -> None:
     await browser.until(lambda: browser.link("finger_1_link_3"))
-    assert not await browser.run(VISIBLE, "object")
+    assert not await browser.run(VISIBLE, "bar")
     stage.gripper.place_object(Finger.ABC, position=90)
     await stage.hand.close()
-    await browser.until(lambda: browser.driver.execute_script(VISIBLE, "object"))
+    await browser.until(lambda: browser.driver.execute_script(VISIBLE, "bar"))
     await browser.until(lambda: "ff5a1f" in browser.driver.execute_script(COLORS, "finger_middle_link_3"))
     assert await browser.says("axes", "contact while closing")
     await stage.hand.open()
-    await browser.until(lambda: not browser.driver.execute_script(VISIBLE, "object"))
+    await browser.until(lambda: not browser.driver.execute_script(VISIBLE, "bar"))
 
 
 async def test_what_it_shows_of_a_gripper_that_dies_and_comes_back(browser: Browser, stage: Stage) -> None:
@@ -224,6 +224,9 @@ async def test_many_hands_have_a_tile_each_and_it_fits_on_a_phone(window: Browse
         await window.open(page.url)
         for tile in ("tile-0", "tile-1"):
             await window.says(tile, "ready")
+        link = window.find("tile-1")
+        assert link.tag_name == "a", "a link, for another tab and for the keyboard"
+        assert str(link.get_attribute("href")).startswith(page.url.partition("?")[0])
         await window.click("tile-1")
         await window.says("address", hand.address)
         await window.says("state", "ready")
@@ -281,6 +284,48 @@ async def test_what_is_dangerous_is_asked_about(browser: Browser, hand: RobotiqH
     await browser.until(insist)
     await browser.press_keys(Keys.ESCAPE)  # it may have asked once more
     await browser.says("state", "reset")
+
+
+@pytest.mark.parametrize(
+    ("name", "axes"),
+    [
+        ("A", Finger.A),
+        ("B", Finger.B),
+        ("C", Finger.C),
+        ("scissor", Finger.SCISSOR),
+        ("fingers", Finger.ABC),
+    ],
+)
+async def test_each_axis_is_sent_where_its_slider_was_let_go(
+    name: str, axes: Finger, browser: Browser, hand: RobotiqHand
+) -> None:
+    """The slider alone moves nothing, and one that is not touched shows where its axis stands."""
+    first = next(axis for axis in AXES if axis in axes)
+    await browser.until(lambda: place_of(browser, name) == hand.status.position(first))
+    target, before = place_of(browser, name) + 30, hand.status
+    for _ in range(10):  # a busy machine may take a press for one that is too old
+        await browser.focus_slider(f"position-{name}")
+        await browser.press_keys(Keys.RIGHT * (target - place_of(browser, name)))
+        if place_of(browser, name) != target:
+            continue  # it was set back, for nothing had been touched yet
+        assert hand.status.requested_position(first) == before.requested_position(first)
+        await browser.click(f"move-{name}")
+        if f"{first.name} at" in await browser.until(partial(outcome_of, browser, "move")):
+            break
+    asked = [hand.status.requested_position(axis) for axis in AXES]
+    assert asked == [target if axis in axes else before.requested_position(axis) for axis in AXES]
+    await browser.until(lambda: place_of(browser, name) == hand.status.position(first))
+
+
+def place_of(browser: Browser, name: str) -> int:
+    """Where the slider of an axis is."""
+    return int(str(browser.find(f"position-{name}").get_attribute("aria-valuenow")))
+
+
+def outcome_of(browser: Browser, name: str) -> str | Literal[False]:
+    """How a command ended, once it has."""
+    words = browser.find("outcome").text
+    return words.startswith(f"{name}: ") and words
 
 
 async def test_a_slider_sends_where_it_was_let_go(browser: Browser, hand: RobotiqHand) -> None:

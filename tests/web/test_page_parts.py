@@ -1,10 +1,9 @@
-"""What the page is made of, without a browser: commands, news, the mirror, being in touch, what is held."""
+"""What the page is made of, without a browser: commands, news, the mirror, being in touch."""
 
 from __future__ import annotations
 
 import asyncio
 import json
-from math import dist
 from time import monotonic
 from typing import Any
 
@@ -14,14 +13,14 @@ pytest.importorskip("nicegui", reason="the page needs the extra web")
 
 from robotiq_async import CLOSED, Fault, Finger, RobotiqHand, State
 from robotiq_async.actions import Operator
-from robotiq_async.description import hand_model
-from robotiq_async.kinematics import JOINTS, joint_angles
+from robotiq_async.control.state_machine import TABLE, Verdict, refusal
+from robotiq_async.control.triggers import Trigger
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.web.commands import FRESH_S, MAX_COMMANDS, PageCommands
+from robotiq_async.telemetry.refusal_words import refusal_words
+from robotiq_async.web.commands import BUTTONS, FRESH_S, MAX_COMMANDS, PageCommands
 from robotiq_async.web.news import HandNews
 from robotiq_async.web.page.heartbeat import LOST_S, Heartbeat
 from robotiq_async.web.page.mirror import HISTORY_S, Mirror
-from robotiq_async.web.page.widgets.held import held, pads
 from robotiq_async.web.page.widgets.words import event_words, fault_words, state_words
 from robotiq_async.web.server import PageServer
 from robotiq_async.web.settings import PageSettings
@@ -67,6 +66,42 @@ async def test_what_there_is_not_is_refused(name: str, hand: int) -> None:
     pages.do(name, hand=hand)
     answer = await pages.answer()
     assert (answer["ok"], answer["words"]) == (False, f"there is no {name} of hand {hand}")
+
+
+async def test_it_speaks_of_buttons_and_not_of_python() -> None:
+    """It said: call activate() or recover(). The button is named activate."""
+    gripper = SimulatedGripper(speedup=20)
+    async with SimulatorServer(gripper) as server:
+        hand = RobotiqHand(server.address, name="left")
+        await hand.start(activate=False)
+        pages, said = Pages(hand), []
+        for name, arguments in (("close", {}), ("move", {"position": 9}), ("release", {"confirm": True})):
+            pages.do(name, **arguments)
+            said.append((await pages.answer())["words"])
+        await hand.activate()
+        gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+        await hand.wait_for_state(State.FAULT)
+        pages.do("close")
+        said.append((await pages.answer())["words"])
+        await hand.stop()
+        pages.do("close")
+        said.append((await pages.answer())["words"])
+    assert said == [
+        "the gripper is not activated; press activate",
+        "the gripper is not activated; press activate",
+        "not now, as it is 'reset: not active'; only when 'fault'",
+        f"major fault 0x0E: {Fault.SCISSOR_BLOCKED.description}; press recover",
+        "the hand is not started",
+    ]
+
+
+@pytest.mark.parametrize("trigger", [each for each in Trigger if each.name.startswith("ASK_")])
+@pytest.mark.parametrize("state", State)
+def test_no_refusal_has_a_method_or_a_state_of_the_library(trigger: Trigger, state: State) -> None:
+    if isinstance(TABLE[state][trigger], Verdict):
+        words = refusal_words(refusal(trigger, state), BUTTONS)
+        assert "()" not in words
+        assert not [each.name for each in State if "_" in each.name and each.name in words]
 
 
 async def test_without_operators_nothing_is_carried_out() -> None:
@@ -292,21 +327,3 @@ def test_a_browser_that_comes_back_has_caught_up_when_it_knows_a_time_since() ->
     heartbeat.heard(monotonic())
     assert heartbeat.has_caught_up()
     assert not heartbeat.has_caught_up(), "told once"
-
-
-# -- what is held ------------------------------------------------------------------------------------------
-
-
-async def test_what_is_held_lies_between_the_fingers(hand: RobotiqHand, gripper: SimulatedGripper) -> None:
-    gripper.place_object(Finger.ABC, position=70)
-    await hand.close()
-    model = hand_model()
-    faces = pads(model, model.link_poses(dict(zip(JOINTS, joint_angles(hand.status), strict=True))))
-    assert held(faces, Finger(0)) is None
-    ball = held(faces, hand.status.contacts)
-    assert ball is not None
-    middle, radius = ball
-    assert abs(middle[2]) < 1e-6, "B and C are level, so it lies in the plane of A"
-    assert dist(middle, faces[Finger.A].position) == pytest.approx(radius)
-    for axes in (Finger.A, Finger.B | Finger.C, Finger.SCISSOR):
-        assert held(faces, axes) is not None

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ...log import log
+from ..addresses import gripper_words, is_simulated
 from ..arguments import Flag, need
 from ..failures import UsageError
 from ..output.log_capture import forget, forwarded_warnings
@@ -90,7 +91,7 @@ async def _serve(settings: AgentSettings) -> None:
     )
     if settings.insecure:
         tell("anyone who reaches this host can command its grippers: there are no keys")
-    hands = {name: gripper.make_hand() for name, gripper in settings.grippers.items()}
+    hands = {name: gripper.make_hand(name) for name, gripper in settings.grippers.items()}
     try:
         bus = await _open(configuration, ", ".join(settings.listen or settings.connect))
         try:
@@ -103,7 +104,7 @@ async def _serve(settings: AgentSettings) -> None:
                     window=settings.window,
                     records=file_records(),
                 )
-                await served.run(lambda: _announce(served))
+                await served.run(lambda: _announce(served, settings))
         finally:
             await bus.close()
     except asyncio.CancelledError:
@@ -120,7 +121,10 @@ async def _open(configuration: dict[str, object], where: str) -> ZenohBus:
         saying.cancel()
 
 
-def _announce(served: Agent) -> None:
+def _announce(served: Agent, settings: AgentSettings) -> None:
+    for name, gripper in settings.grippers.items():
+        if is_simulated(gripper.address):
+            tell(f"{name}: {gripper_words(gripper.address)}")
     try:
         for each in served.hands.values():
             print(each.name, flush=True)

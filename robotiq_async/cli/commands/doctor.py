@@ -7,16 +7,17 @@ from typing import TYPE_CHECKING
 from ...fleet.network.route import is_remote
 from ...link.address import parse_address
 from ...log import printable
-from ..addresses import full_address
+from ...session.options import registers_of
+from ..addresses import full_address, gripper_words
 from ..arguments import Address, Unit, need
-from ..failures import CommandError, UsageError
+from ..failures import CommandError, UsageError, usage
 
 if TYPE_CHECKING:
     from ...doctor import Finding
 
 
 async def doctor(
-    address: Address = "sim://",
+    address: Address,
     /,
     *,
     device_id: Unit | None = None,
@@ -33,6 +34,7 @@ async def doctor(
 
         robotiq-async doctor tcp://192.168.1.11
         robotiq-async doctor rtu:///dev/ttyUSB0
+        robotiq-async doctor rtu+tcp://192.168.1.20:54321
         robotiq-async doctor "zenoh://lab/cell-1/left?connect=tls/192.168.1.20:7447"
 
     Args:
@@ -55,6 +57,11 @@ async def doctor(
         need("cryptography", "fleet")
         if device_id is not None:
             raise UsageError("a gripper on another host is set up there: its agent's file has device_id")
+    else:
+        with usage():
+            registers_of(parse_address(address), device_id=device_id)
+    print(gripper_words(address), flush=True)
+    if is_remote(address):
         await examine_remote(address, report)
     else:
         await examine(parse_address(address), report, device_id=device_id)

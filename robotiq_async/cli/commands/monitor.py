@@ -10,10 +10,12 @@ from typing import Annotated, Final
 from cyclopts import Parameter
 
 from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ..addresses import gripper_words
 from ..arguments import USUAL, Address, Byte, Flag, Link, need
 from ..consent import forget_keys
 from ..failures import CommandError, UsageError
 from ..output.log_capture import forget, forwarded_warnings
+from ..output.notices import tell
 
 SCREEN_S: Final = 1.0
 """How long the screen may take to restore the terminal."""
@@ -42,6 +44,7 @@ async def monitor(
         SPACE    halt
         + -      speed
         ] [      force
+        p        any position of any axes: asks for them
         a r l v  activate, reset, release, recover: ask first
         q        quit
 
@@ -83,7 +86,11 @@ async def _look(address: str, link: Link, *, as_json: bool) -> None:
     from ..connect import connected
     from ..output.stream_output import print_objects, watch
 
+    if not as_json:
+        print(gripper_words(address), flush=True)
     async with connected(address, link, halt=False) as hand:
+        if as_json:
+            tell(gripper_words(address))
         await (print_objects if as_json else watch)(hand)
     raise CommandError("the hand has ended; what became of it is above")
 

@@ -9,6 +9,7 @@ from cyclopts import Parameter
 
 from ...enums import Finger
 from ...wire.checks import check_timeout
+from ..addresses import gripper_words
 from ..arguments import USUAL, Address, Byte, Fingers, Flag, Link, Position, Yes
 from ..consent import consent
 from ..failures import usage
@@ -17,7 +18,7 @@ WARNING = """this MOVES {fingers} to {position}.
 If it is not active yet ALL its fingers open and close to their stops first, and what they hold drops."""
 
 IN_FORCE = "rGTO stays set: the grip is in force."
-LET_GO = "rGTO is clear now: what is held may fall."
+LET_GO = "rGTO is clear now: the vendor says that what is held stays held; no one has measured it."
 HINT = " With --keep it stays set."
 
 
@@ -41,9 +42,9 @@ def move(
     success, and the table says so. Unless the gripper is that of sim:// it asks
     first; without a terminal it needs --yes.
 
-    In the end it stops every axis (rGTO = 0), also those that hold something. A
-    finger locks itself, so the part may stay; nobody has tried it. The next move
-    does not take that grip up again. With --keep rGTO stays set if everything has
+    In the end it stops every axis (rGTO = 0), also those that hold something. By
+    the vendor's word the part stays held then; no one has measured it on a
+    3-Finger. The next move does not take that grip up again. With --keep rGTO stays set if everything has
     come to rest, Ctrl-C or not, and the next move leaves the other axes their grip.
     Speed and force cannot be read back: the other axes get 128 and 64 then.
 
@@ -83,6 +84,7 @@ async def _move(
     from ..connect import connected
     from ..output.tables import print_outcomes
 
+    print(gripper_words(address), flush=True)
     async with connected(address, link, halt=True, keep_grip=keep) as hand:
         if not hand.is_activated:
             print("Activating: the fingers open and close.", flush=True)

@@ -17,7 +17,7 @@ from ..failures import usage
 from ..output.notices import tell
 
 if TYPE_CHECKING:
-    from ...simulator import Trouble
+    from ...simulator import SimulatedGripper, Trouble
 
 
 async def simulate(
@@ -25,9 +25,13 @@ async def simulate(
     port: Port = 5020,
     host: Host = "127.0.0.1",
     speedup: Annotated[float, Parameter(metavar="FACTOR")] = 1.0,
+    like_hardware: Annotated[bool, Parameter(negative="--plain", show_default=False)] = False,
     exact: Flag = False,
     object_: Annotated[Byte | None, Parameter(name="--object")] = None,
+    fixed: Flag = False,
     serial: Annotated[str | None, Parameter(metavar="DEVICE")] = None,
+    rtu_over_tcp: Flag = False,
+    unpaced: Flag = False,
     device_id: Unit | None = None,
     trouble: Annotated[list[str] | None, Parameter(metavar="WORDS", negative=())] = None,
     troubles: Flag = False,
@@ -36,6 +40,14 @@ async def simulate(
 
     Its address is the only line on standard output, printed once it listens:
     other programs connect to it as to a real gripper.
+
+    It does what the manual says, and activates in 4.2 s. With --like-hardware it
+    has the habits that several sources report of real grippers; none has been
+    measured on a 3-Finger, and the hand does not live with all of them yet. An
+    activation takes 12 s then; gDT and gSTA trail the echo by 0.05 s (status-lag);
+    the first status after a second without a message shows fault 0x09
+    (silence-fault); a write within 10 ms of the one before is acknowledged and
+    forgotten (write-spacing). Other habits are troubles: see --troubles.
 
     A trouble is
 
@@ -48,8 +60,10 @@ async def simulate(
 
         robotiq-async simulate
         robotiq-async simulate --port 5021 --speedup 10 --object 150
+        robotiq-async simulate --like-hardware
         robotiq-async simulate --serial /dev/pts/3
         robotiq-async simulate --serial /dev/pts/3 --device-id 12
+        robotiq-async simulate --rtu-over-tcp --port 54321
         robotiq-async simulate --trouble "drop at 5 every 10" --trouble "delay 0.02"
         robotiq-async simulate --trouble "power-cut at 20 for 2; foreign 0 at 30"
 
@@ -57,34 +71,56 @@ async def simulate(
         port: TCP port; 0 takes a free one.
         host: Interface to listen on. Modbus knows no password: whoever reaches the port is in command.
         speedup: How many times faster than the clock the simulated time runs.
+        like_hardware: Have the habits of real grippers, or with --plain (the default) none.
         exact: Stop exactly where it is told to, which no real gripper does.
         object_: Count at which the fingers A, B and C meet something when they close.
+        fixed: The object stays there in an activation, which then fails with fault 0x0D.
         serial: Serve Modbus RTU on this serial device in place of TCP (extra serial).
-        device_id: The only Modbus unit id that is answered (default: 9 serial, any on TCP).
+        rtu_over_tcp: Serve Modbus RTU through a TCP socket, as serial servers and tool ports do.
+        unpaced: Let bytes of a serial line take no time; for a real serial port, which takes it itself.
+        device_id: The only Modbus unit id that is answered (default: 9 for RTU, any on TCP).
         trouble: What goes wrong, and when; may be given again.
         troubles: List what can go wrong, and end.
     """
-    from ...simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, parse_troubles
+    from ...simulator import (
+        RtuOverTcpSimulatorServer,
+        SerialSimulatorServer,
+        SimulatedGripper,
+        SimulatorServer,
+        parse_troubles,
+    )
+    from ...simulator.troubles.like_hardware import LIKE_HARDWARE, OWN_HABITS
 
     if troubles:
         _list_troubles()
         return
     with usage():
         plan = parse_troubles("\n".join(trouble or ()))
-        gripper = SimulatedGripper(speedup=speedup, spread=not exact)
-        if object_ is not None:
-            gripper.place_object(Finger.ABC, object_)
+        gripper = SimulatedGripper(
+            speedup=speedup, spread=not exact, habits=OWN_HABITS if like_hardware else None
+        )
+        _place(gripper, object_, fixed=fixed)
+        if serial is not None and rtu_over_tcp:
+            raise ValueError("--serial and --rtu-over-tcp contradict each other")
+        if unpaced and serial is None and not rtu_over_tcp:
+            raise ValueError("--unpaced is for a serial line: --serial or --rtu-over-tcp")
         server: SimulatorServer | SerialSimulatorServer
-        if serial is None:
-            server = SimulatorServer(gripper, port=port, host=host, device_id=device_id)
+        unit = RTU_REGISTERS.device_id if device_id is None else device_id
+        if serial is not None:
+            server = SerialSimulatorServer(serial, gripper, device_id=unit, paced=not unpaced)
+        elif rtu_over_tcp:
+            server = RtuOverTcpSimulatorServer(
+                gripper, port=port, host=host, device_id=unit, paced=not unpaced
+            )
         else:
-            unit = RTU_REGISTERS.device_id if device_id is None else device_id
-            server = SerialSimulatorServer(serial, gripper, device_id=unit)
+            server = SimulatorServer(gripper, port=port, host=host, device_id=device_id)
         server.fault_injector.check(plan)
     if serial is None and not is_loopback(host):
         tell(f"anyone who reaches {host} can command this gripper")
     try:
         async with server:
+            for habit in LIKE_HARDWARE if like_hardware else ():
+                await server.fault_injector.begin(habit)
             print(server.address, flush=True)
             await server.fault_injector.run(plan, _tell)
             await asyncio.Event().wait()
@@ -100,6 +136,14 @@ async def simulate(
         raise RobotiqError(f"cannot listen on {host}:{port}: {error.strerror or error}") from error
 
 
+def _place(gripper: SimulatedGripper, position: int | None, *, fixed: bool) -> None:
+    """Put something in the way of the fingers, if there is something."""
+    if position is not None:
+        gripper.place_object(Finger.ABC, position, fixed=fixed)
+    elif fixed:
+        raise ValueError("--fixed is about an object: give it with --object")
+
+
 def _tell(trouble: Trouble) -> None:
     tell(f"trouble: {trouble}")
 
@@ -111,4 +155,4 @@ def _list_troubles() -> None:
         usual = "" if kind.value is None else f" (VALUE: {kind.value:g} unless given)"
         lasts = "" if kind.lasts == 0 else "; goes on unless it is said for how long"
         link = "" if kind.link is None else f"; {kind.link} only"
-        print(f"{name:18} {kind.meaning}{usual}{lasts}{link}")
+        print(f"{name:19} {kind.meaning}{usual}{lasts}{link}")

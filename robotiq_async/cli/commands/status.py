@@ -8,7 +8,9 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from ...telemetry.payloads import reading_fields
+from ..addresses import gripper_words
 from ..arguments import USUAL, Address, Flag, Link
+from ..output.notices import tell
 
 
 async def status(
@@ -31,8 +33,11 @@ async def status(
     from ..connect import connected
     from ..output.tables import print_status
 
+    if not as_json:
+        print(gripper_words(address), flush=True)
     async with connected(address, link, halt=False) as hand:
         if as_json:
+            tell(gripper_words(address))
             print(json.dumps(reading_fields(hand), indent=2))
         else:
             print_status(hand)

@@ -11,6 +11,7 @@ from cyclopts import Parameter
 
 from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...telemetry.gate import is_loopback
+from ..addresses import gripper_words
 from ..arguments import USUAL, Address, Byte, Flag, Host, Link, Port, need
 from ..failures import CommandError, UsageError
 from ..output.notices import tell
@@ -81,6 +82,7 @@ async def view(
         # In this order no viewer delays the stop of the fingers.
         with forwarded_warnings(tell):
             async with viewer, operated(operator, tell):
+                tell(gripper_words(address))
                 print(viewer.url, flush=True)
                 await asyncio.Event().wait()
     except asyncio.CancelledError:

@@ -15,6 +15,7 @@ from ...concurrency import wait_shielded
 from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...errors import RobotiqError
 from ...telemetry.payloads import title
+from ..addresses import gripper_words
 from ..arguments import USUAL, Address, Byte, Flag, Host, Link, Port, need
 from ..browser import opened
 from ..failures import CommandError, UsageError, usage
@@ -75,7 +76,8 @@ async def web(
     from ..connect import make_operator
     from ..output.log_capture import forwarded_warnings
 
-    operators = [make_operator(each, link, speed=speed, force=force) for each in addresses or ("sim://",)]
+    shown = addresses or ("sim://",)
+    operators = [make_operator(each, link, speed=speed, force=force) for each in shown]
     with usage():
         settings = PageSettings(
             host=host,
@@ -94,17 +96,22 @@ async def web(
     )
     try:
         with forwarded_warnings(tell):
-            await _show(page, operators, settings, open_browser=open_browser)
+            await _show(page, operators, settings, shown, open_browser=open_browser)
     except asyncio.CancelledError:
         pass  # Being told to stop is how this command ends well.
 
 
 async def _show(
-    page: PageServer, operators: Sequence[Operator], settings: PageSettings, *, open_browser: bool
+    page: PageServer,
+    operators: Sequence[Operator],
+    settings: PageSettings,
+    shown: Sequence[str],
+    *,
+    open_browser: bool,
 ) -> None:
     async with page, AsyncExitStack() as stack:
         try:
-            await _serve(page, operators, settings, stack, open_browser=open_browser)
+            await _serve(page, operators, settings, shown, stack, open_browser=open_browser)
         finally:
             # First: nothing that concerns the page, or a gripper that cannot be reached, delays it.
             await _leave_all(operators, page)
@@ -114,6 +121,7 @@ async def _serve(
     page: PageServer,
     operators: Sequence[Operator],
     settings: PageSettings,
+    shown: Sequence[str],
     stack: AsyncExitStack,
     *,
     open_browser: bool,
@@ -122,6 +130,8 @@ async def _serve(
         await _start(page, index, operator, alone=len(operators) == 1, stack=stack)
     if all(news.problem for news in page.news):
         raise CommandError("; ".join(news.problem for news in page.news))
+    for address in shown:
+        tell(gripper_words(address))
     if not settings.loopback and not settings.certificate:
         tell("without a certificate the password goes through the network for everybody to read")
     print(page.url, flush=True)
@@ -151,6 +161,8 @@ async def _try_again(page: PageServer, index: int, operator: Operator) -> None:
     news = page.news[index]
     while news.problem:
         await asyncio.sleep(AGAIN_S)
+        if page.is_ending:
+            return
         try:
             await operator.hand.start(activate=False)
         except RobotiqError as error:

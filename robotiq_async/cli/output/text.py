@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from datetime import datetime
-from typing import Final
+from typing import Any, Final
 
 from ...control.triggers import Trigger
-from ...enums import AXES
+from ...enums import AXES, State
 from ...telemetry.payloads import Fields
 from ...wire.status import NO_REQUEST
 
@@ -50,6 +50,27 @@ def event_line(fields: Fields) -> str:
     trigger = fields["trigger"]
     why = Trigger[trigger].value if trigger in Trigger.__members__ else trigger
     return f"state    {fields['source']} -> {fields['target']} ({why})"
+
+
+def brief_line(fields: Fields, contacts: dict[str, Any]) -> str:
+    """The line for a state, a fault, or a change of the contacts; empty for all else.
+
+    Args:
+        fields: a status, a request, or an event.
+        contacts: the axes in contact and where, as of the last status; is kept up to date.
+    """
+    if "kind" in fields:
+        # A control loop goes to RUNNING_CC and back with every command.
+        is_command = State.RUNNING_CC.name in (fields.get("source"), fields.get("target"))
+        return "" if is_command else event_line(fields)
+    if "contacts" not in fields:
+        return ""
+    now = {name: fields[name]["position"] for name in fields["contacts"]}
+    if now.keys() == contacts.keys():
+        return ""
+    contacts.clear()
+    contacts.update(now)
+    return f"contact  {' '.join(f'{name}={position}' for name, position in now.items()) or 'none'}"
 
 
 FORMATTERS: Final[dict[str, Callable[[Fields], str]]] = {

@@ -10,20 +10,23 @@ from functools import partial
 from typing import ClassVar, Final
 
 from rich.text import Text
+from textual import events
 from textual.app import App, ComposeResult
 from textual.binding import BindingType
 from textual.widgets import RichLog, Static
 from textual.worker import Worker
 
 from ...actions import ACTIONS, Operator
-from ...enums import AXES, Fault, State
+from ...enums import AXES, Fault, Finger, State
 from ...errors import RobotiqError
 from ...session.timing.clock import now
 from ...telemetry.payloads import fault_fields, title
+from ...telemetry.refusal_words import refusal_words
 from ...wire.status import RobotiqStatus
 from ..output.text import clock, event_line
-from .widgets import Axes, Line, Question, link_text, state_text
-from .words import KEYS, refusal_words, transition_words
+from .asking import Asking, Question, Target
+from .widgets import Axes, Line, link_text, state_text
+from .words import HINTS, KEYS, transition_words
 
 if sys.platform == "win32":
     DRIVER, NONBLOCKING = None, ()
@@ -38,6 +41,8 @@ FIGURES_S: Final = 0.5
 """Between two updates of the polling statistics."""
 BUFFER: Final = 400
 """Statuses kept for the next paint: two seconds."""
+HALTING: Final = frozenset({"space", "h"})
+"""Keys that halt, whatever is asked."""
 STEP: Final = 16
 """Change of speed or force for one press of a key."""
 LOG_LINES: Final = 2000
@@ -56,9 +61,9 @@ class Monitor(App[None]):
     /* A scroll bar that came later would lie on what had been wrapped before. */
     #log { overflow-x: hidden; overflow-y: scroll; scrollbar-size-vertical: 1; }
     #keys { color: $text-muted; }
-    Question { align: center middle; background: transparent; }
-    #question { width: 60; max-width: 100%; height: auto; padding: 1 2; background: $surface; }
-    #question { border: thick $warning; }
+    Screen { layers: below above; }
+    #question { layer: above; dock: bottom; width: 100%; height: auto; padding: 0 2; display: none; }
+    #question { background: $surface; border: thick $warning; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         ("o", "act('open')", "open"),
@@ -71,6 +76,7 @@ class Monitor(App[None]):
         ("r", "act('reset')", "reset"),
         ("l", "act('release')", "release"),
         ("v", "act('recover')", "recover"),
+        ("p", "position", "position"),
         ("plus,equals_sign", f"speed({STEP})", "faster"),
         ("minus", f"speed(-{STEP})", "slower"),
         ("right_square_bracket", f"force({STEP})", "stronger"),
@@ -93,6 +99,9 @@ class Monitor(App[None]):
         self._top = Line(id="state")
         self._axes = Axes()
         self._figures = Line(id="link")
+        self._question = Static(id="question")
+        self.asking: Asking | None = None
+        """What waits for keys; it stands on the screen."""
         self._history = RichLog(id="log", max_lines=LOG_LINES, min_width=1, wrap=True)
         self._overruns = 0
         self._polls = (now(), operator.hand.statistics.polls)
@@ -105,6 +114,7 @@ class Monitor(App[None]):
         self._history.can_focus = False  # It would take keys.
         yield self._history
         yield Static(KEYS, id="keys", markup=False)
+        yield self._question
 
     def on_mount(self) -> None:
         """Start painting."""
@@ -167,18 +177,39 @@ class Monitor(App[None]):
 
     # -- keys -----------------------------------------------------------------------------------------
 
+    async def on_event(self, event: events.Event) -> None:
+        """Give keys to what is asked, but for those that halt."""
+        if isinstance(event, events.Key) and self.asking is not None and event.key not in HALTING:
+            self.ask(None if self.asking.press(event.key) else self.asking)
+        else:
+            await super().on_event(event)
+
+    def ask(self, asking: Asking | None) -> None:
+        """Show what waits for keys from now on, above the log; None for nothing."""
+        self.asking = asking
+        if asking is not None:
+            self._question.update(asking.text)
+        self._question.display = asking is not None
+
     def action_act(self, name: str) -> None:
         """Carry out an action; a dangerous one only after a yes."""
         action = ACTIONS[name]
 
-        def answered(yes: bool | None) -> None:
-            if yes:
-                self._begin(action.name, partial(self._operator.act, action))
+        def begin() -> None:
+            self._begin(action.name, partial(self._operator.act, action))
 
         if action.warning:
-            self.push_screen(Question(f"{action.name}: {action.what}?", action.warning), answered)
+            self.ask(Question(f"{action.name}: {action.what}?", action.warning, begin))
         else:
-            answered(True)
+            begin()
+
+    def action_position(self) -> None:
+        """Ask which axes are to go where, and move them."""
+
+        def begin(axes: Finger, position: int) -> None:
+            self._begin(f"{axes} to {position}", partial(self._operator.move, position, axes))
+
+        self.ask(Target(begin))
 
     def action_speed(self, by: int) -> None:
         """Change the speed of every axis."""
@@ -195,6 +226,6 @@ class Monitor(App[None]):
             try:
                 self.write_log(f"{name}: {await work()}", "bold")
             except RobotiqError as error:
-                self.write_log(f"{name}: {refusal_words(error)}", "bold red")
+                self.write_log(f"{name}: {refusal_words(error, HINTS)}", "bold red")
 
         _: Worker[None] = self.run_worker(carry_out)

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, Final
+from typing import Final
 
 from rich.text import Text
-from textual.app import ComposeResult
-from textual.binding import BindingType
-from textual.screen import ModalScreen
 from textual.widget import Widget
 from textual.widgets import Static
 
@@ -23,8 +20,6 @@ from .words import HINTS
 HISTORY: Final = 60
 """Currents kept, one per paint: five seconds."""
 FULL: Final = 255
-READING_S: Final = 0.3
-"""A yes counts only after this time: it may have been typed before the question could be read."""
 SMALL_MA: Final = 500
 """Lower bound of the scale of the currents: the noise of a motor at rest does not fill it."""
 STILL: Final = 4
@@ -203,40 +198,3 @@ def link_text(figures: Statistics, rate: float, held_up: bool, speed: int, force
             f"  ANOTHER CLIENT commands this gripper ({figures.foreign_commands} times)", "bold yellow"
         )
     return text
-
-
-class Question(ModalScreen[bool]):
-    """Asks before a dangerous action. Halting works meanwhile."""
-
-    BINDINGS: ClassVar[list[BindingType]] = [
-        ("y", "answer(True)", "yes"),
-        ("n,escape,q,ctrl+c", "answer(False)", "no"),
-        ("space,h", "app.act('halt')", "halt"),
-    ]
-
-    def __init__(self, question: str, warning: str) -> None:
-        """Keep question and warning."""
-        super().__init__()
-        self.is_open = False
-        """Whether a yes counts: not before the question can have been read."""
-        self._question = question
-        self._warning = warning
-
-    def compose(self) -> ComposeResult:
-        """Question, warning and keys."""
-        text = Text(f"{self._question}\n\n", "bold")
-        text.append(self._warning, "bold yellow")
-        text.append("\n\ny yes    n no    space halt")
-        yield Static(text, id="question")
-
-    def on_mount(self) -> None:
-        """Let a yes count in a moment."""
-        self.set_timer(READING_S, self._open)
-
-    def _open(self) -> None:
-        self.is_open = True
-
-    def action_answer(self, answer: bool) -> None:
-        """Close with the answer, unless it is a yes too early."""
-        if self.is_open or not answer:
-            self.dismiss(answer)

@@ -15,6 +15,7 @@ from ...enums import AXES, CLOSED, OPEN, Finger, ObjectStatus
 from ...wire.request import AxisRequest, Request
 from ...wire.status import RobotiqStatus
 from ..contact import agrees
+from .standstill import Moment
 
 DIRECTION_WAIT_S: Final = 0.1
 """How long a moving axis is watched for its direction: at the slowest speed a count takes 43 ms
@@ -24,31 +25,44 @@ DIRECTION_WAIT_S: Final = 0.1
 class Adoption:
     """Watches an adopted gripper until the hand writes its own first image."""
 
-    def __init__(self, first: RobotiqStatus, asked: float | None = None, since: float | None = None) -> None:
+    def __init__(self, first: RobotiqStatus, now: Moment | None = None, since: Moment | None = None) -> None:
         """Begin with the first status after the adoption.
 
         Args:
             first: the status.
-            asked: when it was asked for, in monotonic seconds; None for the time of the reply.
-            since: from when the time counts that a moving axis is given to show its direction; None for
-                the same time.
+            now: when it was asked for; None for the time of the reply.
+            since: from when the time counts that a moving axis is given to show its direction, and a late
+                object status to come; None for the same time.
         """
         self._first = first
         self._latest = first
-        self._asked = first.timestamp if asked is None else asked
-        self.since = self._asked if since is None else since
+        self._now = Moment(first.timestamp, 0) if now is None else now
+        self.since = self._now if since is None else since
 
-    def see(self, status: RobotiqStatus, asked: float | None = None) -> None:
+    def see(self, status: RobotiqStatus, now: Moment | None = None) -> None:
         """Take in the next status, and when it was asked for."""
         self._latest = status
-        self._asked = status.timestamp if asked is None else asked
+        self._now = Moment(status.timestamp, self._now.reads + 1) if now is None else now
 
     @property
     def is_certain(self) -> bool:
-        """Whether every moving axis has shown its direction, or has had the time to."""
-        if self._asked - self.since >= DIRECTION_WAIT_S:
-            return True
-        return all(self._direction(axis) for axis in AXES if axis in self._latest.moving)
+        """Whether what the axes do can be relied on.
+
+        A moving one has shown its direction, or has had the time to. One at rest agrees with a request that
+        it may have; or else its gDT may be from before that, and is given the time to come.
+        """
+        has_time = self._now.time - self.since.time < DIRECTION_WAIT_S
+        if has_time and not all(self._direction(axis) for axis in AXES if axis in self._latest.moving):
+            return False
+        return self.since.is_lag_over(self._now) or not self._is_late
+
+    @property
+    def _is_late(self) -> bool:
+        """Whether an axis at rest contradicts its echo; under simple control some do for good."""
+        status = self._latest
+        return status.go_echo and not all(
+            self._agrees(axis, status.requested_position(axis)) for axis in AXES if axis not in status.moving
+        )
 
     def request(self, settings: Sequence[AxisRequest]) -> Request:
         """The image that changes nothing about the gripper.
@@ -73,18 +87,27 @@ class Adoption:
         position = status.position(axis)
         if not status.go_echo:
             return position
-        candidates = [status.requested_position(axis)]
-        if axis in Finger.B | Finger.C:
-            candidates.append(status.requested_position(Finger.A))
-        for request in candidates:
-            if agrees(request, status.finger_status(axis), position, self._direction(axis)):
-                return request
+        requested = self._requested(axis)
+        if requested is not None:
+            return requested
         match status.finger_status(axis):
             case ObjectStatus.CONTACT_CLOSING:
                 return CLOSED
             case ObjectStatus.CONTACT_OPENING:
                 return OPEN
         return position
+
+    def _requested(self, axis: Finger) -> int | None:
+        """The echo that agrees with what an axis does, if one does."""
+        status = self._latest
+        candidates = [status.requested_position(axis)]
+        if axis in Finger.B | Finger.C:
+            candidates.append(status.requested_position(Finger.A))
+        return next((each for each in candidates if self._agrees(axis, each)), None)
+
+    def _agrees(self, axis: Finger, request: int) -> bool:
+        status = self._latest
+        return agrees(request, status.finger_status(axis), status.position(axis), self._direction(axis))
 
     def _direction(self, axis: Finger) -> int:
         """Counts the axis has moved since the first status: above 0 closing, below 0 opening, 0 unknown."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ...enums import AXES, Finger
+from ...enums import AXES, NO_AXES, Finger
 from ...wire.request import AxisRequest, Request
 from ...wire.status import RobotiqStatus
 from ..contact import drifts
@@ -12,7 +12,13 @@ from .pending import PendingCommand
 
 
 def merged(
-    base: Request, pending: PendingCommand, status: RobotiqStatus, *, gripping: Finger, arrived: Finger
+    base: Request,
+    pending: PendingCommand,
+    status: RobotiqStatus,
+    *,
+    gripping: Finger,
+    arrived: Finger,
+    doubtful: Finger = NO_AXES,
 ) -> Request:
     """The image with everything that callers ask for; axes that nobody addresses stay as they are.
 
@@ -22,6 +28,7 @@ def merged(
         status: the newest status.
         gripping: the axes that were in contact when rGTO was last set.
         arrived: the axes that have come to rest under their requests.
+        doubtful: the axes that may move although they are shown at rest.
     """
     # rACT is for the sequences: raised here it would activate a gripper that has lost its activation. And
     # rATR would let go.
@@ -34,7 +41,7 @@ def merged(
     held = {
         axis: status.position(axis)
         for axis in AXES
-        if axis in pending.hold and drifts(axis, base, status, arrived)
+        if axis in pending.hold and drifts(axis, base, status, arrived, doubtful)
     }
     positions = held | pending.positions
     return replace(

@@ -13,11 +13,14 @@ from operator import or_
 from typing import Final
 
 from ...enums import AXES, NO_AXES, Finger, ObjectStatus
+from ...log import Log, log
 from ...wire.request import AxisRequest, Request
 from ...wire.status import RobotiqStatus
 from ..contact import TOLERANCE, agrees
 from ..triggers import Trigger, classify
 from .adoption import Adoption
+from .limits import ALONE_S
+from .standstill import Moment, Standstill
 from .writes import SILENT_S, WINDOW_S, WriteHistory
 
 NEVER: Final = float("-inf")
@@ -26,13 +29,15 @@ NEVER: Final = float("-inf")
 class RequestShadow:
     """The image that is in force, and what is known of it."""
 
-    def __init__(self, speed: int, force: int) -> None:
+    def __init__(self, speed: int, force: int, *, log: Log = log) -> None:
         """Know nothing yet.
 
         Args:
             speed: what every axis gets until set otherwise, 0..255.
             force: what every axis gets until set otherwise, 0..255.
+            log: of the hand.
         """
+        self._log = log
         self._image = Request(axes=(AxisRequest(0, speed, force),) * len(AXES))
         """The last image written, or the one the gripper shows after a reconnect."""
         self._adoption: Adoption | None = None
@@ -47,8 +52,13 @@ class RequestShadow:
         self._contacts: dict[Finger, tuple[ObjectStatus, int]] = {}
         """The contacts, and where, when the go bit was last seen set: gDT is not worth reading without it."""
         self.arrived = Finger.ALL
-        """Axes that have been seen at rest under the position that they were asked last; the others move, or
-        are about to."""
+        """Axes that are known to rest under the position that they were asked last; the others move, or are
+        about to, or what is shown of them may be from before."""
+        self._standstill = {axis: Standstill() for axis in AXES}
+        self._reads = 0
+        self.limited: dict[Finger, int] = {}
+        """What the gripper shows in place of requests of ours that lie beyond a software limit."""
+        self._others_at = NEVER
         self.asked = 0.0
         """When the newest status was asked for. What it shows may be as old as that, however late its reply
         was looked at; so this is the time that the age of a write is measured by."""
@@ -92,13 +102,20 @@ class RequestShadow:
     def is_certain(self) -> bool:
         """Whether the base can be relied on.
 
-        An adopted axis takes a moment to show its direction. A write that was not acknowledged before the
-        link went down may have arrived, and shows within a device cycle: what is written before that would
-        take the axes back to what they were asked before it.
+        An adopted axis takes a moment to show its direction, or that it is at rest. A write that was not
+        acknowledged before the link went down may have arrived, and shows within a device cycle: what is
+        written before that would take the axes back to what they were asked before it.
         """
-        if self._writes.is_in_doubt and self.asked - self._sure_at < SILENT_S:
-            return False
-        return self._adoption is None or self._adoption.is_certain
+        return not self._is_in_doubt and (self._adoption is None or self._adoption.is_certain)
+
+    @property
+    def is_adoption_late(self) -> bool:
+        """Whether nothing but an adopted axis keeps the base from being certain."""
+        return not self._is_in_doubt and self._adoption is not None and not self._adoption.is_certain
+
+    @property
+    def _is_in_doubt(self) -> bool:
+        return self._writes.is_in_doubt and self.asked - self._sure_at < SILENT_S
 
     def is_ready(self, status: RobotiqStatus, *, moves: bool) -> bool:
         """Whether the next image can be made from the base now.
@@ -118,11 +135,13 @@ class RequestShadow:
 
     @property
     def may_begin_to_move(self) -> bool:
-        """Whether an image that does not act yet may set something in motion.
+        """Whether an image that does not act yet, or does not show in gDT, may set something in motion.
 
         While rGTO is clear a speed or a force does not: they have no echo, so all that waits looks alike.
         """
-        return not self.is_settled and (self._image.go or not self._writes.all_look_alike)
+        if not self.is_settled:
+            return self._image.go or not self._writes.all_look_alike
+        return self.arrived is not Finger.ALL and self._image.go and self._adoption is None
 
     @property
     def ours(self) -> Finger:
@@ -141,13 +160,32 @@ class RequestShadow:
 
     def writing(self, image: Request, moved: Finger, now: float) -> int:
         """An image is about to be sent, with new positions for some axes; returns the number it goes by."""
-        self._image = image
-        self._adoption = None
+        before, self._image, self._adoption = self.base, image, None
         self._unsure_until = NEVER
         self._moved |= moved
-        self.arrived &= ~moved
         self._contacts = {axis: at for axis, at in self._contacts.items() if axis not in moved}
-        return self._writes.writing(image, now)
+        self.limited = {axis: at for axis, at in self.limited.items() if axis not in moved}
+        number = self._writes.writing(image, now)
+        self._ask(number, before, image)
+        return number
+
+    def _ask(self, number: int, before: Request, image: Request) -> None:
+        """Note which axes are asked for something else than before; what gDT says of them may be late."""
+        raised = image.go and not before.go
+        for axis, old, new in zip(AXES, before.axes, image.axes, strict=True):
+            # More force lets an axis in contact try again; one that moves goes on as it did.
+            pressed = new.force > old.force
+            is_new = image.go is not before.go or new.position != old.position
+            if is_new or (pressed and axis in self.arrived):
+                self._standstill[axis].ask(
+                    number,
+                    new.position if image.go else None,
+                    before=old.position if before.go else None,
+                    again=raised or pressed,
+                    rested=axis in self.arrived and before.go,
+                )
+                if image.go:
+                    self.arrived &= ~axis
 
     def acknowledged(self, now: float) -> int:
         """The last image was acknowledged; returns its number."""
@@ -164,13 +202,37 @@ class RequestShadow:
     def see(self, status: RobotiqStatus, asked: float) -> None:
         """Take in a status and when it was asked for; what follows is about it."""
         self.asked = asked
+        self._reads += 1
         if self._writes.last_number:
             self._shown = self._writes.see(status, asked)
+            if self._shown is None and self._suspects_limits(status):
+                self._shown = self._writes.see(status, asked)
+            if self._writes.replaced:
+                self._take_limits()
         else:
             # The very first: not ours, but what any write of ours comes after.
             self._writes.restart(self._image, status.echo, asked)
         if not self._writes.is_in_doubt:
             self._sure_at = asked
+
+    def _suspects_limits(self, status: RobotiqStatus) -> bool:
+        """Whether what is not ours may be limits in place of our last requests."""
+        is_alone = self.asked - self._others_at > ALONE_S and self._adoption is None
+        return is_alone and self._writes.suspect_limits(status)
+
+    def _take_limits(self) -> None:
+        """What is shown in place of our requests is what the axes are asked from here on."""
+        replaced, self._writes.replaced = self._writes.replaced, {}
+        for axis, (request, limit) in replaced.items():
+            if self._image.position(axis) == request:
+                self._image = self._image.with_positions({axis: limit})
+                self._standstill[axis].limit(limit)
+                self.limited[axis] = limit
+
+    def see_others(self) -> None:
+        """Another client was seen."""
+        self._others_at = self.asked
+        self._writes.limits.doubt()
 
     def returned(self, status: RobotiqStatus) -> None:
         """The link was lost and is back, and the gripper follows requests: ours, or it is adopted."""
@@ -186,8 +248,8 @@ class RequestShadow:
         """Take the gripper as it is, without writing."""
         self._contacts.clear()
         # Who writes again and again must not make us wait again and again.
-        since = self.asked if self._adoption is None else self._adoption.since
-        self._adoption = Adoption(status, self.asked, since)
+        since = self.moment if self._adoption is None else self._adoption.since
+        self._adoption = Adoption(status, self.moment, since)
         self._adopted = self.base
         self._writes.adopt(self._adopted, status.echo, self.asked)
 
@@ -197,7 +259,7 @@ class RequestShadow:
         if shown is None:
             return False
         if self._adoption is not None and shown is self._adopted:
-            self._adoption.see(status, self.asked)
+            self._adoption.see(status, self.moment)
         elif self.asked < self._unsure_until and shown is self._adopted:
             self.adopt(status)
         elif self._adoption is not None or self.asked < self._unsure_until:
@@ -214,6 +276,9 @@ class RequestShadow:
             gripper that follows requests does not follow that one.
         """
         self._writes.restart(self._image, status.echo, self.asked)
+        self.arrived = Finger.ALL
+        for standstill in self._standstill.values():
+            standstill.clear()
         return status.echo == self._image.echo and not self._image.release
 
     def see_arrivals(self, status: RobotiqStatus) -> None:
@@ -221,8 +286,41 @@ class RequestShadow:
 
         In a fault an axis that has not begun yet is at rest, too.
         """
-        if self.arrived is not Finger.ALL and status.go_echo and self.is_settled:
-            self.arrived |= Finger.ALL & ~status.moving
+        if self.arrived is Finger.ALL or not status.go_echo:
+            return  # quickly: this runs at every poll
+        now = self.moment
+        for axis in AXES:
+            if axis not in self.arrived:
+                standstill = self._standstill[axis]
+                what = status.finger_status(axis)
+                standstill.see(what, self.acts, self._is_old, now)
+                if standstill.is_known(what, status.position(axis)):
+                    self.arrived |= axis
+                    self._prove_limit(axis, what, status.position(axis))
+
+    def _prove_limit(self, axis: Finger, what: ObjectStatus, position: int) -> None:
+        if axis in self.limited and what is ObjectStatus.AT_POSITION:
+            limit = self._writes.limits.prove(axis, position)
+            if limit is not None:
+                self._log.info("the gripper replaces requests of %s by its limit %d", axis, limit)
+
+    def doubtful(self, status: RobotiqStatus) -> Finger:
+        """The axes that may move, or be about to, although they are shown at rest."""
+        doubtful, now = NO_AXES, self.moment
+        for axis, standstill in self._standstill.items():
+            what = status.finger_status(axis)
+            standstill.see(what, self.acts, self._is_old, now)
+            if standstill.is_doubtful(what, status.position(axis)):
+                doubtful |= axis
+        return doubtful
+
+    def _is_old(self, number: int) -> bool:
+        return self._writes.is_old(number, self.asked)
+
+    @property
+    def moment(self) -> Moment:
+        """When the newest status was asked for, and how many have been read."""
+        return Moment(self.asked, self._reads)
 
     # -- grips -----------------------------------------------------------------------------------------
 
@@ -230,6 +328,8 @@ class RequestShadow:
         """Remember which axes grip, as long as that can be seen."""
         if status.go_echo and (self._contacts or status.contacts):
             contacts = status.contacts
+            if self.arrived is not Finger.ALL and contacts & ~self.arrived:
+                contacts &= ~self.doubtful(status)
             self._contacts = {
                 axis: (status.finger_status(axis), status.position(axis)) for axis in AXES if axis in contacts
             }

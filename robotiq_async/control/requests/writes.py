@@ -12,9 +12,11 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
+from ...enums import Finger
 from ...wire.registers import Echo
 from ...wire.request import Request
 from ...wire.status import RobotiqStatus
+from .limits import Limits
 
 WINDOW_S: Final = 0.5
 """How long after its acknowledgement a write may still be about to show; the slowest device cycle that is
@@ -47,6 +49,8 @@ class _Write:
     echo: Echo
     time: float
     phase: Phase = Phase.SENT
+    alias: Echo | None = None
+    """How it is echoed where a limit takes the place of a request."""
 
 
 class WriteHistory:
@@ -58,6 +62,10 @@ class WriteHistory:
         self.last_number = 0
         """The number of the last image."""
         self._shown: _Write | None = None
+        self.limits = Limits()
+        self.replaced: dict[Finger, tuple[int, int]] = {}
+        """The requests that the newest status is the first to show limited, each with its limit."""
+        self._has_alias = False
 
     @property
     def is_in_doubt(self) -> bool:
@@ -93,7 +101,9 @@ class WriteHistory:
     def writing(self, image: Request, now: float) -> int:
         """An image is about to be sent; returns the number it goes by."""
         self.last_number += 1
-        self._writes.append(_Write(self.last_number, image, image.echo, now))
+        alias = self.limits.alias(image)
+        self._has_alias = self._has_alias or alias is not None
+        self._writes.append(_Write(self.last_number, image, image.echo, now, alias=alias))
         return self.last_number
 
     def acknowledged(self, now: float) -> None:
@@ -120,9 +130,11 @@ class WriteHistory:
         echo = status.echo
         # The usual case first: nothing has changed since the last poll.
         shown = self._shown
-        if shown is not None and shown.echo == echo and shown.number >= self._writes[0].number:
+        is_shown = shown is not None and shown.echo == echo and shown.number >= self._writes[0].number
+        if is_shown and not self._has_alias:
+            assert shown is not None
             return shown.image
-        fitting = [each for each in self._writes if each.echo == echo]
+        fitting = [each for each in self._writes if each.echo == echo or self._is_limited(each, echo, asked)]
         if not fitting:
             return None
         number = shown.number if shown is not None else 0
@@ -130,7 +142,43 @@ class WriteHistory:
         if newer:
             self._shown = newer[0]
             self._shown.phase = Phase.SHOWN
+            self._settle(self._shown, echo)
+        if self._has_alias:
+            self._has_alias = any(each.alias is not None for each in self._writes)
         return (newer or fitting)[0].image
+
+    def suspect_limits(self, status: RobotiqStatus) -> bool:
+        """Whether what a status shows can be limits in place of what was written last."""
+        shown = self._shown
+        waiting = [each for each in self._writes if shown is not None and each.number > shown.number]
+        if shown is None or not waiting or any(each.phase is not Phase.ACKNOWLEDGED for each in waiting):
+            return False
+        if not any(self.limits.suspect(shown.image, each.image, status) for each in waiting):
+            return False
+        for each in waiting:
+            each.alias = self.limits.alias(each.image)
+        self._has_alias = True
+        return True
+
+    def _is_limited(self, write: _Write, echo: Echo, now: float) -> bool:
+        """Whether a write shows as limits in place of its requests.
+
+        What the gripper shows already may be that, or that the write does not act yet: that takes its time.
+        """
+        if write.alias != echo:
+            return False
+        tells = self._shown is None or self._shown.echo != echo
+        return tells or (write.phase is Phase.ACKNOWLEDGED and now - write.time >= SILENT_S)
+
+    def _settle(self, write: _Write, echo: Echo) -> None:
+        """From here on a write is what is shown of it, if that is limits in place of requests."""
+        if echo == write.echo:
+            self.limits.forget(write.image, echo)
+        else:
+            limits = self.limits.apply(write.image)
+            self.replaced = {axis: (write.image.position(axis), limit) for axis, limit in limits.items()}
+            write.image, write.echo = write.image.with_positions(limits), echo
+        write.alias = None
 
     def newest_that_shows_like(self, image: Request) -> Request:
         """The newest image that has arrived for certain and cannot be told from this one by its echo.
@@ -162,6 +210,15 @@ class WriteHistory:
             return False
         # The echo cannot tell the waiting images apart. Equal ones change nothing; a speed or a force does.
         return age >= SILENT_S or all(each.image == last.image for each in waiting)
+
+    def is_old(self, number: int, now: float) -> bool:
+        """Whether the image of this number has not shown, and was acknowledged so long ago that it acts."""
+        if self._shown is None or self._shown.number >= number:
+            return False
+        return any(
+            each.number == number and each.phase is not Phase.SENT and now - each.time >= WINDOW_S
+            for each in self._writes
+        )
 
     def _forget(self, now: float) -> None:
         """Drop what is older than the window, but for the newest of that: the gripper has it, or ought to."""

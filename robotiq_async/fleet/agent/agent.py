@@ -168,7 +168,7 @@ class Agent:
         other = self._other(key)
         if is_there and other is not None:
             _, name = other
-            limited = self._conflicts.setdefault(name.gripper, LimitedLog(Log(str(name))))
+            limited = self._conflicts.setdefault(name.gripper, LimitedLog(Log(name.gripper)))
             is_told = limited.warn("%s: one of them has to go", self._said_of(name), level=logging.ERROR)
             if is_told and name.gripper in self.hands:
                 self.hands[name.gripper].publisher.add({"kind": "conflict", "key": key})

@@ -29,7 +29,7 @@ from ..keys.access_list import AccessList
 from ..keys.key_folder import ACCESS, check_key_folder
 from ..network.configuration import LOOPBACK, LOOPBACK_TLS
 from ..network.endpoints import check_connect, check_listen
-from ..wire.names import SCHEME, check_name
+from ..wire.names import check_name, has_scheme
 from .toml_lines import Names, line_of
 
 _GRIPPERS: Final = "grippers"
@@ -45,6 +45,7 @@ class GripperSettings:
 
     address: str
     device_id: int | None = None
+    read_function: int | None = None
     poll_interval: float = POLL_INTERVAL_S
     connect_timeout: float = CONNECT_TIMEOUT_S
     response_timeout: float = RESPONSE_TIMEOUT_S
@@ -55,13 +56,16 @@ class GripperSettings:
     status_address: int | None = None
     keep_grip: bool = False
 
-    def make_hand(self) -> RobotiqHand:
+    def make_hand(self, name: str) -> RobotiqHand:
         """A hand for the gripper; opens nothing.
+
+        Args:
+            name: the gripper's, by which the log calls it.
 
         Raises:
             TypeError, ValueError: a value that :func:`read_agent_file` would have refused.
         """
-        return RobotiqHand(**asdict(self))
+        return RobotiqHand(**asdict(self), name=name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,7 +206,7 @@ class _Reader:
         self._check_keys_of(table, path, _OF_GRIPPER, needed=("address",))
         address = table["address"]
         with self._blaming(*path, "address"):
-            if isinstance(address, str) and address.startswith(SCHEME):
+            if isinstance(address, str) and has_scheme(address):
                 raise ValueError(f"address must be of a gripper on this host, got {address!r}")
             _check_gripper(address, {})
         for key, value in table.items():

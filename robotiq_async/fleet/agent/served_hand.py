@@ -52,7 +52,7 @@ class ServedHand:
     ) -> None:
         """Serve a hand that is not started."""
         self.name = name
-        self._log = Log(str(name))
+        self._log = Log(name.gripper)
         self._hand = hand
         self._epoch = epoch
         self._records = records
@@ -110,9 +110,9 @@ class ServedHand:
                 if transition.target in RUNNING and self._owed:
                     await self._hold(self._owed)
         except RobotiqError as error:
-            if str(error) != self.publisher.problem:
-                self._log.warning("%s", error)
-            self.publisher.problem = str(error)
+            if error.message != self.publisher.problem:
+                self._log.warning("%s", error.message)
+            self.publisher.problem = error.message
             await self._hand.stop(halt=False)
             await asyncio.sleep(RETRY_S)
 
@@ -138,7 +138,7 @@ class ServedHand:
             self._expire()
             value = self._answer(verb, call, query)
         except (RobotiqError, TypeError, ValueError, OverflowError) as error:  # JSON may hold infinity
-            self._log.info("%s refused: %s", verb, error)
+            self._log.info("%s refused: %s", verb, getattr(error, "message", error))
             # By this gripper, whichever it was for: a copy of it may have found its way meanwhile.
             refused = Answer(self.name.base, call.number, self._epoch, error=error_fields(error))
             self._reply(query, refused)
@@ -272,9 +272,9 @@ class ServedHand:
             await self._hand.hold(axes)
         except RobotiqConnectionError as error:
             self._owed |= axes
-            self._log.warning("the fingers are held when the gripper is reached: %s", error)
+            self._log.warning("the fingers are held when the gripper is reached: %s", error.message)
         except RobotiqError as error:
-            self._log.warning("the fingers could not be held: %s", error)
+            self._log.warning("the fingers could not be held: %s", error.message)
 
     def wake(self) -> None:
         """The machine was suspended: nobody has proven anything since."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 from urllib.parse import parse_qsl
 
-from ..wire.names import SCHEME, GripperName
+from ..wire.names import GripperName, has_scheme
 from .configuration import LOOPBACK, LOOPBACK_TLS, client_configuration
 
 FORM: Final = "zenoh://SITE/HOST/GRIPPER[?connect=tls/HOST:7447][&keys=FOLDER]"
@@ -54,7 +54,7 @@ def default_route() -> Route:
 
 def is_remote(address: object) -> bool:
     """Whether an address is one of a hand on another host."""
-    return isinstance(address, str) and address.startswith(SCHEME)
+    return isinstance(address, str) and has_scheme(address)
 
 
 def parse_remote_address(address: object) -> tuple[GripperName, Route]:

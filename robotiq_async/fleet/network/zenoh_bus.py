@@ -13,8 +13,13 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
-import zenoh
-from zenoh.handlers import Callback
+try:
+    import zenoh
+    from zenoh.handlers import Callback
+except ModuleNotFoundError as error:
+    from ...extras import install
+
+    raise ImportError(f"hands on other hosts need zenoh: {install('fleet')}") from error
 
 from ...concurrency import in_a_thread
 from ...errors import ConnectFailedError

@@ -214,12 +214,10 @@ class LeaseKeeper:
 
     async def _acquire(self, what: Fields) -> None:
         await self._run.agents.check_one()
-        # A run of the agent that has not heard of them gets them with the lease: nothing moves before.
-        settings, run = self._run.settings, self._run.mirror.epoch
-        unknown = settings.unknown_to(run)
-        call = self._run.call({**what, "label": label()} | ({"settings": unknown} if unknown else {}))
+        # With the lease, so that nothing moves before.
+        settings = {"settings": self._run.settings.fields} if self._run.settings.fields else {}
+        call = self._run.call({**what, "label": label(), **settings})
         value = await self._run.send(call, "lease", timeout=ANSWER_S)
-        settings.given_to(run, call.number)
         with reading("a lease"):
             self.lease, self._lease_run = int(value["lease"]), self._run.mirror.epoch
         if not self._is_ending:

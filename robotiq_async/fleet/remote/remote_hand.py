@@ -10,7 +10,7 @@ from ...enums import State
 from ...errors import InvalidStateError, NotStartedError
 from ...log import Log
 from ...session.ending import Ending
-from ...session.options import check_units
+from ...session.options import LONGEST_WAIT_S, check_units
 from ...session.streams import Channels
 from ...session.timing.event_loop import running_loop
 from ...wire.checks import check_flag, check_seconds
@@ -93,23 +93,27 @@ class RemoteHand(RemoteCommands):
         """Stop, also when the block failed or was cancelled."""
         await self.stop()
 
-    async def start(self, activate: bool = True) -> None:
+    async def start(self, activate: bool = True, *, wait: float = 0.0) -> None:
         """Find the agent, acquire the lease, and activate a gripper that is reset: its fingers MOVE then.
 
         A hand that only reads activates nothing. A failed or cancelled start leaves nothing running.
 
         Args:
             activate: False writes nothing to the gripper.
+            wait: seconds, 0..86400, for which there may be no agent or no gripper yet. It may be activated
+                long after the call, and its fingers MOVE only then.
 
         Raises:
             RuntimeError: not in a running asyncio event loop.
             InvalidStateError: this hand is started already.
             ConnectFailedError: no agent that serves this gripper.
+            ImportError: the extra fleet is not installed.
             NotAllowedError: the agent's access rules say no.
             ControlLostError: another client commands the gripper.
             RobotiqError: as for a hand of this process, where the gripper is.
         """
         check_flag("activate", activate)
+        wait = check_seconds("wait", wait, 0.0, LONGEST_WAIT_S)
         running_loop()
         self._abandon_if_loop_closed()
         before = self._session
@@ -131,7 +135,7 @@ class RemoteHand(RemoteCommands):
         self._outbox = Outbox(session)
         try:
             with no_answer_as_lost_connection():
-                await session.connect(self._connect_timeout)
+                await session.connect(max(self._connect_timeout, wait))
             if activate and self._control:
                 await self._activate_if_reset()
         except BaseException:

@@ -28,6 +28,11 @@ def check_name(what: str, name: object) -> str:
     return name
 
 
+def has_scheme(address: str) -> bool:
+    """Whether an address begins as those of hands on other hosts do; in capitals, too."""
+    return address[: len(SCHEME)].lower() == SCHEME
+
+
 @dataclass(frozen=True, slots=True, order=True)
 class GripperName:
     """One gripper of a fleet.
@@ -57,13 +62,13 @@ class GripperName:
 
         Raises:
             TypeError: not a string.
-            ValueError: malformed; the message shows the form.
+            ValueError: malformed; the message says what is wrong, and not with which address.
         """
         if not isinstance(address, str):
             raise TypeError(f"address must be a string, got {address!r}; accepted: {FORM}")
-        parts = address.removeprefix(SCHEME).split("/")
-        if not address.startswith(SCHEME) or len(parts) != 3:
-            raise ValueError(f"malformed address {address!r}; accepted: {FORM}")
+        parts = address[len(SCHEME) :].split("/")
+        if not has_scheme(address) or len(parts) != 3:
+            raise ValueError(f"it must be {FORM}")
         return cls(*parts)
 
     @classmethod

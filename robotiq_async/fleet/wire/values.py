@@ -230,7 +230,10 @@ def statistics_fields(statistics: Statistics) -> Fields:
 def read_statistics(fields: Mapping[str, Any]) -> Statistics:
     """The snapshot of the polling in an object; figures that are not known here are left out.
 
+    Those that an agent of an earlier version does not count are 0.
+
     Raises:
         KeyError, TypeError, ValueError: there is none.
     """
-    return Statistics(**{name: fields[name] for name in Statistics.__dataclass_fields__})
+    figures = {"passing_faults": 0, **fields}
+    return Statistics(**{name: figures[name] for name in Statistics.__dataclass_fields__})

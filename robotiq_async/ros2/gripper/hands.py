@@ -5,11 +5,13 @@ from __future__ import annotations
 from importlib.util import find_spec
 
 from ...errors import RobotiqError
+from ...extras import install
 from ...fleet.network.route import is_remote
 from ...fleet.remote.remote_hand import RemoteHand
 from ...hand import RobotiqHand
 from ...protocol import Hand
-from ..translation.settings import Settings
+from ...session.options import POLL_INTERVAL_S
+from ..translation.settings import USUAL, Settings
 
 
 def make_hand(settings: Settings) -> Hand:
@@ -23,11 +25,23 @@ def make_hand(settings: Settings) -> Hand:
     """
     if is_remote(settings.address):
         if find_spec("zenoh") is None:
-            raise RobotiqError("a gripper on another host needs zenoh: pip install 'robotiq-async[fleet]'")
+            raise RobotiqError(f"a gripper on another host needs zenoh: {install('fleet')}")
         return RemoteHand(settings.address, control=None)
     return RobotiqHand(
         settings.address,
-        poll_interval=settings.poll_interval,
+        device_id=_given(settings.device_id),
+        read_function=_given(settings.read_function),
+        poll_interval=_or_usual(settings.poll_interval),
+        response_timeout=settings.response_timeout,
         speed=settings.speed,
         force=settings.force,
     )
+
+
+def _given(number: int) -> int | None:
+    return None if number == USUAL else number
+
+
+def _or_usual(interval: float) -> float:
+    """The default comes back from ROS as a plain figure, which would count as given on purpose."""
+    return POLL_INTERVAL_S if interval == POLL_INTERVAL_S else interval

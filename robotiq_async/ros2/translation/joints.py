@@ -17,7 +17,7 @@ from types import MappingProxyType
 from typing import Final
 
 from ...enums import Finger
-from ...kinematics import BASE, JOINTS, MIDDLE, PALM, PREFIX, Points, joint_angles
+from ...kinematics import BASE, FINGER_NAMES, JOINTS, MIDDLE, PALM, Points, joint_angles
 from ...wire.status import RobotiqStatus
 
 FINGERS: Final = "fingers"
@@ -132,11 +132,11 @@ def targets(names: Sequence[str], angles: Sequence[float], prefix: str = "") -> 
     counts: dict[Finger, int] = {}
     for name, angle in asked.items():
         if name == FINGERS:
-            for finger in PREFIX:
+            for finger in FINGER_NAMES:
                 counts[finger] = _closing_counts(angle)
         elif name == _PALM_JOINT:
             counts[Finger.SCISSOR] = _counts(name, angle, LIMITS[name], PALM)
-    for finger, name in PREFIX.items():
+    for finger, name in FINGER_NAMES.items():
         base, middle = asked.get(f"{name}_joint_1"), asked.get(f"{name}_joint_2")
         if base is None and middle is None:
             continue
@@ -223,7 +223,7 @@ def _between(angle: float, points: Points) -> int:
 _BASE_RANGE: Final = (0.0, _BASE_LIMITS[1])
 """Of goals: 0 for an open finger is what people write, although it reads a little more there."""
 _COMMANDED: Final = (
-    *(f"{name}_joint_{number}" for name in PREFIX.values() for number in (1, 2)),
+    *(f"{name}_joint_{number}" for name in FINGER_NAMES.values() for number in (1, 2)),
     _PALM_JOINT,
     FINGERS,
 )

@@ -10,10 +10,12 @@ from typing import Final
 from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...fleet.network.route import is_remote, parse_remote_address
 from ...link.address import parse_address
-from ...session.options import POLL_INTERVAL_S
-from ...wire.checks import check_byte, check_number, check_seconds
+from ...session.options import LONGEST_RESPONSE_S, POLL_INTERVAL_S, RESPONSE_TIMEOUT_S
+from ...wire.checks import check_int, check_number, check_seconds
 
 Value = str | int | float | bool
+USUAL: Final = -1
+"""A parameter of ROS always has a value: this one stands for none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +40,20 @@ class Parameter:
 PARAMETERS: Final[Mapping[str, Parameter]] = {
     "address": Parameter(
         "sim://",
-        "The gripper: tcp://HOST[:502], rtu:///dev/ttyUSB0, zenoh://SITE/HOST/GRIPPER, or sim://, simulated.",
+        "The gripper: tcp://HOST[:502], rtu:///dev/ttyUSB0, rtu+tcp://HOST:PORT, zenoh://SITE/HOST/GRIPPER, "
+        "or sim://, simulated.",
+    ),
+    "device_id": Parameter(USUAL, "Modbus unit id; -1 is what is usual: 2 over TCP, 9 over RTU.", USUAL, 255),
+    "read_function": Parameter(
+        USUAL, "Modbus function that reads, 3 or 4; -1 is what is usual: 4 over TCP, 3 over RTU.", USUAL, 4
     ),
     "poll_interval": Parameter(
-        POLL_INTERVAL_S, "Seconds between two polls; a gripper on another host is polled there.", 0.001, 0.1
+        float(POLL_INTERVAL_S),
+        "Seconds between two polls; 0.005 is 0.015 over RTU. A gripper on another host is polled there.",
+        0.001,
+        0.1,
     ),
+    "response_timeout": Parameter(RESPONSE_TIMEOUT_S, "Seconds for one answer.", 0.005, LONGEST_RESPONSE_S),
     "publish_rate": Parameter(50.0, "Joint states a second.", 1.0, 200.0),
     "joint_prefix": Parameter(
         "", "Stands before the name of every joint, as it is: left_ makes left_finger_1_joint_1."
@@ -74,7 +85,10 @@ class Settings:
     """
 
     address: str
+    device_id: int
+    read_function: int
     poll_interval: float
+    response_timeout: float
     publish_rate: float
     joint_prefix: str
     frame_id: str
@@ -110,8 +124,11 @@ def check_parameter(name: str, value: object) -> Value:
             check = _CHECKS.get(name)
             return text if check is None else check(str(text))
         if isinstance(parameter.default, int):
-            return check_byte(name, value)
-        if name.endswith("interval"):
+            number = check_int(name, value, int(parameter.low), int(parameter.high))
+            if name == "read_function" and number not in (USUAL, 3, 4):
+                raise ValueError(f"read_function must be 3, 4 or {USUAL}, got {value!r}")
+            return number
+        if name.endswith(("interval", "timeout")):
             return check_seconds(name, value, parameter.low, parameter.high)
         return check_number(name, value, parameter.low, parameter.high)
     except TypeError as error:

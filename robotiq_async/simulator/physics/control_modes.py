@@ -5,8 +5,9 @@ All of it is data: a :data:`Goals` tuple says where each axis goes, a sequence i
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
+from robotiq_async.calibration.closing_time import closing_time
 from robotiq_async.enums import (
     CLOSED,
     OPEN,
@@ -16,6 +17,9 @@ from robotiq_async.enums import (
     WIDTH_WIDE,
     Mode,
 )
+from robotiq_async.wire.checks import check_int
+
+from .mechanics.goal import Goal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,27 +27,11 @@ if TYPE_CHECKING:
     from robotiq_async.wire.request import AxisRequest, Request
 
 
-class Goal(NamedTuple):
-    """Where an axis goes, how fast and with what force, in counts.
-
-    Attributes:
-        position: where to.
-        speed: 0..255.
-        force: 0..255.
-        is_reading: the axis ends where it reads the position, and not beside it as after a request.
-    """
-
-    position: int
-    speed: int
-    force: int
-    is_reading: bool = False
-
-
 Goals = tuple[Goal | None, ...]
 """Where A, B, C and the scissor go; None for an axis that stands still."""
 
-SCISSOR_LOW: Final = OPEN_READING
-"""Where the scissor is open: TAMS recorded a pose at 11; as no more is known, it ends where a finger does."""
+SCISSOR_LOW: Final = 15
+"""Scissor reading when it is open: two drivers use 15..232."""
 SCISSOR_HIGH: Final = 232
 """Scissor reading when the scissor mode has closed it, its closing stop (manual)."""
 PINCH_CLOSED_READING: Final = 113
@@ -55,6 +43,17 @@ MODE_POSITION: Final = {Mode.BASIC: 137, Mode.PINCH: 219, Mode.WIDE: 24, Mode.SC
 _SEQUENCE_SPEED: Final = SPEED_MAX
 _SEQUENCE_FORCE: Final = 128
 _RELEASE_SPEED: Final = SPEED_MIN
+
+
+def check_scissor_limit(limit: tuple[int, int]) -> tuple[int, int]:
+    """The range that a software limit leaves the scissor, checked.
+
+    Raises:
+        TypeError: an end of it is not an int.
+        ValueError: it is not a range within 6..232.
+    """
+    low = check_int("scissor_limit", limit[0], OPEN_READING, SCISSOR_HIGH)
+    return low, check_int("scissor_limit", limit[1], low, SCISSOR_HIGH)
 
 
 def finger_limit(mode: Mode | None) -> int | None:
@@ -82,10 +81,18 @@ def requested(request: Request, readings: Sequence[int]) -> Goals:
     return *fingers, grip if scissor_grips else _on_its_own(MODE_POSITION[request.mode])
 
 
-def activation(mode: Mode | None) -> tuple[Goals, ...]:
-    """Fingers close, then open; the scissor goes to its mode meanwhile (basic without one)."""
-    close, open_ = _on_its_own(CLOSED), _on_its_own(OPEN)
-    scissor = _on_its_own(MODE_POSITION[Mode.BASIC if mode is None else mode])
+def activation(mode: Mode | None, seconds: float) -> tuple[Goals, ...]:
+    """Fingers close, then open, each in half the time; the scissor goes to its mode meanwhile.
+
+    Args:
+        mode: the mode; None for none, which is as basic.
+        seconds: how long it is to take; it is never faster than the gripper.
+    """
+    stroke_time = max(seconds / 2, closing_time(_SEQUENCE_SPEED))
+    close, open_, scissor = (
+        _on_its_own(position)._replace(stroke_time=stroke_time, clears=True)
+        for position in (CLOSED, OPEN, MODE_POSITION[Mode.BASIC if mode is None else mode])
+    )
     return (close, close, close, scissor), (open_, open_, open_, None)
 
 

@@ -6,8 +6,10 @@ before doing anything later; all times are simulated seconds.
 
 from __future__ import annotations
 
+import math
 from collections import deque
-from typing import Final
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final
 
 from robotiq_async.enums import (
     AXES,
@@ -19,17 +21,20 @@ from robotiq_async.enums import (
     Mode,
     ObjectStatus,
 )
-from robotiq_async.wire import registers as reg
-from robotiq_async.wire.request import Request
 
 from . import control_modes as control
-from .axis import Axis
+from .emergency_stop import EmergencyStop
 from .faults import PresentFaults
-from .motor import MOTORS, Motor
-from .spread import Spread
+from .inbox import REST
+from .mechanics.axis import Axis
+from .mechanics.motor import MOTORS, Motor
+from .mechanics.spread import Spread
+from .status_trail import NOTHING, Statuses, StatusTrail
 
-REST: Final = Request.from_registers((0,) * reg.REGISTER_COUNT)
-"""The image of a gripper that was just switched on: all zero."""
+if TYPE_CHECKING:
+    from robotiq_async.wire.request import Request
+
+    from .habits import Habits
 
 _NOWHERE: Final[control.Goals] = (None,) * len(AXES)
 
@@ -39,32 +44,40 @@ class Controller:
 
     Attributes:
         axes: A, B, C and the scissor.
+        habits: how it does what the manual leaves open.
         request: the image in force.
         progress: what gIMC says.
         faults: the faults that are present, apart from those that follow from the request and the progress.
         fail_activation: the next activation ends in fault 0x0D; reset to False when it does.
+        is_asleep: the next image with rACT = 1 wakes the gripper, and moves nothing.
     """
 
-    def __init__(self, scissor_limit: tuple[int, int], seed: int | None) -> None:
+    def __init__(self, scissor_limit: tuple[int, int], seed: int | None, habits: Habits) -> None:
         """An open gripper in the basic mode's shape, reset; without a seed one that is exact."""
         *fingers, scissor = (Spread(seed, axis) for axis in AXES)
         self.axes = (
             *(_finger(motor, spread) for motor, spread in zip(MOTORS[:3], fingers, strict=True)),
             Axis(control.MODE_POSITION[Mode.BASIC], *scissor_limit, MOTORS[3], scissor),
         )
-        self.request = REST
+        self.habits = habits
+        self.request = self._obeyed = REST
         self.progress = Initialization.RESET
         self.faults = PresentFaults()
         self.fail_activation = False
+        self.is_asleep = False
+        self._stop = EmergencyStop()
         self._release = Fault.NONE
         self._mode: Mode | None = None
         self._steps: deque[control.Goals] = deque()
+        self._step_lasts_until = -math.inf
+        self._trail = StatusTrail()
 
     @property
     def next_event(self) -> float:
         """When something happens next by itself; infinite when nothing will."""
         a, b, c, scissor = self.axes
-        return min(self.faults.changes_at, a.ends_at, b.ends_at, c.ends_at, scissor.ends_at)
+        step_ends = self._step_lasts_until if self._steps and self._is_done(self._steps[0]) else math.inf
+        return min(self.faults.changes_at, a.ends_at, b.ends_at, c.ends_at, scissor.ends_at, step_ends)
 
     def update(self, time: float) -> None:
         """Let happen what happens at this time, and drive the axes accordingly."""
@@ -76,14 +89,16 @@ class Controller:
 
     def apply(self, time: float, request: Request) -> None:
         """Put an image into force; the same again changes nothing."""
-        if request == self.request:
+        obeyed = self._obeyed_of(request)
+        if request == self.request and obeyed == self._obeyed:
             return
-        was_active, self.request = self.request.activate, request
+        was_active, self.request, self._obeyed = self.request.activate, request, obeyed
         if was_active and not request.activate:
             self.reset(time)
         elif request.activate and not was_active:
             self._set_mode(time, self._requested_mode)
-            self._begin(time, Initialization.ACTIVATING, control.activation(self._mode))
+            steps = control.activation(self._mode, self.habits.activation_time)
+            self._begin(time, Initialization.ACTIVATING, steps)
         if request.release:
             self.release(time)
         self._follow_mode(time)
@@ -91,11 +106,14 @@ class Controller:
 
     def power_off(self, time: float) -> None:
         """Forget the request and everything that came of it; the axes stay where they are."""
-        self.request = REST
+        self.request = self._obeyed = REST
+        self.is_asleep = False
+        self._stop.forget()
         self.reset(time)
 
     def reset(self, time: float) -> None:
         """Stop at once and forget faults, sequences and what was touched; nothing moves after it."""
+        self._stop.reset()
         self.faults.clear()
         self._release = Fault.NONE
         self._begin(time, Initialization.RESET, ())
@@ -107,6 +125,33 @@ class Controller:
             self._begin(time, Initialization.RESET, control.release())
             self._drive(time)
 
+    def stop(self, time: float, resets: int) -> None:
+        """Begin an emergency stop, after whose end so many resets are needed."""
+        self._stop.press(resets)
+        if self.request.activate:
+            self._begin(time, Initialization.ACTIVATING, ())
+
+    def end_stop(self) -> None:
+        """End an emergency stop."""
+        self._stop.end()
+
+    @property
+    def echoes(self) -> tuple[int, ...]:
+        """What gPR says of each axis: its own register, even where simple control drives it by another."""
+        *fingers, scissor = (axis.position for axis in self.request.axes)
+        if self.habits.echoes_limits and self.progress is Initialization.COMPLETE:
+            if (limit := control.finger_limit(self._mode)) is not None:
+                fingers = [min(limit, position) for position in fingers]
+            if self.request.individual_scissor:
+                scissor = self.axes[-1].within_stops(scissor)
+        return *fingers, scissor
+
+    def shown_statuses(self, time: float) -> Statuses:
+        """What gDT says of each axis."""
+        if self.progress is not Initialization.COMPLETE:
+            return NOTHING
+        return self._trail.at(time - self.habits.status_lag)
+
     @property
     def fault(self) -> Fault:
         """What gFLT says: the release above all, then the worst fault, then a request that has to wait."""
@@ -116,6 +161,8 @@ class Controller:
 
     @property
     def _waiting(self) -> Fault:
+        if self.request.activate and self._stop.is_in_force:
+            return Fault.ACTIVATION_PENDING
         if not self.request.go:
             return Fault.NONE
         if not self.request.activate:
@@ -128,17 +175,29 @@ class Controller:
 
     @property
     def _requested_mode(self) -> Mode | None:
-        return None if self.request.individual_scissor else self.request.mode
+        return None if self._obeyed.individual_scissor else self._obeyed.mode
+
+    def _obeyed_of(self, request: Request) -> Request:
+        """What is done of an image: all, unless it wakes the gripper; then it moves nothing."""
+        if not self.is_asleep or not request.activate:
+            return request
+        self.is_asleep = False
+        if not request.go:
+            return request
+        before = self._obeyed
+        return replace(before, activate=True, release=request.release)
 
     def _follow_mode(self, time: float) -> None:
         """Begin, replace or abandon a mode change; only an active gripper does."""
         mode = self._requested_mode
         if mode == self._mode or self.progress not in (Initialization.COMPLETE, Initialization.CHANGING_MODE):
             return
+        was_changing = self.progress is Initialization.CHANGING_MODE
+        opens = was_changing or self._mode is not None or self.habits.opens_without_rics
         self._set_mode(time, mode)
-        if mode is not None:
+        if mode is not None and opens:
             self._begin(time, Initialization.CHANGING_MODE, control.mode_change(mode))
-        elif self.progress is Initialization.CHANGING_MODE:
+        elif was_changing:
             self._begin(time, Initialization.COMPLETE, ())
 
     def _set_mode(self, time: float, mode: Mode | None) -> None:
@@ -150,6 +209,8 @@ class Controller:
         self.progress = progress
         self._steps = deque(steps)
         self._clear_axes(time)
+        self._begin_step(time)
+        self._note(time)
 
     def _clear_axes(self, time: float) -> None:
         for axis in self.axes:
@@ -158,38 +219,54 @@ class Controller:
     def _drive(self, time: float) -> None:
         """Send every axis where it has to go now; steps of a sequence follow one another."""
         self._command(time, self._goals(time))
-        while self._steps and self._is_done(self._steps[0]):
-            self._steps.popleft()
-            self._clear_axes(time)
-            if not self._steps:
-                self._finish(time)
+        while self._steps and self._is_done(self._steps[0]) and time >= self._step_lasts_until:
+            self._end_step(time)
             self._command(time, self._goals(time))
+        self._note(time)
+
+    def _begin_step(self, time: float) -> None:
+        """A step of an activation lasts as long wherever it begins."""
+        half = self.habits.activation_time / 2 if self.progress is Initialization.ACTIVATING else 0.0
+        self._step_lasts_until = time + half
+
+    def _end_step(self, time: float) -> None:
+        """Go on to the next step; an activation that has met something ends in a fault."""
+        self._steps.popleft()
+        if self.progress is Initialization.ACTIVATING and any(axis.status.is_contact for axis in self.axes):
+            self._steps.clear()
+            self.fail_activation = True
+        self._clear_axes(time)
+        self._begin_step(time)
+        if not self._steps:
+            self._finish(time)
 
     def _goals(self, time: float) -> control.Goals:
         if self._steps:
             return self._steps[0]
-        if self.progress is Initialization.COMPLETE and self.request.go:
-            return control.requested(self.request, [round(axis.position(time)) for axis in self.axes])
+        if self.progress is Initialization.COMPLETE and self._obeyed.go:
+            return control.requested(self._obeyed, [round(axis.position(time)) for axis in self.axes])
         return _NOWHERE
 
     def _command(self, time: float, goals: control.Goals) -> None:
         for name, axis, goal in zip(AXES, self.axes, goals, strict=True):
             if goal is None or self._is_stopped(name):
-                axis.hold(time)
+                axis.hold(time, locks=not self.habits.lets_go_on_halt)
             else:
                 axis.command(time, goal)
 
     def _is_stopped(self, name: Finger) -> bool:
-        """Whether a fault keeps the axis from moving; nothing stops the automatic release."""
+        """Whether a fault keeps the axis from moving; nothing but the power stops the automatic release."""
+        if self._stop.is_in_force:
+            return True
         if self._release is not Fault.NONE:
             return False
         return self.faults.stops_scissor if name is Finger.SCISSOR else self.faults.stops_fingers
 
     def _is_done(self, step: control.Goals) -> bool:
-        """Whether every axis of the step has arrived or touched something."""
+        """Whether every axis of the step has arrived or touched something, and may go on."""
         return all(
-            goal is None or axis.status is not ObjectStatus.IN_MOTION
-            for axis, goal in zip(self.axes, step, strict=True)
+            goal is None or (axis.status is not ObjectStatus.IN_MOTION and not self._is_stopped(name))
+            for name, axis, goal in zip(AXES, self.axes, step, strict=True)
         )
 
     def _finish(self, time: float) -> None:
@@ -202,6 +279,17 @@ class Controller:
         else:
             self.progress = Initialization.COMPLETE
             self._follow_mode(time)
+
+    def _note(self, time: float) -> None:
+        """Let the trail know what gDT is from now on."""
+        statuses = tuple(axis.status for axis in self.axes)
+        if self.progress is not Initialization.COMPLETE or self._is_silent_on_halt:
+            statuses = NOTHING
+        self._trail.note(time, statuses, self.habits.status_lag)
+
+    @property
+    def _is_silent_on_halt(self) -> bool:
+        return not (self.request.go or self.habits.keeps_status_on_halt)
 
 
 def _finger(motor: Motor, spread: Spread) -> Axis:

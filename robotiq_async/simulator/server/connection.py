@@ -30,8 +30,8 @@ class Endpoint(Protocol):
     """What a connection asks of the simulator it belongs to."""
 
     @property
-    def functions(self) -> Collection[int]:
-        """The Modbus functions that are served."""
+    def served_functions(self) -> Collection[int]:
+        """The Modbus functions that are served now."""
 
     @property
     def answers_nobody(self) -> bool:
@@ -48,6 +48,9 @@ class Endpoint(Protocol):
 
     def undelivered(self, part: bytes) -> None:
         """Take what was to be sent to a client that is gone."""
+
+    def lets_in(self, client: Connection) -> bool:
+        """Whether a client that has come may stay."""
 
     def left_over(self) -> Iterable[bytes]:
         """What a new client is sent before it has asked for anything."""
@@ -77,6 +80,9 @@ class Connection(ServerRequestHandler):
     def callback_connected(self) -> None:
         """A client is there."""
         super().callback_connected()
+        if not self._endpoint.lets_in(self):
+            self.hang_up(reset=True)
+            return
         for part in self._endpoint.left_over():
             self.pass_on(part)
 
@@ -171,7 +177,7 @@ class Connection(ServerRequestHandler):
 
     def _answer(self, frame: Frame) -> None:
         self._answering = True
-        if (code := refusal(frame.pdu, self._endpoint.functions)) is not None:
+        if (code := refusal(frame.pdu, self._endpoint.served_functions)) is not None:
             self.pdu_send(ExceptionResponse(frame.pdu[0], code, frame.unit, frame.transaction))
             return
         self.recv_buffer = b""

@@ -7,9 +7,11 @@ from abc import ABC, abstractmethod
 from collections import deque
 from typing import TYPE_CHECKING, ClassVar, Final, Self
 
+from ..functions import READ_INPUT
 from ..physics.gripper import SimulatedGripper
 from ..troubles.corruption import ReplyPolicy, unchanged
 from ..troubles.fault_injector import FaultInjector
+from ..troubles.like_hardware import OWN_HABITS
 from ..troubles.replies import Replies
 from .connection import Connection
 
@@ -31,7 +33,8 @@ class SimulatorEndpoint(ABC):
     """A simulated gripper on a link.
 
     Attributes:
-        gripper: what answers. It keeps its state when the server is stopped and started again.
+        gripper: what answers. It keeps its state when the server is stopped and started again. One that is
+            not given takes 12 s for an activation.
         policy: decides what becomes of each reply that no trouble is about.
         fault_injector: makes troubles happen, and decides on requests and replies.
         replies: gives it a policy, in a word.
@@ -39,11 +42,11 @@ class SimulatorEndpoint(ABC):
 
     link: ClassVar[Link]
     functions: ClassVar[Collection[int]]
-    """The Modbus functions that are served."""
+    """The Modbus functions that are served without any trouble."""
 
     def __init__(self, gripper: SimulatedGripper | None) -> None:
         """A server that is not started."""
-        self.gripper = SimulatedGripper() if gripper is None else gripper
+        self.gripper = SimulatedGripper(habits=OWN_HABITS) if gripper is None else gripper
         self.policy: ReplyPolicy = unchanged
         self.fault_injector = FaultInjector(self)
         self.replies = Replies(self)
@@ -118,6 +121,18 @@ class SimulatorEndpoint(ABC):
         return self._server
 
     # What connections ask (see connection.Endpoint).
+
+    @property
+    def served_functions(self) -> Collection[int]:
+        """The Modbus functions that are served now."""
+        if self.fault_injector.reads_only_with_function_3:
+            return set(self.functions) - {READ_INPUT}
+        return self.functions
+
+    def lets_in(self, client: Connection) -> bool:
+        """Whether a client that has come may stay."""
+        others = [] if self._server is None else connections(self._server)
+        return self.fault_injector.lets_in(sum(each.is_active() for each in others if each is not client))
 
     @property
     def answers_nobody(self) -> bool:

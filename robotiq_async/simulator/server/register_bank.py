@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pymodbus.constants import ExcCodes
 
     from ..physics.gripper import SimulatedGripper
+    from ..troubles.fault_injector import FaultInjector
 
 _STARTS: Final = (0, RTU_REGISTERS.request, RTU_REGISTERS.status)
 
@@ -34,12 +35,13 @@ class RegisterBank:
     0x07D0  status block            status block            address refused
     ======  ======================  ======================  =================
 
-    FC23 writes before it reads.
+    FC23 writes before it reads. Where function 3 has to do for 4, it reads the status at 0x0000.
     """
 
-    def __init__(self, gripper: SimulatedGripper) -> None:
-        """The registers of one gripper."""
+    def __init__(self, gripper: SimulatedGripper, troubles: FaultInjector) -> None:
+        """The registers of one gripper, and what goes wrong with it."""
         self._gripper = gripper
+        self._troubles = troubles
 
     def device(self) -> SimDevice:
         """A device that answers any unit id."""
@@ -65,8 +67,13 @@ class RegisterBank:
         if set_values is not None:
             self._gripper.write(offset, [int(value) for value in set_values])
         elif function_code in (READ_HOLDING, READ_INPUT, READ_WRITE):
-            is_status = block == RTU_REGISTERS.status or (block == 0 and function_code == READ_INPUT)
+            is_status = block == RTU_REGISTERS.status or (block == 0 and self._reads_status(function_code))
             registers = self._gripper.status_registers() if is_status else self._gripper.request_registers
             first = address - start_address
             current_registers[first : first + count] = registers[offset : offset + count]
         return None
+
+    def _reads_status(self, function_code: int) -> bool:
+        """Whether a function reads the status at 0x0000, and not the request."""
+        status = READ_HOLDING if self._troubles.reads_only_with_function_3 else READ_INPUT
+        return function_code == status

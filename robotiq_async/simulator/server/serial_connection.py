@@ -1,15 +1,16 @@
-"""The serial line of a simulator: where a frame ends, and bytes that nobody takes."""
+"""The serial line of a simulator: where a frame ends, how long it takes, and bytes that nobody takes."""
 
 from __future__ import annotations
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from .connection import MOST_UNREAD, Connection
+from .connection import MOST_UNREAD, Connection, Endpoint
 from .framing import take_rtu
+from .wire_time import SILENCE_S, WireTime
 
-SILENCE_S: Final = 0.00175
-"""Modbus RTU ends a frame at a silence of 3.5 characters; at more than 19200 baud of this, whatever a
-character takes (Modbus over Serial Line, 2.5.1.1)."""
+if TYPE_CHECKING:
+    from pymodbus.server.base import ModbusBaseServer
+
 LONGEST_PAUSE_S: Final = 0.02
 """Longer than this no frame pauses on its way to this program, which does not see the wire: a USB adapter
 keeps what it has for up to 16 ms (the usual latency timer), and who writes half a frame to a pseudo terminal
@@ -23,21 +24,53 @@ MOST_UNSENT: Final = 4096
 class SerialConnection(Connection):
     """The other end of a serial line, which has no connections, no packets and no flow control."""
 
-    _heard_at = 0.0
-    _unsent = 0
-    """Bytes sent since the line had taken all of them."""
+    def __init__(self, owner: ModbusBaseServer, endpoint: Endpoint, *, paced: bool) -> None:
+        """The end of a line.
+
+        Args:
+            owner: pymodbus's server.
+            endpoint: the simulator it belongs to.
+            paced: whether bytes take the time that they take at the baud rate.
+        """
+        super().__init__(owner, endpoint)
+        self._wire = WireTime() if paced else None
+        self._heard_at = 0.0
+        self._unsent = 0
+        """Bytes sent since the line had taken all of them."""
 
     def data_received(self, data: bytes) -> None:
-        """Take bytes from the line; those of a frame that was cut off before are dropped."""
+        """Take bytes from the line, once they have come; more than it can carry for long is lost."""
         now = self.loop.time()
-        pause, self._heard_at = now - self._heard_at, now
+        if self._wire is None:
+            pause, self._heard_at = now - self._heard_at, now
+            self._hear(data, pause)
+        elif self._wire.unheard(now) < MOST_UNREAD:
+            due, pause = self._wire.hears(now, len(data))
+            self.loop.call_at(due, self._hear_late, due, data, pause)
+
+    def _hear_late(self, due: float, data: bytes, pause: float) -> None:
+        assert self._wire is not None, "bytes take time"
+        self._wire.heard(due)
+        if self.is_active():
+            self._hear(data, pause)
+
+    def _hear(self, data: bytes, pause: float) -> None:
+        """Bytes have come; those of a frame that was cut off before them are dropped."""
         self._answer_next()  # what is whole is not cut off, even if it has not had its turn
         if not self._answering and _begins_anew(pause, data):
             self._inbox.clear()
         super().data_received(data)
 
     def pass_on(self, part: bytes) -> None:
-        """Send bytes now, unless nobody has taken those before."""
+        """Send bytes: whoever reads has them when the last one has come."""
+        now = self.loop.time()
+        if self._wire is None:
+            self._put(part)
+        elif part and self._wire.unsent(now) < MOST_UNSENT:
+            self.loop.call_at(self._wire.sends(now, len(part)), self._put, part)
+
+    def _put(self, part: bytes) -> None:
+        """Give bytes to the line, unless nobody has taken those before."""
         if self.is_active() and not self.transport.get_write_buffer_size():  # type: ignore[attr-defined]
             self._unsent = 0
         if self._unsent + len(part) <= MOST_UNSENT:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, ClassVar, Final
 
 from pymodbus.server import ModbusTcpServer
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from pymodbus.server.base import ModbusBaseServer
 
     from ..physics.gripper import SimulatedGripper
+    from ..troubles.trouble import Link
 
 _LONGEST_OFF: Final = 3600.0
 
@@ -35,7 +36,7 @@ class SimulatorServer(SimulatorEndpoint):
     replies is not read from until it does.
     """
 
-    link = "tcp"
+    link: ClassVar[Link] = "tcp"
     functions = TCP_FUNCTIONS
 
     def __init__(
@@ -130,9 +131,12 @@ class SimulatorServer(SimulatorEndpoint):
         return self._device_id in (None, unit)
 
     async def _open(self) -> ModbusTcpServer:
-        server = _TcpServer(self)
+        server = self._make_server()
         await self._listen(server)
         return server
+
+    def _make_server(self) -> ModbusTcpServer:
+        return _TcpServer(self)
 
     async def _listen(self, server: ModbusBaseServer) -> None:
         """Listen. pymodbus's own listen() hides the error and cannot listen again on a port it found."""
@@ -154,7 +158,7 @@ class SimulatorServer(SimulatorEndpoint):
 
 class _TcpServer(ModbusTcpServer):
     def __init__(self, endpoint: SimulatorServer) -> None:
-        super().__init__(RegisterBank(endpoint.gripper).device())
+        super().__init__(RegisterBank(endpoint.gripper, endpoint.fault_injector).device())
         self._endpoint = endpoint
 
     def callback_new_connection(self) -> Connection:

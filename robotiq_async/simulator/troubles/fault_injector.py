@@ -7,7 +7,7 @@ import contextlib
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from robotiq_async.wire.request import AxisRequest, Request
 
@@ -47,6 +47,8 @@ class FaultInjector:
         self._ongoing: list[Ongoing] = []
         self._device_cycle = target.gripper.device_cycle
         """What the gripper has when nothing makes it slow."""
+        self._habits = target.gripper.habits
+        """Those it has without any trouble."""
         self._idle: asyncio.TimerHandle | None = None
         """When the gripper loses its activation unless a request comes before."""
 
@@ -62,7 +64,7 @@ class FaultInjector:
             ValueError: one of them does not.
         """
         for trouble in troubles:
-            if KINDS[trouble.kind].link not in (None, self._target.link):
+            if not KINDS[trouble.kind].fits(self._target.link):
                 raise ValueError(f"{trouble.kind} does not fit a simulator on {self._target.link}")
 
     async def begin(self, trouble: Trouble) -> Ongoing:
@@ -148,6 +150,19 @@ class FaultInjector:
         """Whether clients share a connection to the gripper that outlives theirs."""
         return bool(self._lasting("multiplexer"))
 
+    @property
+    def reads_only_with_function_3(self) -> bool:
+        """Whether function 4 is refused, and 3 serves in its place."""
+        return bool(self._lasting("function-3-only"))
+
+    def lets_in(self, present: int) -> bool:
+        """Whether a new connection is let in, beside those that there are."""
+        if present and self._lasting("one-connection-only"):
+            return False
+        if self._lasting("wake-needed"):
+            self._target.gripper.is_asleep = True
+        return True
+
     def hears(self) -> bool:
         """Whether the request that came in is heard."""
         for ongoing in self._ongoing:
@@ -159,7 +174,7 @@ class FaultInjector:
 
     def deliver(self, frame: bytes) -> Iterable[tuple[float, bytes]] | None:
         """What to send for a reply; None to hang up."""
-        reply = Reply(frame, self._target.link == "rtu")
+        reply = Reply(frame, serial=self._target.link != "tcp")
         for ongoing in self._ongoing:
             parts = ongoing.trouble.corrupt(reply)
             if parts is not None:
@@ -207,6 +222,12 @@ class FaultInjector:
                 gripper.inject_fault(int(amount))
             case "release":
                 gripper.emergency_release()
+            case "e-stop":
+                gripper.emergency_stop(int(amount))
+        if KINDS[trouble.kind].habit is not None:
+            if not self._changed_habits():
+                self._habits = gripper.habits
+            self._change_habit(trouble)
 
     async def _undo(self, trouble: Trouble) -> None:
         """What happens at the end; the troubles that go on keep their effect."""
@@ -226,6 +247,25 @@ class FaultInjector:
                 gripper.clear_faults()
                 for each in self._lasting("interference", "fault"):
                     self._do(each)
+            case "e-stop":
+                if not self._lasting("e-stop"):
+                    gripper.end_emergency_stop()
+            case "wake-needed":
+                gripper.is_asleep = gripper.is_asleep and bool(self._lasting("wake-needed"))
+        if KINDS[trouble.kind].habit is not None:
+            gripper.habits = self._habits
+            for each in self._changed_habits():
+                self._change_habit(each)
+
+    def _change_habit(self, trouble: Trouble) -> None:
+        """Give the gripper a habit; its times are the gripper's, those of a trouble are real."""
+        gripper, kind = self._target.gripper, KINDS[trouble.kind]
+        change: Any = {kind.habit: True if kind.value is None else trouble.amount * gripper.speedup}
+        gripper.habits = replace(gripper.habits, **change)
+
+    def _changed_habits(self) -> list[Trouble]:
+        """The troubles that last and change habits, oldest first."""
+        return self._lasting(*(name for name, kind in KINDS.items() if kind.habit is not None))
 
     def _await_request(self) -> None:
         """Begin to wait for the next request, as long as the least patient trouble says."""

@@ -26,7 +26,7 @@ _EVENT: Final = 0.0
 _CONDITION: Final = math.inf
 
 On = Literal["read", "write", "any"]
-Link = Literal["tcp", "rtu"]
+Link = Literal["tcp", "rtu", "rtu+tcp"]
 
 
 class Kind(NamedTuple):
@@ -41,6 +41,7 @@ class Kind(NamedTuple):
         corruption: what it does to a reply, if that is what it does.
         on: the requests whose replies it can be about.
         link: the only kind of link it fits, if there is only one.
+        habit: the habit of the gripper that it changes, if that is what it does.
     """
 
     meaning: str
@@ -51,6 +52,13 @@ class Kind(NamedTuple):
     corruption: Corruption | None = None
     on: On = "any"
     link: Link | None = None
+    habit: str | None = None
+
+    def fits(self, link: Link) -> bool:
+        """Whether it can happen on a kind of link: a serial server has frames of a line, and connections."""
+        if link == "rtu+tcp":
+            return self.link in (None, "rtu") or self.corruption is None
+        return self.link in (None, link)
 
     @property
     def can_hit_once(self) -> bool:
@@ -111,6 +119,39 @@ KINDS: Final[dict[str, Kind]] = {
     "interference": Kind("the scissor is blocked: fault 0x0A, after 20 s 0x0E", _CONDITION),
     "fault": Kind("the gripper reports fault VALUE", _CONDITION, 9, 1, 15),
     "release": Kind("the gripper releases automatically"),
+    "e-stop": Kind(
+        "the emergency stop is pressed: fault 0x05; after its end VALUE resets are needed",
+        *(_CONDITION, 1, 1, 9),
+    ),
+    # Habits that grippers are said to have.
+    "status-lag": Kind(
+        "gDT and gSTA trail the rest of the status by VALUE seconds",
+        *(_CONDITION, 0.05, 0, 1),
+        habit="status_lag",
+    ),
+    "silence-fault": Kind(
+        "the first status after VALUE seconds without a message shows fault 0x09",
+        *(_CONDITION, 1.0, 0, 3600),
+        habit="silence_fault",
+    ),
+    "slow-activation": Kind(
+        "an activation takes VALUE seconds", *(_CONDITION, 25.0, 0, 600), habit="activation_time"
+    ),
+    "echoed-limits": Kind(
+        "a request beyond a software limit is echoed as the limit", _CONDITION, habit="echoes_limits"
+    ),
+    "write-spacing": Kind(
+        "a write within VALUE seconds of the one before is acknowledged and forgotten",
+        *(_CONDITION, 0.01, 0, 1),
+        habit="write_spacing",
+    ),
+    "wake-needed": Kind(
+        "on a new connection the first image with rACT only wakes the gripper: its motion is forgotten",
+        _CONDITION,
+        link="tcp",
+    ),
+    "function-3-only": Kind("function 4 is refused, and 3 reads the status in its place", _CONDITION),
+    "one-connection-only": Kind("while there is a connection, a new one is reset", _CONDITION, link="tcp"),
 }
 """Every kind of trouble, by its name."""
 

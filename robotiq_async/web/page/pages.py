@@ -169,6 +169,7 @@ def _hand_page(mirror: Mirror, hand: HandMirror, client: Client, visits: Visits)
     if mirror.control:
         with place:
             controls = Controls(mirror, hand, client.id, heartbeat, lambda words: events.add(timed(words)))
+        shown.append(controls.show)
         _halt_button("halt", "stops every axis", controls.halt)
     else:
         with place:
@@ -201,8 +202,9 @@ def _halt_all(mirror: Mirror, page: str) -> None:
 
 
 def _tile(mirror: Mirror, hand: HandMirror) -> Callable[[], None]:
-    with ui.card().classes("w-full cursor-pointer").props(f"data-testid=tile-{hand.index}") as card:
-        card.on("click", lambda: ui.navigate.to(f"/hand/{hand.index}"))
+    # A link, so that it can be opened in another tab, and with the keyboard.
+    link = ui.link(target=f"/hand/{hand.index}").classes(replace="w-full text-inherit no-underline")
+    with link.props(f"data-testid=tile-{hand.index}"), ui.card().classes("w-full"):
         ui.label(hand.address).classes("font-bold")
         with ui.row().classes("w-full items-center gap-3"):
             state = StatePanel()

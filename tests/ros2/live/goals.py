@@ -46,7 +46,7 @@ def test_joints_of_their_own(cell: Cell) -> None:
     names = ["finger_1_joint_1", "finger_2_joint_2", "finger_middle_joint_1", "palm_finger_1_joint"]
     status, _ = cell.client.move(math.radians(20), math.radians(45), 0.0, 0.0, names=names).ends()
     assert status == SUCCEEDED
-    axes = (Finger.B, Finger.C, Finger.A, Finger.SCISSOR)
+    axes = (Finger.C, Finger.B, Finger.A, Finger.SCISSOR)
     assert [position(cell.simulator, axis) for axis in axes] == pytest.approx([40, 190, 6, 128], abs=1)
 
 

@@ -71,7 +71,7 @@ async def gripper(
     """
     from ...connect import make_hand
 
-    if not address.startswith("sim:"):
+    if not is_simulated(address):
         async with make_hand(address) as hand:
             yield hand
         return
@@ -147,7 +147,9 @@ async def carry_out(
         try:
             await campaign.measure(run)
         except (MeasuringError, TableError, OSError) as error:
-            raise CommandError(f"{error}; {len(campaign.table)} rows are in {campaign.path}") from error
+            rows = len(campaign.table)
+            kept = f"{rows} rows are in {campaign.path}" if rows else "nothing was written"
+            raise CommandError(f"{error}; {kept}") from error
 
 
 async def asked(question: str) -> str:

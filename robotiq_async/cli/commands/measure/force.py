@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from ....enums import DEFAULT_SPEED
-from ...addresses import full_address
+from ...addresses import full_address, gripper_words, is_simulated
 from ...arguments import Address, Byte, Yes
 from ...consent import consent
 from ...failures import CommandError, UsageError
@@ -28,7 +28,7 @@ MOST_GRAMS = 100_000
 
 
 def force(
-    address: Address = "sim://",
+    address: Address,
     /,
     *,
     surface: Literal["foam", "rigid"] = "foam",
@@ -52,7 +52,7 @@ def force(
 
     For example:
 
-        robotiq-async measure force --surface rigid
+        robotiq-async measure force sim:// --surface rigid
         robotiq-async measure force 192.168.1.11 --runs 1
 
     Args:
@@ -79,7 +79,7 @@ def force(
         campaign = force_campaign(path, step, runs, **origin)
         currents = _currents_of(campaign)
     read_scale = _scale(address, surface, readings, campaign.left, runs)
-    typed_in = readings is None and not address.startswith("sim:")
+    typed_in = readings is None and not is_simulated(address)
     if campaign.left:
         consent(address, WARNING.format(count=runs * len(campaign.left)), yes=yes)
     return _measure(
@@ -107,6 +107,7 @@ async def _measure(
     if not campaign.left:
         print(f"{output} is complete: nothing is measured again.")
     if campaign.left:
+        print(gripper_words(address), flush=True)
         load_rich()
         async with gripper(address, speedup, lambda simulated: _place_scale(simulated, surface)) as hand:
 
@@ -123,7 +124,7 @@ async def _measure(
             await carry_out(campaign, run, lambda _: seconds, "force", bar=bar)
     told([output, currents_file])
     if plot:
-        _plot(output, surface, campaign.table, "simulated" if address.startswith("sim:") else "measured")
+        _plot(output, surface, campaign.table, "simulated" if is_simulated(address) else "measured")
 
 
 def currents_beside(output: Path) -> Path:
@@ -180,9 +181,9 @@ def _scale(
 
     if readings is not None:
         return from_table
-    if not address.startswith("sim:"):
+    if not is_simulated(address):
         return typed
-    from ....simulator.physics.scale import SimulatedScale
+    from ....simulator.physics.mechanics.scale import SimulatedScale
 
     simulated = SimulatedScale(surface)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ....enums import Finger
-from ...addresses import full_address
+from ...addresses import full_address, gripper_words, is_simulated
 from ...arguments import Address, Fingers, Yes
 from ...consent import consent
 from ...failures import UsageError
@@ -23,7 +23,7 @@ If it is not active yet it is activated first, and what it holds drops."""
 
 
 def speed(
-    address: Address = "sim://",
+    address: Address,
     /,
     *,
     output: Annotated[Path, Parameter(metavar="FILE.csv")] = Path("closing_time_ms.csv"),
@@ -44,7 +44,7 @@ def speed(
 
     For example:
 
-        robotiq-async measure speed
+        robotiq-async measure speed sim://
         robotiq-async measure speed 192.168.1.11 --step 25 --runs 1
 
     Args:
@@ -76,6 +76,7 @@ async def _measure(address: str, campaign: Campaign, fingers: Finger, speedup: f
     if not campaign.left:
         print(f"{output} is complete: nothing is measured again.")
     if campaign.left:
+        print(gripper_words(address), flush=True)
         load_rich()
         async with gripper(address, speedup) as hand:
 
@@ -87,6 +88,6 @@ async def _measure(address: str, campaign: Campaign, fingers: Finger, speedup: f
     if plot:
         from ....measure.plots import plot_speed
 
-        label = "simulated" if address.startswith("sim:") else "measured"
+        label = "simulated" if is_simulated(address) else "measured"
         with refused():
             told(plot_speed(output.with_suffix(""), campaign.table, label))

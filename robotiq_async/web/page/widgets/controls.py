@@ -12,17 +12,13 @@ from ....actions import ACTIONS, Action
 from ....enums import FORCE_MAX, SPEED_MAX
 from ..heartbeat import PRESS, PRESS_WITH_VALUE, Heartbeat
 from ..mirror import HandMirror, Mirror
+from .positions import Positions
+from .slider import Slider
 
 ARMED_S: Final = 0.3
 """A question takes no yes before: nobody has read it."""
 DIRECT: Final = ("open", "close", "wide", "normal", "pinch")
 ASKED: Final = tuple(name for name, action in ACTIONS.items() if action.warning)
-
-
-class _Slider(ui.slider):
-    """Keeps its value in the browser: an answer of the server would set back one that has moved on."""
-
-    LOOPBACK = False
 
 
 class Controls:
@@ -46,6 +42,7 @@ class Controls:
         with ui.row().classes("w-full gap-2"):
             for name in DIRECT:
                 self._button(ACTIONS[name])
+        self._positions = Positions(hand, self._pressed)
         with ui.grid(columns="auto 1fr auto").classes("w-full items-center gap-x-3 gap-y-0"):
             self._slider("speed", SPEED_MAX, mirror.speed)
             self._slider("force", FORCE_MAX, mirror.force)
@@ -53,6 +50,10 @@ class Controls:
             for name in ASKED:
                 self._question(ACTIONS[name])
         self._outcome = ui.label("").classes("text-sm").props("data-testid=outcome")
+
+    def show(self) -> None:
+        """Take in what is newest."""
+        self._positions.show()
 
     def halt(self) -> None:
         """Stop every axis; it is never too old and never asked about. Closes what is open."""
@@ -94,7 +95,7 @@ class Controls:
             self._pressed(f"set_{what}", {"value": value}, sent_back)
 
         ui.label(what)
-        slider = _Slider(min=0, max=highest, value=value).props(f"data-testid={what}")
+        slider = Slider(min=0, max=highest, value=value).props(f"data-testid={what}")
         # Sent when it is let go, and not for every value on the way.
         slider.on("change", change, js_handler=PRESS_WITH_VALUE)
         ui.label().bind_text_from(slider, "value", lambda each: f"{each:.0f}").classes("w-8 text-right")

@@ -12,10 +12,10 @@ from nicegui.elements.scene.scene_object3d import Object3D
 from ....description import HandModel, Pose, Shape, hand_model
 from ....description.geometry import turned
 from ....enums import AXES, Finger, ObjectStatus
-from ....kinematics import JOINTS, PREFIX, finger_angles, palm_angle
+from ....kinematics import FINGER_NAMES, JOINTS, finger_angles, palm_angle
 from ....wire.status import RobotiqStatus
 from ..mirror import HandMirror
-from .held import held, pads
+from .held import Thing, grasp
 from .words import COLORS
 
 SCALE: Final = 10.0
@@ -28,6 +28,10 @@ STAGE: Final = "#b9c3cf"
 """Behind the hand, which is grey and black; on a light page and on a dark one."""
 HALO: Final = "text-shadow:0 0 2px #fff,0 0 2px #fff,0 0 4px #fff"
 """Around a letter, wherever it is before."""
+LETTER: Final = "font:bold 17px sans-serif"
+NAME: Final = "font:11px sans-serif;font-size:clamp(0px,(100vw - 640px) * 9,11px);padding-top:2.2em"
+"""Below the letter, which stands in the same place; on a phone there is no room for it."""
+HELD: Final = "#f2c230"
 STALE: Final = 0.25
 APART: Final = 3
 """Counts between request and position from which on the request of an axis that is not there yet is drawn."""
@@ -126,9 +130,13 @@ class HandScene:
             self.scene = scene
             self._ghost = None if compact else Figure(model, ghost=True)
             self._figure = Figure(model, ghost=False)
-            self._object = ui.scene.sphere(1.0).material("#f2c230", 0.85).with_name("object").visible(False)
+            # A cylinder of three.js lies along y, which is z of the palm.
+            self._bar = ui.scene.cylinder(1.0, 1.0, 1.0, 48).with_name("bar")
+            self._ball = ui.scene.sphere(1.0).with_name("ball")
+            for each in (self._bar, self._ball):
+                each.material(HELD, 0.7).visible(False)
             if not compact:
-                self._letters()
+                self._labels()
         self._model = model
         scene.move_camera(0.8, -2.2, 2.1, 0, 0, 1.05, duration=0)
 
@@ -137,65 +145,65 @@ class HandScene:
         if hand.status is None:
             self._figure.look_all(None, STALE)
             return
-        angles = _angles(hand.status, requested=False)
+        angles, thing = grasp(self._model, hand.status)
         calls = self._figure.turn(angles)
         if self._ghost is not None:
             calls += self._show_ghost(self._ghost, hand, hand.status)
         if calls:
             self.scene.run_method("run_methods", calls)
         self._show_contacts(hand, hand.status)
-        self._show_object(hand, hand.status, angles)
+        self._show_held(None if hand.is_lost else thing)
 
     def _show_ghost(self, ghost: Figure, hand: HandMirror, status: RobotiqStatus) -> Calls:
         away = _away(status) if status.go_echo and status.is_activated and not hand.is_lost else Finger(0)
-        for finger, prefix in PREFIX.items():
+        for finger, prefix in FINGER_NAMES.items():
             ghost.show(f"{prefix}_link_0", is_shown=bool(finger & away))
-        return ghost.turn(_angles(status, requested=True)) if away else []
+        return ghost.turn(_asked_angles(status)) if away else []
 
     def _show_contacts(self, hand: HandMirror, status: RobotiqStatus) -> None:
         opacity = STALE if hand.is_lost else 1.0
         glowing = Finger(0) if hand.is_lost else status.contacts
         if glowing & Finger.SCISSOR:
             glowing |= Finger.B | Finger.C
-        fingers = {f"{prefix}_link_{n}": finger for finger, prefix in PREFIX.items() for n in (2, 3)}
+        fingers = {f"{prefix}_link_{n}": finger for finger, prefix in FINGER_NAMES.items() for n in (2, 3)}
         for link in self._model.links:
             is_hot = bool(fingers.get(link, Finger(0)) & glowing)
             self._figure.look(link, GLOW if is_hot else None, opacity)
 
-    def _show_object(self, hand: HandMirror, status: RobotiqStatus, angles: Mapping[str, float]) -> None:
-        closing = Finger(0)
-        for axis in AXES:
-            if status.finger_status(axis) is ObjectStatus.CONTACT_CLOSING:
-                closing |= axis & status.contacts
-        ball = None if hand.is_lost else held(pads(self._model, self._model.link_poses(angles)), closing)
-        self._object.visible(ball is not None)
-        if ball is not None:
-            (x, y, z), radius = ball
-            self._object.move(x * SCALE, -z * SCALE, y * SCALE + LIFT).scale(radius * SCALE)
+    def _show_held(self, thing: Thing | None) -> None:
+        is_bar = thing is not None and thing.length > 0
+        self._bar.visible(is_bar)
+        self._ball.visible(thing is not None and not is_bar)
+        if thing is not None:
+            (x, y, z), radius = thing.middle, thing.radius * SCALE
+            drawn = self._bar if is_bar else self._ball
+            drawn.move(x * SCALE, -z * SCALE, y * SCALE + LIFT)
+            drawn.scale(radius, thing.length * SCALE if is_bar else radius, radius)
 
-    def _letters(self) -> None:
+    def _labels(self) -> None:
+        """What the gripper calls its fingers, and below it what joint states call them."""
         for axis, color in zip(AXES, COLORS, strict=True):
-            if axis in PREFIX:
-                with self._figure.group(f"{PREFIX[axis]}_link_3"):
-                    style = f"color:{color};font:bold 17px sans-serif;{HALO}"
-                    ui.scene.text(str(axis.name), style).move(0.052, 0.032, 0.0)
+            if axis in FINGER_NAMES:
+                with self._figure.group(f"{FINGER_NAMES[axis]}_link_3"):
+                    for words, font in ((str(axis.name), LETTER), (FINGER_NAMES[axis], NAME)):
+                        ui.scene.text(words, f"color:{color};{font};{HALO}").move(0.052, 0.032, 0.0)
 
 
 def _away(status: RobotiqStatus) -> Finger:
-    """The fingers that are not where they are asked to be; the scissor stands for B and C."""
+    """The fingers that are on their way to where they are asked to be; the scissor stands for B and C."""
     away = Finger(0)
     for axis in AXES:
-        # Open is 6 or 7 where 0 was asked for: what an axis itself calls reached is no difference.
-        if status.finger_status(axis) is not ObjectStatus.AT_POSITION:
+        # Open is 6 or 7 where 0 was asked for: what an axis itself calls reached is no difference. One that
+        # has met something goes no further, and the request would be drawn within what it holds.
+        if status.finger_status(axis) is ObjectStatus.IN_MOTION:
             apart = abs(status.requested_position(axis) - status.position(axis)) > APART
             away |= (Finger.B | Finger.C if axis is Finger.SCISSOR else axis) if apart else Finger(0)
     return away
 
 
-def _angles(status: RobotiqStatus, *, requested: bool) -> dict[str, float]:
-    where = status.requested_position if requested else status.position
-    palm = palm_angle(where(Finger.SCISSOR))
-    one, two, middle = (finger_angles(where(finger)) for finger in PREFIX)
+def _asked_angles(status: RobotiqStatus) -> dict[str, float]:
+    palm = palm_angle(status.requested_position(Finger.SCISSOR))
+    one, two, middle = (finger_angles(status.requested_position(finger)) for finger in FINGER_NAMES)
     return dict(zip(JOINTS, (palm, *one, -palm, *two, *middle), strict=True))
 
 

@@ -13,16 +13,15 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from ..hand import RobotiqHand
-    from ..simulator import SimulatedGripper, SimulatorServer
-    from ..simulator.troubles.fault_injector import FaultInjector
+    from robotiq_async.hand import RobotiqHand
+    from robotiq_async.simulator import FaultInjector, SimulatedGripper, SimulatorServer
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Have the fixtures of whatever runs coroutines here."""
     for driver in ("anyio", "asyncio"):
         if config.pluginmanager.has_plugin(driver):
-            config.pluginmanager.import_plugin(f"robotiq_async.testing.with_{driver}")
+            config.pluginmanager.import_plugin(f"{__package__}.with_{driver}")
 
 
 @pytest.fixture
@@ -34,7 +33,7 @@ def robotiq_speedup() -> float:
 @pytest.fixture
 def robotiq_gripper(robotiq_speedup: float) -> SimulatedGripper:
     """A simulated gripper that was just switched on. To be overridden, for one of another kind."""
-    from ..simulator import SimulatedGripper  # noqa: PLC0415  # not for those who do not use it
+    from robotiq_async.simulator import SimulatedGripper  # noqa: PLC0415  # not for those who do not use it
 
     return SimulatedGripper(speedup=robotiq_speedup)
 
@@ -66,23 +65,32 @@ def robotiq_hand(request: pytest.FixtureRequest, robotiq_server: SimulatorServer
 
 
 def _driver(request: pytest.FixtureRequest) -> str:
-    """Who runs the test: "anyio" or "asyncio", as their plugins are called.
+    """Which plugin runs the test, by its name: "anyio" or "asyncio".
 
     Raises:
-        pytest.UsageError: nobody does, for it is no coroutine; or not in asyncio's loop.
+        pytest.UsageError: not one of these two does; the test is no coroutine, or is trio's.
     """
-    function = getattr(request.node, "obj", None)
+    test, name = request.node, request.fixturename
+    function = getattr(test, "obj", None)
     function = getattr(getattr(function, "hypothesis", None), "inner_test", function)
     if not inspect.iscoroutinefunction(function):
         raise pytest.UsageError(
-            f"{request.fixturename} is for tests that are coroutines (async def): it lives in their event "
+            f"{name} is for tests that are coroutines (async def): it lives in their event "
             'loop. In others use robotiq_async.sync.RobotiqHand("sim://?speedup=20")'
         )
-    if "anyio_backend" in request.fixturenames:
-        return "anyio"
-    if request.config.pluginmanager.has_plugin("asyncio"):
-        return "asyncio"
+    if test.get_closest_marker("trio"):
+        raise pytest.UsageError(f"{name} lives in asyncio's event loop, and trio runs this test")
+    # In its auto mode pytest-asyncio marks all coroutines.
+    of_asyncio = test.get_closest_marker("asyncio") and request.config.pluginmanager.has_plugin("asyncio")
+    of_anyio = "anyio_backend" in request.fixturenames
+    if of_asyncio and of_anyio:
+        raise pytest.UsageError(
+            f"pytest-asyncio runs this test and anyio makes its fixtures, in another event loop than {name} "
+            "needs: set asyncio_mode = strict for tests that are marked with pytest.mark.anyio"
+        )
+    if of_asyncio or of_anyio:
+        return "asyncio" if of_asyncio else "anyio"
     raise pytest.UsageError(
-        f"{request.fixturename} needs somebody who runs the test: mark it with pytest.mark.anyio, or install "
-        "pytest-asyncio"
+        f"nothing runs this test in an event loop, and {name} needs one: mark it with pytest.mark.anyio, or "
+        "with pytest.mark.asyncio where pytest-asyncio is installed"
     )

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from ..hand import RobotiqHand
-from ..session.timing.event_loop import running_loop
-from ..simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.hand import RobotiqHand
+from robotiq_async.session.timing.event_loop import running_loop
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
 
 @asynccontextmanager

@@ -9,13 +9,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from robotiq_async.calibration.closing_time import closing_time
-from robotiq_async.enums import STROKE_COUNTS, ObjectStatus
+from robotiq_async.enums import ObjectStatus
 
 from .motor import Motor, peak
 
 if TYPE_CHECKING:
-    from .control_modes import Goal
+    from .goal import Goal
     from .spread import Spread
 
 PRESSING: Final = 0.05
@@ -29,10 +28,12 @@ class Obstacle(NamedTuple):
     Attributes:
         position: the count at which the axis touches it.
         soft: counts by which a force of 255 presses the axis into it; less force, proportionally less.
+        fixed: it stays there in an activation; anything else is taken out for it and put back.
     """
 
     position: int
     soft: int = 0
+    fixed: bool = False
 
 
 class _Way(NamedTuple):
@@ -70,6 +71,8 @@ class Axis:
         self._spread = spread
         self._closed = high
         self._goal: Goal | None = None
+        self._is_locked = False
+        """Whether it was stopped in a grip and holds on, without a goal."""
         self._origin = float(position)
         self._since = 0.0
         self._way = _Way(self._origin, ObjectStatus.IN_MOTION)
@@ -87,9 +90,14 @@ class Axis:
         return self._goal is not None and self._is_latched_against(self._goal)
 
     @property
+    def holds(self) -> bool:
+        """Whether the axis grips, or did when it was stopped and has locked itself."""
+        return self.grips or self._is_locked
+
+    @property
     def target(self) -> int:
         """Where the axis is driven to, in counts within its stops; at rest without a goal, where it is."""
-        return round(self._origin) if self._goal is None else self._within_stops(self._goal.position)
+        return round(self._origin) if self._goal is None else self.within_stops(self._goal.position)
 
     def position(self, time: float) -> float:
         """Where the axis is."""
@@ -101,6 +109,10 @@ class Axis:
     def travel(self, time: float) -> float:
         """The way the axis has gone since it was made, in counts, forth and back added up."""
         return self._travelled + abs(self.position(time) - self._origin)
+
+    def within_stops(self, position: int) -> int:
+        """The count nearest to a position that the axis can be at."""
+        return max(self.low, min(self.high, position))
 
     def current(self, time: float) -> int:
         """Motor current in counts: that of the motion, up to the peak of a contact, and 0 at rest."""
@@ -117,18 +129,19 @@ class Axis:
         if goal == self._goal:
             return
         is_latched = self._is_latched_against(goal)
-        self._goal = goal
+        self._goal, self._is_locked = goal, False
         if not is_latched:
             self._plan(time)
 
-    def hold(self, time: float) -> None:
-        """Stop on the count the axis reads now, and forget the goal."""
+    def hold(self, time: float, *, locks: bool) -> None:
+        """Stop on the count the axis reads now, and forget the goal; one that locks holds what it held."""
+        self._is_locked = locks and self.holds
         self._rest(time, float(round(self.position(time))))
         self._goal = None
 
     def clear(self, time: float) -> None:
-        """Stop like :meth:`hold`, and forget what was touched or reached."""
-        self.hold(time)
+        """Stop, let go, and forget what was touched or reached."""
+        self.hold(time, locks=False)
         self.status = ObjectStatus.IN_MOTION
 
     def arrive(self) -> None:
@@ -158,7 +171,7 @@ class Axis:
             self.status = ObjectStatus.AT_POSITION
             return
         self.status = ObjectStatus.IN_MOTION
-        self._rate = STROKE_COUNTS / closing_time(self._goal.speed)
+        self._rate = self._goal.rate
         self._running = self._motor.running(self._rate, closing=self._way.end > here)
         self._peak = peak(self._goal.force)
         self.ends_at = time + abs(self._way.end - here) / self._rate
@@ -172,11 +185,11 @@ class Axis:
 
         An obstacle that the axis has passed already is behind it and no contact.
         """
-        target = self._within_stops(goal.position)
+        target = self.within_stops(goal.position)
         way = 1 if target > here else -1
-        end = self._within_stops(target + way * self._overshoot(goal))
+        end = self.within_stops(target + way * self._overshoot(goal))
         obstacle = self.in_closing if way > 0 else self.in_opening
-        if obstacle is None:
+        if obstacle is None or (goal.clears and not obstacle.fixed):
             return _Way(end, ObjectStatus.AT_POSITION)
         surface = obstacle.position + self._spread.contact(obstacle.position)
         far_side = max(way * obstacle.position, way * surface) + obstacle.soft + self._spread.tolerance
@@ -205,7 +218,7 @@ class Axis:
         """Whether the contact that the axis stands in holds against a goal beyond it with no more force."""
         if self._goal is None or self.is_moving or goal.force > self._goal.force:
             return False
-        beyond = self._within_stops(goal.position) - self._origin
+        beyond = self.within_stops(goal.position) - self._origin
         return (self.status is ObjectStatus.CONTACT_CLOSING and beyond > 0) or (
             self.status is ObjectStatus.CONTACT_OPENING and beyond < 0
         )
@@ -219,9 +232,6 @@ class Axis:
         if position == way.end:
             return 1.0
         return 0.0 if way.end == way.surface else max(0.0, (position - way.surface) / (way.end - way.surface))
-
-    def _within_stops(self, position: int) -> int:
-        return max(self.low, min(self.high, position))
 
     def _rest(self, time: float, position: float) -> None:
         """Stand still at a position, with the way up to it accounted for."""

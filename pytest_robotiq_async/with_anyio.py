@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from ..hand import RobotiqHand
-    from ..simulator import SimulatedGripper, SimulatorServer
+    from robotiq_async.hand import RobotiqHand
+    from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
 
 @pytest.fixture

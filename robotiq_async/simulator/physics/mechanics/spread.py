@@ -1,8 +1,9 @@
 """What makes one gripper differ from another, and each of them from the ideal one.
 
 What the sources print: an open hand reads 7, 6, 6, and one object is held at 188, 193 and 189 (manual, worked
-grasp); a closed finger reads 240 or more (manual); 111 and 208 were asked and 112 and 210 reached (poses that
-TAMS recorded); a contact is precise to some millimetres only (manual), of which a count is 0.66.
+grasp); a closed finger reads 240 or more, and others stop within 1 to 2 counts (manual); 111 and 208 were
+asked and 112 and 210 reached (poses that TAMS recorded); a contact is precise to some millimetres only
+(manual), of which a count is 0.66.
 
 Nothing is drawn in passing: a figure follows from the seed, the axis and what is asked of it. So it does not
 depend on how often anybody looks, and what is done again ends in the same way.
@@ -44,8 +45,8 @@ class Spread:
         return self._figure("closed", -1, 1)
 
     def overshoot(self, position: int) -> int:
-        """Counts by which the axis goes too far when it is asked for a position between its stops."""
-        return self._figure(f"stop at {position}", 1, _TOLERANCE)
+        """Counts, or none, by which the axis goes too far when it is asked for a place between its stops."""
+        return self._figure(f"goes past {position}", 0, _TOLERANCE)
 
     def contact(self, position: int) -> int:
         """Counts from where an object is to where the axis feels it."""

@@ -1,0 +1,1 @@
+"""``robotiq-async record``, and what becomes of a recording."""

@@ -1,0 +1,111 @@
+"""What the monitor asks before it does something: a yes, or an axis and a position. Pure: text and keys.
+
+No screens of textual's: while one lies over another, every paint draws all of both, and the loop that paints
+is the one that polls.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, Protocol
+
+from rich.text import Text
+
+from ...enums import AXES, CLOSED, Finger
+from ...session.timing.clock import now
+
+READING_S: Final = 0.3
+"""A yes counts only after this time: it may have been typed before the question could be read."""
+NO: Final = frozenset({"escape", "q", "ctrl+c"})
+"""Keys that end every question, and nothing is done."""
+_ERASE: Final = frozenset({"backspace", "delete", "ctrl+h"})
+_LETTERS: Final = {"a": Finger.A, "b": Finger.B, "c": Finger.C, "s": Finger.SCISSOR}
+
+
+class Asking(Protocol):
+    """Something that waits for keys. Those that halt never come here."""
+
+    @property
+    def text(self) -> Text:
+        """What is to be shown now."""
+
+    def press(self, key: str) -> bool:
+        """Take a key, by textual's name for it; returns whether it was the last."""
+
+
+class Question:
+    """Asks before a dangerous action."""
+
+    def __init__(self, question: str, warning: str, yes: Callable[[], None]) -> None:
+        """Ask now.
+
+        Args:
+            question: what it is about.
+            warning: what will happen.
+            yes: is called when the answer is a yes.
+        """
+        self._question, self._warning, self._yes = question, warning, yes
+        self._asked_at = now()
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a yes counts: not before the question can have been read."""
+        return now() - self._asked_at >= READING_S
+
+    @property
+    def text(self) -> Text:
+        """Question, warning and keys."""
+        text = Text(f"{self._question}\n\n", "bold")
+        text.append(self._warning, "bold yellow")
+        text.append("\n\ny yes    n no    space halt")
+        return text
+
+    def press(self, key: str) -> bool:
+        """Only a yes and a no count, and a yes not too early."""
+        if key == "y" and self.is_open:
+            self._yes()
+            return True
+        return key in NO or key == "n"
+
+
+class Target:
+    """Asks which axes are to go where. Only the last key, Enter, moves anything."""
+
+    def __init__(self, move: Callable[[Finger, int], None]) -> None:
+        """Ask now.
+
+        Args:
+            move: is called with axes and position.
+        """
+        self._move = move
+        self._axes = Finger(0)
+        self._digits = ""
+
+    @property
+    def text(self) -> Text:
+        """What has been chosen so far, and the keys."""
+        text = Text("move axes to a position\n\naxes     ", "bold")
+        for axis in AXES:
+            text.append(str(axis.name), "reverse" if axis in self._axes else "dim not bold")
+            text.append(" ")
+        text.append(f"\nposition {self._digits}", "bold")
+        text.append("_", "blink")
+        text.append(f"   0 open .. {CLOSED} closed", "dim not bold")
+        text.append("\n\nEnter MOVES them at once.", "bold yellow")
+        text.append("\n\na b c s axes    0-9 position    ESC no    space halt")
+        return text
+
+    def press(self, key: str) -> bool:
+        """Letters choose axes, digits write the position."""
+        if key in NO:
+            return True
+        if key == "enter" and self._axes and self._digits:
+            self._move(self._axes, int(self._digits))
+            return True
+        if key in _LETTERS:
+            self._axes ^= _LETTERS[key]
+        elif key in _ERASE:
+            self._digits = self._digits[:-1]
+        elif len(key) == 1 and key in "0123456789" and int(self._digits + key) <= CLOSED:
+            self._digits = str(int(self._digits + key))
+        return False

@@ -1,0 +1,58 @@
+"""How to install what an extra brings, whatever way the library came here.
+
+``pip install 'robotiq-async[web]'`` works only where an index has the library. What an extra consists of
+works everywhere: the library stays as it was installed, from a clone, a wheel or an index.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Iterator, Sequence
+from importlib import metadata
+from typing import Final
+
+NAME: Final = "robotiq-async"
+_NESTED: Final = re.compile(rf"{NAME}\[(.+)\]$")
+
+
+def install(extra: str) -> str:
+    """The command that installs an extra, for the end of a message.
+
+    Args:
+        extra: its name in ``pyproject.toml``.
+
+    Raises:
+        ValueError: there is no such extra.
+    """
+    try:
+        requirements = metadata.requires(NAME) or []
+    except metadata.PackageNotFoundError:  # run from a clone that was not installed
+        return f"pip install '.[{extra}]' in the clone"
+    return told(extra, requirements)
+
+
+def told(extra: str, requirements: Sequence[str]) -> str:
+    """The command, by what the metadata of a distribution require.
+
+    Raises:
+        ValueError: they have no such extra.
+    """
+    packages = [shlex.quote(each) for each in dict.fromkeys(_packages(extra, requirements))]
+    if not packages:
+        raise ValueError(f"there is no extra {extra!r}")
+    return f"pip install {' '.join(packages)} (the extra {extra})"
+
+
+def _packages(extra: str, requirements: Sequence[str]) -> Iterator[str]:
+    marker = re.compile(rf"""\bextra\s*==\s*['"]{re.escape(extra)}['"]""")
+    for requirement in requirements:
+        package, _, condition = requirement.partition(";")
+        if not marker.search(condition):
+            continue
+        nested = _NESTED.match(package.strip())
+        if nested is None:
+            yield package.strip()
+            continue
+        for other in nested[1].split(","):
+            yield from _packages(other.strip(), requirements)

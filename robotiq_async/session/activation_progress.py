@@ -1,0 +1,40 @@
+"""A word in the log while a gripper activates: on real ones that may take half a minute."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Final
+
+from ..enums import State
+from ..log import Log
+
+TOLD_EVERY_S: Final = 4.0
+ACTIVATING: Final = frozenset({State.DO_ACTIVATION, State.WF_ACTIVATION})
+
+
+class ActivationProgress:
+    """Tells how long an activation has taken so far, whoever began it."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, log: Log) -> None:
+        """Nothing activates yet."""
+        self._loop = loop
+        self._log = log
+        self._since = 0.0
+        self._timer: asyncio.TimerHandle | None = None
+
+    def reached(self, state: State) -> None:
+        """The hand has come to a state."""
+        if state in ACTIVATING:
+            if self._timer is None:
+                self._since = self._loop.time()
+                self._wait()
+        elif self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _wait(self) -> None:
+        self._timer = self._loop.call_later(TOLD_EVERY_S, self._tell)
+
+    def _tell(self) -> None:
+        self._log.info("activating, %.0f s so far", self._loop.time() - self._since)
+        self._wait()

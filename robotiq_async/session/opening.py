@@ -1,0 +1,98 @@
+"""Opens the link of a hand, at its start and again when it was lost, until it is open or given up."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from dataclasses import replace
+
+import anyio
+
+from ..errors import (
+    ConnectFailedError,
+    ConnectionLostError,
+    ResponseTimeoutError,
+    RobotiqConnectionError,
+)
+from .options import Options
+from .reconnecting import Backoff, ReconnectPolicy
+
+
+class Opener:
+    """Tries until it works. :meth:`end` ends that at any moment, and for good."""
+
+    def __init__(self, connect: Callable[[], Awaitable[None]], options: Options) -> None:
+        """Prepare; must be made inside a running event loop.
+
+        Args:
+            connect: one try; raises RobotiqConnectionError when it fails.
+            options: of the hand.
+        """
+        self._connect = connect
+        self._options = options
+        self._log = options.log
+        self._loop = asyncio.get_running_loop()
+        self._has_ended = False
+        self._scope: anyio.CancelScope | None = None
+
+    def end(self) -> None:
+        """Try no more; a try that is under way is cancelled. Never blocks."""
+        self._has_ended = True
+        if self._scope is not None:
+            self._scope.cancel()
+
+    async def first(self, wait: float) -> bool:
+        """Open the link of a hand that starts; False when that was ended meanwhile.
+
+        Args:
+            wait: seconds for which there may be no gripper yet.
+
+        Raises:
+            RobotiqConnectionError: the last try has failed.
+        """
+        told = ""
+
+        def tell(error: RobotiqConnectionError) -> None:
+            nonlocal told
+            if str(error) != told:
+                told = str(error)
+                self._log.warning("no gripper yet, trying for %g s: %s", wait, told)
+
+        policy = replace(self._options.policy or ReconnectPolicy(), give_up_after=wait)
+        try:
+            return await self._open(policy, tell)
+        except (ResponseTimeoutError, ConnectionLostError) as error:
+            why = f"connected, but nobody answers: {error}"
+            raise ConnectFailedError(self._options.address, why) from error
+
+    async def again(self, policy: ReconnectPolicy) -> bool:
+        """Open a link that was lost; False when that was ended meanwhile.
+
+        Raises:
+            RobotiqConnectionError: the last try has failed.
+        """
+        return await self._open(
+            policy, lambda error: self._log.debug("still no link: %s", error), policy.first_delay
+        )
+
+    async def _open(
+        self,
+        policy: ReconnectPolicy,
+        failed: Callable[[RobotiqConnectionError], None],
+        delay: float | None = None,
+    ) -> bool:
+        """Try; ``failed`` is called with the error of each try but the last, which is raised."""
+        backoff = Backoff(policy, self._loop.time())
+        while not self._has_ended:
+            try:
+                with anyio.CancelScope() as self._scope:
+                    if delay is not None:
+                        await asyncio.sleep(delay)
+                    await self._connect()
+                    return True
+            except RobotiqConnectionError as error:
+                if backoff.gives_up(self._loop.time()):
+                    raise
+                failed(error)
+                delay = backoff.delay
+        return False

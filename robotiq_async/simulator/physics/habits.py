@@ -1,0 +1,68 @@
+"""Habits: what grippers are seen to do beside the manual, and what no source settles, each with a name."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from robotiq_async.wire.checks import check_seconds
+
+_LONGEST: Final = 1e9
+
+QUICK_ACTIVATION: Final = 4.2
+"""Seconds of an activation at full speed: the fingers close and open (thesis, table A1.1)."""
+REAL_ACTIVATION: Final = 12.0
+"""Seconds that a real activation takes, about: one driver reports 15, others wait for 25 and 30."""
+
+
+@dataclass(frozen=True, slots=True)
+class Habits:
+    """How one gripper does what the manual leaves open or others saw it do otherwise. Times are simulated.
+
+    Nothing of it has been measured on a 3-Finger by us. What is as it is by default follows the manual, and
+    where that says nothing the source named here.
+
+    Attributes:
+        activation_time: seconds that an activation takes at least, wherever it begins; half of them to close
+            the fingers, half to open them.
+        status_lag: seconds by which gDT and gSTA trail the rest of the status. The manual says that they are
+            valid with the echo; the vendor's own software for the two-finger grippers waits up to 0.2 s.
+        silence_fault: after so many seconds without a message gFLT is 0x09 in the first status that is read,
+            and in no other (siblings: 1 s). A write that comes first takes it away.
+        write_spacing: a write that comes less than so many seconds after the last one that was kept is
+            acknowledged and forgotten (manual 2014: leave 10 ms, or some are lost).
+        echoes_limits: a request beyond a software limit is echoed as the limit. The manual says that it is
+            replaced by the limit, and not which of the two gPR shows.
+        lets_go_on_halt: clearing rGTO, or a fault, lets go of what is held. By the vendor's article on
+            protective stops it stays held, and by the manual fingers lock themselves; no one has measured it.
+        keeps_status_on_halt: with rGTO = 0 an axis that stands in a contact or at its request keeps its gDT;
+            otherwise gDT and gSTA are 0 then. The manual says only that their 0 means nothing while gGTO = 0.
+        opens_without_rics: clearing rICS is a mode change: it opens the fingers, rGTO or not, and drops the
+            part. Otherwise the scissor alone goes to its mode, as soon as rGTO is set. No source says.
+    """
+
+    activation_time: float = QUICK_ACTIVATION
+    status_lag: float = 0.0
+    silence_fault: float = math.inf
+    write_spacing: float = 0.0
+    echoes_limits: bool = False
+    lets_go_on_halt: bool = False
+    keeps_status_on_halt: bool = True
+    opens_without_rics: bool = True
+
+    def __post_init__(self) -> None:
+        """Check that they are what a gripper can have.
+
+        Raises:
+            TypeError: a time is not a number, or another one not a bool.
+            ValueError: a time is negative.
+        """
+        for name in ("activation_time", "status_lag", "write_spacing"):
+            check_seconds(name, getattr(self, name), 0, _LONGEST)
+        if self.silence_fault != math.inf:
+            check_seconds("silence_fault", self.silence_fault, 0, _LONGEST)
+        for name in ("echoes_limits", "lets_go_on_halt", "keeps_status_on_halt", "opens_without_rics"):
+            value = getattr(self, name)
+            if not isinstance(value, bool):
+                raise TypeError(f"{name} must be True or False, got {value!r}")

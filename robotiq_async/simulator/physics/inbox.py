@@ -1,0 +1,79 @@
+"""The request registers as they are written, and the writes on their way into effect."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from robotiq_async.wire import registers as reg
+from robotiq_async.wire.checks import check_int
+from robotiq_async.wire.request import Request
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+REST: Final = Request.from_registers((0,) * reg.REGISTER_COUNT)
+"""The image of a gripper that was just switched on: all zero."""
+_HISTORY: Final = 10_000
+_ROUNDING: Final = 1e-9
+
+
+class Write(NamedTuple):
+    """One write that was kept.
+
+    Attributes:
+        time: reading of the gripper's clock, in seconds.
+        registers: the full image after the write.
+    """
+
+    time: float
+    registers: reg.Registers
+
+
+class Inbox:
+    """Takes writes; each takes effect a device cycle later. Times are simulated seconds.
+
+    Attributes:
+        image: the registers as written, in effect or not yet.
+        pending: what takes effect, and when, oldest first.
+        writes: the last writes that were kept, oldest first.
+    """
+
+    def __init__(self) -> None:
+        """Nothing was written."""
+        self.image: reg.Registers = REST.registers
+        self.pending: deque[tuple[float, Request]] = deque()
+        self.writes: deque[Write] = deque(maxlen=_HISTORY)
+        self._kept_at: float | None = None
+
+    def checked(self, address_offset: int, registers: Sequence[int]) -> reg.Registers:
+        """The image with some registers replaced.
+
+        Raises:
+            TypeError: the offset or a register is not an int.
+            ValueError: the registers do not lie within the block, or one is outside 0..65535.
+        """
+        offset = check_int("address_offset", address_offset, 0, reg.REGISTER_COUNT - 1)
+        room = reg.REGISTER_COUNT - offset
+        if not 1 <= len(registers) <= room:
+            raise ValueError(f"registers: expected 1..{room} from offset {offset}, got {len(registers)}")
+        image = list(self.image)
+        image[offset : offset + len(registers)] = registers
+        return reg.check_registers(image)
+
+    def keep(self, time: float, write: Write, cycle: float, spacing: float) -> None:
+        """Keep a write, unless it follows the last one too closely: then it is forgotten."""
+        if self._kept_at is not None and time - self._kept_at < spacing - _ROUNDING:
+            return
+        self._kept_at = time
+        self.image = write.registers
+        self.writes.append(write)
+        # In their order, also when the device cycle has become shorter meanwhile.
+        due = max(time + cycle, self.pending[-1][0] if self.pending else 0.0)
+        self.pending.append((due, Request.from_registers(write.registers)))
+
+    def clear(self) -> None:
+        """The power went."""
+        self.image = REST.registers
+        self.pending.clear()
+        self._kept_at = None

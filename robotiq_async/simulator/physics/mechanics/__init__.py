@@ -1,0 +1,1 @@
+"""Axes, their motors and what makes one differ from another; a scale between the fingers."""

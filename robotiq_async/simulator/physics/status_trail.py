@@ -1,0 +1,44 @@
+"""What gSTA and gDT were, for a gripper that shows them late."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import NamedTuple
+
+from robotiq_async.enums import AXES, ObjectStatus
+
+NOTHING = (ObjectStatus.IN_MOTION,) * len(AXES)
+"""What gDT says of four axes when it says nothing: zeros."""
+
+Statuses = tuple[ObjectStatus, ...]
+
+
+class _Entry(NamedTuple):
+    since: float
+    statuses: Statuses
+
+
+class StatusTrail:
+    """The object status of the four axes over time. Times are simulated seconds and never decrease."""
+
+    def __init__(self) -> None:
+        """Nothing has been noted."""
+        self._entries = deque([_Entry(-math.inf, NOTHING)])
+
+    def note(self, time: float, statuses: Statuses, lag: float) -> None:
+        """Remember what is so from now on, and as much of the past as that lag lets be seen."""
+        if statuses == self._entries[-1].statuses:
+            return
+        self._entries.append(_Entry(time, statuses))
+        while self._entries[1].since <= time - lag:
+            self._entries.popleft()
+            if len(self._entries) == 1:
+                return
+
+    def at(self, time: float) -> Statuses:
+        """What was so at a time; of what is forgotten, the oldest that is not."""
+        for entry in reversed(self._entries):
+            if entry.since <= time:
+                return entry.statuses
+        return self._entries[0].statuses

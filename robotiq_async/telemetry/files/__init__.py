@@ -1,0 +1,1 @@
+"""What a recording is made of: MCAP, and tables."""

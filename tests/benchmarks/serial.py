@@ -1,0 +1,184 @@
+"""A hand on a serial line at its real speed: how often it polls and writes, and how long a command takes.
+
+    python -m tests.benchmarks.serial [idle stream] --seconds 20
+
+The simulated gripper runs in a process of its own, on one end of a pair of pseudo terminals, and takes the
+time that the bytes take at 115200 baud. Beside the interval of serial lines stand others, 5 ms too.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import selectors
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from robotiq_async import Finger, RobotiqHand
+from robotiq_async.session.options import SERIAL_POLL_INTERVAL_S
+from robotiq_async.session.statistics import percentile
+from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
+from tests.benchmarks.program import Row, main, say
+from tests.serial_line import SerialLine
+
+ROOT = Path(__file__).parents[2]
+PARTS = ("idle", "stream")
+INTERVALS = (0.005, 0.01, SERIAL_POLL_INTERVAL_S, 0.02)
+STREAM_S = 0.002
+"""From one command of a stream to the next: more than any line can carry."""
+Figures = dict[str, float]
+
+
+# -- the gripper, in a process of its own ------------------------------------------------------------------
+
+
+async def gripper(folder: str) -> None:
+    """Serve until told to end; prints the port once it does."""
+    with SerialLine(Path(folder)) as line:
+        async with SerialSimulatorServer(line.far, SimulatedGripper(speedup=4.0)):
+            print(line.near, flush=True)  # noqa: T201
+            await asyncio.Event().wait()
+
+
+@contextmanager
+def served() -> Iterator[str]:
+    """The port of a gripper."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "tests.benchmarks.serial", "--gripper", folder]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
+            assert process.stdout is not None
+            try:
+                yield process.stdout.readline().strip()
+            finally:
+                process.terminate()
+
+
+# -- the hand ----------------------------------------------------------------------------------------------
+
+
+async def measured(port: str, interval: float, seconds: float, *, streams: bool) -> Figures:
+    """What a hand does in so many seconds, with a stream of commands or without."""
+    async with RobotiqHand(f"rtu://{port}", poll_interval=interval) as hand:
+        await asyncio.sleep(0.3)
+        before, used, began = hand.statistics, time.process_time(), time.monotonic()
+        took = await (streamed(hand, seconds) if streams else asked(hand, seconds))
+        wall, cpu, after = time.monotonic() - began, time.process_time() - used, hand.statistics
+    polls = after.polls - before.polls
+    took.sort()
+    return {
+        "polls": polls / wall,
+        "writes": (after.writes - before.writes) / wall,
+        "overruns": (after.overruns - before.overruns) / wall,
+        "reconnects": after.reconnects - before.reconnects,
+        "round_trip": after.round_trip_p50,
+        "p50": percentile(took, 0.5),
+        "p99": percentile(took, 0.99),
+        "cpu": cpu / polls,
+    }
+
+
+async def streamed(hand: RobotiqHand, seconds: float) -> list[float]:
+    """A control loop that commands all the time; how long commands take that are awaited beside it."""
+    ends = time.monotonic() + seconds
+
+    async def stream() -> None:
+        position = 0
+        while time.monotonic() < ends:
+            position = (position + 1) % 200
+            hand.command(Finger.A, position=position)
+            await asyncio.sleep(STREAM_S)
+
+    streaming = asyncio.create_task(stream())
+    took = await asked(hand, seconds)
+    await streaming
+    return took
+
+
+async def asked(hand: RobotiqHand, seconds: float) -> list[float]:
+    """Now and then a command that is awaited: seconds until it was acknowledged."""
+    took, ends, speed = [], time.monotonic() + seconds, 0
+    while time.monotonic() < ends:
+        speed = (speed + 37) % 256
+        began = time.monotonic()
+        await hand.set_speed(speed, Finger.B)
+        took.append(time.monotonic() - began)
+        await asyncio.sleep(0.2 + 0.001 * (speed % 20))
+    return took
+
+
+# -- the tables --------------------------------------------------------------------------------------------
+
+
+class Benchmarks:
+    """One run of all that is asked for."""
+
+    def __init__(self, _folder: Path, rounds: int, seconds: float) -> None:
+        self.rounds = rounds
+        self.seconds = seconds
+        self.results: dict[str, Any] = {}
+
+    def idle(self) -> Iterator[Row]:
+        """A hand that polls, with a command now and then."""
+        yield from self._rows("idle")
+
+    def stream(self) -> Iterator[Row]:
+        """A hand that is given a command every 2 ms."""
+        yield from self._rows("stream")
+
+    def _rows(self, what: str) -> Iterator[Row]:
+        rounds: dict[float, list[Figures]] = {interval: [] for interval in INTERVALS}
+        for number in range(self.rounds):
+            for interval in INTERVALS:
+                say(f"{what}, round {number + 1} of {self.rounds}: {1000 * interval:g} ms")
+                rounds[interval].append(self._one(interval, what))
+        self.results[what] = {str(interval): each for interval, each in rounds.items()}
+        for interval, figures in rounds.items():
+            it = {name: median(each[name] for each in figures) for name in figures[0]}
+            yield {
+                "interval, ms": f"{1000 * interval:g}",
+                **{f"{name} a second": f"{it[name]:.1f}" for name in ("polls", "writes", "overruns")},
+                "round trip of a read p50, ms": f"{1000 * it['round_trip']:.1f}",
+                "command until acknowledged p50, ms": f"{1000 * it['p50']:.1f}",
+                "p99, ms": f"{1000 * it['p99']:.1f}",
+                "reconnects": f"{it['reconnects']:g}",
+                "CPU a poll, us": f"{1e6 * it['cpu']:.0f}",
+            }
+
+    def _one(self, interval: float, what: str) -> Figures:
+        with served() as port:
+            command = [sys.executable, "-m", "tests.benchmarks.serial", "--hand", port]
+            done = subprocess.run(
+                [*command, str(interval), str(self.seconds), what],
+                stdout=subprocess.PIPE,
+                text=True,
+                check=True,
+                cwd=ROOT,
+            )
+        figures: Figures = json.loads(done.stdout)
+        return figures
+
+
+def precise_loop() -> asyncio.AbstractEventLoop:
+    """A loop whose timers are not rounded up to a millisecond, as epoll's are: the line is to be exact."""
+    return asyncio.SelectorEventLoop(selectors.SelectSelector())
+
+
+if __name__ == "__main__":
+    logging.getLogger("robotiq_async").setLevel(logging.CRITICAL)
+    match sys.argv[1:]:
+        case ["--gripper", folder]:
+            with asyncio.Runner(loop_factory=precise_loop) as runner:
+                runner.run(gripper(folder))
+        case ["--hand", port, interval, seconds, what]:
+            figures = asyncio.run(measured(port, float(interval), float(seconds), streams=what == "stream"))
+            print(json.dumps(figures))  # noqa: T201
+        case _:
+            sys.exit(main(Benchmarks, __doc__ or "", PARTS, ["pymodbus", "pyserial", "anyio"], 20.0))

@@ -1,0 +1,401 @@
+"""An object status that trails the echo by some reads: no move ends before it begins, and nothing lies."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robotiq_async import Finger, MoveResult, MoveSupersededError, ObjectStatus
+from robotiq_async.control.requests.standstill import LAG_READS, LAG_S, LONG_AGO, Moment, Standstill
+from robotiq_async.enums import AXES
+from tests.control.other_client import image
+from tests.control.outcome import Outcome
+from tests.control.scan import POLL_S, Scan, started
+
+A, B, C, S = AXES
+ABC = Finger.ABC
+MOVING, OPENING, CLOSING, THERE = ObjectStatus
+LAGS = pytest.mark.parametrize("lag", [0, 1, 2, 4, 8])
+CYCLES = pytest.mark.parametrize("device_cycle", [0.005, 0.2])
+FEW_POLLS_S = 6 * POLL_S
+
+
+def ended(scan: Scan, told: Outcome) -> MoveResult:
+    """The result of a move, and what it says is so: the hand is not moving, and stays where it is."""
+    scan.until(lambda: told.is_told)
+    result, moves = told.result, [axis for axis in AXES if axis in scan.controller.status.moving]  # type: ignore[union-attr]
+    axes = list(result.outcomes)
+    travels = scan.travels()
+    assert not set(axes) & set(moves)
+    scan.run(1.0)
+    for axis in axes:
+        assert scan.gripper.travel(axis) - travels[axis] <= 2, f"{axis} went on"
+        assert scan.latest.finger_status(axis) is result.outcomes[axis], axis
+    return result
+
+
+def ready(lag: int, device_cycle: float = 0.005) -> Scan:
+    """A hand that is open, and says so: after an activation alone gDT is 0, as in a motion."""
+    scan = started(device_cycle, lag=lag)
+    scan.moved(0)
+    scan.run(2 * LAG_S)
+    return scan
+
+
+def holding(lag: int, device_cycle: float = 0.005) -> Scan:
+    """All fingers hold something at 150."""
+    scan = ready(lag, device_cycle)
+    scan.gripper.place_object(ABC, 150)
+    assert ended(scan, scan.move(255, speed=255)[1]).contacts == ABC
+    return scan
+
+
+# -- lag x what happens ------------------------------------------------------------------------------------
+
+
+@LAGS
+@CYCLES
+@pytest.mark.parametrize("position", [255, 200, 20, 12])
+def test_a_move_ends_there(lag: int, device_cycle: float, position: int) -> None:
+    scan = ready(lag, device_cycle)
+    result = ended(scan, scan.move(position)[1])
+    assert set(result.outcomes.values()) == {THERE}
+    assert all(abs(at - min(position, 241)) <= 2 for at in result.positions.values())
+
+
+@LAGS
+@CYCLES
+@pytest.mark.parametrize("at", [9, 60, 150])
+def test_a_move_ends_in_contact(lag: int, device_cycle: float, at: int) -> None:
+    scan = ready(lag, device_cycle)
+    scan.gripper.place_object(ABC, at)
+    result = ended(scan, scan.move(255)[1])
+    assert result.contacts == ABC
+    assert all(position == pytest.approx(at, abs=1) for position in result.positions.values())
+
+
+@LAGS
+@pytest.mark.parametrize("what", ["there", "within a count", "latched", "open"])
+def test_a_move_of_nothing_ends_within_a_few_polls(lag: int, what: str) -> None:
+    scan = ready(lag)
+    if what == "latched":
+        scan = holding(lag)
+    else:
+        scan.moved(0 if what == "open" else 100)
+    scan.run(1.0)
+    target = {"there": 100, "within a count": 101, "latched": 200, "open": 0}[what]
+    _, told = scan.move(target)
+    assert scan.until(lambda: told.is_told) <= FEW_POLLS_S
+    assert ended(scan, told).contacts == (ABC if what == "latched" else Finger(0))
+
+
+@LAGS
+@CYCLES
+def test_a_move_that_supersedes_another_ends_where_it_was_sent(lag: int, device_cycle: float) -> None:
+    """At every moment of the first one: at its start, under way, at its end, and after it."""
+    for seconds in (0.005, 0.02, 0.05, 0.85, 0.9, 1.2):
+        scan = ready(lag, device_cycle)
+        _, first = scan.move(100, speed=255)
+        scan.run(seconds)
+        _, second = scan.move(30, speed=255)
+        result = ended(scan, second)
+        assert result.positions == dict.fromkeys((A, B, C), pytest.approx(30, abs=2)), seconds
+        assert set(result.outcomes.values()) == {THERE}
+        assert first.is_told
+
+
+@LAGS
+@CYCLES
+def test_a_part_that_is_let_go_of_is_no_contact(lag: int, device_cycle: float) -> None:
+    """`open()` of a held part reported a contact while closing, and ended before it began."""
+    scan = holding(lag, device_cycle)
+    result = ended(scan, scan.move(0)[1])
+    assert result.contacts == Finger(0)
+    assert all(position <= 7 for position in result.positions.values())
+
+
+@LAGS
+@CYCLES
+@pytest.mark.parametrize("polls", [1, 3, 8, 60])
+def test_a_part_that_is_let_go_of_and_gripped_again_at_once(
+    lag: int, device_cycle: float, polls: int
+) -> None:
+    """The part is gone by then: what is shown of the grip before is no grip now."""
+    scan = holding(lag, device_cycle)
+    scan.move(0)
+    for _ in range(polls):
+        scan.step()
+    scan.gripper.remove_object(ABC)
+    _, again = scan.move(255)
+    result = ended(scan, again)
+    # Who had not begun to open is in the contact still: a contact latches.
+    latched = {axis for axis, how in result.outcomes.items() if how is CLOSING}
+    assert all(abs(result.positions[axis] - 150) <= 1 for axis in latched)
+    assert all(result.positions[axis] >= 240 for axis in result.outcomes if axis not in latched)
+
+
+@LAGS
+@CYCLES
+@pytest.mark.parametrize("polls", [1, 3, 8])
+def test_who_was_sent_away_from_a_part_and_back_is_stopped_by_a_hold(
+    lag: int, device_cycle: float, polls: int
+) -> None:
+    scan = holding(lag, device_cycle)
+    scan.move(0)
+    for _ in range(polls):
+        scan.step()
+    scan.gripper.remove_object(ABC)
+    scan.move(255)
+    scan.run(2 * device_cycle + 0.005)
+    was_moving = scan.gripper.is_moving
+    scan.hold()
+    scan.run(2 * device_cycle + 0.1)
+    travels = scan.travels()
+    scan.run(3.0)
+    after = scan.travels()
+    if was_moving:
+        assert all(after[axis] - travels[axis] <= 2 for axis in AXES), "it went on after a hold"
+
+
+@LAGS
+@CYCLES
+def test_a_hold_keeps_a_grip(lag: int, device_cycle: float) -> None:
+    scan = holding(lag, device_cycle)
+    scan.move(200, S)
+    scan.run(0.3)
+    scan.hold()
+    scan.run(1.0)
+    assert scan.gripper.grips == ABC
+    assert scan.last_image.position(S) < 200
+
+
+@LAGS
+@CYCLES
+@pytest.mark.parametrize("seconds", [0.0, 0.01, 0.03, 0.3])
+def test_a_motion_that_is_held_stops(lag: int, device_cycle: float, seconds: float) -> None:
+    scan = ready(lag, device_cycle)
+    _, told = scan.move(255, speed=255)
+    scan.step()
+    scan.run(seconds)
+    scan.hold()
+    scan.run(0.5)
+    assert isinstance(told.error, MoveSupersededError)
+    travels = scan.travels()
+    scan.run(2.0)
+    assert scan.travels() == travels
+    result = ended(scan, scan.move(60, A)[1])
+    assert abs(result.positions[A] - 60) <= 2
+
+
+@LAGS
+@CYCLES
+def test_two_moves_at_once_end_each_in_its_time(lag: int, device_cycle: float) -> None:
+    scan = ready(lag, device_cycle)
+    scan.gripper.place_object(B, 60)
+    _, short = scan.move(40, A, speed=255)
+    _, held = scan.move(255, B, speed=255)
+    scan.step()
+    _, long = scan.move(200, C, speed=128)
+    results = []
+    for told in (short, held, long):
+        scan.until(lambda told=told: told.is_told)  # type: ignore[misc]
+        results.append(told.result)
+    assert [result.positions[axis] for result, axis in zip(results, (A, B, C), strict=True)] == [
+        pytest.approx(at, abs=2) for at in (40, 60, 200)
+    ]
+    assert [result.contacts for result in results] == [Finger(0), B, Finger(0)]
+    assert results[0].duration < results[1].duration < results[2].duration
+
+
+@LAGS
+@CYCLES
+def test_more_force_on_a_part_that_is_gone_shows_that_it_is(lag: int, device_cycle: float) -> None:
+    """It is how a program asks whether a part is still there: the contact of before must not answer."""
+    scan = holding(lag, device_cycle)
+    scan.gripper.remove_object(ABC)
+    scan.run(0.5)
+    result = ended(scan, scan.move(254, force=200)[1])
+    assert result.contacts == Finger(0)
+
+
+@LAGS
+@CYCLES
+def test_a_grip_that_is_taken_up_after_a_halt_is_seen_anew(lag: int, device_cycle: float) -> None:
+    scan = holding(lag, device_cycle)
+    scan.halt()
+    scan.run(2 * device_cycle + 0.02)
+    scan.gripper.remove_object(ABC)
+    result = ended(scan, scan.move(255)[1])
+    assert result.contacts == Finger(0)
+
+
+# -- what cannot be reached --------------------------------------------------------------------------------
+
+
+@LAGS
+def test_an_axis_at_a_software_limit_ends_when_the_lag_is_over(lag: int) -> None:
+    """It says "reached" far from its request, and nothing has moved: it may be late, and it may be so."""
+    scan = ready(lag)
+    scan.moved(255, S)
+    scan.run(1.0)
+    _, told = scan.move(240, S)
+    took = scan.until(lambda: told.is_told)
+    assert took == pytest.approx(LAG_S, abs=0.05)
+    assert told.result.outcomes == {S: THERE}
+
+
+# -- whoever looks -----------------------------------------------------------------------------------------
+
+
+@LAGS
+@CYCLES
+def test_a_hand_that_was_sent_off_is_moving_until_it_has_stopped(lag: int, device_cycle: float) -> None:
+    scan = ready(lag, device_cycle)
+    scan.run(1.0)
+    scan.command(A, position=60)
+    while scan.gripper.position(A) < 60:
+        scan.step()
+        assert scan.controller.is_moving
+    scan.until(lambda: not scan.controller.is_moving, 1.0)
+
+
+@LAGS
+@CYCLES
+def test_a_grip_is_kept_and_what_was_just_sent_off_is_held(lag: int, device_cycle: float) -> None:
+    scan = holding(lag, device_cycle)
+    scan.command(S, position=200)
+    scan.step()
+    scan.stop(keep_grip=True)
+    travels = scan.travels()
+    assert scan.gripper.grips == ABC
+    scan.now += 5
+    assert scan.travels() == travels
+
+
+@LAGS
+@pytest.mark.parametrize("polls", [1, 3, 8])
+def test_a_grip_that_is_being_let_go_of_is_not_kept_for_one(lag: int, polls: int) -> None:
+    scan = holding(lag)
+    scan.command(ABC, position=0)
+    for _ in range(polls):
+        scan.step()
+    scan.stop(keep_grip=True)
+    travels = scan.travels()
+    scan.now += 5
+    assert scan.travels() == travels, "it went on after the end"
+
+
+@LAGS
+@pytest.mark.parametrize("target", [0, 200])
+def test_the_first_write_beside_another_clients_leaves_it_what_it_has_just_asked(
+    lag: int, target: int
+) -> None:
+    """Found with a gDT from before, an axis would have been sent back to where it came from."""
+    scan = Scan(lag=lag)
+    scan.gripper.place_object(B, 150)
+    scan.gripper.write(0, [0x0100])
+    scan.now += 10
+    scan.gripper.write(0, image({B: 255}))
+    for _ in range(1000):
+        scan.now += POLL_S
+        scan.status()
+    scan.gripper.write(0, image({B: target}))
+    scan.now += 0.01
+    scan.connect(activate=False)
+    scan.command(S, position=100)
+    scan.run(10)
+    assert scan.gripper.position(B) == pytest.approx(6 if target == 0 else 150, abs=2)
+    assert scan.last_image.position(B) == target
+
+
+# -- one axis ----------------------------------------------------------------------------------------------
+
+
+class Axis(Standstill):
+    """One that is asked something at a moment; everything acts at once."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.now = Moment(10.0, 1000)
+
+    def after(self, seconds: float, reads: int) -> Axis:
+        self.now = Moment(self.now.time + seconds, self.now.reads + reads)
+        return self.seen(THERE)
+
+    def seen(self, what: ObjectStatus) -> Axis:
+        self.see(what, lambda _: True, lambda _: False, self.now)
+        return self
+
+    def asked(
+        self, position: int | None, before: int | None, *, again: bool = False, rested: bool = False
+    ) -> Axis:
+        self.ask(1, position, before=before, again=again, rested=rested)
+        return self.after(0, 0)
+
+
+def test_what_is_shown_is_believed_where_nothing_was_asked_lately() -> None:
+    assert Axis().is_known(THERE, 100)
+    assert not Axis().is_known(MOVING, 100)
+    assert not Axis().is_doubtful(CLOSING, 100)
+
+
+def test_a_change_that_fits_the_new_request_alone_is_no_old_news() -> None:
+    assert Axis().asked(255, 0).is_known(CLOSING, 9)
+    assert not Axis().asked(0, 255).is_known(CLOSING, 9)
+
+
+def test_what_fitted_before_and_was_contradicted_since_is_not_known() -> None:
+    axis = Axis().asked(0, 255).asked(255, 0)
+    assert not axis.is_known(CLOSING, 150)
+    assert axis.is_doubtful(CLOSING, 150)
+    # Until the request that contradicts it is old enough: it is from the last one then.
+    assert axis.after(LAG_S, LAG_READS).is_known(CLOSING, 150)
+
+
+@pytest.mark.parametrize(("seconds", "reads"), [(LAG_S - 0.001, 1000), (1000.0, LAG_READS - 1)])
+def test_the_lag_takes_both_time_and_reads(seconds: float, reads: int) -> None:
+    axis = Axis().asked(255, 0).after(seconds, reads)
+    assert not axis.is_known(THERE, 7)
+    assert axis.after(0.001, 1).is_known(THERE, 7)
+
+
+def test_nothing_is_known_under_what_does_not_act() -> None:
+    axis = Axis()
+    axis.ask(7, 100, before=101, again=False, rested=True)
+    assert not axis.is_known(THERE, 100)
+
+
+def test_what_has_been_seen_to_move_does_not_show_what_was_before_its_motion() -> None:
+    """What is shown comes in its order; but a motion may be that of a request before, if there was one."""
+    assert Axis().asked(0, 255, rested=True).asked(255, 0).seen(MOVING).is_known(CLOSING, 150)
+    assert not Axis().asked(0, 255).asked(255, 0).seen(MOVING).is_known(CLOSING, 150)
+
+
+@pytest.mark.parametrize(("position", "doubtful"), [(100, True), (102, True), (103, False), (105, False)])
+def test_who_stands_between_two_requests_may_have_some_counts_to_go(position: int, doubtful: bool) -> None:
+    assert Axis().asked(104, 100).is_doubtful(THERE, position) is doubtful
+
+
+def test_a_contact_that_is_tried_again_is_known_when_the_lag_is_over() -> None:
+    axis = Axis().asked(255, 255, again=True)
+    assert not axis.is_known(CLOSING, 150)
+    assert not axis.is_doubtful(CLOSING, 150), "for a hold it is a grip"
+    assert axis.after(LAG_S, LAG_READS).is_known(CLOSING, 150)
+
+
+@given(
+    st.lists(st.tuples(st.one_of(st.none(), st.integers(0, 255)), st.booleans()), max_size=8),
+    st.sampled_from(ObjectStatus),
+    st.integers(0, 255),
+)
+def test_whatever_was_asked_is_forgotten_when_the_lag_is_over(
+    asked: list[tuple[int | None, bool]], what: ObjectStatus, position: int
+) -> None:
+    axis, before = Axis(), 0
+    for request, again in asked:
+        axis.asked(request, before, again=again).after(0.01, 2)
+        before = 0 if request is None else request
+    axis.after(LAG_S, LAG_READS)
+    assert axis.is_known(what, position) == (what is not MOVING)
+    assert LONG_AGO.is_lag_over(axis.now)

@@ -1,0 +1,262 @@
+"""Software limits that are echoed in place of the request, and how other clients are told from them."""
+
+from __future__ import annotations
+
+import logging
+
+import pytest
+
+from robotiq_async import Finger, MoveSupersededError, ObjectStatus, RobotiqStatus
+from robotiq_async.control.requests.limits import ALONE_S, Limits
+from robotiq_async.enums import AXES
+from robotiq_async.simulator import SimulatedGripper
+from robotiq_async.wire.registers import Registers, gPR
+from robotiq_async.wire.request import AxisRequest, Request
+from tests.control.scan import Scan
+from tests.register_words import status_of
+
+A, B, C, S = AXES
+ABC = Finger.ABC
+LOW, HIGH = 20, 220
+CYCLES = pytest.mark.parametrize("device_cycle", [0.0, 0.005, 0.03, 0.2])
+LAGS = pytest.mark.parametrize("lag", [0, 2, 8])
+
+
+class Echoing(Scan):
+    """Of a gripper whose scissor goes to 20..220, and that shows that in place of requests beyond."""
+
+    def __init__(self, device_cycle: float = 0.005, lag: int = 0) -> None:
+        super().__init__(lag=lag)
+        self.gripper = SimulatedGripper(
+            lambda: self.now, device_cycle=device_cycle, spread=False, scissor_limit=(LOW, HIGH)
+        )
+        self.start()
+        self.moved(130, S)
+        self.run(1.0)
+
+    def status(self) -> RobotiqStatus:
+        status = super().status()
+        words = list(status.registers)
+        if status.go_echo:
+            gPR[3].write(words, min(max(gPR[3].read(words), LOW), HIGH))
+        return RobotiqStatus(tuple(words), status.timestamp, status.sequence)
+
+
+# -- limits ------------------------------------------------------------------------------------------------
+
+
+@CYCLES
+@LAGS
+@pytest.mark.parametrize(("request_", "limit"), [(255, HIGH), (230, HIGH), (0, LOW)])
+def test_a_move_beyond_a_limit_ends_with_what_it_reached(
+    device_cycle: float, lag: int, request_: int, limit: int
+) -> None:
+    scan = Echoing(device_cycle, lag)
+    for _ in range(2):
+        result = scan.moved(request_, S)
+        assert result.outcomes == {S: ObjectStatus.AT_POSITION}
+        assert result.positions == {S: limit}
+        assert scan.moved(130, S).positions == {S: 130}
+    assert scan.controller.foreign_commands == 0
+
+
+def test_it_is_learned_and_told_once(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO)
+    scan = Echoing()
+    for request in (255, 130, 250, 130, 255):
+        scan.moved(request, S)
+    assert caplog.text.count(f"its limit {HIGH}") == 1
+
+
+def test_an_axis_at_its_limit_rests_and_is_left_alone() -> None:
+    scan = Echoing()
+    scan.moved(255, S)
+    written = len(scan.written)
+    scan.hold()
+    scan.run(0.5)
+    assert len(scan.written) == written
+    scan.moved(100, A)
+    assert scan.last_image.position(S) == HIGH
+    scan.stop(keep_grip=True)
+    assert scan.last_image.go
+
+
+def test_an_axis_that_a_part_keeps_from_its_limit_is_in_contact() -> None:
+    scan = Echoing()
+    scan.gripper.place_object(S, 180)
+    assert scan.moved(255, S).contacts == S
+
+
+@CYCLES
+def test_a_control_loop_beyond_a_limit_commands_alone(device_cycle: float) -> None:
+    scan = Echoing(device_cycle)
+    for position in range(140, 256, 2):
+        scan.command(S, position=position)
+        scan.step()
+    for position in range(254, 120, -2):
+        scan.command(S, position=position)
+        scan.step()
+    _, told = scan.move(255, S)
+    scan.until(lambda: told.is_told)
+    assert told.result.positions == {S: HIGH}
+    assert scan.controller.foreign_commands == 0
+
+
+def test_two_moves_at_once_one_of_them_beyond_a_limit() -> None:
+    scan = Echoing()
+    _, finger = scan.move(150, A)
+    _, scissor = scan.move(255, S)
+    scan.until(lambda: finger.is_told and scissor.is_told)
+    assert finger.result.positions == {A: 150}
+    assert scissor.result.positions == {S: HIGH}
+
+
+def test_after_a_reconnect_it_goes_on() -> None:
+    scan = Echoing()
+    scan.moved(255, S)
+    scan.blink()
+    assert scan.moved(100, A).positions == {A: 100}
+    assert scan.last_image.position(S) == HIGH
+    assert scan.moved(130, S).positions == {S: 130}
+    assert scan.controller.foreign_commands == 0
+
+
+# -- other clients -----------------------------------------------------------------------------------------
+
+
+def beside(scan: Scan, **positions: int) -> Registers:
+    """What another client writes that knows all the rest."""
+    image = Request.from_registers(scan.gripper.request_registers)
+    return image.with_positions({Finger[name]: at for name, at in positions.items()}).registers
+
+
+@CYCLES
+@pytest.mark.parametrize("polls", [1, 5, 60])
+def test_a_client_that_writes_after_ours_has_shown_is_one(device_cycle: float, polls: int) -> None:
+    scan = Scan(device_cycle=device_cycle)
+    scan.start()
+    _, told = scan.move(200, S, speed=0)
+    scan.until(lambda: scan.controller.status is not None and scan.latest.requested_position(S) == 200)
+    for _ in range(polls):
+        scan.step()
+    scan.gripper.write(0, beside(scan, SCISSOR=180))
+    scan.until(lambda: told.is_told, 2.0)
+    assert isinstance(told.error, MoveSupersededError)
+    assert scan.controller.foreign_commands == 1
+
+
+@CYCLES
+@pytest.mark.parametrize(
+    "others",
+    [
+        {"SCISSOR": 50},  # the other way
+        {"SCISSOR": 180, "A": 90},  # another axis as well
+        {"A": 90},
+    ],
+    ids=str,
+)
+def test_a_client_that_writes_just_after_us_is_one(device_cycle: float, others: dict[str, int]) -> None:
+    scan = Scan(device_cycle=device_cycle)
+    scan.start()
+    scan.moved(130, S)
+    scan.run(1.0)
+    _, told = scan.move(200, S, speed=0)
+    scan.step()
+    scan.gripper.write(0, beside(scan, **others))
+    scan.run(1.0)
+    assert scan.controller.foreign_commands == 1
+    if "SCISSOR" in others:
+        assert isinstance(told.error, MoveSupersededError)
+
+
+@CYCLES
+def test_a_client_that_takes_the_fingers_just_after_us_is_one(device_cycle: float) -> None:
+    """Fingers have a limit only near pinch."""
+    scan = Scan(device_cycle=device_cycle)
+    scan.start()
+    _, told = scan.move(255)
+    scan.step()
+    scan.gripper.write(0, beside(scan, A=100, B=100, C=100))
+    scan.until(lambda: told.is_told, 2.0)
+    assert isinstance(told.error, MoveSupersededError)
+    assert scan.controller.foreign_commands == 1
+
+
+def test_who_was_seen_lately_is_the_better_explanation() -> None:
+    scan = Echoing()
+    scan.gripper.write(0, beside(scan, A=90))
+    scan.run(2.0)
+    assert scan.controller.foreign_commands == 1
+    _, told = scan.move(255, S)
+    scan.until(lambda: told.is_told)
+    assert isinstance(told.error, MoveSupersededError)
+    scan.run(ALONE_S + 1)
+    scan.moved(130, S)
+    scan.run(1.0)
+    assert scan.moved(255, S).positions == {S: HIGH}
+
+
+def test_a_client_that_is_taken_for_a_limit_is_not_undone() -> None:
+    """It wrote within our device cycle, on our axis, on its way: that cannot be told. Nothing moves by it."""
+    scan = Scan(device_cycle=0.03)
+    scan.start()
+    scan.moved(130, S)
+    scan.run(1.0)
+    _, told = scan.move(255, S)
+    scan.step()
+    scan.gripper.write(0, beside(scan, SCISSOR=180))
+    scan.until(lambda: told.is_told)
+    assert told.result.positions == {S: 180}
+    travel = scan.gripper.travel(S)
+    scan.moved(100, A)
+    assert scan.gripper.travel(S) == travel
+    # Next time the request is shown as it is: it was no limit.
+    assert scan.moved(225, S).positions == {S: 225}
+    assert scan.controller.foreign_commands == 0
+
+
+# -- what is suspected -------------------------------------------------------------------------------------
+
+BEFORE = Request(activate=True, go=True, axes=(AxisRequest(0),) * 3 + (AxisRequest(130),))
+
+
+@pytest.mark.parametrize(
+    ("shown", "position", "asked", "expected"),
+    [
+        ((0, 0, 0, 220), 130, {S: 255}, True),
+        ((0, 0, 0, 120), 130, {S: 255}, False),  # behind it
+        ((0, 0, 0, 15), 130, {S: 0}, True),
+        ((0, 0, 0, 140), 130, {S: 0}, False),
+        ((0, 0, 0, 220), 130, {}, False),  # an axis that was not asked
+        ((113, 113, 113, 130), 130, {A: 255, B: 255, C: 255}, False),  # the scissor is not near pinch
+        ((113, 113, 113, 130), 219, {A: 255, B: 255, C: 255}, True),
+        ((113, 255, 113, 130), 219, {A: 255, B: 255, C: 255}, True),
+    ],
+)
+def test_what_may_be_a_limit(
+    shown: tuple[int, ...], position: int, asked: dict[Finger, int], expected: bool
+) -> None:
+    status = status_of(0x39, 0xFF, echo=shown, position=(6, 6, 6, position))
+    assert Limits().suspect(BEFORE, BEFORE.with_positions(asked), status) is expected
+
+
+@pytest.mark.parametrize("byte_0", [0x31, 0x38, 0x30], ids=["halt", "reset", "both"])
+def test_a_halt_and_a_reset_by_others_are_no_limits(byte_0: int) -> None:
+    image = BEFORE.with_positions({S: 255})
+    status = status_of(byte_0, 0xFF, echo=(0, 0, 0, 220), position=130)
+    assert not Limits().suspect(BEFORE, image, status)
+
+
+def test_what_was_not_proven_is_doubted_when_another_client_is_seen() -> None:
+    limits, image = Limits(), BEFORE.with_positions({S: 255})
+    status = status_of(0x39, 0xFF, echo=(0, 0, 0, 220), position=130)
+    assert limits.suspect(BEFORE, image, status)
+    limits.doubt()
+    assert limits.alias(image) is None
+    assert limits.suspect(BEFORE, image, status)
+    assert limits.prove(S, 219) == 220
+    assert limits.prove(S, 219) is None, "no news"
+    limits.doubt()
+    assert limits.alias(image) == (True, True, 0, 0, 0, 220)
+    limits.forget(image, image.echo)
+    assert limits.alias(image) is None

@@ -1,0 +1,257 @@
+"""Fault 0x09 after a second without a message: shown once, and no fault; one that lasts is."""
+
+from __future__ import annotations
+
+import logging
+
+import pytest
+
+from robotiq_async import Fault, Finger, GripperFaultError, RobotiqStatus, State
+from robotiq_async.control.passing_fault import LASTS_READS, LASTS_S, PassingFault
+from robotiq_async.simulator import SimulatedGripper
+from robotiq_async.wire.registers import Registers
+from tests.control.other_client import going_to
+from tests.control.scan import POLL_S, Scan
+from tests.register_words import status_of
+
+A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
+
+
+class Silent(Scan):
+    """Of a gripper that shows 0x09 in the first read after a second without one."""
+
+    def __init__(self, gripper: SimulatedGripper | None = None, shows: int = 1) -> None:
+        super().__init__(gripper=gripper)
+        self.shows = shows
+        self.silences = 0
+        self._asked = 0.0
+        self._left = 0
+
+    def status(self) -> RobotiqStatus:
+        if self.now - self._asked > 1.0:
+            self._left = self.shows
+            self.silences += 1
+        self._asked = self.now
+        status = super().status()
+        if not self._left:
+            return status
+        self._left -= 1
+        return RobotiqStatus(with_fault(status.registers), status.timestamp, status.sequence)
+
+
+def with_fault(words: Registers) -> Registers:
+    return (words[0], words[1] & 0x00FF | Fault.COMMUNICATION_NOT_READY << 8, *words[2:])
+
+
+@pytest.fixture
+def silent() -> Silent:
+    scan = Silent()
+    scan.start()
+    return scan
+
+
+# -- what a silence shows ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shows", [1, 2])
+def test_a_start_looks_past_it_and_activates(shows: int) -> None:
+    scan = Silent(shows=shows)
+    scan.start()
+    assert [target for _, target, _ in scan.transitions] == [
+        State.DO_ACTIVATION,
+        State.WF_ACTIVATION,
+        State.RUNNING_IDLE,
+    ]
+
+
+def test_a_start_looks_past_it_and_adopts() -> None:
+    scan = Silent()
+    scan.gripper.write(0, [0x0100])
+    scan.now += 10
+    scan.gripper.write(0, going_to(200))
+    scan.now += 10
+    scan.connect()
+    assert [target for _, target, _ in scan.transitions] == [State.RUNNING_IDLE]
+    scan.run(0.5)
+    assert not scan.written
+
+
+def test_it_decides_nothing_about_a_gripper_before_it_has_looked_past_it() -> None:
+    scan = Silent()
+    scan.controller.activates = True
+    scan.controller.see(scan.status())
+    assert scan.controller.is_undecided
+    assert scan.state is State.DISCONNECTED
+    assert scan.controller.decide(scan.now) is None
+
+
+def test_a_move_goes_on_through_a_loop_that_is_held_up(silent: Silent) -> None:
+    _, told = silent.move(255, speed=0)
+    silent.run(1.0)
+    for _ in range(4):
+        silent.now += 1.2
+        silent.step()
+    silent.until(lambda: told.is_told)
+    assert all(position >= 240 for position in told.result.positions.values())
+    assert silent.controller.passing_faults == 5, "the start, and each time"
+    assert State.FAULT not in [target for _, target, _ in silent.transitions]
+
+
+def test_a_loop_that_is_held_up_at_every_poll_sees_no_fault(silent: Silent) -> None:
+    for _ in range(10):
+        silent.now += 1.2
+        silent.step()
+    assert silent.silences == 11
+    assert silent.state is State.RUNNING_IDLE
+
+
+def test_on_a_link_so_slow_that_each_read_ends_a_silence_things_are_done() -> None:
+    scan = Silent()
+    scan.gripper.write(0, [0x0100])
+    scan.now += 10
+    scan.controller.activates = True
+    for _ in range(LASTS_READS):
+        assert scan.state is State.DISCONNECTED
+        scan.now += 1.2
+        scan.controller.see(scan.status())
+    assert scan.state is State.RUNNING_IDLE
+    told = scan.command(A, position=100)
+    scan.now += 1.2
+    scan.step()
+    assert told.told == [None]
+    assert scan.state is State.RUNNING_IDLE
+
+
+def test_a_reconnect_looks_past_it(silent: Silent) -> None:
+    silent.moved(100)
+    silent.transitions.clear()
+    silent.blink(away=3.0)
+    assert [target for _, target, _ in silent.transitions] == [State.DISCONNECTED, State.RUNNING_IDLE]
+
+
+@pytest.mark.parametrize("how", ["command", "hold", "activate", "reset"])
+def test_what_is_asked_after_a_silence_is_done(silent: Silent, how: str) -> None:
+    silent.run(0.1)
+    if how == "activate":
+        silent.controller.reset()
+        silent.until(lambda: silent.state is State.RESET)
+    silent.now += 1.5
+    match how:
+        case "command":
+            silent.moved(100)
+        case "hold":
+            assert silent.hold().told == []
+            silent.step()
+        case "activate":
+            silent.controller.activate()
+            silent.until(lambda: silent.state is State.RUNNING_IDLE)
+        case "reset":
+            silent.controller.reset()
+            silent.until(lambda: silent.state is State.RESET)
+    assert State.FAULT not in [target for _, target, _ in silent.transitions]
+
+
+def test_a_grip_is_kept_after_a_silence(silent: Silent) -> None:
+    silent.gripper.place_object(B | C, 150)
+    silent.moved(255, B | C)
+    silent.run(0.5)
+    silent.now += 1.5
+    silent.stop(keep_grip=True)
+    assert silent.gripper.grips == B | C
+
+
+def test_it_is_told_once(silent: Silent, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO)
+    silent.controller.passing_faults = 0
+    for _ in range(3):
+        silent.now += 1.2
+        silent.run(0.1)
+    assert silent.controller.passing_faults == 3
+    assert caplog.text.count("0x09") == 1
+
+
+# -- what lasts --------------------------------------------------------------------------------------------
+
+
+def test_one_that_lasts_is_a_fault_after_some_reads(silent: Silent) -> None:
+    _, told = silent.move(255)
+    silent.run(0.5)
+    silent.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 2.0)
+    took = silent.until(lambda: told.is_told)
+    assert took <= (LASTS_READS + 1) * POLL_S
+    assert isinstance(told.error, GripperFaultError)
+    assert silent.state is State.FAULT
+    assert silent.controller.passing_faults == 1, "that of the start"
+
+
+@pytest.mark.parametrize("how", ["command", "activate"])
+def test_under_one_that_lasts_nothing_is_begun(silent: Silent, how: str) -> None:
+    silent.run(0.1)
+    if how == "activate":
+        silent.controller.reset()
+        silent.until(lambda: silent.state is State.RESET)
+    silent.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.5)
+    written = len(silent.written)
+    told = None
+    if how == "activate":
+        silent.controller.activate()
+    else:
+        told = silent.command(A, position=100)
+    silent.until(lambda: silent.state is State.FAULT, 0.1)
+    assert len(silent.written) == written
+    assert told is None or isinstance(told.error, GripperFaultError)
+
+
+def test_a_hold_and_a_halt_do_not_wait_for_it(silent: Silent) -> None:
+    for stop in (silent.hold, silent.halt):
+        silent.move(255 if stop == silent.hold else 0, speed=0)
+        silent.run(0.5)
+        silent.now += 1.2
+        written = len(silent.written)
+        stop()
+        silent.step()
+        assert len(silent.written) == written + 1
+
+
+def test_one_that_lasts_at_the_start_leaves_the_hand_in_fault() -> None:
+    scan = Silent()
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 2.0)
+    scan.connect()
+    assert scan.state is State.FAULT
+    assert not scan.written
+
+
+def test_it_does_not_clear_another_fault(silent: Silent) -> None:
+    silent.gripper.inject_fault(Fault(0x0C))
+    silent.run(0.1)
+    assert silent.state is State.FAULT
+    silent.now += 1.2
+    silent.step()
+    assert silent.state is State.FAULT
+
+
+@pytest.mark.parametrize(
+    ("at", "shown"),
+    [
+        ([0.0], [True]),
+        ([0.0, LASTS_S, 2 * LASTS_S], [True, True, False]),
+        ([0.0, 0.001, 0.002, 0.003], [True] * 4),  # some time, too
+        ([0.0, 0.1, 0.2], [True, True, False]),  # a slow poll
+        ([0.0, 1.2, 2.4, 3.6], [True] * 4),  # each after a silence
+        ([0.0, 1.2, 1.21, 1.22], [True, True, True, False]),  # since the last silence
+    ],
+)
+def test_it_takes_some_reads_and_some_time_without_a_silence(at: list[float], shown: list[bool]) -> None:
+    passing = PassingFault()
+    told = []
+    for time in at:
+        judged = passing.see(status_of(0x31, 0xFF, 0x09, at=time), time)
+        told.append(passing.is_shown)
+        assert (judged.fault is Fault.NONE) == passing.is_shown
+    assert told == shown
+
+
+@pytest.mark.parametrize("code", [0x00, 0x05, 0x0A, 0x0C, 0x0E])
+def test_every_other_status_is_what_it_is(code: int) -> None:
+    status = status_of(0x31, 0xFF, code)
+    assert PassingFault().see(status, 0.0) is status

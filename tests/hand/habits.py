@@ -1,0 +1,151 @@
+"""Transports on which a gripper behaves as some real ones are said to do."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Sequence
+
+from robotiq_async.enums import Fault
+from robotiq_async.errors import ConnectFailedError, ConnectionLostError
+from robotiq_async.simulator import SimulatedGripper
+from robotiq_async.wire.registers import Registers, gPR
+from robotiq_async.wire.request import Request
+from tests.register_words import with_object_status
+
+
+class Plain:
+    """A gripper in the time of the loop, and no network."""
+
+    def __init__(self, **options: float) -> None:
+        self.gripper = SimulatedGripper(asyncio.get_running_loop().time, spread=False, **options)  # type: ignore[arg-type]
+        self.is_open = False
+        self.is_pulled = False
+        """Whether the cable is."""
+        self.written: list[Request] = []
+
+    async def open(self) -> None:
+        await asyncio.sleep(0.0005)
+        if self.is_pulled:
+            raise ConnectFailedError("plain", "pulled")
+        self.is_open = True
+
+    async def read(self) -> Registers:
+        await asyncio.sleep(0.0005)
+        if self.is_pulled:
+            self.is_open = False
+            raise ConnectionLostError("pulled")
+        return self.shown()
+
+    async def write(self, registers: Sequence[int]) -> None:
+        await asyncio.sleep(0.0005)
+        self.written.append(Request.from_registers(registers))
+        self.take(tuple(registers))
+
+    async def close(self) -> None:
+        self.is_open = False
+
+    def shown(self) -> Registers:
+        return self.gripper.status_registers()
+
+    def take(self, registers: Registers) -> None:
+        self.gripper.write(0, registers)
+
+    @property
+    def now(self) -> float:
+        return asyncio.get_running_loop().time()
+
+
+class Late(Plain):
+    """gDT and gSTA come some reads late."""
+
+    def __init__(self, reads: int) -> None:
+        super().__init__()
+        self._late: deque[Registers] = deque(maxlen=reads + 1)
+
+    def shown(self) -> Registers:
+        self._late.append(super().shown())
+        return with_object_status(self._late[-1], self._late[0])
+
+
+class Silent(Plain):
+    """0x09 in the first read after a second without a message."""
+
+    _last = -10.0
+    seen = 0
+
+    def shown(self) -> Registers:
+        was_silent, self._last = self.now - self._last > 1.0, self.now
+        words = super().shown()
+        if was_silent:
+            self.seen += 1
+            words = (words[0], words[1] & 0x00FF | Fault.COMMUNICATION_NOT_READY << 8, *words[2:])
+        return words
+
+    def take(self, registers: Registers) -> None:
+        self._last = self.now
+        super().take(registers)
+
+
+class Asleep(Plain):
+    """The first images on a new connection are echoed, and move nothing.
+
+    ``shows`` is the gDT of an axis that does not follow; None for the one it had.
+    """
+
+    def __init__(self, images: float = 1, shows: int | None = None) -> None:
+        super().__init__()
+        self._images = images
+        self._shows = shows
+        self._left = images
+        self._swallowed: Registers | None = None
+
+    async def open(self) -> None:
+        await super().open()
+        self._left, self._swallowed = self._images, None
+
+    def take(self, registers: Registers) -> None:
+        if not Request.from_registers(registers).go or self._left <= 0:
+            self._swallowed = None
+            super().take(registers)
+            return
+        self._left -= 1
+        self._swallowed = registers
+
+    def shown(self) -> Registers:
+        words = list(super().shown())
+        if self._swallowed is None:
+            return tuple(words)
+        image = Request.from_registers(self._swallowed)
+        words[0] |= image.go << 11
+        for axis, field in zip(image.axes, gPR, strict=True):
+            field.write(words, axis.position)
+        if self._shows is not None:
+            words[0] = words[0] & 0x3F00 | self._shows * 0x55
+        return tuple(words)
+
+
+class Stopped(Plain):
+    """After an emergency stop: 0x05 and gIMC = 1 until it has been reset so many times."""
+
+    def __init__(self, resets: float) -> None:
+        super().__init__()
+        self.resets_left = resets
+        self.resets = 0
+        self._is_raised = True
+
+    def take(self, registers: Registers) -> None:
+        raised = Request.from_registers(registers).activate
+        if self._is_raised and not raised:
+            self.resets += 1
+            self.resets_left -= 1
+        self._is_raised = raised
+        if self.resets_left <= 0:
+            super().take(registers)
+
+    def shown(self) -> Registers:
+        if self.resets_left <= 0:
+            return super().shown()
+        if not self._is_raised:
+            return (0x0000, 0x0000, *super().shown()[2:])
+        return (0x1100, Fault.ACTIVATION_PENDING << 8, *super().shown()[2:])

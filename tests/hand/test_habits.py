@@ -1,0 +1,246 @@
+"""A hand on grippers with the habits of real ones."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+
+import pytest
+
+from robotiq_async import (
+    ActivationTimeoutError,
+    Finger,
+    GripChange,
+    RobotiqHand,
+    State,
+    StateTimeoutError,
+)
+from robotiq_async.control.first_motion import IGNORED_S
+from robotiq_async.control.requests.standstill import LAG_S
+from robotiq_async.errors import MoveIgnoredError
+from robotiq_async.hand.recovery import STALLED_S
+from robotiq_async.session.activation_progress import TOLD_EVERY_S
+from robotiq_async.session.options import ACTIVATION_TIMEOUT_S
+from tests.grippers import activate_beforehand
+from tests.hand.habits import Asleep, Late, Plain, Silent, Stopped
+from tests.virtual import VirtualLoop
+
+pytestmark = pytest.mark.virtual_time
+
+ABC = Finger.ABC
+LAGS = pytest.mark.parametrize("reads", [0, 1, 2, 4, 8])
+
+
+def now() -> float:
+    return asyncio.get_running_loop().time()
+
+
+# -- a late object status ----------------------------------------------------------------------------------
+
+
+@LAGS
+async def test_a_hand_with_a_late_object_status_is_used_as_any(reads: int) -> None:
+    late = Late(reads)
+    async with RobotiqHand(late) as hand:
+        assert set((await hand.open()).outcomes) == {Finger.A, Finger.B, Finger.C}
+        closed = await hand.close()
+        assert not closed.object_detected
+        assert min(closed.positions.values()) >= 240
+        assert max((await hand.open()).positions.values()) <= 7
+        late.gripper.place_object(ABC, 150)
+        assert await hand.grasp()
+        events = hand.grip_events()
+        opened = await hand.open()
+        assert not opened.object_detected
+        assert max(opened.positions.values()) <= 7
+        assert {event.change for event in events.drain()} == {GripChange.RELEASED}
+
+
+# -- a fault in passing ------------------------------------------------------------------------------------
+
+
+async def test_a_start_is_entered_active_although_the_silence_before_shows_as_a_fault() -> None:
+    silent = Silent()
+    for _ in range(2):
+        async with RobotiqHand(silent) as hand:
+            assert hand.state is State.RUNNING_IDLE
+            assert (await hand.move(100)).positions[Finger.A] == 100
+            assert hand.statistics.passing_faults == 1
+            assert hand.statistics.faults == 0
+        await asyncio.sleep(3)
+    assert silent.seen == 2
+
+
+async def test_a_loop_that_is_held_up_does_not_end_a_motion() -> None:
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualLoop)
+    async with RobotiqHand(Silent()) as hand:
+        loop.call_later(0.5, loop.hold_up, 1.2)
+        closed = await hand.close(speed=0)
+        assert min(closed.positions.values()) >= 240
+        assert hand.statistics.passing_faults == 2
+
+
+async def test_a_reconnect_after_a_silence_goes_on() -> None:
+    silent = Silent()
+    async with RobotiqHand(silent) as hand:
+        transitions = hand.transitions()
+        silent.is_pulled = True
+        await asyncio.sleep(2)
+        silent.is_pulled = False
+        await hand.wait_for_state(State.RUNNING_IDLE)
+        assert [each.target for each in transitions.drain()] == [State.DISCONNECTED, State.RUNNING_IDLE]
+        assert hand.statistics.passing_faults == 2
+
+
+# -- an activation that takes its time ---------------------------------------------------------------------
+
+
+async def test_an_activation_may_take_half_a_minute_and_is_told_on_the_way(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level(logging.INFO)
+    slow = Plain(speedup=4.2 / 30)  # 4.2 s is the simulator's own
+    began = now()
+    async with RobotiqHand(slow) as hand:
+        assert hand.state is State.RUNNING_IDLE
+        assert 25 < now() - began < ACTIVATION_TIMEOUT_S
+    told = [record.getMessage() for record in caplog.records if "so far" in record.getMessage()]
+    assert len(told) == int((now() - began) // TOLD_EVERY_S)
+    assert "activating, 12 s so far" in told[2]
+    await asyncio.sleep(100)
+    assert len(told) == caplog.text.count("so far"), "the end is the end"
+
+
+async def test_at_the_limit_an_activation_goes_on_and_can_be_waited_for_again() -> None:
+    slow = Plain(speedup=4.2 / 50)
+    hand = RobotiqHand(slow)
+    await hand.start(activate=False)
+    with pytest.raises(ActivationTimeoutError, match="within 40 s"):
+        await hand.activate()
+    assert [request.activate for request in slow.written] == [True], "nothing is taken back"
+    await hand.activate()
+    assert hand.state is State.RUNNING_IDLE
+    await hand.stop()
+
+
+async def test_who_leaves_before_its_end_takes_it_back() -> None:
+    slow = Plain(speedup=4.2 / 50)
+    with pytest.raises(ActivationTimeoutError):
+        await RobotiqHand(slow).start()
+    assert [request.activate for request in slow.written] == [True, False]
+
+
+# -- a gripper that does not follow at first ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shows", [None, 0, 3], ids=["as it was", "moving", "at position"])
+async def test_a_first_motion_that_moves_nothing_is_named(shows: int | None) -> None:
+    asleep = Asleep(shows=shows)
+    await activate_beforehand(asleep.gripper)
+    async with RobotiqHand(asleep) as hand:
+        began = now()
+        with pytest.raises(MoveIgnoredError, match="nothing has moved"):
+            await hand.close()
+        assert now() - began == pytest.approx(IGNORED_S, abs=0.2)
+        await asyncio.sleep(5)
+        assert asleep.gripper.position(Finger.A) <= 7, "it does not begin by itself"
+        assert min((await hand.close()).positions.values()) >= 240
+
+
+async def test_a_gripper_that_never_follows_is_named_each_time() -> None:
+    asleep = Asleep(images=math.inf)
+    await activate_beforehand(asleep.gripper)
+    async with RobotiqHand(asleep) as hand:
+        for _ in range(2):
+            with pytest.raises(MoveIgnoredError):
+                await hand.close()
+
+
+async def test_after_a_reconnect_it_is_the_same() -> None:
+    asleep = Asleep(images=0)
+    await activate_beforehand(asleep.gripper)
+    async with RobotiqHand(asleep) as hand:
+        await hand.move(100)
+        asleep._images = 1
+        asleep.is_pulled = True
+        await hand.wait_for_state(State.DISCONNECTED)
+        asleep.is_pulled = False
+        await hand.wait_for_state(State.RUNNING_IDLE)
+        with pytest.raises(MoveIgnoredError):
+            await hand.move(200)
+        assert (await hand.move(200)).positions[Finger.A] == 200
+
+
+@pytest.mark.parametrize(("target", "fingers"), [(0, ABC), (255, Finger.SCISSOR), (130, Finger.SCISSOR)])
+async def test_a_first_motion_of_nothing_is_one(target: int, fingers: Finger) -> None:
+    """The scissor stands at its software limit, which is reported as reached."""
+    plain = Plain(scissor_limit=(6, 228))  # type: ignore[arg-type]
+    await activate_beforehand(plain.gripper)
+    async with RobotiqHand(plain) as hand:
+        await hand.move(255 if target == 255 else 130, Finger.SCISSOR)
+    async with RobotiqHand(plain) as hand:
+        began = now()
+        await hand.move(target, fingers)
+        assert now() - began < 0.5
+
+
+async def test_a_slow_first_motion_is_one() -> None:
+    assert IGNORED_S > 2 * LAG_S
+    plain = Plain()
+    await activate_beforehand(plain.gripper)
+    async with RobotiqHand(plain) as hand:
+        assert (await hand.move(12, speed=0)).positions[Finger.A] == 12
+
+
+# -- an emergency stop -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("resets", [1, 2])
+async def test_a_gripper_that_waits_for_its_activation_is_reset_and_activated(resets: int) -> None:
+    stopped = Stopped(resets)
+    hand = RobotiqHand(stopped)
+    await hand.start(activate=False)
+    assert hand.state is State.WF_ACTIVATION
+    began = now()
+    await hand.recover()
+    assert hand.state is State.RUNNING_IDLE
+    assert stopped.resets == resets
+    assert now() - began < resets * (STALLED_S + 1) + 10
+    assert (await hand.move(100)).positions[Finger.A] == 100
+    await hand.stop()
+
+
+async def test_one_that_never_comes_back_is_reset_twice_and_left_to_a_person() -> None:
+    stopped = Stopped(math.inf)
+    hand = RobotiqHand(stopped)
+    await hand.start(activate=False)
+    began = now()
+    with pytest.raises(StateTimeoutError, match="emergency stop released") as caught:
+        await hand.recover()
+    assert "0x05" in str(caught.value)
+    assert stopped.resets == 2
+    assert now() - began < 4 * STALLED_S
+    await hand.stop()
+
+
+async def test_an_activation_that_shows_nothing_new_is_not_reset() -> None:
+    """Without a priority code it may well go on; here it ends after 20 s."""
+
+    class Quiet(Plain):
+        def shown(self) -> tuple[int, ...]:
+            words = super().shown()
+            return words if words[0] >> 12 & 0b11 == 0b11 else (words[0], 0, 0, 0, 0, 0, 0, 0)
+
+    quiet = Quiet(speedup=4.2 / 20)
+    hand = RobotiqHand(quiet)
+    await hand.start(activate=False)
+    await hand.recover()
+    assert [request.activate for request in quiet.written] == [True]
+    await hand.stop()
+
+
+async def test_a_start_on_such_a_gripper_says_what_helps() -> None:
+    with pytest.raises(ActivationTimeoutError, match=r"0x05\); recover\(\) resets it"):
+        await RobotiqHand(Stopped(math.inf)).start()

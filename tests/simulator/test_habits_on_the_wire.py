@@ -1,0 +1,216 @@
+"""Habits as troubles: what a client meets while they last, and that they end."""
+
+from __future__ import annotations
+
+import asyncio
+import struct
+
+import pytest
+
+from robotiq_async.enums import Fault, Finger, Initialization
+from robotiq_async.simulator import Habits, SimulatorServer, Trouble
+from robotiq_async.simulator import parse_troubles as plan_of
+from robotiq_async.simulator.physics.habits import REAL_ACTIVATION
+from robotiq_async.simulator.troubles.trouble import KINDS
+from robotiq_async.wire.request import AxisRequest, Request
+from tests.simulator.test_fault_injector import (
+    SerialClient,
+    activate,
+    is_answered,
+    serial_simulator,
+    simulator,
+    status,
+    virtual,
+)
+from tests.simulator.test_server import RawClient, raw_client
+
+READ_3 = bytes.fromhex("03 0000 0001")
+READ_4 = bytes.fromhex("04 0000 0001")
+REFUSED = b"\x84\x01"
+
+
+def image(position: int, *, go: bool = True) -> tuple[int, ...]:
+    axes = (AxisRequest(position, 255, 0),) * 4
+    return Request(activate=True, go=go, axes=axes).registers
+
+
+async def begin(server: SimulatorServer) -> None:
+    """Active, and every axis told to stay open."""
+    await activate(server)
+    server.gripper.write(0, image(0))
+    await asyncio.sleep(10)
+
+
+@virtual
+async def test_each_habit_is_the_grippers_own_again_when_its_trouble_ends() -> None:
+    async with simulator() as server:
+        own = server.gripper.habits
+        for name, kind in KINDS.items():
+            if kind.habit is None:
+                continue
+            async with server.fault_injector.making(Trouble(name)):
+                expected = True if kind.value is None else kind.value
+                assert getattr(server.gripper.habits, kind.habit) == expected
+            assert server.gripper.habits == own
+
+
+@virtual
+async def test_habits_overlap_and_the_newest_counts() -> None:
+    async with simulator() as server:
+        own = server.gripper.habits
+        begun = [await server.fault_injector.begin(each) for each in plan_of("status-lag 0.1; echoed-limits")]
+        async with server.fault_injector.making(Trouble("status-lag", 0.3)):
+            assert server.gripper.habits.status_lag == 0.3
+            await server.fault_injector.end(begun[1])
+            assert server.gripper.habits == Habits(status_lag=0.3)
+        assert server.gripper.habits == Habits(status_lag=0.1)
+        await server.fault_injector.end(begun[0])
+        assert server.gripper.habits == own
+
+
+@virtual
+async def test_the_times_of_troubles_are_real_ones() -> None:
+    slow = Trouble("slow-activation", 12)
+    async with simulator(speedup=20) as server, server.fault_injector.making(slow):
+        server.gripper.write(0, Request(activate=True).registers)
+        await asyncio.sleep(11.9)
+        assert status(server).initialization is Initialization.ACTIVATING
+        await asyncio.sleep(0.2)
+        assert status(server).is_activated
+
+
+def test_a_server_that_is_given_no_gripper_activates_as_slowly_as_a_real_one() -> None:
+    assert SimulatorServer().gripper.habits == Habits(activation_time=REAL_ACTIVATION)
+
+
+@virtual
+async def test_the_object_status_trails_the_echo() -> None:
+    async with simulator() as server, raw_client(server) as client:
+        await begin(server)
+        async with server.fault_injector.making(Trouble("status-lag")):
+            await client.write(image(200))
+            await asyncio.sleep(0.01)
+            seen = await client.read_status()
+            assert seen.requested_position(Finger.A) == 200
+            assert not seen.is_moving
+            await asyncio.sleep(0.05)
+            assert (await client.read_status()).is_moving
+
+
+@virtual
+async def test_a_fault_after_silence_whoever_asked_before() -> None:
+    async with simulator() as server, raw_client(server) as one, raw_client(server) as other:
+        await server.fault_injector.begin(Trouble("silence-fault"))
+        await asyncio.sleep(0.6)
+        assert (await one.read_status()).fault is Fault.NONE
+        await asyncio.sleep(0.6)
+        assert (await other.read_status()).fault is Fault.NONE
+        await asyncio.sleep(1.1)
+        assert (await one.read_status()).fault is Fault.COMMUNICATION_NOT_READY
+        assert (await other.read_status()).fault is Fault.NONE
+
+
+@virtual
+async def test_writes_that_are_acknowledged_and_forgotten() -> None:
+    async with simulator() as server, raw_client(server) as client:
+        async with server.fault_injector.making(Trouble("write-spacing")):
+            for position in (10, 20, 30):
+                assert await client.write(image(position)) == struct.pack(">BHH", 16, 0, 8)
+            await asyncio.sleep(0.01)
+            assert await client.write(image(40)) == struct.pack(">BHH", 16, 0, 8)
+        kept = [Request.from_registers(write.registers).axes[0].position for write in server.gripper.writes]
+        assert kept == [10, 40]
+
+
+@virtual
+async def test_the_first_motion_on_a_new_connection_is_forgotten() -> None:
+    async with simulator() as server, raw_client(server) as before:
+        await begin(server)
+        async with server.fault_injector.making(Trouble("wake-needed")):
+            await before.write(image(50))
+            await asyncio.sleep(5)
+            assert server.gripper.position(Finger.A) == 50, "an old connection is awake"
+            async with raw_client(server) as client:
+                await client.read_status()
+                await client.write(image(200))
+                await asyncio.sleep(5)
+                seen = await client.read_status()
+                assert (seen.requested_position(Finger.A), seen.position(Finger.A)) == (200, 50)
+                await client.write(image(200))
+                await asyncio.sleep(5)
+                assert server.gripper.position(Finger.A) == 200
+            async with raw_client(server) as client:
+                await client.read_status()
+        await before.write(image(100))
+        await asyncio.sleep(5)
+        assert server.gripper.position(Finger.A) == 100, "it is over"
+
+
+@virtual
+async def test_function_3_serves_where_4_would() -> None:
+    async with simulator() as server, raw_client(server) as client:
+        await activate(server)
+        async with server.fault_injector.making(Trouble("function-3-only")):
+            assert await client.ask(READ_4) == REFUSED
+            assert await client.ask(READ_3) == b"\x03\x02\x31\x00"
+            assert await client.write(image(50)) == struct.pack(">BHH", 16, 0, 8)
+            await asyncio.sleep(0.1)
+            assert (await client.ask(bytes.fromhex("03 07d0 0001"))) == b"\x03\x02\x39\x00"
+        assert await client.ask(READ_4) == b"\x04\x02\x39\x00"
+        assert await client.ask(READ_3) == struct.pack(">BBH", 3, 2, image(50)[0])
+
+
+@virtual
+async def test_function_3_on_a_serial_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with serial_simulator(monkeypatch) as (server, client):
+        async with server.fault_injector.making(Trouble("function-3-only")):
+            assert await client.ask() == b"", "a serial line refuses by silence"
+            assert await asked_with_3(client) == bytes.fromhex("09 03 02 0000 5985")
+        assert await client.ask() != b""
+
+
+async def asked_with_3(client: SerialClient) -> bytes:
+    return await client.ask(bytes.fromhex("09 03 07d0 0001 85cf"))
+
+
+@virtual
+async def test_one_connection_at_a_time() -> None:
+    async with simulator() as server:
+        async with server.fault_injector.making(Trouble("one-connection-only")):
+            async with raw_client(server) as first:
+                assert await is_answered(first)
+                assert await is_reset(server)
+                assert await is_answered(first), "the first one goes on"
+            await asyncio.sleep(0.1)
+            async with raw_client(server) as second:
+                assert await is_answered(second)
+            await asyncio.sleep(0.1)
+        async with raw_client(server) as one, raw_client(server) as other:
+            assert [await is_answered(each) for each in (one, other)] == [True, True]
+
+
+async def is_reset(server: SimulatorServer) -> bool:
+    """Whether a new connection is reset before anything is answered."""
+    async with raw_client(server) as client:
+        try:
+            await RawClient.ask(client, READ_4)
+        except (ConnectionResetError, asyncio.IncompleteReadError):
+            return True
+    return False
+
+
+@virtual
+async def test_an_emergency_stop_for_a_while() -> None:
+    async with simulator() as server:
+        await begin(server)
+        async with server.fault_injector.making(Trouble("e-stop", 2)):
+            async with server.fault_injector.making(Trouble("e-stop", 1)):
+                assert status(server).fault is Fault.ACTIVATION_PENDING
+            server.gripper.write(0, (0,) * 8)
+            await asyncio.sleep(1)
+        for expected in (False, True):
+            server.gripper.write(0, Request(activate=True).registers)
+            await asyncio.sleep(30)
+            assert status(server).is_activated is expected
+            server.gripper.write(0, (0,) * 8)
+            await asyncio.sleep(1)

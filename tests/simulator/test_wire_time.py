@@ -1,0 +1,193 @@
+"""Bytes take their time on the simulator's serial line: by its clock, by the machine's, and for a hand."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from typing import Any
+
+import pytest
+import serial
+
+from robotiq_async import Finger, RobotiqHand
+from robotiq_async.simulator import RtuOverTcpSimulatorServer, SerialSimulatorServer, SimulatedGripper
+from robotiq_async.simulator.server.connection import MOST_UNREAD
+from robotiq_async.simulator.server.endpoint import connections
+from robotiq_async.simulator.server.serial_connection import MOST_UNSENT
+from robotiq_async.simulator.server.wire_time import WireTime
+from tests.grippers import activate_beforehand
+from tests.simulator.test_serial_server import Line, with_crc
+from tests.virtual import run
+from tests.virtual_line import VirtualLine
+
+BYTE_S = 10 / 115200
+SILENCE_S = 0.00175
+READ = with_crc(bytes.fromhex("09 03 07d0 0008"))
+WRITE = with_crc(bytes.fromhex("09 10 03e8 0008 10") + bytes(16))
+EXCHANGES = [(READ, 21), (WRITE, 8)]
+
+
+def on_the_wire(request: bytes, answer_size: int) -> float:
+    """What an exchange takes; the silence after the answer comes before the next request."""
+    return (len(request) + answer_size) * BYTE_S + SILENCE_S
+
+
+def test_the_figures_of_the_manual_pages() -> None:
+    read, write = (on_the_wire(*each) for each in EXCHANGES)
+    assert 1000 * (read - SILENCE_S) == pytest.approx(2.52, abs=0.005)
+    assert 1000 * (write - SILENCE_S) == pytest.approx(2.86, abs=0.005)
+    assert 1000 * (read + write + 2 * SILENCE_S) == pytest.approx(12.38, abs=0.01)
+
+
+def test_directions_are_apart_and_nothing_overtakes() -> None:
+    wire = WireTime()
+    due, pause = wire.hears(10.0, 8)
+    assert (due, pause) == (pytest.approx(10.0 + 8 * BYTE_S + SILENCE_S), 10.0)
+    assert wire.hears(10.0, 8) == (pytest.approx(10.0 + 16 * BYTE_S + SILENCE_S), 0.0), "behind the first"
+    wire.heard(due)
+    assert wire.sends(due + 0.0009, 21) == pytest.approx(due + 21 * BYTE_S), "a timer that was late"
+    assert wire.sends(due + 0.0009, 21) == pytest.approx(due + 42 * BYTE_S)
+    assert wire.sends(due + 1.0, 21) == pytest.approx(due + 1.0 + 21 * BYTE_S), "a reply that was late"
+
+
+@pytest.mark.parametrize(("request_", "size"), EXCHANGES)
+def test_an_exchange_takes_what_its_bytes_take(
+    request_: bytes, size: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def main() -> None:
+        loop = asyncio.get_running_loop()
+        cable = VirtualLine(monkeypatch)
+        async with SerialSimulatorServer(cable.FAR, SimulatedGripper(loop.time)):
+            port: Any = serial.serial_for_url(cable.NEAR)
+            for _ in range(3):
+                arrived: asyncio.Future[None] = loop.create_future()
+                loop.add_reader(port.fileno(), arrived.set_result, None)
+                began = loop.time()
+                port.write(request_)
+                await arrived
+                loop.remove_reader(port.fileno())
+                assert loop.time() - began == pytest.approx(on_the_wire(request_, size), abs=1e-6)
+                assert len(port.read(4096)) == size
+                await asyncio.sleep(SILENCE_S)
+            port.close()
+
+    run(main)
+
+
+@pytest.mark.parametrize(("request_", "size"), EXCHANGES)
+async def test_by_the_clock_of_the_machine(request_: bytes, size: int) -> None:
+    """Never shorter; and where nothing else is in the way, longer by the timers' millisecond and a bit."""
+    line, took = Line(), []
+    try:
+        async with SerialSimulatorServer(line.port):
+            for _ in range(50):
+                began = time.perf_counter()
+                line.send(request_)
+                await line.receive(size)
+                took.append(time.perf_counter() - began)
+                await asyncio.sleep(SILENCE_S)
+    finally:
+        line.close()
+    assert min(took) >= on_the_wire(request_, size) - 0.0001
+    assert sorted(took)[5] <= on_the_wire(request_, size) + 0.0025
+
+
+async def test_without_pacing_bytes_take_no_time() -> None:
+    line = Line()
+    try:
+        async with SerialSimulatorServer(line.port, paced=False):
+            await line.read_status()
+            began = time.perf_counter()
+            for _ in range(20):
+                await line.read_status()
+            assert (time.perf_counter() - began) / 20 < on_the_wire(READ, 21) / 2
+    finally:
+        line.close()
+
+
+@pytest.mark.parametrize("paced", ["yes", 1, None])
+def test_paced_or_not(paced: Any) -> None:
+    with pytest.raises(TypeError, match="paced must be True or False"):
+        SerialSimulatorServer("/dev/ttyFAR", paced=paced)
+    with pytest.raises(TypeError, match="paced must be True or False"):
+        RtuOverTcpSimulatorServer(paced=paced)
+
+
+def test_a_line_keeps_no_more_than_it_carries_for_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def main() -> None:
+        loop = asyncio.get_running_loop()
+        cable = VirtualLine(monkeypatch)
+        async with SerialSimulatorServer(cable.FAR, SimulatedGripper(loop.time)) as server:
+            connection: Any = connections(server._running())[0]
+            for _ in range(1000):
+                connection.data_received(100 * READ)
+                connection.pass_on(bytes(100))
+            assert connection._wire.unheard(loop.time()) <= MOST_UNREAD + 100 * len(READ)
+            assert connection._wire.unsent(loop.time()) <= MOST_UNSENT + 100
+            await asyncio.sleep(60)
+            assert not connection._inbox
+
+    run(main)
+
+
+# -- a hand on such a line ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("interval", "streaming", "polls", "missed"),
+    [
+        ({}, False, 66.7, 0),
+        ({}, True, 66.7, 0),
+        ({"poll_interval": 0.01}, False, 100, 0),
+        ({"poll_interval": 0.01}, True, 80.8, 19.2),
+        ({"poll_interval": 0.005}, False, 166.2, 33.8),
+        ({"poll_interval": 0.005}, True, 80.8, 119.2),
+    ],
+)
+def test_how_often_a_hand_polls(
+    interval: dict[str, float], streaming: bool, polls: float, missed: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the interval of serial lines was chosen by: with it no command costs a poll."""
+
+    async def main() -> None:
+        loop = asyncio.get_running_loop()
+        cable = VirtualLine(monkeypatch)
+        gripper = SimulatedGripper(loop.time)
+        async with SerialSimulatorServer(cable.FAR, gripper):
+            await activate_beforehand(gripper)
+            async with RobotiqHand(f"rtu://{cable.NEAR}", **interval) as hand:  # type: ignore[arg-type]
+                await asyncio.sleep(0.1)
+                before, until = hand.statistics, loop.time() + 10.0
+                while loop.time() < until:
+                    if streaming:
+                        hand.command(Finger.A, position=100 + int(20 * (loop.time() % 5)))
+                        hand.command(Finger.A, speed=int(1000 * loop.time()) % 256)
+                    await asyncio.sleep(0.001)
+                after = hand.statistics
+                assert (after.polls - before.polls) / 10 == pytest.approx(polls, rel=0.02)
+                assert (after.overruns - before.overruns) / 10 == pytest.approx(missed, rel=0.02)
+                assert not streaming or (after.writes - before.writes) / 10 == pytest.approx(polls, rel=0.05)
+                assert after.reconnects == 0
+
+    run(main)
+
+
+@pytest.mark.parametrize("delay", [0.05, 0.08])
+def test_a_line_as_slow_as_bluetooth_works_when_told(delay: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def main() -> None:
+        loop = asyncio.get_running_loop()
+        cable = VirtualLine(monkeypatch)
+        gripper = SimulatedGripper(loop.time)
+        async with SerialSimulatorServer(cable.FAR, gripper) as server:
+            await activate_beforehand(gripper)
+            server.policy = lambda reply: [(delay, reply)]
+            address = f"rtu://{cable.NEAR}"
+            async with RobotiqHand(address, poll_interval=0.1, response_timeout=0.5) as hand:
+                result = await hand.move(200)
+                assert result.positions[Finger.A] == pytest.approx(200, abs=2)
+                assert hand.statistics.reconnects == 0
+                began = loop.time()
+                await hand.set_speed(10)
+                assert loop.time() - began < 0.4
+
+    run(main)
