@@ -288,7 +288,7 @@ class RemoteCommands(RemoteObservation):
                 )
         except (asyncio.CancelledError, RobotiqConnectionError, NotAllowedError):
             # Also when an answer came that tells nothing of what became of it.
-            cancelling = session.stops.call_off(call)
+            cancelling = session.stops.call_off(name, call)
             if cancelling is not None and name in ("move", "set_position"):
                 outbox.count_motion(cancelling)
             raise

@@ -17,6 +17,8 @@ from .requests import label
 
 TRIES: Final = 2
 """How many times a request is called off in a window."""
+GOES_ON: Final = frozenset({"activate", "reset", "atr", "recover"})
+"""What the gripper carries on with when the call is cancelled, as with a hand of this process."""
 
 
 class Asker(Protocol):
@@ -57,10 +59,12 @@ class Stops:
         """Wait until halts under way have ended, well or not."""
         await asyncio.gather(*self._halts, return_exceptions=True)
 
-    def call_off(self, call: Call) -> asyncio.Task[Any] | None:
-        """Nobody waits for a request any more: what it set going is to be held."""
+    def call_off(self, name: str, call: Call) -> asyncio.Task[Any] | None:
+        """The call of a command was cancelled: what it set going is to be held, unless it goes on."""
         if not self._run.keeper.is_in_control or self._run.is_over:
             return None
+        if name in GOES_ON:
+            return self._run.spawn(self._call_off(call))
         return self._begin(self._cancels, self._call_off(call))
 
     async def _halt_once(self, left: float) -> None:
