@@ -18,7 +18,7 @@ from ..errors import (
 from ..link.address import Address
 from ..link.modbus import ModbusTransport
 from ..link.sim_transport import SimulatedTransport, new_gripper
-from ..link.transport import Transport
+from ..link.transport import Link
 from ..session.options import LONGEST_RESPONSE_S, registers_of
 from ..wire.registers import RTU_REGISTERS, STATUS_RESERVED, TCP_REGISTERS, RegisterMap
 from ..wire.status import RobotiqStatus
@@ -37,7 +37,7 @@ UNITS: Final = (2, 9, 1, 0, 255)
 ALONE: Final = "It may serve one client at a time"
 
 
-async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> Transport:
+async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> Link:
     """An open link to a gripper that answers.
 
     No connection is made to try the port: a gateway that serves one client would be busy with that one.
@@ -117,14 +117,14 @@ async def _other_frames(address: Address) -> str:
     return f"The frames there are others: write the address as {other}."
 
 
-def _link(address: Address, registers: RegisterMap, patience: float) -> Transport:
+def _link(address: Address, registers: RegisterMap, patience: float) -> Link:
     if address.kind == "sim":
         gripper = new_gripper(address.simulation)
         return SimulatedTransport(gripper, registers, connect_timeout=REACH_S, response_timeout=patience)
     return ModbusTransport(address, registers, connect_timeout=REACH_S, response_timeout=patience)
 
 
-async def _first_reading(link: Transport) -> tuple[RobotiqStatus, float]:
+async def _first_reading(link: Link) -> tuple[RobotiqStatus, float]:
     """What is read once the link is open, and after how many seconds the reply came.
 
     Raises:

@@ -13,7 +13,7 @@ from ..enums import Severity
 from ..errors import ConnectionLostError, RobotiqConnectionError
 from ..link.address import Address
 from ..link.host_names import addresses_of
-from ..link.transport import Transport
+from ..link.transport import Link
 from ..session.options import (
     POLL_INTERVAL_S,
     RESPONSE_TIMEOUT_S,
@@ -79,7 +79,7 @@ async def _resolve(address: Address, report: Report) -> None:
     report(Finding(Level.GOOD, "name", f"{address.host} is {', '.join(found)}"))
 
 
-async def _timing(link: Transport, interval: float, report: Report) -> None:
+async def _timing(link: Link, interval: float, report: Report) -> None:
     """Round trip, and the rate of reads that it allows; ``interval`` is the usual one on such a link."""
     loop = asyncio.get_running_loop()
     times, began = [], loop.time()
@@ -142,7 +142,7 @@ def report_state(status: RobotiqStatus, report: Report) -> None:
             report(Finding(Level.BAD, "fault", found, advice))
 
 
-async def _others(link: Transport, report: Report) -> None:
+async def _others(link: Link, report: Report) -> None:
     """Whether the requests change although this program writes none."""
     loop = asyncio.get_running_loop()
     until, seen = loop.time() + WATCH_S, set()

@@ -8,7 +8,7 @@ from typing import Final
 from ..link.address import Address
 from ..link.modbus import ModbusTransport
 from ..link.serial_ports import USB_SERIAL, latency_file, latency_timer
-from ..link.transport import Transport
+from ..link.transport import Link
 from .findings import Finding, Level, Report
 
 LATENCY_MS: Final = 2
@@ -38,7 +38,7 @@ def report_adapter(address: Address, report: Report, folder: Path = USB_SERIAL) 
         report(Finding(Level.DOUBT, "adapter", f"{found}, which every read waits for", advice))
 
 
-def report_damage(link: Transport, reads: int, report: Report) -> None:
+def report_damage(link: Link, reads: int, report: Report) -> None:
     """Report reads that had to be asked again."""
     repeats = link.repeats if isinstance(link, ModbusTransport) else 0
     if repeats:

@@ -90,16 +90,21 @@ class GuardedTransport:
             self._drop()
             raise ProtocolError(f"{self._name}: {error}") from error
 
-    async def ready(self) -> None:
-        """What the transport may wait for is not known."""
-
-    async def write(self, registers: Sequence[int]) -> None:
-        """Write the eight request registers.
+    async def send(self, decide: Callable[[], Sequence[int] | None]) -> bool:
+        """Write what ``decide`` returns, if anything; it is called by the task that makes the call.
 
         Raises:
             RobotiqConnectionError: that failed, or took too long.
         """
-        await self._bounded(lambda: self._inner.write(registers), self._response_timeout)
+
+        async def write() -> bool:
+            registers = decide()
+            if registers is None:
+                return False
+            await self._inner.write(registers)
+            return True
+
+        return await self._bounded(write, self._response_timeout)
 
     async def close(self) -> None:
         """Disconnect; never fails."""

@@ -23,7 +23,7 @@ import asyncio
 import logging
 import math
 import secrets
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final
 
 import anyio
@@ -178,14 +178,19 @@ class ModbusTransport:
             answer = await self._read_again(ended.reason)
         return tuple(answer.registers)
 
-    async def ready(self) -> None:
-        """Wait until the line takes a request: on a serial line frames are kept apart.
+    async def send(self, decide: Callable[[], Sequence[int] | None]) -> bool:
+        """Write what ``decide`` returns, if anything; on a serial line after the silence between frames.
 
         Raises:
-            RobotiqConnectionError: something arrived meanwhile that nobody had asked for.
+            RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
         """
         if self._keeps_silence:
             await self._pause()
+        registers = decide()
+        if registers is None:
+            return False
+        await self.write(registers)
+        return True
 
     async def write(self, registers: Sequence[int]) -> None:
         """Write the eight request registers with one FC16, exactly once.
@@ -227,7 +232,8 @@ class ModbusTransport:
                 caller gets the line back in step.
         """
         client = self._connected()
-        await self.ready()
+        if self._keeps_silence:
+            await self._pause()
         self._watchdog.watch(by)
         try:
             response: ModbusPDU = await client.execute(False, request)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from ..enums import Finger
@@ -83,16 +83,13 @@ class SimulatedTransport:
         """
         return await self._connected().read()
 
-    async def ready(self) -> None:
-        """There is nothing to wait for."""
-
-    async def write(self, registers: Sequence[int]) -> None:
-        """Write the eight request registers, exactly once.
+    async def send(self, decide: Callable[[], Sequence[int] | None]) -> bool:
+        """Write what ``decide`` returns, if anything.
 
         Raises:
             RobotiqConnectionError: no clean acknowledgement in time; the connection is closed.
         """
-        await self._connected().write(registers)
+        return await self._connected().send(decide)
 
     async def close(self) -> None:
         """Disconnect and stop the simulator's server; does nothing when closed."""

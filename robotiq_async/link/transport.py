@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol, runtime_checkable
 
 from ..wire.registers import Registers
@@ -45,12 +45,32 @@ class Transport(Protocol):
         """Disconnect; never fails, and does nothing when closed."""
 
 
-class Link(Transport, Protocol):
-    """A transport of ours, which can be asked to be ready: what is written then does not wait."""
+class Link(Protocol):
+    """A transport as the poller uses it: what is written is decided on at the last moment."""
 
-    async def ready(self) -> None:
-        """Wait until the line takes a request.
+    @property
+    def is_open(self) -> bool:
+        """As :attr:`Transport.is_open`."""
+
+    async def open(self) -> None:
+        """As :meth:`Transport.open`."""
+
+    async def read(self) -> Registers:
+        """As :meth:`Transport.read`."""
+
+    async def send(self, decide: Callable[[], Sequence[int] | None]) -> bool:
+        """Write what ``decide`` returns, exactly once, if it returns anything.
+
+        A write may have to wait: for the silence between the frames of a serial line, or for the task that
+        calls a transport object. A request that stops the hand meanwhile must still count, so ``decide`` is
+        called in the turn of the event loop in which the write leaves.
+
+        Returns:
+            Whether something was written, and acknowledged.
 
         Raises:
-            RobotiqConnectionError: the link went down meanwhile; the transport is closed.
+            RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
         """
+
+    async def close(self) -> None:
+        """As :meth:`Transport.close`."""

@@ -26,6 +26,8 @@ from ..errors import (
 )
 from ..link.transport import Link
 from ..link.watchdog import HELD_S
+from ..wire.registers import Registers
+from ..wire.request import Request
 from ..wire.status import RobotiqStatus
 from .ending import Ending
 from .opening import Opener
@@ -106,6 +108,8 @@ class Poller:
         self._tick = Tick(options.poll_interval)
         self._last_poll = 0.0
         self._warned = -math.inf
+        self._decided: tuple[Request, float] | None = None
+        """What the last cycle decided to write, and when."""
 
     def request_stop(self, *, halt: bool, keep_grip: bool = False) -> None:
         """End the task; with ``halt`` it stops the fingers first. Never blocks.
@@ -243,25 +247,32 @@ class Poller:
 
     async def _write(self) -> None:
         """Write what the controller decides on, if anything."""
-        # First: what is decided on leaves in this turn, and no stop comes between.
-        await self._transport.ready()
-        now = self._tick.time()
-        request = self._controller.decide(now)
-        if request is None:
-            self._channels.publish_changes()
-            return
-        self._counters.has_begun_to_write = True
+        self._decided = None
         # Listeners hear of it after the write: what they ask for would come too late for this one.
         try:
-            await self._transport.write(request.registers)
+            is_written = await self._transport.send(self._decide)
         except RobotiqConnectionError:
             self._channels.publish_changes()
-            self._channels.requests.push(SentRequest(request, now, acknowledged=False))
+            if self._decided is not None:
+                self._channels.requests.push(SentRequest(*self._decided, acknowledged=False))
             raise
+        if not is_written or self._decided is None:
+            return
         self._counters.writes += 1
         self._controller.acknowledged(self._tick.time())
         self._channels.publish_changes()
-        self._channels.requests.push(SentRequest(request, now, acknowledged=True))
+        self._channels.requests.push(SentRequest(*self._decided, acknowledged=True))
+
+    def _decide(self) -> Registers | None:
+        """Called by the link in the turn of the loop in which it writes: no stop comes between."""
+        now = self._tick.time()
+        request = self._controller.decide(now)
+        if request is None:
+            self._channels.publish_changes()  # it waits for no write
+            return None
+        self._counters.has_begun_to_write = True
+        self._decided = request, now
+        return request.registers
 
     async def _poll_once(self) -> None:
         """Read, and tell everybody."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections import deque
 from collections.abc import Sequence
 
@@ -12,6 +13,9 @@ from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.wire.registers import Registers, gPR
 from robotiq_async.wire.request import Request
 from tests.register_words import with_object_status
+
+DEVICE_CYCLE_S = 0.005
+"""So long a simulated gripper takes to see a write."""
 
 
 class Plain:
@@ -99,6 +103,7 @@ class Asleep(Plain):
         self._shows = shows
         self._left = images
         self._swallowed: Registers | None = None
+        self._follows_at = math.inf
 
     async def open(self) -> None:
         await super().open()
@@ -106,14 +111,17 @@ class Asleep(Plain):
 
     def take(self, registers: Registers) -> None:
         if not Request.from_registers(registers).go or self._left <= 0:
-            self._swallowed = None
+            if self._swallowed is not None:
+                self._follows_at = self.now + DEVICE_CYCLE_S  # until then it echoes what it has swallowed
             super().take(registers)
             return
         self._left -= 1
-        self._swallowed = registers
+        self._swallowed, self._follows_at = registers, math.inf
 
     def shown(self) -> Registers:
         words = list(super().shown())
+        if self.now >= self._follows_at:
+            self._swallowed = None
         if self._swallowed is None:
             return tuple(words)
         image = Request.from_registers(self._swallowed)

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from typing import Any
 
 import pytest
 
 from robotiq_async import Finger, NotStartedError, RobotiqHand, State
 from robotiq_async.simulator import Habits, SerialSimulatorServer, SimulatedGripper, SimulatorServer
+from robotiq_async.wire.registers import Registers
 from robotiq_async.wire.request import Request
 from tests.contract.bench import until
 from tests.grippers import activate_beforehand
+from tests.session.wire import Wire
 from tests.virtual_line import VirtualLine
 
 pytestmark = pytest.mark.virtual_time
@@ -363,3 +365,46 @@ async def test_what_waits_for_the_silence_of_a_serial_line_is_not_sent_after_a_s
                 called = loop.time()
             late = [image for when, image in line.written if when > called and image.go]
             assert late == [], f"stopped {step * 0.5:g} ms after the command"
+
+
+@pytest.mark.parametrize("turns", range(8))
+@pytest.mark.parametrize("options", [{}, {"halt": False}, {"keep_grip": True}], ids=str)
+async def test_what_a_transport_object_is_given_was_decided_before_the_stop(
+    turns: int, options: dict[str, bool]
+) -> None:
+    """Its calls are made in a task of their own: an image was decided one turn before the stop, and left."""
+    stopped_at: list[int] = []
+    late: list[Request] = []
+    loop = asyncio.get_running_loop()
+
+    class Watched(Wire):
+        """Calls for the stop so many turns of the loop after the read that a command is decided on."""
+
+        async def read(self) -> Registers:
+            registers = await super().read()
+            if commanded and not stopping:
+                stopping.append(loop.create_task(stop()))
+            return registers
+
+        async def write(self, registers: Sequence[int]) -> None:
+            image = Request.from_registers(registers)
+            if stopped_at and image.go and any(axis.position == 255 for axis in image.axes):
+                late.append(image)
+            await super().write(registers)
+
+    async def stop() -> None:
+        for _ in range(turns):
+            await asyncio.sleep(0)
+        stopped_at.append(len(wire.gripper.writes))
+        await hand.stop(**options)
+
+    wire = Watched(speedup=5)
+    commanded: list[bool] = []
+    stopping: list[asyncio.Task[None]] = []
+    hand = RobotiqHand(wire)
+    await hand.start()
+    hand.command(position=255)
+    commanded.append(True)
+    await until(lambda: bool(stopping))
+    await stopping[0]
+    assert not late

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from robotiq_async.errors import ResponseTimeoutError, RobotiqConnectionError
 from robotiq_async.simulator import SimulatedGripper
@@ -41,8 +41,13 @@ class Wire:
         await self._carry("read")
         return self.gripper.status_registers()
 
-    async def ready(self) -> None:
-        """There is nothing to wait for."""
+    async def send(self, decide: Callable[[], Sequence[int] | None]) -> bool:
+        """What a link does beyond a transport object."""
+        registers = decide()
+        if registers is None:
+            return False
+        await self.write(registers)
+        return True
 
     async def write(self, registers: Sequence[int]) -> None:
         await self._carry("write")
