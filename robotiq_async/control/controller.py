@@ -41,6 +41,10 @@ _COMMANDED: Final = RUNNING | {State.FAULT}
 """The states in which the gripper follows requests, ours or another client's."""
 WARNING_S: Final = 1.0
 """At most one warning about another client in this time."""
+SPACING_S: Final = 0.01
+"""Of two writes: a gripper may forget one that comes sooner (manual of 2014, chapters on TCP and RTU)."""
+_SPACED: Final = frozenset({State.DO_ACTIVATION, State.DO_ATR})
+"""What moves the fingers, and is sent only once, keeps that distance."""
 
 
 class Controller:
@@ -77,6 +81,8 @@ class Controller:
         """The write that carried the last step of a sequence: it sees only what came of it."""
         self._activating = False
         """Whether an activation of ours may still be under way: to be taken back if the hand is stopped."""
+        self._written_at = NEVER
+        """When a write was acknowledged last."""
         self._hold_on_return = NO_AXES
         """Axes whose hold was not delivered before the link went down."""
         self._grip_keeper = GripKeeper(self._shadow, log=machine.log)
@@ -335,6 +341,7 @@ class Controller:
 
     def acknowledged(self, now: float) -> None:
         """The image was acknowledged."""
+        self._written_at = now
         number = self._shadow.acknowledged(now)
         self._callers.acknowledged(number)
         if number == self._step or (self.machine.sequence is None and self._callers.pending.is_empty):
@@ -367,7 +374,9 @@ class Controller:
         """What the sequence under way wants written; at its end, see where that leaves the hand."""
         if self._step and not self._shadow.acts(self._step):
             return None
-        if self._passing_fault.is_open and self.machine.state is State.DO_ACTIVATION:
+        if self.machine.state is State.DO_ACTIVATION and self._passing_fault.is_open:
+            return None
+        if self.machine.state in _SPACED and now - self._written_at < SPACING_S:
             return None
         image = self.machine.advance(status)
         if image is not None:

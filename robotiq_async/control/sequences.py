@@ -5,6 +5,10 @@ image, the next status it is sent is one that shows what came of it. The first s
 whether there is anything to begin at all: between being asked for and being carried out, somebody else
 may have done something to the gripper. There is no I/O, no clock and no event loop here; whoever waits
 for a sequence bounds it in time.
+
+A gripper may acknowledge a write that comes soon after another one and forget it (manual of 2014: space
+them by 10 ms). A stop or a reset that does not show when it should act is therefore yielded again. An
+activation and a release are not, for they move the fingers: they keep their distance from the write before.
 """
 
 from __future__ import annotations
@@ -54,9 +58,10 @@ def activation(at_rest: Image) -> Sequence:
 def reset(at_rest: Image) -> Sequence:
     """Clear rACT and wait for gACT = 0 and gIMC = 0. Clears faults; the gripper lets go."""
     status = yield None
-    status = yield replace(at_rest(status), activate=False, release=False)
+    image = replace(at_rest(status), activate=False, release=False)
+    status = yield image
     while classify(status) is not Trigger.SEEN_RESET:
-        status = yield None
+        status = yield image if status.activation_echo else None
 
 
 def automatic_release(at_rest: Image) -> Sequence:
@@ -99,11 +104,7 @@ def shutdown(last_image: Callable[[RobotiqStatus], Request | None]) -> Sequence:
 
 
 def stop_fingers(last: Request) -> Sequence:
-    """Write the last image, again if need be, until its echo is back: the end of a shutdown.
-
-    A gripper may acknowledge a write that comes soon after another one and forget it (manual of 2014: space
-    them by 10 ms). Unlike a motion, a stop may be sent again; the next status is one by which it should act.
-    """
+    """Write the last image, again if need be, until its echo is back: the end of a shutdown."""
     status = yield last
     while status.echo != last.echo:
         status = yield last

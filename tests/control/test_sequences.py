@@ -56,8 +56,8 @@ def waits(sequence: Sequence, *statuses: RobotiqStatus) -> None:
         assert sequence.send(status) is None
 
 
-def stops_again(sequence: Sequence, last: Request, *statuses: RobotiqStatus) -> None:
-    """A stop that does not show by when it should act was forgotten, perhaps."""
+def written_again(sequence: Sequence, last: Request, *statuses: RobotiqStatus) -> None:
+    """What does not show by when it should act was forgotten, perhaps."""
     for status in statuses:
         assert sequence.send(status) == last
 
@@ -203,23 +203,26 @@ def test_a_reset_clears_ract_rgto_and_ratr() -> None:
 
 def test_a_reset_ends_when_both_gact_and_gimc_are_zero() -> None:
     sequence = reset(at_rest)
-    first(sequence, RUNNING)
-    waits(sequence, RUNNING, READY, status_of(0x30), status_of(0x01))
+    image = first(sequence, RUNNING)
+    waits(sequence, status_of(0x30), status_of(0x10))
+    written_again(sequence, image, RUNNING, READY)
+    waits(sequence, status_of(0x30))
     ends(sequence, RESET)
 
 
 @pytest.mark.parametrize("code", [0x09, 0x0B, 0x0D, 0x0E, 0x0F, 0x0C])
 def test_a_fault_may_outlast_a_reset_and_does_not_end_it(code: int) -> None:
     sequence = reset(at_rest)
-    first(sequence, RUNNING)
-    waits(sequence, status_of(0x01, fault=code), status_of(0x00, fault=code))
+    image = first(sequence, RUNNING)
+    written_again(sequence, image, status_of(0x01, fault=code))
+    waits(sequence, status_of(0x00, fault=code))
     ends(sequence, RESET)
 
 
 def test_gimc_zero_alone_is_an_automatic_release_and_not_a_reset() -> None:
     sequence = reset(at_rest)
-    first(sequence, RUNNING)
-    waits(sequence, status_of(0x01, fault=0x0B), status_of(0x01))
+    image = first(sequence, RUNNING)
+    written_again(sequence, image, status_of(0x01, fault=0x0B), status_of(0x01))
     ends(sequence, RESET)
 
 
@@ -268,7 +271,7 @@ def test_a_shutdown_with_nothing_to_stop_writes_nothing() -> None:
 
 def test_a_shutdown_ends_when_the_complete_last_image_is_echoed() -> None:
     sequence = shutdown(last_image)
-    stops_again(sequence, first(sequence, RUNNING), status_of(0x39, 0xC0, echo=ECHO))
+    written_again(sequence, first(sequence, RUNNING), status_of(0x39, 0xC0, echo=ECHO))
     ends(sequence, status_of(0x31, 0xC0, echo=ECHO))
 
 
@@ -277,13 +280,13 @@ def test_a_shutdown_ends_when_the_complete_last_image_is_echoed() -> None:
 )
 def test_a_cleared_go_bit_alone_does_not_end_a_shutdown(echo: tuple[int, ...]) -> None:
     sequence = shutdown(last_image)
-    stops_again(sequence, first(sequence, RUNNING), status_of(0x31, echo=echo), status_of(0x39, echo=ECHO))
+    written_again(sequence, first(sequence, RUNNING), status_of(0x31, echo=echo), status_of(0x39, echo=ECHO))
     ends(sequence, status_of(0x31, echo=ECHO))
 
 
 def test_a_shutdown_does_not_end_while_the_activation_bit_differs() -> None:
     sequence = shutdown(last_image)
-    stops_again(sequence, first(sequence, RUNNING), status_of(0x30, echo=ECHO))
+    written_again(sequence, first(sequence, RUNNING), status_of(0x30, echo=ECHO))
     ends(sequence, status_of(0x31, echo=ECHO))
 
 

@@ -339,7 +339,7 @@ class MemoryBus:
     def see(self, key: str, is_there: bool) -> None:
         """A token has come or gone."""
         for expression, listener in self.watchers:
-            if matches(expression, key):
+            if matches(expression, key) and not self.loop.is_closed():
                 self.loop.call_later(LATENCY_S, listener, key, is_there)
 
     async def announced(self, expression: str, *, timeout: float) -> list[str]:  # noqa: ARG002

@@ -99,7 +99,7 @@ class Agent:
             AgentError: another agent serves one of the grippers, or has the same site and host.
         """
         undo: list[Undo] = []
-        self._running = asyncio.current_task()
+        self._running, loop = asyncio.current_task(), asyncio.get_running_loop()
         try:
             await self._refuse_if_served()
             undo += [self._bus.announce(each.name.key("alive", str(self.epoch))) for each in self._all]
@@ -119,7 +119,8 @@ class Agent:
         finally:
             for take_back in reversed(undo):
                 take_back()
-            await self._records.kept()
+            if not loop.is_closed():
+                await self._records.kept()
 
     @property
     def _all(self) -> list[ServedHand]:

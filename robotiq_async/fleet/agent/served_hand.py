@@ -82,18 +82,21 @@ class ServedHand:
 
     async def run(self) -> None:
         """Keep the hand running, with or without its gripper, until cancelled; then stop the fingers."""
+        loop = asyncio.get_running_loop()
         removes = [self._hand.add_listener(each) for each in (self.publisher.hear, self._settings.hear)]
         try:
             while True:
                 await self._run_once()
         finally:
-            self.refuse_requests()
-            await self._hand.stop()
-            for remove in removes:
-                remove()
-            if self._expiry is not None:
-                self._expiry.cancel()
-            await self._requests.end()
+            # A task that was left in a closed loop is ended when it is collected: nothing can be sent then.
+            if not loop.is_closed():
+                self.refuse_requests()
+                await self._hand.stop()
+                for remove in removes:
+                    remove()
+                if self._expiry is not None:
+                    self._expiry.cancel()
+                await self._requests.end()
 
     def refuse_requests(self) -> None:
         """The agent ends: take nothing more but halts, and drop what was not sent."""
