@@ -107,7 +107,7 @@ class Agent:
             for each in self._all:
                 each.resume()
             undo.append(self._bus.watch(f"{self._prefix}/*/alive/*", self._see_agent))
-            undo.append(self._bus.serve(f"{self._prefix}/*/info", self._hear, Questions().allow))
+            undo.append(self._bus.serve(f"{self._prefix}/*/info", self._hear, Questions(loop.time).allow))
             undo += [
                 self._bus.serve(f"{self._prefix}/*/{verb}", self._hear) for verb in ("lease", "halt", "cmd/*")
             ]

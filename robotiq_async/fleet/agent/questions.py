@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import threading
 from collections.abc import Callable
-from time import monotonic
 from typing import Final
 
 from ...log import log
@@ -21,8 +20,8 @@ class Questions:
     What is dropped is not answered, not even with a refusal: that would take as long as the answer.
     """
 
-    def __init__(self, clock: Callable[[], float] = monotonic) -> None:
-        """None were asked yet."""
+    def __init__(self, clock: Callable[[], float]) -> None:
+        """None were asked yet; ``clock`` is that of the agent's loop, and is read in any thread."""
         self._clock = clock
         self._budget = Budget()
         self._lock = threading.Lock()
