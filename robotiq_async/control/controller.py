@@ -41,17 +41,20 @@ _COMMANDED: Final = RUNNING | {State.FAULT}
 """The states in which the gripper follows requests, ours or another client's."""
 WARNING_S: Final = 1.0
 """At most one warning about another client in this time."""
-SPACING_S: Final = 0.01
-"""Of two writes: a gripper may forget one that comes sooner (manual of 2014, chapters on TCP and RTU)."""
-_SPACED: Final = frozenset({State.DO_ACTIVATION, State.DO_ATR})
-"""What moves the fingers, and is sent only once, keeps that distance."""
+_STOPPING: Final = frozenset({State.DO_RESET, State.WF_RESET, State.DO_SHUTDOWN})
+"""The states in which what is written ends motion: it waits for nothing."""
 
 
 class Controller:
     """State, requests and moves of one hand."""
 
     def __init__(
-        self, machine: StateMachine, speed: int, force: int, closing_time: Callable[[int], float]
+        self,
+        machine: StateMachine,
+        speed: int,
+        force: int,
+        closing_time: Callable[[int], float],
+        write_spacing: float = 0.0,
     ) -> None:
         """Start without a status.
 
@@ -60,6 +63,8 @@ class Controller:
             speed: what every axis gets until set otherwise, 0..255.
             force: what every axis gets until set otherwise, 0..255.
             closing_time: seconds of a full closing at a speed; default timeouts of moves come from it.
+            write_spacing: seconds from the acknowledgement of a write to the next one: a gripper may
+                acknowledge one that comes sooner and forget it. A stop does not wait; it is repeated.
         """
         self.machine = machine
         self.status: RobotiqStatus | None = None
@@ -81,8 +86,11 @@ class Controller:
         """The write that carried the last step of a sequence: it sees only what came of it."""
         self._activating = False
         """Whether an activation of ours may still be under way: to be taken back if the hand is stopped."""
+        self._write_spacing = write_spacing
         self._written_at = NEVER
         """When a write was acknowledged last."""
+        self._is_early = False
+        """Whether that one came sooner after the one before it than a gripper may bear."""
         self._hold_on_return = NO_AXES
         """Axes whose hold was not delivered before the link went down."""
         self._grip_keeper = GripKeeper(self._shadow, log=machine.log)
@@ -270,7 +278,7 @@ class Controller:
         if self._activating:
             self._see_activation(status)
         if self._callers.halting:
-            self._callers.see_halt(status, self._shadow.acts)
+            self._callers.see_halt(status, self._shadow.acts, may_be_forgotten=self._may_be_forgotten(asked))
         if after in RUNNING:
             self._shadow.see_arrivals(status)
             self._shadow.see_contacts(status)
@@ -299,7 +307,19 @@ class Controller:
         if self._keeps_grip and self._grip_keeper.rests(self._judged):
             may_move = False  # whether to leave it so is decided on what is read next
         stops = state is State.DO_RESET or (state is State.DO_SHUTDOWN and may_move)
-        return stops and not self._step
+        return stops and (not self._step or self._is_early)
+
+    def wait(self, now: float) -> float:
+        """Seconds until the next write may leave; 0 for one that stops."""
+        if self.machine.sequence is None:
+            stops = self._callers.pending.halting is not None
+        else:  # one that came early has been sent, and is only repeated
+            stops = self.machine.state in _STOPPING and not self._keeps_grip and not self._is_early
+        return 0.0 if stops else max(0.0, self._written_at + self._write_spacing - now)
+
+    def _may_be_forgotten(self, now: float) -> bool:
+        """Whether the last write came too soon after another one, and the next one does not."""
+        return self._is_early and now - self._written_at >= self._write_spacing
 
     def decide(self, now: float) -> Request | None:
         """The image to write now, after the status just seen, or None. It counts as sent from here on."""
@@ -309,7 +329,7 @@ class Controller:
         if self.machine.sequence is not None:
             return self._next_step(status, now)
         # Most cycles end here.
-        if pending.is_empty or self.machine.state not in _COMMANDED:
+        if pending.is_empty or self.machine.state not in _COMMANDED or self.wait(now):
             return None
         shadow = self._shadow
         if self._passing_fault.is_open and pending.halting is None and not pending.holds_at_most:
@@ -333,11 +353,15 @@ class Controller:
         sent = self._callers.take()
         if image.go and not shadow.base.go:
             self._grip_keeper.tell_of_lost_grips(status, sent.moved)
-        number = shadow.writing(image, sent.moved, now)
+        number = self._writing(image, sent.moved, now)
         self._first_motion.written(number, sent.moved, status)
         if sent.positions:
             self._callers.moves.written(number)
         return image
+
+    def _writing(self, image: Request, moved: Finger, now: float) -> int:
+        self._is_early = now - self._written_at < self._write_spacing
+        return self._shadow.writing(image, moved, now)
 
     def acknowledged(self, now: float) -> None:
         """The image was acknowledged."""
@@ -372,15 +396,16 @@ class Controller:
 
     def _next_step(self, status: RobotiqStatus, now: float) -> Request | None:
         """What the sequence under way wants written; at its end, see where that leaves the hand."""
-        if self._step and not self._shadow.acts(self._step):
+        stops = self.machine.state in _STOPPING and not self._keeps_grip
+        if self._step and not (self._shadow.acts(self._step) or (stops and self._may_be_forgotten(now))):
             return None
         if self.machine.state is State.DO_ACTIVATION and self._passing_fault.is_open:
             return None
-        if self.machine.state in _SPACED and now - self._written_at < SPACING_S:
+        if self.wait(now):
             return None
         image = self.machine.advance(status)
         if image is not None:
-            self._step = self._shadow.writing(image, NO_AXES, now)
+            self._step = self._writing(image, NO_AXES, now)
         elif self.machine.sequence is None:
             self._after_sequence(status)
         return image

@@ -36,6 +36,10 @@ SERIAL_POLL_INTERVAL_S: Final = 0.015
 """The bytes of a read and a write take 5.38 ms at 115200 baud, and the silences that the standard wants
 after each of the four frames 7 ms: 12.4 ms. In 15 ms they fit, with what an adapter needs to pass on two
 replies, so that a stream of commands misses no polls."""
+WRITE_SPACING_S: Final = 0.01
+"""The manual of 2014 (chapters on TCP and RTU): registers are renewed at 100 Hz; leave 10 ms, or some writes
+are lost. Users of two-finger grippers on two arms saw that."""
+LONGEST_SPACING_S: Final = 0.1
 CONNECT_TIMEOUT_S: Final = 2.0
 RESPONSE_TIMEOUT_S: Final = 0.4
 """Two of these, a read in flight and a write, still end within the second that a write may take; on a serial
@@ -67,6 +71,7 @@ class Options:
     gripper: Callable[[], Gripper]
     """Which one it is, at this moment: a serial port may have been plugged in meanwhile."""
     poll_interval: float
+    write_spacing: float
     activation_timeout: float
     policy: ReconnectPolicy | None
     speed: int
@@ -92,6 +97,7 @@ def check_options(
     device_id: object,
     read_function: object = None,
     poll_interval: object,
+    write_spacing: object,
     connect_timeout: object,
     response_timeout: object,
     activation_timeout: object,
@@ -129,6 +135,7 @@ def check_options(
         address=way.address,
         gripper=way.gripper,
         poll_interval=interval,
+        write_spacing=check_seconds("write_spacing", write_spacing, 0.0, LONGEST_SPACING_S),
         activation_timeout=check_seconds("activation_timeout", activation_timeout, 0.01, 120.0),
         policy=_check_reconnect(reconnect),
         speed=check_byte("speed", speed),

@@ -31,7 +31,7 @@ from ..wire.request import Request
 from ..wire.status import RobotiqStatus
 from .ending import Ending
 from .opening import Opener
-from .options import Options
+from .options import LONGEST_SPACING_S, Options
 from .statistics import Counters
 from .streams import Channels, SentRequest
 from .timing.tick import Tick
@@ -52,6 +52,9 @@ SHUTDOWN_PAUSE_S: Final = 0.05
 """Between two attempts at that."""
 READS: Final = 3
 """At most this many reads in a cycle that has something to write, in a loop that is held up."""
+SOON_S: Final = 0.0025
+"""A cycle waits so long for the distance between two writes: half of a usual period. What is decided on is no
+older than that then."""
 LATE_S: Final = 0.05
 """Later than this a poll is worth a warning; on a busy machine a few milliseconds are usual."""
 LATE_WARNING_S: Final = 1.0
@@ -235,15 +238,25 @@ class Poller:
     async def _cycle(self) -> None:
         """Read, decide, write. A stop is written before that, too: the gripper may hear without answering."""
         controller = self._controller
-        if controller.is_urgent and not self._is_held_up():
-            await self._write()
+        for _ in range(2):  # the second one repeats a stop that came too soon after another write
+            if controller.is_urgent and not self._is_held_up() and await self._may_write(LONGEST_SPACING_S):
+                await self._write()
         for _ in range(READS):
             await self._poll_once()
-            if not controller.has_request:
+            if not controller.has_request or not await self._may_write():
                 return
             if not self._is_held_up():
                 break
         await self._write()
+
+    async def _may_write(self, soon: float = SOON_S) -> bool:
+        """Whether the gripper bears another write in this cycle; waits for that if it does soon."""
+        wait = self._controller.wait(self._tick.time())
+        if wait > soon:
+            return False
+        if wait:
+            await asyncio.sleep(wait)
+        return True
 
     async def _write(self) -> None:
         """Write what the controller decides on, if anything."""

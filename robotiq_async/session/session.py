@@ -76,7 +76,9 @@ class Session:
         self.machine = machine
         machine.why_down = None
         self._claim()
-        self.controller = Controller(machine, options.speed, options.force, options.units.closing_s)
+        self.controller = Controller(
+            machine, options.speed, options.force, options.units.closing_s, options.write_spacing
+        )
         self.controller.activates = activate
         self.counters = Counters()
         self._channels = channels

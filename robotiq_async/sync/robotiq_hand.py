@@ -9,7 +9,13 @@ from ..calibration import ForceCalibration, SpeedCalibration
 from ..enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..hand import RobotiqHand as AsyncRobotiqHand
 from ..link.transport import Transport
-from ..session.options import ACTIVATION_TIMEOUT_S, CONNECT_TIMEOUT_S, POLL_INTERVAL_S, RESPONSE_TIMEOUT_S
+from ..session.options import (
+    ACTIVATION_TIMEOUT_S,
+    CONNECT_TIMEOUT_S,
+    POLL_INTERVAL_S,
+    RESPONSE_TIMEOUT_S,
+    WRITE_SPACING_S,
+)
 from ..session.reconnecting import ReconnectPolicy
 from .caller import Caller
 from .commands import Commands
@@ -39,6 +45,7 @@ class RobotiqHand(Commands):
         device_id: int | None = None,
         read_function: int | None = None,
         poll_interval: float = POLL_INTERVAL_S,
+        write_spacing: float = WRITE_SPACING_S,
         connect_timeout: float = CONNECT_TIMEOUT_S,
         response_timeout: float = RESPONSE_TIMEOUT_S,
         activation_timeout: float = ACTIVATION_TIMEOUT_S,
@@ -68,6 +75,9 @@ class RobotiqHand(Commands):
             read_function: Modbus function that reads the status, 3 or 4; by default 4 over TCP and 3 over
                 RTU.
             poll_interval: seconds between polls, 0.001..0.1; over RTU 0.015 unless given.
+            write_spacing: seconds from the acknowledgement of a write to the next one, 0..0.1: what is asked
+                meanwhile is merged. The manual of 2014 says that a gripper may lose what comes sooner than
+                10 ms; pass 0 for one that does not. A stop and a halt do not wait.
             connect_timeout: seconds for opening the link, 0.01..5.
             response_timeout: seconds for one answer, 0.005..5. A write fails within twice that, and over RTU,
                 where a read may be asked again, within 0.15 s more (three times that if it is above 0.4).
@@ -96,6 +106,7 @@ class RobotiqHand(Commands):
             device_id=device_id,
             read_function=read_function,
             poll_interval=poll_interval,
+            write_spacing=write_spacing,
             connect_timeout=connect_timeout,
             response_timeout=response_timeout,
             activation_timeout=activation_timeout,

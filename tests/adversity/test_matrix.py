@@ -7,10 +7,18 @@ import pytest
 from robotiq_async.simulator.troubles.trouble import KINDS
 from tests.adversity.cell import outcome
 from tests.adversity.table import Cell, cells
-from tests.adversity.world import HeldLoopError, world
+from tests.adversity.world import HABITS, HeldLoopError, world
 from tests.virtual import run
 
 CELLS = list(cells())
+FORGETTING = {
+    # The other client's write comes too soon after ours, and is the one that is forgotten.
+    ("moving", "foreign 128"): "done → RUNNING_IDLE",
+    # The one stop that gets through comes too soon after the motion, and its reply takes too long.
+    ("stopping", "multiplexer for 60"): "done, fingers went on → SHUTDOWN",
+    ("stopping", "multiplexer 0.5 for 60"): "done, fingers went on → SHUTDOWN",
+}
+"""What comes of a cell on a gripper that forgets writes (``make habits``), where that is something else."""
 
 
 @pytest.mark.parametrize(
@@ -26,7 +34,9 @@ def test_cell(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> None:
     except HeldLoopError:
         # Virtual time takes the same course again: what the code does to the loop it does twice.
         told = run(main)
-    assert told == cell.outcome
+    forgets = any(habit.kind == "write-spacing" for habit in HABITS)
+    other = FORGETTING.get((cell.phase.name, str(cell.trouble))) if forgets else None
+    assert told == (other or cell.outcome)
 
 
 NOT_SETTLED = {"e-stop", "write-spacing", "function-3-only"}

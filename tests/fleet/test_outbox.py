@@ -184,7 +184,7 @@ async def test_asking_for_the_lease_again_holds_nothing() -> None:
 
 @virtual
 async def test_more_missed_events_than_fit_into_one_message() -> None:
-    async with lab(window=3.0) as here, here.client() as hand:
+    async with lab(window=8.0) as here, here.client() as hand:
         transitions, requests = hand.transitions(), hand.requests()
         stream = here.network.stream("agent", "client")
         stream.is_cut = True

@@ -25,6 +25,7 @@ def options(wire: Wire, policy: ReconnectPolicy | None, key: str = "wire") -> Op
         address="wire",
         gripper=lambda: Gripper(key),
         poll_interval=0.01,
+        write_spacing=0.0,
         activation_timeout=20.0,
         policy=policy,
         speed=128,

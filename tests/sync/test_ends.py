@@ -70,7 +70,9 @@ def test_hands_that_were_not_stopped_are_stopped_together(caplog: pytest.LogCapt
     caller._stop_all()
     assert [hand.state for hand in hands] == [State.SHUTDOWN] * 3
     assert [wire.is_moving() for wire in wires] == [False, True, False]
-    assert [wire.writes() - written for wire, written in zip(wires, before, strict=True)] == [1, 0, 0]
+    stops = [wire.writes() - written for wire, written in zip(wires, before, strict=True)]
+    assert stops[0] in (1, 2), "a stop that comes soon after another write is repeated"
+    assert stops[1:] == [0, 0]
     told = [record.message for record in caplog.records if "still running at exit" in record.message]
     assert len(told) == 2
     caller._stop_all()

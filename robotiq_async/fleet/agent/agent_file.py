@@ -20,6 +20,7 @@ from ...session.options import (
     CONNECT_TIMEOUT_S,
     POLL_INTERVAL_S,
     RESPONSE_TIMEOUT_S,
+    WRITE_SPACING_S,
     Options,
     check_options,
 )
@@ -47,6 +48,7 @@ class GripperSettings:
     device_id: int | None = None
     read_function: int | None = None
     poll_interval: float = POLL_INTERVAL_S
+    write_spacing: float = WRITE_SPACING_S
     connect_timeout: float = CONNECT_TIMEOUT_S
     response_timeout: float = RESPONSE_TIMEOUT_S
     activation_timeout: float = ACTIVATION_TIMEOUT_S

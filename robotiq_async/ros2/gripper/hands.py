@@ -32,6 +32,7 @@ def make_hand(settings: Settings) -> Hand:
         device_id=_given(settings.device_id),
         read_function=_given(settings.read_function),
         poll_interval=_or_usual(settings.poll_interval),
+        write_spacing=settings.write_spacing,
         response_timeout=settings.response_timeout,
         speed=settings.speed,
         force=settings.force,

@@ -10,7 +10,13 @@ from typing import Final
 from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...fleet.network.route import is_remote, parse_remote_address
 from ...link.address import parse_address
-from ...session.options import LONGEST_RESPONSE_S, POLL_INTERVAL_S, RESPONSE_TIMEOUT_S
+from ...session.options import (
+    LONGEST_RESPONSE_S,
+    LONGEST_SPACING_S,
+    POLL_INTERVAL_S,
+    RESPONSE_TIMEOUT_S,
+    WRITE_SPACING_S,
+)
 from ...wire.checks import check_int, check_number, check_seconds
 
 Value = str | int | float | bool
@@ -53,6 +59,12 @@ PARAMETERS: Final[Mapping[str, Parameter]] = {
         0.001,
         0.1,
     ),
+    "write_spacing": Parameter(
+        WRITE_SPACING_S,
+        "Seconds from one write to the next; 0 for a gripper that forgets none. Stops do not wait.",
+        0.0,
+        LONGEST_SPACING_S,
+    ),
     "response_timeout": Parameter(RESPONSE_TIMEOUT_S, "Seconds for one answer.", 0.005, LONGEST_RESPONSE_S),
     "publish_rate": Parameter(50.0, "Joint states a second.", 1.0, 200.0),
     "joint_prefix": Parameter(
@@ -88,6 +100,7 @@ class Settings:
     device_id: int
     read_function: int
     poll_interval: float
+    write_spacing: float
     response_timeout: float
     publish_rate: float
     joint_prefix: str
@@ -128,7 +141,7 @@ def check_parameter(name: str, value: object) -> Value:
             if name == "read_function" and number not in (USUAL, 3, 4):
                 raise ValueError(f"read_function must be 3, 4 or {USUAL}, got {value!r}")
             return number
-        if name.endswith(("interval", "timeout")):
+        if name.endswith(("interval", "spacing", "timeout")):
             return check_seconds(name, value, parameter.low, parameter.high)
         return check_number(name, value, parameter.low, parameter.high)
     except TypeError as error:

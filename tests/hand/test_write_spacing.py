@@ -1,0 +1,91 @@
+"""A gripper that acknowledges writes closer than 10 ms and forgets them: nothing that is asked is lost."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from itertools import pairwise
+from typing import Any
+
+import pytest
+
+from robotiq_async import Finger, RobotiqHand
+from robotiq_async.simulator import Habits, SimulatedGripper, SimulatorServer
+from robotiq_async.wire.request import Request
+from tests.contract.bench import until
+from tests.grippers import activate_beforehand
+
+pytestmark = pytest.mark.virtual_time
+
+A = Finger.A
+SPACING_S = 0.01
+
+
+@asynccontextmanager
+async def forgetful(**options: Any) -> AsyncIterator[tuple[SimulatedGripper, RobotiqHand]]:
+    """A hand that has been idle for a while, and its gripper."""
+    habits = Habits(write_spacing=SPACING_S)
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, spread=False, habits=habits)
+    await activate_beforehand(gripper)
+    async with SimulatorServer(gripper) as server, RobotiqHand(server.address, **options) as hand:
+        await asyncio.sleep(1)
+        yield gripper, hand
+
+
+@pytest.mark.parametrize("period", [0.001, 0.002, 0.005, 0.0071, 0.012])
+@pytest.mark.parametrize("count", [10, 11, 12, 13])
+async def test_the_last_value_of_a_control_loop_arrives(period: float, count: int) -> None:
+    """It was lost in 12 of 16 of these, and the hand took its own last but one for another client's."""
+    async with forgetful() as (gripper, hand):
+        for step in range(count):
+            hand.command(A, position=50 + 2 * step, speed=255)
+            await asyncio.sleep(period)
+        await asyncio.sleep(1)
+        assert gripper.request_registers == gripper.writes[-1].registers
+        assert Request.from_registers(gripper.request_registers).position(A) == 50 + 2 * (count - 1)
+        assert hand.statistics.foreign_commands == 0
+        assert not hand.is_moving
+
+
+@pytest.mark.parametrize("later", [step * 0.0005 for step in range(24)], ids=lambda s: f"{s * 1000:g}ms")
+async def test_a_move_right_after_another_one_goes_where_it_is_asked(later: float) -> None:
+    """Within 5 ms of a write it failed with "another client commands the gripper", half a second later."""
+    async with forgetful() as (_, hand):
+        await hand.set_position(100, A)
+        await asyncio.sleep(later)
+        assert (await hand.move(60, A)).positions[A] == pytest.approx(60, abs=2)
+
+
+@pytest.mark.parametrize("spacing", [0.0, 0.004, 0.01, 0.03])
+async def test_writes_keep_the_distance_that_is_asked_for(spacing: float) -> None:
+    gripper = SimulatedGripper(asyncio.get_running_loop().time)
+    await activate_beforehand(gripper)
+    async with SimulatorServer(gripper) as server, RobotiqHand(server.address, write_spacing=spacing) as hand:
+        await asyncio.sleep(1)
+        written = len(gripper.writes)
+        for step in range(200):
+            hand.command(A, position=step)
+            await asyncio.sleep(0.005)
+        gaps = [later.time - earlier.time for earlier, later in pairwise(gripper.writes[written:])]
+    assert min(gaps) >= spacing
+    usual = max(0.005, spacing)
+    assert sum(gaps) / len(gaps) < usual + 0.003, "no slower than it must be"
+
+
+@pytest.mark.parametrize("later", [0.0, 0.001, 0.004, 0.006, 0.009])
+@pytest.mark.parametrize("call", ["halt", "stop", "reset"])
+async def test_a_stop_waits_for_nothing_and_is_repeated_soon(call: str, later: float) -> None:
+    """It was written again half a second later."""
+    async with forgetful() as (gripper, hand):
+        loop = asyncio.get_running_loop()
+        await hand.set_speed(0)
+        await asyncio.sleep(1)
+        await hand.set_position(255, A)
+        await asyncio.sleep(later)
+        sent, asked = hand.requests(), loop.time()
+        stopping = asyncio.create_task(getattr(hand, call)())
+        await until(lambda: not Request.from_registers(gripper.request_registers).go)
+        assert loop.time() - asked < 0.025, "it is repeated as soon as the gripper bears that"
+        await stopping
+        assert next(sent.drain()).timestamp - asked < 0.006, "and the first one waits for nothing"
