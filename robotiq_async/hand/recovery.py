@@ -10,10 +10,10 @@ from ..control.state_machine import RUNNING
 from ..control.triggers import Trigger
 from ..enums import Severity, State
 from ..errors import InvalidStateError, NotActivatedError, StateTimeoutError
+from ..session.stall_watch import STALLED_S, StallWatch
 from ..wire.checks import check_timeout
 from .naming import tells_its_hand
 from .observation import Observation
-from .stall_watch import StallWatch
 
 RESET_TIMEOUT_S: Final = 5.0
 """A reset takes a device cycle or two; this leaves room for a slow one."""
@@ -21,9 +21,6 @@ RELEASE_TIMEOUT_S: Final = 60.0
 """A release opens slowly; no figure is published. A full stroke at the slowest speed takes 10 s."""
 RECOVER_TIMEOUT_S: Final = 90.0
 """Interference counts as minor for 20 s, a release may take a minute, a reset and an activation follow."""
-STALLED_S: Final = 5.0
-"""A gripper that waits for its activation (gFLT 0x05 to 0x07) and shows nothing new for so long gets nowhere.
-One that activates shows currents and positions; no figure is published."""
 RESETS: Final = 2
 """After an emergency stop one reset has been seen to help, and sometimes a second."""
 
@@ -40,8 +37,9 @@ class Recovery(Observation):
         Raises:
             GripperFaultError: a fault is latched (see :meth:`recover`), or the activation ended in one.
             NotActivatedError: the gripper was reset meanwhile.
-            ActivationTimeoutError: not finished within the activation timeout. It goes on: nothing is taken
-                back, for that would leave a hand that does not know where its fingers are.
+            ActivationTimeoutError: not finished within the activation timeout, or 0x05 and nothing new for
+                5 s, as with a pressed emergency stop. It goes on: nothing is taken back, for that would leave
+                a hand that does not know where its fingers are.
             RobotiqError: not possible now, or the link went down.
         """
         session = self._asked()
@@ -121,7 +119,7 @@ class Recovery(Observation):
         """
         limit = check_timeout("timeout", timeout) or RECOVER_TIMEOUT_S
         self._asked()
-        watch, resets = StallWatch(self._channels.listeners, self._machine, STALLED_S), 0
+        watch, resets = StallWatch(self._channels.listeners, self._machine), 0
         with anyio.move_on_after(limit), watch as stall:
             while self.state not in RUNNING:
                 with stall.ends_early() as step:

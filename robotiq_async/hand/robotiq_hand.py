@@ -182,7 +182,8 @@ class RobotiqHand(Commands):
             RobotiqConnectionError: somebody answers, but not a gripper; or the link went down again.
             GripperFaultError: the activation that was begun ended in a fault.
             NotActivatedError: the gripper was reset during the activation that was begun.
-            ActivationTimeoutError: the activation was not finished in time.
+            ActivationTimeoutError: the activation was not finished in time, or got nowhere for 5 s (0x05 and
+                nothing new, as with a pressed emergency stop).
         """
         check_flag("activate", activate)
         wait = check_seconds("wait", wait, 0.0, LONGEST_WAIT_S)

@@ -30,6 +30,7 @@ from .activation_progress import ActivationProgress
 from .claims import Claims
 from .options import Options
 from .poller import Poller
+from .stall_watch import STALLED_S, StallWatch
 from .state_waiters import StateWaiters
 from .statistics import Counters
 from .streams import Channels, Transition
@@ -283,7 +284,7 @@ class Session:
         Raises:
             GripperFaultError: it is refused because of a fault, or ended in one.
             NotActivatedError: the gripper was reset meanwhile, or reset() or halt() took over.
-            ActivationTimeoutError: not finished within the activation timeout.
+            ActivationTimeoutError: not finished within the activation timeout, or stalled.
             InvalidStateError: it is refused: a reset or a release is under way.
             ConnectionLostError: the link is or went down.
             NotStartedError: the hand was stopped.
@@ -298,13 +299,17 @@ class Session:
             State.DO_RESET: lambda: NotActivatedError("reset() or halt() took over"),
         }
         try:
-            await self.reach(
-                RUNNING.union(faulty),
-                self.options.activation_timeout,
-                ask=ask,
-                failing=failing,
-                what="the activation was not finished",
-            )
+            watch = StallWatch(self._channels.listeners, self.machine)
+            with watch, watch.ends_early():
+                await self.reach(
+                    RUNNING.union(faulty),
+                    self.options.activation_timeout,
+                    ask=ask,
+                    failing=failing,
+                    what="the activation was not finished",
+                )
+                return
+            raise self._stalled()
         except StateTimeoutError as error:
             fault = Fault.NONE if self.controller.status is None else self.controller.status.fault
             why = f": {fault.description} (gFLT 0x{int(fault):02X}); recover() resets it" if fault else ""
@@ -333,6 +338,15 @@ class Session:
     @staticmethod
     def _stopped() -> NotStartedError:
         return NotStartedError("the hand was stopped")
+
+    def _stalled(self) -> ActivationTimeoutError:
+        assert self.controller.status is not None, "the stall was seen in one"
+        fault = self.controller.status.fault
+        return ActivationTimeoutError(
+            f"the activation gets nowhere: for {STALLED_S:g} s nothing but {fault.description} (gFLT "
+            f"0x{int(fault):02X}). Is the emergency stop released, and the gripper powered? Release it; then "
+            "start(activate=False) and recover(), which resets the gripper"
+        )
 
     def _fault(self) -> GripperFaultError:
         assert self.controller.status is not None, "a fault was read from a status"

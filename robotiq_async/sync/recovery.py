@@ -19,8 +19,9 @@ class Recovery(Observation):
         Raises:
             GripperFaultError: a fault is latched (see :meth:`recover`), or the activation ended in one.
             NotActivatedError: the gripper was reset meanwhile.
-            ActivationTimeoutError: not finished within the activation timeout. It goes on: nothing is taken
-                back, for that would leave a hand that does not know where its fingers are.
+            ActivationTimeoutError: not finished within the activation timeout, or 0x05 and nothing new for
+                5 s, as with a pressed emergency stop. It goes on: nothing is taken back, for that would leave
+                a hand that does not know where its fingers are.
             RobotiqError: not possible now, or the link went down.
         """
         self._caller.wait(lambda: self._inner.activate())

@@ -136,11 +136,12 @@ class Asleep(Plain):
 class Stopped(Plain):
     """After an emergency stop: 0x05 and gIMC = 1 until it has been reset so many times."""
 
-    def __init__(self, resets: float) -> None:
+    def __init__(self, resets: float, *, is_raised: bool = True) -> None:
         super().__init__()
         self.resets_left = resets
         self.resets = 0
-        self._is_raised = True
+        self._is_raised = is_raised
+        """Whether rACT is set: not after a power cut."""
 
     def take(self, registers: Registers) -> None:
         raised = Request.from_registers(registers).activate

@@ -19,9 +19,9 @@ from robotiq_async import (
 from robotiq_async.control.first_motion import IGNORED_S
 from robotiq_async.control.requests.standstill import LAG_S
 from robotiq_async.errors import MoveIgnoredError
-from robotiq_async.hand.recovery import STALLED_S
 from robotiq_async.session.activation_progress import TOLD_EVERY_S
 from robotiq_async.session.options import ACTIVATION_TIMEOUT_S
+from robotiq_async.session.stall_watch import STALLED_S
 from tests.grippers import activate_beforehand
 from tests.hand.habits import Asleep, Late, Plain, Silent, Stopped
 from tests.virtual import VirtualLoop
@@ -241,6 +241,60 @@ async def test_an_activation_that_shows_nothing_new_is_not_reset() -> None:
     await hand.stop()
 
 
-async def test_a_start_on_such_a_gripper_says_what_helps() -> None:
+STUCK = r"gets nowhere.*0x05.*emergency stop.*start\(activate=False\).*recover\(\)"
+
+
+async def test_a_start_on_such_a_gripper_ends_soon_and_says_what_helps() -> None:
+    stopped = Stopped(math.inf)
+    began = now()
+    with pytest.raises(ActivationTimeoutError, match=STUCK):
+        await RobotiqHand(stopped).start()
+    assert STALLED_S <= now() - began < STALLED_S + 2
+    assert stopped.written == [], "the activation is not ours to take back"
+
+
+@pytest.mark.parametrize("resets", [1, math.inf])
+async def test_so_does_the_activation_of_one_that_comes_back_from_a_power_cut(resets: float) -> None:
+    """Its emergency stop is pressed: rACT is taken, and nothing moves."""
+    stopped = Stopped(resets, is_raised=False)
+    began = now()
+    with pytest.raises(ActivationTimeoutError, match=STUCK):
+        await RobotiqHand(stopped).start()
+    assert STALLED_S <= now() - began < STALLED_S + 2
+    assert [request.activate for request in stopped.written] == [True, False], "taken back on leaving"
+
+
+async def test_activate_ends_soon_as_well_and_recover_goes_on_from_there() -> None:
+    stopped = Stopped(1, is_raised=False)
+    hand = RobotiqHand(stopped)
+    await hand.start(activate=False)
+    with pytest.raises(ActivationTimeoutError, match=STUCK):
+        await hand.activate()
+    assert [request.activate for request in stopped.written] == [True]
+    await hand.recover()
+    assert hand.state is State.RUNNING_IDLE
+    await hand.stop()
+
+
+async def test_a_reserved_byte_that_counts_is_no_progress() -> None:
+    class Counting(Stopped):
+        def shown(self) -> tuple[int, ...]:
+            words = super().shown()
+            return (*words[:7], words[7] & 0xFF00 | int(1000 * self.now) & 0xFF)
+
+    began = now()
+    with pytest.raises(ActivationTimeoutError, match=STUCK):
+        await RobotiqHand(Counting(math.inf)).start()
+    assert now() - began < STALLED_S + 2
+
+
+async def test_one_whose_currents_change_is_waited_for_until_the_limit() -> None:
+    class Humming(Stopped):
+        def shown(self) -> tuple[int, ...]:
+            words = super().shown()
+            return (*words[:7], words[7] & 0x00FF | int(self.now) % 9 << 8)
+
+    began = now()
     with pytest.raises(ActivationTimeoutError, match=r"0x05\); recover\(\) resets it"):
-        await RobotiqHand(Stopped(math.inf)).start()
+        await RobotiqHand(Humming(math.inf)).start()
+    assert now() - began >= ACTIVATION_TIMEOUT_S

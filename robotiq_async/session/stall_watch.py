@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Self
+from typing import Final, Self
 
 import anyio
 
 from ..control.state_machine import StateMachine
 from ..enums import Severity, State
-from ..session.listeners import Listeners
 from ..wire.registers import Registers
 from ..wire.status import RobotiqStatus
+from .listeners import Listeners
+
+STALLED_S: Final = 5.0
+"""A gripper that waits for its activation (gFLT 0x05 to 0x07) and shows nothing new for so long gets nowhere.
+One that activates shows currents and positions; no figure is published."""
 
 
 class StallWatch:
@@ -22,11 +26,10 @@ class StallWatch:
     gripper may well activate, and show nothing of it.
     """
 
-    def __init__(self, listeners: Listeners, machine: StateMachine, seconds: float) -> None:
-        """Listen beside others to a hand in the state of a machine; so long nothing new makes a stall."""
+    def __init__(self, listeners: Listeners, machine: StateMachine) -> None:
+        """Listen beside others to a hand in the state of a machine."""
         self._listeners = listeners
         self._machine = machine
-        self._seconds = seconds
         self._shown: Registers | None = None
         self._since = 0.0
         self._scope: anyio.CancelScope | None = None
@@ -52,7 +55,8 @@ class StallWatch:
         if not isinstance(item, RobotiqStatus):
             return
         waits = self._machine.state is State.WF_ACTIVATION
-        if not waits or item.fault.severity is not Severity.PRIORITY or item.registers != self._shown:
-            self._shown, self._since = item.registers, item.timestamp
-        elif item.timestamp - self._since >= self._seconds and self._scope is not None:
+        shown = (*item.registers[:-1], item.registers[-1] >> 8)  # its other byte is reserved
+        if not waits or item.fault.severity is not Severity.PRIORITY or shown != self._shown:
+            self._shown, self._since = shown, item.timestamp
+        elif item.timestamp - self._since >= STALLED_S and self._scope is not None:
             self._scope.cancel()
