@@ -104,8 +104,8 @@ class Recovery(Observation):
 
         Waits for a minor fault to clear, and for an activation, reset or release under way; resets and
         activates after a major one. A gripper that waits for its activation (0x05, as after an emergency
-        stop) and shows nothing new for 5 s is reset and activated as well, twice at most. A reset DROPS the
-        part, and an activation MOVES the fingers.
+        stop) or releases, and shows nothing new for 5 s, is reset and activated as well, twice at most. A
+        reset DROPS the part, and an activation MOVES the fingers.
 
         Args:
             timeout: seconds for all of it; None for 90 s.

@@ -1,4 +1,4 @@
-"""Notices a gripper that waits for its activation and gets nowhere, as after an emergency stop."""
+"""Notices an activation or a release that gets nowhere, as after an emergency stop."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from ..wire.status import RobotiqStatus
 from .listeners import Listeners
 
 STALLED_S: Final = 5.0
-"""A gripper that waits for its activation (gFLT 0x05 to 0x07) and shows nothing new for so long gets nowhere.
-One that activates shows currents and positions; no figure is published."""
+"""A gripper that waits for its activation (gFLT 0x05 to 0x07) or releases, and shows nothing new for so long,
+gets nowhere. One that moves shows currents and positions; no figure is published."""
 
 
 class StallWatch:
     """Listens to statuses while it is entered, and ends a wait when nothing new has shown for some time.
 
-    The fault must be a priority code: an action waits for an activation that does not go on. Without one a
-    gripper may well activate, and show nothing of it.
+    In an activation the fault must be a priority code: an action waits for what does not go on. Without one
+    a gripper may well activate, and show nothing of it. A release opens the fingers, which shows.
     """
 
     def __init__(self, listeners: Listeners, machine: StateMachine) -> None:
@@ -54,9 +54,10 @@ class StallWatch:
     def _see(self, item: object) -> None:
         if not isinstance(item, RobotiqStatus):
             return
-        waits = self._machine.state is State.WF_ACTIVATION
+        state, is_priority = self._machine.state, item.fault.severity is Severity.PRIORITY
+        waits = state is State.WF_ATR or (state is State.WF_ACTIVATION and is_priority)
         shown = (*item.registers[:-1], item.registers[-1] >> 8)  # its other byte is reserved
-        if not waits or item.fault.severity is not Severity.PRIORITY or shown != self._shown:
+        if not waits or shown != self._shown:
             self._shown, self._since = shown, item.timestamp
         elif item.timestamp - self._since >= STALLED_S and self._scope is not None:
             self._scope.cancel()

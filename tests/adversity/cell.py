@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Collection
 from contextlib import asynccontextmanager
 from dataclasses import replace
 from itertools import pairwise
@@ -12,6 +12,7 @@ from typing import NamedTuple, Self
 from robotiq_async import Finger, RobotiqError, State
 from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.enums import AXES
+from robotiq_async.session.stall_watch import STALLED_S
 from robotiq_async.simulator import parse_troubles
 from robotiq_async.simulator.troubles.trouble import KINDS
 from robotiq_async.wire.registers import Registers
@@ -28,6 +29,8 @@ ESCALATION_S = 5.0
 """Interference is a major fault after this time (20 s of the gripper, which is five times as fast)."""
 STOP_S = 2.0
 """What a stop has promised to take at most: the phases that end so are stops."""
+STUCK = (State.WF_ACTIVATION, State.WF_ATR)
+"""Where an emergency stop leaves the hand: what it waits for does not go on until a reset."""
 MOVES_EVERYTHING = ("foreign", "release")
 SETTLED = (*RUNNING, State.RESET, State.FAULT, State.ATR_DONE, State.SHUTDOWN)
 
@@ -49,15 +52,18 @@ async def outcome(world: World, phase: Phase, words: str) -> str:
             await asyncio.sleep(ESCALATION_S)
         else:
             await end()
-        told = _noticed(world) if task is None else await _told(task, before.time + phase.bound)
-        await _rest(world)
+        kind, bound = words.split()[0], phase.bound
+        if kind == "e-stop" and phase.name == "connecting":
+            bound += STALLED_S  # connected in time, start() waits for an activation that gets nowhere
+        told = _noticed(world) if task is None else await _told(task, before.time + bound)
+        await _rest(world, (*SETTLED, *STUCK) if kind == "e-stop" else SETTLED)
         state = world.hand.state
         if phase.name == "keeping a grip":
             told += ", kept" if world.gripper.grips == Finger.B | Finger.C else ", let go"
         if phase.bound == STOP_S and abs(world.gripper.position(Finger.A) - TARGET) <= 2:
             told += ", fingers went on"
-        _check_motions(world, before, phase, words.split()[0], told)
-        await _works(world)
+        _check_motions(world, before, phase, kind, told)
+        await _works(world, activate=kind != "e-stop")
         world.check_no_stale_status()
         world.check_loop()
     return f"{told} → {state.name}"
@@ -130,19 +136,20 @@ def _noticed(world: World) -> str:
         (State.DISCONNECTED, "link lost"),
         (State.FAULT, "fault"),
         (State.ATR_DONE, "fault"),
+        (State.WF_ACTIVATION, "stuck"),
     ):
         if state in world.states:
             return words
     return "taken over" if world.hand.statistics.foreign_commands else "nothing"
 
 
-async def _rest(world: World) -> None:
+async def _rest(world: World, settled: Collection[State]) -> None:
     """Wait until the hand stays in one state, and whatever it moves has come to rest."""
     async with asyncio.timeout(40):
         while True:
             state = world.hand.state
             await asyncio.sleep(0.6)
-            if world.hand.state is state and state in SETTLED and not world.gripper.is_moving:
+            if world.hand.state is state and state in settled and not world.gripper.is_moving:
                 return
 
 
@@ -166,11 +173,14 @@ def _check_travel(world: World, before: dict[Finger, float], addressed: Finger) 
     assert not any(moved.values()), f"axes moved that nobody addressed: {moved}"
 
 
-async def _works(world: World) -> None:
-    """The hand is as good as new: it can be recovered if need be, and moves one axis and no other."""
+async def _works(world: World, *, activate: bool) -> None:
+    """The hand is as good as new: it can be recovered if need be, and moves one axis and no other.
+
+    With ``activate`` a start alone has to make it ready.
+    """
     hand = world.hand
     if hand.state is State.SHUTDOWN:
-        await hand.start()
+        await hand.start(activate=activate)
     await hand.recover()
     before = world.travels()
     result = await hand.move(60, Finger.B, speed=255)

@@ -39,8 +39,8 @@ def test_cell(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> None:
     assert told == (other or cell.outcome)
 
 
-NOT_SETTLED = {"e-stop", "write-spacing", "function-3-only"}
-"""What the hand does about these is not decided; function-3-only differs from link to link."""
+NOT_SETTLED = {"write-spacing"}
+"""What the hand does about it is not decided."""
 
 
 def test_every_kind_of_trouble_is_in_the_table() -> None:
