@@ -39,6 +39,7 @@ class Phase(Enum):
 
 _WAITING: Final = frozenset({Phase.IN_DOUBT, Phase.OVERTAKEN})
 """It counts while it may still act, and not as what the gripper has."""
+_SETTLED: Final = frozenset({Phase.ACKNOWLEDGED, Phase.SHOWN})
 _ARRIVED: Final = frozenset({Phase.ACKNOWLEDGED, Phase.SHOWN, Phase.OVERTAKEN})
 
 
@@ -66,12 +67,17 @@ class WriteHistory:
         self.replaced: dict[Finger, tuple[int, int]] = {}
         """The requests that the newest status is the first to show limited, each with its limit."""
         self._has_alias = False
+        """Whether a write may show as limits in place of its requests."""
+        self._has_waiting = False
+        """Whether a write may be in a phase that waits; the usual case is none of many."""
 
     @property
     def is_in_doubt(self) -> bool:
         """Whether a write may or may not act, and has not shown so far."""
-        # One entry is the usual case, and this is asked at every poll.
-        return len(self._writes) > 1 and any(each.phase in _WAITING for each in self._writes)
+        return self._has_waiting and len(self._writes) > 1 and self._any_waits()
+
+    def _any_waits(self) -> bool:
+        return any(each.phase in _WAITING for each in self._writes)
 
     @property
     def all_look_alike(self) -> bool:
@@ -83,6 +89,7 @@ class WriteHistory:
         self.last_number += 1
         self._shown = _Write(self.last_number, image, echo, now, Phase.SHOWN)
         self._writes = deque([self._shown])
+        self._has_waiting = False
 
     def adopt(self, image: Request, echo: Echo, now: float) -> None:
         """Restart, but what has not shown yet may still come.
@@ -97,6 +104,7 @@ class WriteHistory:
             self.last_number += 1
             phase = Phase.OVERTAKEN if each.phase in _ARRIVED else Phase.IN_DOUBT
             self._writes.append(replace(each, number=self.last_number, time=now, phase=phase))
+            self._has_waiting = True
 
     def writing(self, image: Request, now: float) -> int:
         """An image is about to be sent; returns the number it goes by."""
@@ -115,6 +123,7 @@ class WriteHistory:
         """The link is down: what was not acknowledged may have arrived, or not."""
         if self._writes and self._writes[-1].phase is Phase.SENT:
             self._writes[-1].phase = Phase.IN_DOUBT
+            self._has_waiting = True
 
     def see(self, status: RobotiqStatus, asked: float) -> Request | None:
         """The image that a status shows, or None if it shows none of ours.
@@ -134,7 +143,12 @@ class WriteHistory:
         if is_shown and not self._has_alias:
             assert shown is not None
             return shown.image
-        fitting = [each for each in self._writes if each.echo == echo or self._is_limited(each, echo, asked)]
+        # A stream of commands leaves a hundred writes in the window: what is usual costs one look at each.
+        fitting = [
+            each
+            for each in self._writes
+            if each.echo == echo or (each.alias is not None and self._is_limited(each, echo, asked))
+        ]
         if not fitting:
             return None
         number = shown.number if shown is not None else 0
@@ -225,9 +239,10 @@ class WriteHistory:
         writes = self._writes
         if len(writes) == 1:
             return
-        for each in [each for each in writes if each.phase in _WAITING and now - each.time > WINDOW_S]:
-            writes.remove(each)
-        settled = [each for each in writes if each.phase in (Phase.ACKNOWLEDGED, Phase.SHOWN)]
-        old = [each for each in settled if now - each.time > WINDOW_S]
-        while old and writes[0] is not old[-1]:
-            writes.popleft()
+        old: list[_Write] = []
+        while writes and now - writes[0].time > WINDOW_S:  # times only rise: what is old stands first
+            old.append(writes.popleft())
+        settled = [each for each in old if each.phase in _SETTLED]
+        on_the_line = [each for each in old if each.phase is Phase.SENT]  # no other comes after it
+        writes.extendleft(reversed([*settled[-1:], *on_the_line]))
+        self._has_waiting = self._has_waiting and self._any_waits()
