@@ -39,9 +39,5 @@ def test_cell(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> None:
     assert told == (other or cell.outcome)
 
 
-NOT_SETTLED = {"write-spacing"}
-"""What the hand does about it is not decided."""
-
-
 def test_every_kind_of_trouble_is_in_the_table() -> None:
-    assert {cell.trouble.split()[0] for cell in CELLS} - {"line"} == set(KINDS) - NOT_SETTLED
+    assert {cell.trouble.split()[0] for cell in CELLS} - {"line"} == set(KINDS)
