@@ -74,9 +74,9 @@ def test_something_fixed_fails_an_activation(call: Call, beside: Callable[..., B
 
 @pytest.mark.parametrize(
     ("options", "second_status", "seconds"),
-    [(("--like-hardware",), [9, 0], 12), ((), [0, 0], 4.2), (("--plain",), [0, 0], 4.2)],
+    [(("--like-hardware",), [9, 0], 12), ((), [9, 0], 12), (("--plain",), [0, 0], 4.2)],
 )
-async def test_the_habits_of_real_grippers_if_they_are_asked_for(
+async def test_the_habits_of_real_grippers_unless_it_is_plain(
     shell: Shell, options: tuple[str, ...], second_status: list[int], seconds: float
 ) -> None:
     process = await shell.start("simulate", "--port", "0", "--speedup", "4", *options)

@@ -25,7 +25,7 @@ async def simulate(
     port: Port = 5020,
     host: Host = "127.0.0.1",
     speedup: Annotated[float, Parameter(metavar="FACTOR")] = 1.0,
-    like_hardware: Annotated[bool, Parameter(negative="--plain", show_default=False)] = False,
+    like_hardware: Annotated[bool, Parameter(negative="--plain", show_default=False)] = True,
     exact: Flag = False,
     object_: Annotated[Byte | None, Parameter(name="--object")] = None,
     fixed: Flag = False,
@@ -41,13 +41,12 @@ async def simulate(
     Its address is the only line on standard output, printed once it listens:
     other programs connect to it as to a real gripper.
 
-    It does what the manual says, and activates in 4.2 s. With --like-hardware it
-    has the habits that several sources report of real grippers; none has been
-    measured on a 3-Finger, and the hand does not live with all of them yet. An
-    activation takes 12 s then; gDT and gSTA trail the echo by 0.05 s (status-lag);
-    the first status after a second without a message shows fault 0x09
-    (silence-fault); a write within 10 ms of the one before is acknowledged and
-    forgotten (write-spacing). Other habits are troubles: see --troubles.
+    It has the habits that several sources report of real grippers; none has been
+    measured on a 3-Finger. An activation takes 12 s; gDT and gSTA trail the
+    echo by 0.05 s (status-lag); the first status after a second without a message
+    shows fault 0x09 (silence-fault); a write within 10 ms of the one before is
+    acknowledged and forgotten (write-spacing). With --plain it does what the
+    manual says, and activates in 4.2 s. Other habits are troubles: see --troubles.
 
     A trouble is
 
@@ -60,7 +59,7 @@ async def simulate(
 
         robotiq-async simulate
         robotiq-async simulate --port 5021 --speedup 10 --object 150
-        robotiq-async simulate --like-hardware
+        robotiq-async simulate --plain
         robotiq-async simulate --serial /dev/pts/3
         robotiq-async simulate --serial /dev/pts/3 --device-id 12
         robotiq-async simulate --rtu-over-tcp --port 54321
@@ -71,7 +70,7 @@ async def simulate(
         port: TCP port; 0 takes a free one.
         host: Interface to listen on. Modbus knows no password: whoever reaches the port is in command.
         speedup: How many times faster than the clock the simulated time runs.
-        like_hardware: Have the habits of real grippers, or with --plain (the default) none.
+        like_hardware: Have the habits of real grippers (the default), or with --plain none.
         exact: Stop exactly where it is told to, which no real gripper does.
         object_: Count at which the fingers A, B and C meet something when they close.
         fixed: The object stays there in an activation, which then fails with fault 0x0D.
