@@ -100,21 +100,22 @@ class Callers:
                 halt.number = number  # this write is the second one of those before it, or as good
             self.halting += [_Halt(number, waiter) for waiter in sent.halting]
 
-    def see_halt(
-        self, status: RobotiqStatus, acts: Callable[[int], bool], *, may_be_forgotten: bool = False
-    ) -> None:
-        """Tell those whose halt a status shows. One that may have been forgotten is sent once more.
+    def halt_again(self) -> None:
+        """The last halt is on the line once more."""
+        self._sent = PendingCommand(halting=[])
 
-        A gripper may acknowledge a write that comes soon after another one and forget it. Unlike a motion, a
-        halt may be sent again: as soon as the gripper bears another write if it came too soon, and otherwise
-        when it should act and does not show. That it shows only then is not told twice.
+    def see_halt(self, status: RobotiqStatus, acts: Callable[[int], bool]) -> None:
+        """Tell those whose halt a status shows. One that should act and does not show is sent once more.
+
+        A gripper may acknowledge a write and forget it. Unlike a motion, a halt may be sent again; that it
+        shows only then is not told twice.
         """
         for halt in self.halting[:]:
             if not status.go_echo or (halt.is_second and acts(halt.number)):
                 self.halting.remove(halt)
                 resolve([halt.waiter])
-            elif self.pending.halting is None and (may_be_forgotten or acts(halt.number)):
-                halt.is_second, self.pending.halting = halt.is_second or not may_be_forgotten, []
+            elif acts(halt.number) and self.pending.halting is None:
+                halt.is_second, self.pending.halting = True, []
 
     def fail(self, error: RobotiqError) -> None:
         """Nothing asked so far will happen: tell everybody. The write may be on the line all the same."""

@@ -89,8 +89,9 @@ class Controller:
         self._write_spacing = write_spacing
         self._written_at = NEVER
         """When a write was acknowledged last."""
-        self._is_early = False
-        """Whether that one came sooner after the one before it than a gripper may bear."""
+        self._repeat: Request | None = None
+        """A stop that came sooner after another write than a gripper may bear. It is written again, whatever
+        a status shows meanwhile: that may be from before the write that it followed."""
         self._hold_on_return = NO_AXES
         """Axes whose hold was not delivered before the link went down."""
         self._grip_keeper = GripKeeper(self._shadow, log=machine.log)
@@ -216,7 +217,8 @@ class Controller:
     def has_undelivered_stop(self) -> bool:
         """Whether a halt, a hold or a reset was asked for that the gripper has not acknowledged."""
         resets = self.machine.state is State.DO_RESET
-        return resets or self._callers.has_undelivered_stop or bool(self._hold_on_return)
+        waits = self._repeat is not None or bool(self._hold_on_return)
+        return resets or self._callers.has_undelivered_stop or waits
 
     def keep_no_grip(self, why: str) -> None:
         """Clear rGTO in the shutdown under way after all."""
@@ -277,8 +279,8 @@ class Controller:
         # What nobody waits for is not worked out: this runs at every poll.
         if self._activating:
             self._see_activation(status)
-        if self._callers.halting:
-            self._callers.see_halt(status, self._shadow.acts, may_be_forgotten=self._may_be_forgotten(asked))
+        if self._callers.halting and self._repeat is None:
+            self._callers.see_halt(status, self._shadow.acts)
         if after in RUNNING:
             self._shadow.see_arrivals(status)
             self._shadow.see_contacts(status)
@@ -296,36 +298,42 @@ class Controller:
     @property
     def has_request(self) -> bool:
         """Whether there may be something to write."""
-        return self.machine.sequence is not None or not self._callers.pending.is_empty
+        asked = self.machine.sequence is not None or not self._callers.pending.is_empty
+        return asked or self._repeat is not None
 
     @property
     def is_urgent(self) -> bool:
         """Whether a stop is to be written. It does not wait for a status that may never come."""
+        if self._repeat is not None:
+            return True
         if self.machine.sequence is None or self._judged is None:
             return self._callers.pending.halting is not None
         state, may_move = self.machine.state, self._activating or self._shadow.may_go(self._judged)
         if self._keeps_grip and self._grip_keeper.rests(self._judged):
             may_move = False  # whether to leave it so is decided on what is read next
         stops = state is State.DO_RESET or (state is State.DO_SHUTDOWN and may_move)
-        return stops and (not self._step or self._is_early)
+        return stops and not self._step
 
     def wait(self, now: float) -> float:
-        """Seconds until the next write may leave; 0 for one that stops."""
-        if self.machine.sequence is None:
-            stops = self._callers.pending.halting is not None
-        else:  # one that came early has been sent, and is only repeated
-            stops = self.machine.state in _STOPPING and not self._keeps_grip and not self._is_early
-        return 0.0 if stops else max(0.0, self._written_at + self._write_spacing - now)
+        """Seconds until the next write may leave; 0 for one that stops, unless it is a repetition."""
+        if self._stops and self._repeat is None:
+            return 0.0
+        return max(0.0, self._written_at + self._write_spacing - now)
 
-    def _may_be_forgotten(self, now: float) -> bool:
-        """Whether the last write came too soon after another one, and the next one does not."""
-        return self._is_early and now - self._written_at >= self._write_spacing
+    @property
+    def _stops(self) -> bool:
+        """Whether what is written next ends motion."""
+        if self.machine.sequence is None:
+            return self._callers.pending.halting is not None
+        return self.machine.state in _STOPPING and not self._keeps_grip
 
     def decide(self, now: float) -> Request | None:
         """The image to write now, after the status just seen, or None. It counts as sent from here on."""
         status, pending = self._judged, self._callers.pending
         if status is None:
             return None
+        if self._repeat is not None:
+            return self._write_again(self._repeat, now)
         if self.machine.sequence is not None:
             return self._next_step(status, now)
         # Most cycles end here.
@@ -353,15 +361,27 @@ class Controller:
         sent = self._callers.take()
         if image.go and not shadow.base.go:
             self._grip_keeper.tell_of_lost_grips(status, sent.moved)
-        number = self._writing(image, sent.moved, now)
+        self._note_early_stop(image, now, stops=sent.halting is not None)
+        number = shadow.writing(image, sent.moved, now)
         self._first_motion.written(number, sent.moved, status)
         if sent.positions:
             self._callers.moves.written(number)
         return image
 
-    def _writing(self, image: Request, moved: Finger, now: float) -> int:
-        self._is_early = now - self._written_at < self._write_spacing
-        return self._shadow.writing(image, moved, now)
+    def _note_early_stop(self, image: Request, now: float, *, stops: bool) -> None:
+        if stops and now - self._written_at < self._write_spacing:
+            self._repeat = image
+
+    def _write_again(self, image: Request, now: float) -> Request | None:
+        if self.wait(now):
+            return None
+        self._repeat = None
+        number = self._shadow.writing(image, NO_AXES, now)
+        if self.machine.sequence is None:
+            self._callers.halt_again()
+        else:
+            self._step = number
+        return image
 
     def acknowledged(self, now: float) -> None:
         """The image was acknowledged."""
@@ -377,6 +397,7 @@ class Controller:
         self._grip_keeper.doubt = "the link went down"
         error = ConnectionLostError(f"the link went down before this was done: {why}")
         error.__cause__ = why
+        self._repeat = None
         self._hold_on_return |= self._callers.lost(error)
         self.machine.drop_sequence()
         self._shadow.lost()
@@ -390,14 +411,13 @@ class Controller:
 
     def _begin(self, sequence: Sequence) -> None:
         self.machine.begin(sequence)
-        self._step = 0
+        self._step, self._repeat = 0, None
         self._hold_on_return = NO_AXES
         self._shadow.forget_contacts()
 
     def _next_step(self, status: RobotiqStatus, now: float) -> Request | None:
         """What the sequence under way wants written; at its end, see where that leaves the hand."""
-        stops = self.machine.state in _STOPPING and not self._keeps_grip
-        if self._step and not (self._shadow.acts(self._step) or (stops and self._may_be_forgotten(now))):
+        if self._step and not self._shadow.acts(self._step):
             return None
         if self.machine.state is State.DO_ACTIVATION and self._passing_fault.is_open:
             return None
@@ -405,7 +425,8 @@ class Controller:
             return None
         image = self.machine.advance(status)
         if image is not None:
-            self._step = self._writing(image, NO_AXES, now)
+            self._note_early_stop(image, now, stops=self._stops)
+            self._step = self._shadow.writing(image, NO_AXES, now)
         elif self.machine.sequence is None:
             self._after_sequence(status)
         return image

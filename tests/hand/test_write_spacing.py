@@ -89,3 +89,34 @@ async def test_a_stop_waits_for_nothing_and_is_repeated_soon(call: str, later: f
         assert loop.time() - asked < 0.025, "it is repeated as soon as the gripper bears that"
         await stopping
         assert next(sent.drain()).timestamp - asked < 0.006, "and the first one waits for nothing"
+
+
+@pytest.mark.parametrize("later", [0.0, 0.001, 0.002, 0.003, 0.004, 0.006])
+async def test_a_stop_is_not_taken_for_done_by_what_was_there_before_the_motion(later: float) -> None:
+    """Halted, then moved, then halted again: a status from before the motion showed rGTO = 0."""
+    async with forgetful() as (gripper, hand):
+        await hand.halt()
+        await asyncio.sleep(1)
+        moving = asyncio.create_task(hand.set_position(255, A))
+        await asyncio.sleep(later)
+        await hand.halt()
+        await asyncio.gather(moving, return_exceptions=True)
+        assert not gripper.is_moving
+        await asyncio.sleep(1)
+        assert not gripper.is_moving
+
+
+@pytest.mark.parametrize("later", [step * 0.0005 for step in range(24)], ids=lambda s: f"{s * 1000:g}ms")
+async def test_an_activation_is_taken_back_although_the_gripper_shows_reset_still(later: float) -> None:
+    """The taking back was forgotten, and the status from before the activation looked like its effect."""
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, habits=Habits(write_spacing=SPACING_S))
+    async with SimulatorServer(gripper) as server:
+        hand = RobotiqHand(server.address)
+        await hand.start(activate=False)
+        await asyncio.sleep(1)
+        activating = asyncio.create_task(hand.activate())
+        await asyncio.sleep(later)
+        await hand.stop()
+        await asyncio.gather(activating, return_exceptions=True)
+        await asyncio.sleep(1)
+        assert not gripper.is_moving
