@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from ...calibration import ForceCalibration, SpeedCalibration
 from ...enums import State
@@ -92,6 +92,19 @@ class RemoteHand(RemoteCommands):
     ) -> None:
         """Stop, also when the block failed or was cancelled."""
         await self.stop()
+
+    if not TYPE_CHECKING:  # type checkers tell the mistake themselves
+
+        def __enter__(self) -> None:
+            """Refuse ``with``.
+
+            Raises:
+                TypeError: always.
+            """
+            raise TypeError("a RemoteHand is used with 'async with', in a coroutine")
+
+        def __exit__(self, *_: object) -> None:
+            """Never called; without it Python would not call the other one."""
 
     async def start(self, activate: bool = True, *, wait: float = 0.0) -> None:
         """Find the agent, acquire the lease, and activate a gripper that is reset: its fingers MOVE then.
