@@ -148,6 +148,8 @@ def test_a_hand_that_starts_while_the_others_are_stopped_at_exit_is_refused(
     monkeypatch.setattr(LOOP_THREAD, "begins_no_more", False)  # and is so again after the test
     slow, other = RobotiqHand(wire), RobotiqHand(Wire())
     slow.start()
+    slow.set_speed(0)
+    slow.set_position(255)  # what has moved nothing may be stopped before the test looks
     wire.is_slow = True
     ending, _ = in_a_thread(caller._at_exit)
     until(lambda: slow.state is State.DO_SHUTDOWN)
