@@ -2,7 +2,8 @@
 
     python -m tests.adversity.fuzz --help
 
-The tests run a small part of it (test_fuzz.py); figures of a long run stand in docs/under-fault.md.
+The tests run a small part of it (test_fuzz.py); figures of a long run are in docs/under-fault.md. ``HABITS`` in
+the environment gives the gripper of the live link habits, as ``make habits`` does.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from robotiq_async import ReconnectPolicy, RobotiqError, RobotiqHand, RobotiqSta
 from robotiq_async.errors import ProtocolError
 from robotiq_async.link.frames import expected_reply
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
+from tests.adversity.world import HABITS
 
 READ, WRITE = 4, 16
 
@@ -255,6 +257,8 @@ def resident() -> int:
 
 async def _live_over_tcp(count: int, seed: int) -> dict[str, float]:
     async with SimulatorServer(SimulatedGripper(speedup=50)) as server:
+        for habit in HABITS:
+            await server.fault_injector.begin(habit)
         line = Line(random.Random(seed), serial=False, share=0.25)
         figures: dict[str, float] = {}
         # This fills what grows once: caches, samples, the history of writes (the last 10,000).

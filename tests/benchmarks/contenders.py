@@ -118,8 +118,11 @@ async def hand_with_readers(seconds: float, ports: list[int], count: int) -> Fig
 
 
 async def latency(seconds: float, ports: list[int]) -> Figures:
-    """From command() to the write, from a reply to its reader, from the last reply to move()'s return."""
-    it = RobotiqHand(f"127.0.0.1:{ports[0]}")
+    """From command() to the write, from a reply to its reader, from the last reply to move()'s return.
+
+    Commands follow each other closely here; what the distance between two writes adds is not measured.
+    """
+    it = RobotiqHand(f"127.0.0.1:{ports[0]}", write_spacing=0.0)
     link: Any = it._options.make_transport()
     it._options = replace(it._options, make_transport=lambda: link)
     arrived = written = 0.0

@@ -93,7 +93,7 @@ async def local(_endpoint: str, *ports: str) -> None:
 
 
 def hands_at(ports: tuple[str, ...]) -> dict[str, RobotiqHand]:
-    return {f"g{n}": RobotiqHand(f"127.0.0.1:{port}") for n, port in enumerate(ports)}
+    return {f"g{n}": RobotiqHand(f"127.0.0.1:{port}", write_spacing=0.0) for n, port in enumerate(ports)}
 
 
 async def active(hands: dict[str, RobotiqHand]) -> None:
@@ -170,7 +170,7 @@ async def commander(endpoint: str) -> None:
 
 async def local_commander(_endpoint: str, port: str) -> None:
     """The same in the process of the hand."""
-    async with RobotiqHand(f"127.0.0.1:{port}") as hand:
+    async with RobotiqHand(f"127.0.0.1:{port}", write_spacing=0.0) as hand:
         await commands(hand)
 
 

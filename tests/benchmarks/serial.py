@@ -66,7 +66,7 @@ def served() -> Iterator[str]:
 
 async def measured(port: str, interval: float, seconds: float, *, streams: bool) -> Figures:
     """What a hand does in so many seconds, with a stream of commands or without."""
-    async with RobotiqHand(f"rtu://{port}", poll_interval=interval) as hand:
+    async with RobotiqHand(f"rtu://{port}", poll_interval=interval, write_spacing=0.0) as hand:
         await asyncio.sleep(0.3)
         before, used, began = hand.statistics, time.process_time(), time.monotonic()
         took = await (streamed(hand, seconds) if streams else asked(hand, seconds))
