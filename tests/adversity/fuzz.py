@@ -2,7 +2,7 @@
 
     python -m tests.adversity.fuzz --help
 
-The tests run a small part of it (test_fuzz.py); figures of a long run are in docs/under-fault.md. ``HABITS`` in
+The tests run a small part of it (test_fuzz.py); figures of a long run are in docs/under-fault.md. HABITS in
 the environment gives the gripper of the live link habits, as ``make habits`` does.
 """
 
