@@ -49,8 +49,8 @@ LONGEST_RESPONSE_S: Final = 5.0
 LONGEST_WAIT_S: Final = 86400.0
 """For which a start may wait for its gripper: a day."""
 ACTIVATION_TIMEOUT_S: Final = 40.0
-"""Drivers that ran on hardware saw about 15 s, and wait for 25 to 30 s; the notes of one list time-outs of the
-activation. What ends one early leaves a hand that does not know where its fingers are."""
+"""Drivers that ran on hardware saw about 15 s, and wait for 25 to 30 s; the notes of one list time-outs of
+the activation. What ends one early leaves a hand that does not know where its fingers are."""
 LONGEST_NAME: Final = 64
 """Characters of a hand's name: it begins every line of the log."""
 _GATEWAY: Final = " (two grippers behind one gateway: give each of the hands its device_id)"
