@@ -195,6 +195,8 @@ async def world(
         server, address = TcpServer(gripper), ""
     async with server:
         options = {"poll_interval": 0.01} | options  # the manual has 200 for RTU
+        if any(habit.kind == "function-3-only" for habit in HABITS):
+            options = {"read_function": 3} | options
         hand = RobotiqHand(address or server.address, **options)  # type: ignore[arg-type]
         here = World(gripper, server, line, hand)
         watching = [asyncio.create_task(here.watch()), asyncio.create_task(here.watch_states())]
