@@ -89,9 +89,9 @@ class Controller:
         self._write_spacing = write_spacing
         self._written_at = NEVER
         """When a write was acknowledged last."""
-        self._repeat: Request | None = None
-        """A stop that came sooner after another write than a gripper may bear. It is written again, whatever
-        a status shows meanwhile: that may be from before the write that it followed."""
+        self._early_stop: Request | None = None
+        """A stop that came sooner after another write than a gripper may bear. It is written again, after the
+        next status, also if that shows it: what it shows may be from before the write that it followed."""
         self._hold_on_return = NO_AXES
         """Axes whose hold was not delivered before the link went down."""
         self._grip_keeper = GripKeeper(self._shadow, log=machine.log)
@@ -217,7 +217,7 @@ class Controller:
     def has_undelivered_stop(self) -> bool:
         """Whether a halt, a hold or a reset was asked for that the gripper has not acknowledged."""
         resets = self.machine.state is State.DO_RESET
-        waits = self._repeat is not None or bool(self._hold_on_return)
+        waits = self._early_stop is not None or bool(self._hold_on_return)
         return resets or self._callers.has_undelivered_stop or waits
 
     def keep_no_grip(self, why: str) -> None:
@@ -279,7 +279,7 @@ class Controller:
         # What nobody waits for is not worked out: this runs at every poll.
         if self._activating:
             self._see_activation(status)
-        if self._callers.halting and self._repeat is None:
+        if self._callers.halting and self._early_stop is None:
             self._callers.see_halt(status, self._shadow.acts)
         if after in RUNNING:
             self._shadow.see_arrivals(status)
@@ -299,13 +299,11 @@ class Controller:
     def has_request(self) -> bool:
         """Whether there may be something to write."""
         asked = self.machine.sequence is not None or not self._callers.pending.is_empty
-        return asked or self._repeat is not None
+        return asked or self._early_stop is not None
 
     @property
     def is_urgent(self) -> bool:
         """Whether a stop is to be written. It does not wait for a status that may never come."""
-        if self._repeat is not None:
-            return True
         if self.machine.sequence is None or self._judged is None:
             return self._callers.pending.halting is not None
         state, may_move = self.machine.state, self._activating or self._shadow.may_go(self._judged)
@@ -316,7 +314,7 @@ class Controller:
 
     def wait(self, now: float) -> float:
         """Seconds until the next write may leave; 0 for one that stops, unless it is a repetition."""
-        if self._stops and self._repeat is None:
+        if self._stops and self._early_stop is None:
             return 0.0
         return max(0.0, self._written_at + self._write_spacing - now)
 
@@ -332,8 +330,10 @@ class Controller:
         status, pending = self._judged, self._callers.pending
         if status is None:
             return None
-        if self._repeat is not None:
-            return self._write_again(self._repeat, now)
+        if self._early_stop is not None and self._early_stop.activate and not status.activation_echo:
+            self._early_stop = None  # the gripper was reset meanwhile, and stands: this would activate it
+        if self._early_stop is not None:
+            return self._repeat_stop(self._early_stop, now)
         if self.machine.sequence is not None:
             return self._next_step(status, now)
         # Most cycles end here.
@@ -370,12 +370,12 @@ class Controller:
 
     def _note_early_stop(self, image: Request, now: float, *, stops: bool) -> None:
         if stops and now - self._written_at < self._write_spacing:
-            self._repeat = image
+            self._early_stop = image
 
-    def _write_again(self, image: Request, now: float) -> Request | None:
+    def _repeat_stop(self, image: Request, now: float) -> Request | None:
         if self.wait(now):
             return None
-        self._repeat = None
+        self._early_stop = None
         number = self._shadow.writing(image, NO_AXES, now)
         if self.machine.sequence is None:
             self._callers.halt_again()
@@ -397,7 +397,7 @@ class Controller:
         self._grip_keeper.doubt = "the link went down"
         error = ConnectionLostError(f"the link went down before this was done: {why}")
         error.__cause__ = why
-        self._repeat = None
+        self._early_stop = None
         self._hold_on_return |= self._callers.lost(error)
         self.machine.drop_sequence()
         self._shadow.lost()
@@ -411,7 +411,7 @@ class Controller:
 
     def _begin(self, sequence: Sequence) -> None:
         self.machine.begin(sequence)
-        self._step, self._repeat = 0, None
+        self._step, self._early_stop = 0, None
         self._hold_on_return = NO_AXES
         self._shadow.forget_contacts()
 

@@ -107,4 +107,6 @@ def stop_fingers(last: Request) -> Sequence:
     """Write the last image, again if need be, until its echo is back: the end of a shutdown."""
     status = yield last
     while status.echo != last.echo:
+        if not status.activation_echo:
+            return  # it was reset meanwhile, and stands: this image would activate it
         status = yield last

@@ -238,9 +238,8 @@ class Poller:
     async def _cycle(self) -> None:
         """Read, decide, write. A stop is written before that, too: the gripper may hear without answering."""
         controller = self._controller
-        for _ in range(2):  # the second one repeats a stop that came too soon after another write
-            if controller.is_urgent and not self._is_held_up() and await self._may_write(LONGEST_SPACING_S):
-                await self._write()
+        if controller.is_urgent and not self._is_held_up() and await self._may_write(LONGEST_SPACING_S):
+            await self._write()
         for _ in range(READS):
             await self._poll_once()
             if not controller.has_request or not await self._may_write():

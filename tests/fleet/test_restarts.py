@@ -222,3 +222,14 @@ async def test_an_agent_without_records_serves_all_the_same() -> None:
         await asyncio.sleep(2)
         here.mend(here.holder)
         await here.until(lambda: here.holder.hand.is_in_control)
+
+
+async def test_all_that_was_kept_is_waited_for(tmp_path: Path) -> None:
+    """A record that waited for the one before it was not: a halt was answered with its grant on the disk."""
+    records, name = FileRecords(tmp_path), GripperName("lab", "cell", "left")
+    for number in range(5):
+        records.keep(name, {"number": number})
+    await records.kept()
+    record = FileRecords(tmp_path).read(name)
+    assert record is not None
+    assert record["number"] == 4

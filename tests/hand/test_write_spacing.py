@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from itertools import pairwise
 from typing import Any
@@ -15,6 +15,7 @@ from robotiq_async.simulator import Habits, SimulatedGripper, SimulatorServer
 from robotiq_async.wire.request import Request
 from tests.contract.bench import until
 from tests.grippers import activate_beforehand
+from tests.session.wire import Wire
 
 pytestmark = pytest.mark.virtual_time
 
@@ -120,3 +121,43 @@ async def test_an_activation_is_taken_back_although_the_gripper_shows_reset_stil
         await asyncio.gather(activating, return_exceptions=True)
         await asyncio.sleep(1)
         assert not gripper.is_moving
+
+
+class ResetByAnother(Wire):
+    """Another client resets the gripper some time after this one has stopped its fingers; once."""
+
+    resets_after = 0.0
+    is_reset = False
+
+    async def write(self, registers: Sequence[int]) -> None:
+        await super().write(registers)
+        image = Request.from_registers(registers)
+        if image.activate and not image.go and not self.is_reset:
+            self.is_reset = True
+            reset = Request().registers
+            asyncio.get_running_loop().call_later(self.resets_after, self.gripper.write, 0, reset)
+
+
+@pytest.mark.parametrize("resets_after", [0.0, 0.001, 0.003])
+@pytest.mark.parametrize("later", [0.0, 0.002, 0.004, 0.006, 0.009, 0.05])
+@pytest.mark.parametrize("spacing", [0.0, 0.01, 0.1])
+@pytest.mark.parametrize("call", ["halt", "stop"])
+async def test_a_stop_that_is_repeated_activates_nothing(
+    call: str, spacing: float, later: float, resets_after: float
+) -> None:
+    """It was written again with rACT = 1 on a gripper that had been reset meanwhile: the fingers moved."""
+    wire = ResetByAnother()
+    wire.gripper.device_cycle = 0.0
+    await wire.activate()
+    hand = RobotiqHand(wire, write_spacing=spacing)
+    await hand.start(activate=False)
+    await asyncio.sleep(1)
+    await hand.set_position(255, A)
+    await asyncio.sleep(later)
+    wire.resets_after = resets_after
+    stopping = asyncio.create_task(getattr(hand, call)())
+    await asyncio.wait({stopping}, timeout=2)
+    await asyncio.sleep(2)
+    assert not wire.gripper.status_registers()[0], "it was reset, and is so still"
+    await asyncio.gather(stopping, return_exceptions=True)
+    await hand.stop(halt=False)

@@ -72,6 +72,8 @@ class FileRecords:
 
     def read(self, name: GripperName) -> Fields | None:
         """See :class:`Records`."""
+        if not os.access(self._folder, os.W_OK):
+            return None  # what is there may be old: the run before this one could not replace it
         try:
             record = json.loads(self._path(name).read_bytes())
         except (OSError, ValueError, RecursionError):
@@ -88,8 +90,10 @@ class FileRecords:
 
     async def kept(self) -> None:
         """See :class:`Records`."""
-        if self._writing:
-            await asyncio.wait(list(self._writing.values()), timeout=PATIENCE_S)
+        loop = asyncio.get_running_loop()
+        until = loop.time() + PATIENCE_S
+        while self._writing and (left := until - loop.time()) > 0:  # one may wait for the one before it
+            await asyncio.wait(list(self._writing.values()), timeout=left)
 
     def _begin(self, name: GripperName) -> None:
         data = self._newest.pop(name)
