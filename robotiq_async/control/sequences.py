@@ -107,6 +107,8 @@ def stop_fingers(last: Request) -> Sequence:
     """Write the last image, again if need be, until its echo is back: the end of a shutdown."""
     status = yield last
     while status.echo != last.echo:
-        if not status.activation_echo:
-            return  # it was reset meanwhile, and stands: this image would activate it
-        status = yield last
+        # If it was reset meanwhile, it is at rest, and this image would activate it.
+        is_being_reset = last.activate and not status.activation_echo
+        if is_being_reset and classify(status) is Trigger.SEEN_RESET:
+            return
+        status = yield None if is_being_reset else last

@@ -286,8 +286,16 @@ def test_a_cleared_go_bit_alone_does_not_end_a_shutdown(echo: tuple[int, ...]) -
 
 def test_a_shutdown_does_not_end_while_the_activation_bit_differs() -> None:
     sequence = shutdown(last_image)
-    written_again(sequence, first(sequence, RUNNING), status_of(0x30, echo=ECHO))
+    first(sequence, RUNNING)
+    waits(sequence, status_of(0x30, echo=ECHO))
     ends(sequence, status_of(0x31, echo=ECHO))
+
+
+def test_a_shutdown_does_not_activate_a_gripper_that_was_reset_meanwhile() -> None:
+    sequence = shutdown(last_image)
+    first(sequence, RUNNING)
+    waits(sequence, status_of(0x30), status_of(0x10))
+    ends(sequence, RESET)
 
 
 def test_a_shutdown_of_a_reset_gripper_leaves_it_reset() -> None:
