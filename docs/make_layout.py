@@ -9,9 +9,9 @@ import json
 from pathlib import Path
 from typing import Any, Final
 
-from robotiq_async.actions import ACTIONS
-from robotiq_async.description import hand_model
-from robotiq_async.enums import AXES, Fault, Severity, State
+from robotiq_async.tools.actions import ACTIONS
+from robotiq_async.tools.description import hand_model
+from robotiq_async.values.enums import AXES, Fault, Severity, State
 
 FILE: Final = Path(__file__).parents[1] / "robotiq_async" / "data" / "foxglove_layout.json"
 GREEN, YELLOW, RED, GREY = "#4caf50", "#ffb300", "#e53935", "#9e9e9e"

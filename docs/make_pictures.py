@@ -19,13 +19,13 @@ if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
 
 from robotiq_async import Finger, RobotiqHand, State  # noqa: E402
-from robotiq_async.actions import ACTIONS, Operator  # noqa: E402
 from robotiq_async.cli.output.log_capture import forwarded_warnings  # noqa: E402
 from robotiq_async.cli.tui.screen import Monitor  # noqa: E402
-from robotiq_async.measure.plots import plot_recording  # noqa: E402
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer  # noqa: E402
-from robotiq_async.telemetry.recorder import Recorder  # noqa: E402
-from robotiq_async.telemetry.recordings import read_recording  # noqa: E402
+from robotiq_async.tools.actions import ACTIONS, Operator  # noqa: E402
+from robotiq_async.tools.measure.plots import plot_recording  # noqa: E402
+from robotiq_async.tools.recording.recorder import Recorder  # noqa: E402
+from robotiq_async.tools.recording.recordings import read_recording  # noqa: E402
 
 FOLDER: Final = ROOT / "docs" / "measured"
 FONT: Final = re.compile(r"@font-face \{.*?\}", re.DOTALL)

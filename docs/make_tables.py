@@ -20,13 +20,20 @@ if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
 
 from robotiq_async import ReconnectPolicy, RobotiqHand  # noqa: E402
-from robotiq_async.calibration.csv_tables import SPEED, read_table, thesis_table  # noqa: E402
 from robotiq_async.control.state_machine import TABLE, Verdict  # noqa: E402
 from robotiq_async.control.triggers import Trigger  # noqa: E402
-from robotiq_async.enums import Fault, Initialization, Mode, ObjectStatus, Severity, State  # noqa: E402
 from robotiq_async.simulator.troubles.trouble import KINDS  # noqa: E402
-from robotiq_async.wire import registers  # noqa: E402
-from robotiq_async.wire.registers import RTU_REGISTERS, TCP_REGISTERS, Field  # noqa: E402
+from robotiq_async.values import registers  # noqa: E402
+from robotiq_async.values.calibration.csv_tables import SPEED, read_table, thesis_table  # noqa: E402
+from robotiq_async.values.enums import (  # noqa: E402
+    Fault,
+    Initialization,
+    Mode,
+    ObjectStatus,
+    Severity,
+    State,
+)
+from robotiq_async.values.registers import RTU_REGISTERS, TCP_REGISTERS, Field  # noqa: E402
 
 DOCS: Final = ROOT / "docs"
 

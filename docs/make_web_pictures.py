@@ -22,10 +22,10 @@ if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
 
 from robotiq_async import WIDTH_NORMAL, WIDTH_WIDE, Finger, RobotiqHand  # noqa: E402
-from robotiq_async.actions import Operator  # noqa: E402
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer  # noqa: E402
-from robotiq_async.web.server import PageServer  # noqa: E402
-from robotiq_async.web.settings import PageSettings  # noqa: E402
+from robotiq_async.tools.actions import Operator  # noqa: E402
+from robotiq_async.tools.web.server import PageServer  # noqa: E402
+from robotiq_async.tools.web.settings import PageSettings  # noqa: E402
 from tests.web.browser import Browser  # noqa: E402
 from tests.web.pace import Pace  # noqa: E402
 

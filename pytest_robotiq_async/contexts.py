@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from robotiq_async.hand import RobotiqHand
-from robotiq_async.session.timing.event_loop import running_loop
+from robotiq_async.runtime.event_loop import running_loop
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
 

@@ -21,10 +21,15 @@ What a program needs is imported from here. Where it comes from, and what stands
 Nothing of this has run on real hardware yet.
 """
 
-from .calibration import Units
 from .control.motion import MoveResult
 from .control.triggers import Trigger
-from .enums import (
+from .hand import RobotiqHand
+from .link.transport import Transport
+from .session.reconnecting import ReconnectPolicy
+from .session.statistics import Statistics
+from .session.streams import SentRequest, Stream, Transition
+from .values.calibration import Units
+from .values.enums import (
     CLOSED,
     FORCE_MAX,
     FORCE_MIN,
@@ -42,7 +47,7 @@ from .enums import (
     Severity,
     State,
 )
-from .errors import (
+from .values.errors import (
     ActivationTimeoutError,
     ConnectFailedError,
     ConnectionLostError,
@@ -59,14 +64,10 @@ from .errors import (
     RobotiqStateError,
     StateTimeoutError,
 )
-from .grasping import GraspResult, GripChange, GripEvent
-from .hand import RobotiqHand
-from .link.transport import Transport
-from .session.reconnecting import ReconnectPolicy
-from .session.statistics import Statistics
-from .session.streams import SentRequest, Stream, Transition
+from .values.grasp_result import GraspResult
+from .values.grip_event import GripChange, GripEvent
+from .values.status import RobotiqStatus
 from .version import __version__ as __version__
-from .wire.status import RobotiqStatus
 
 __all__ = [
     "CLOSED",

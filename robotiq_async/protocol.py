@@ -11,13 +11,15 @@ from collections.abc import Iterator
 from types import TracebackType
 from typing import Protocol, Self, TypeVar
 
-from .calibration import Units
+from .control.grip_watch import SLIP_COUNTS
 from .control.motion import MoveResult
-from .enums import Finger, State
-from .grasping import SLIP_COUNTS, GraspResult, GripEvent
 from .session.statistics import Statistics
 from .session.streams import SentRequest, Transition
-from .wire.status import RobotiqStatus
+from .values.calibration import Units
+from .values.enums import Finger, State
+from .values.grasp_result import GraspResult
+from .values.grip_event import GripEvent
+from .values.status import RobotiqStatus
 
 T_co = TypeVar("T_co", covariant=True)
 

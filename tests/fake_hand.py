@@ -27,11 +27,13 @@ from robotiq_async import (
     Transition,
     Trigger,
 )
-from robotiq_async.calibration import Units
-from robotiq_async.enums import AXES, ObjectStatus
-from robotiq_async.grasping import SLIP_COUNTS, GraspResult, GripEvent, GripWatch, check_at_least
-from robotiq_async.wire import registers as reg
-from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.control.grip_watch import SLIP_COUNTS, GripWatch
+from robotiq_async.values import registers as reg
+from robotiq_async.values.calibration import Units
+from robotiq_async.values.enums import AXES, ObjectStatus
+from robotiq_async.values.grasp_result import GraspResult, check_at_least
+from robotiq_async.values.grip_event import GripEvent
+from robotiq_async.values.request import AxisRequest, Request
 
 T = TypeVar("T")
 

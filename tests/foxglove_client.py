@@ -12,7 +12,7 @@ from typing import Any
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
-from robotiq_async.telemetry.viewer import Viewer
+from robotiq_async.tools.viewer.viewer import Viewer
 
 MESSAGE_DATA, CALL, ANSWER = 1, 2, 3
 """Binary operations of the protocol foxglove.sdk.v1."""

@@ -7,7 +7,7 @@ import time
 from typing import Any, Final
 
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.values.request import AxisRequest, Request
 
 _OPEN: Final = (AxisRequest(0, 255, 64),) * 3 + (AxisRequest(128, 255, 64),)
 ACTIVATION: Final = Request(activate=True, axes=_OPEN).registers

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from robotiq_async.enums import AXES
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.wire.registers import Registers
-from robotiq_async.wire.request import Request
-from robotiq_async.wire.status import RobotiqStatus
+from robotiq_async.values.enums import AXES
+from robotiq_async.values.registers import Registers
+from robotiq_async.values.request import Request
+from robotiq_async.values.status import RobotiqStatus
 
 REQUEST_RESERVED = (0xE0, 0xF3, 0xFF, *(0,) * 12, 0xFF)
 """For each of the sixteen request bytes the bits that must be written 0 (rGLV and rAAC among them)."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from robotiq_async.enums import ObjectStatus
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.wire import registers as reg
-from robotiq_async.wire.registers import Registers
+from robotiq_async.values import registers as reg
+from robotiq_async.values.enums import ObjectStatus
+from robotiq_async.values.registers import Registers
 
 
 class Restless(SimulatedGripper):

@@ -23,9 +23,9 @@ from robotiq_async import (
     RobotiqHand,
     State,
 )
-from robotiq_async.actions import ACTIONS, Operator
-from robotiq_async.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.tools.actions import ACTIONS, Operator
+from robotiq_async.values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 
 pytestmark = pytest.mark.virtual_time
 

@@ -68,7 +68,7 @@ def test_importing_the_library_imports_neither_simulator_nor_extras() -> None:
     for name in (
         "robotiq_async.simulator",
         "robotiq_async.cli",
-        "robotiq_async.telemetry",
+        "robotiq_async.tools",
         "robotiq_async.fleet",
         "zenoh",
         "matplotlib",

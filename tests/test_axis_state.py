@@ -10,11 +10,11 @@ from robotiq_async import RobotiqStatus, State
 from robotiq_async.cli.output.tables import print_status
 from robotiq_async.cli.output.text import status_line
 from robotiq_async.cli.tui.widgets import STILL, Axes
-from robotiq_async.enums import AXES
 from robotiq_async.ros2.translation.diagnosis import diagnose, status_text
-from robotiq_async.telemetry.payloads import reading_fields
-from robotiq_async.web.page.mirror import HandMirror
-from robotiq_async.web.page.widgets.words import axis_words
+from robotiq_async.tools.recording.payloads import reading_fields
+from robotiq_async.tools.web.page.mirror import HandMirror
+from robotiq_async.tools.web.page.widgets.words import axis_words
+from robotiq_async.values.enums import AXES
 from tests.fake_hand import FakeHand
 from tests.register_words import status_of
 

@@ -16,9 +16,6 @@ from typing import Any
 import pytest
 
 from robotiq_async import RobotiqHand
-from robotiq_async.doctor import Finding, Level, examine
-from robotiq_async.doctor.answer import _advice_for_opening
-from robotiq_async.doctor.serial_line import report_adapter
 from robotiq_async.link.address import parse_address
 from robotiq_async.simulator import (
     RtuOverTcpSimulatorServer,
@@ -27,7 +24,10 @@ from robotiq_async.simulator import (
     SimulatorServer,
     Trouble,
 )
-from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.tools.doctor import Finding, Level, examine
+from robotiq_async.tools.doctor.answer import _advice_for_opening
+from robotiq_async.tools.doctor.serial_line import report_adapter
+from robotiq_async.values.request import AxisRequest, Request
 from tests.serial_line import SerialLine
 from tests.virtual import run
 

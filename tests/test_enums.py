@@ -11,7 +11,7 @@ import pytest
 
 import robotiq_async as package
 from robotiq_async import Fault, Finger, Initialization, Mode, ObjectStatus, Severity, State
-from robotiq_async.enums import AXES
+from robotiq_async.values.enums import AXES
 
 ASSIGNED = {
     0x00: "NONE",

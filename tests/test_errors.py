@@ -6,8 +6,8 @@ import pickle
 
 import pytest
 
-from robotiq_async import errors
-from robotiq_async.enums import Fault, State
+from robotiq_async.values import errors
+from robotiq_async.values.enums import Fault, State
 from tests.register_words import status_of
 
 TREE: dict[str, tuple[str, ...]] = {

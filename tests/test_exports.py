@@ -16,7 +16,8 @@ from types import FunctionType
 import pytest
 
 import robotiq_async
-from robotiq_async import enums, fleet, simulator, sync
+from robotiq_async import fleet, simulator, sync
+from robotiq_async.values import enums
 
 CONTRACT = {
     # The hand and what it hands out.

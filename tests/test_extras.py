@@ -12,7 +12,7 @@ import pytest
 from packaging.requirements import Requirement
 
 from robotiq_async import __version__
-from robotiq_async.extras import install, told
+from robotiq_async.runtime.extras import install, told
 from tests.cli.test_project import EXTRAS, packages_of
 
 ROOT = Path(__file__).parents[1]

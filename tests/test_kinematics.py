@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async import Finger
-from robotiq_async.kinematics import (
+from robotiq_async.tools.description.kinematics import (
     FINGER_NAMES,
     JOINTS,
     finger_angles,

@@ -23,17 +23,17 @@ from robotiq_async import (
     State,
     Stream,
 )
-from robotiq_async.actions import ACTIONS, Operator
 from robotiq_async.cli.output.stream_output import print_objects
 from robotiq_async.cli.output.tables import print_outcomes, print_status
 from robotiq_async.cli.tui.screen import Monitor
-from robotiq_async.errors import MeasuringError
-from robotiq_async.measure.campaigns import grasp, time_closing
 from robotiq_async.protocol import Hand, HandStream
-from robotiq_async.telemetry.metrics import serve_metrics
-from robotiq_async.telemetry.payloads import reading_fields
-from robotiq_async.telemetry.recorder import Recorder
-from robotiq_async.telemetry.recordings import read_recording
+from robotiq_async.tools.actions import ACTIONS, Operator
+from robotiq_async.tools.measure.campaigns import grasp, time_closing
+from robotiq_async.tools.metrics import serve_metrics
+from robotiq_async.tools.recording.payloads import reading_fields
+from robotiq_async.tools.recording.recorder import Recorder
+from robotiq_async.tools.recording.recordings import read_recording
+from robotiq_async.values.errors import MeasuringError
 from tests.fake_hand import FakeHand, FakeStream
 
 ROOT = Path(robotiq_async.__file__).parent
@@ -155,7 +155,7 @@ async def test_a_recording(tmp_path: Path) -> None:
 
 async def test_a_viewer(hand: FakeHand) -> None:
     pytest.importorskip("foxglove")
-    from robotiq_async.telemetry.viewer import Viewer  # noqa: PLC0415
+    from robotiq_async.tools.viewer.viewer import Viewer  # noqa: PLC0415
     from tests.foxglove_client import client  # noqa: PLC0415
 
     async with Viewer(hand, port=0, operator=Operator(hand)) as viewer, client(viewer) as one:

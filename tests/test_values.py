@@ -43,25 +43,25 @@ from robotiq_async import (
     Trigger,
     Units,
 )
-from robotiq_async.calibration import ForceCalibration, SpeedCalibration
-from robotiq_async.calibration.csv_tables import SPEED, TableError
 from robotiq_async.control.motion import Move
-from robotiq_async.doctor import Finding, Level
-from robotiq_async.errors import MoveIgnoredError
 from robotiq_async.fleet import ControlLostError, GripperName, Member, NotAllStoppedError, Route
 from robotiq_async.fleet.agent.agent_file import GripperSettings
 from robotiq_async.fleet.control.lease import Holder
 from robotiq_async.fleet.keys.access_list import AccessList
 from robotiq_async.fleet.keys.credentials import Credentials
 from robotiq_async.fleet.network.endpoints import Endpoint
-from robotiq_async.frozen_mapping import FrozenMapping
 from robotiq_async.link.address import parse_address
 from robotiq_async.link.simulation import Simulation
 from robotiq_async.session.statistics import Counters
 from robotiq_async.simulator import Habits, Trouble
-from robotiq_async.web.settings import PageSettings
-from robotiq_async.wire.registers import TCP_REGISTERS, gDT
-from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.tools.doctor import Finding, Level
+from robotiq_async.tools.web.settings import PageSettings
+from robotiq_async.values.calibration import ForceCalibration, SpeedCalibration
+from robotiq_async.values.calibration.csv_tables import SPEED, TableError
+from robotiq_async.values.errors import MoveIgnoredError
+from robotiq_async.values.frozen_mapping import FrozenMapping
+from robotiq_async.values.registers import TCP_REGISTERS, gDT
+from robotiq_async.values.request import AxisRequest, Request
 from tests.register_words import status_of
 
 A, B = Finger.A, Finger.B

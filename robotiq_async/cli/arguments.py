@@ -10,10 +10,10 @@ from typing import Annotated, Final
 
 from cyclopts import Parameter, Token
 
-from ..enums import Finger
-from ..extras import install
+from ..runtime.extras import install
 from ..session.options import RESPONSE_TIMEOUT_S
-from ..wire.checks import parse_fingers
+from ..values.checks import parse_fingers
+from ..values.enums import Finger
 from .failures import CommandError, UsageError, usage
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import mkstemp
 from typing import Final
 
-from ..concurrency import in_a_thread
+from ..runtime.concurrency import in_a_thread
 
 OPEN_S: Final = 1.0
 """Some browsers are only done with opening a page when somebody closes them."""

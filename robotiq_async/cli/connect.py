@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
-from ..actions import Operator
-from ..enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..fleet.network.route import is_remote
 from ..fleet.remote.remote_hand import RemoteHand
 from ..hand import RobotiqHand
 from ..protocol import Hand
 from ..session.options import POLL_INTERVAL_S
+from ..tools.actions import Operator
+from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from .arguments import USUAL, Link, need
 from .failures import UsageError, usage
 

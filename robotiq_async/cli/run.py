@@ -16,7 +16,7 @@ from typing import Self
 
 from cyclopts import CycloptsError
 
-from ..errors import RobotiqError
+from ..values.errors import RobotiqError
 from .app import build
 from .failures import CommandError, UsageError
 from .output.log_capture import collected_warnings, forget

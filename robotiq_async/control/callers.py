@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from ..enums import NO_AXES, Finger
-from ..errors import MoveSupersededError, RobotiqError
-from ..wire.status import RobotiqStatus
+from ..values.enums import NO_AXES, Finger
+from ..values.errors import MoveSupersededError, RobotiqError
+from ..values.status import RobotiqStatus
 from .motion import LiveMoves
 from .requests.pending import Command, PendingCommand
 from .waiters import Waiter, resolve

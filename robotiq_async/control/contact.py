@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from ..enums import NO_AXES, Finger, ObjectStatus
-from ..wire.request import Request
-from ..wire.status import RobotiqStatus
+from ..values.enums import NO_AXES, Finger, ObjectStatus
+from ..values.request import Request
+from ..values.status import RobotiqStatus
 
 TOLERANCE: Final = 2
 """Counts between a request and the position reached (manual: within 1-2)."""

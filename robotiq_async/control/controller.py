@@ -12,8 +12,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from ..enums import NO_AXES, Finger, Severity, State
-from ..errors import (
+from ..values.enums import NO_AXES, Finger, Severity, State
+from ..values.errors import (
     ConnectionLostError,
     GripperFaultError,
     MoveIgnoredError,
@@ -22,8 +22,8 @@ from ..errors import (
     NotStartedError,
     RobotiqError,
 )
-from ..wire.request import Request
-from ..wire.status import RobotiqStatus
+from ..values.request import Request
+from ..values.status import RobotiqStatus
 from .callers import Callers
 from .first_motion import IGNORED_S, FirstMotion
 from .grip_keeper import GripKeeper

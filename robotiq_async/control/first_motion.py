@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from ..enums import AXES, NO_AXES, Finger, ObjectStatus
-from ..wire.request import Request
-from ..wire.status import RobotiqStatus
+from ..values.enums import AXES, NO_AXES, Finger, ObjectStatus
+from ..values.request import Request
+from ..values.status import RobotiqStatus
 from .contact import TOLERANCE, agrees
 from .requests.limits import NEAR_PINCH
 from .requests.standstill import LAG_READS, Moment

@@ -11,10 +11,10 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ..enums import NO_AXES, Fault, Finger, State
-from ..log import Log, log
-from ..wire.request import Request
-from ..wire.status import RobotiqStatus
+from ..runtime.log import Log, log
+from ..values.enums import NO_AXES, Fault, Finger, State
+from ..values.request import Request
+from ..values.status import RobotiqStatus
 from .requests.merging import merged
 from .requests.pending import PendingCommand
 from .requests.shadow import RequestShadow

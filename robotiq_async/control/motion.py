@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from ..enums import AXES, STROKE_COUNTS, Finger, ObjectStatus, names_of
-from ..errors import ConnectionLostError, RobotiqError
-from ..frozen_mapping import FrozenMapping
-from ..wire.status import RobotiqStatus
+from ..values.enums import AXES, STROKE_COUNTS, Finger, ObjectStatus, names_of
+from ..values.errors import ConnectionLostError, RobotiqError
+from ..values.frozen_mapping import FrozenMapping
+from ..values.status import RobotiqStatus
 from .waiters import Waiter, fail
 
 MARGIN_S: Final = 2.0

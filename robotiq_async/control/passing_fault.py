@@ -11,9 +11,9 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from ..enums import Fault
-from ..wire import registers as reg
-from ..wire.status import RobotiqStatus
+from ..values import registers as reg
+from ..values.enums import Fault
+from ..values.status import RobotiqStatus
 
 LASTS_READS: Final = 3
 """In so many reads it must be seen. It is shown in one; a second read may have met the same registers."""

@@ -16,10 +16,10 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from dataclasses import replace
 
-from ..enums import Fault, Severity
-from ..errors import GripperFaultError, NotActivatedError
-from ..wire.request import Request
-from ..wire.status import RobotiqStatus
+from ..values.enums import Fault, Severity
+from ..values.errors import GripperFaultError, NotActivatedError
+from ..values.request import Request
+from ..values.status import RobotiqStatus
 from .requests.writes import WINDOW_S
 from .triggers import Trigger, classify
 

@@ -19,8 +19,9 @@ from collections.abc import Callable
 from enum import Enum
 from typing import Final
 
-from ..enums import Fault, State
-from ..errors import (
+from ..runtime.log import Log, log
+from ..values.enums import Fault, State
+from ..values.errors import (
     ConnectionLostError,
     GripperFaultError,
     InvalidStateError,
@@ -28,9 +29,8 @@ from ..errors import (
     NotStartedError,
     RobotiqError,
 )
-from ..log import Log, log
-from ..wire.request import Request
-from ..wire.status import RobotiqStatus
+from ..values.request import Request
+from ..values.status import RobotiqStatus
 from .sequences import Sequence
 from .triggers import Trigger, classify
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from enum import Enum
 from functools import cache
 
-from ..enums import Fault, Initialization
-from ..wire.status import RobotiqStatus
+from ..values.enums import Fault, Initialization
+from ..values.status import RobotiqStatus
 
 
 class Trigger(Enum):

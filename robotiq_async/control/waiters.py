@@ -6,7 +6,7 @@ import copy
 from collections.abc import Iterable
 from typing import Any, Protocol, TypeVar
 
-from ..errors import RobotiqError
+from ..values.errors import RobotiqError
 
 T_contra = TypeVar("T_contra", contravariant=True)
 

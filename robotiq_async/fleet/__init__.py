@@ -11,7 +11,7 @@ session is opened. ``import robotiq_async`` does not come here. Where it comes f
     wire             names, requests, answers, statuses
 """
 
-from ..errors import AgentError, ControlLostError, NotAllowedError, NotAllStoppedError
+from ..values.errors import AgentError, ControlLostError, NotAllowedError, NotAllStoppedError
 from .agent.agent import Agent
 from .fleet import Fleet, Member
 from .network.bus import Bus

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Any, Final, Self
 
-from ..enums import Fault, State
-from ..errors import NotAllStoppedError, ProtocolError
+from ..runtime.clock import now
+from ..runtime.event_loop import running_loop
 from ..session.listeners import Listeners
 from ..session.streams import Channel, Stream
-from ..session.timing.clock import now
-from ..session.timing.event_loop import running_loop
+from ..values.enums import Fault, State
+from ..values.errors import NotAllStoppedError, ProtocolError
 from .halting import STOPPED, halt
 from .limited_log import LimitedLog
 from .network.bus import Bus, Undo

@@ -6,7 +6,7 @@ import secrets
 from itertools import count
 from typing import Final
 
-from ..errors import AgentError, RobotiqError
+from ..values.errors import AgentError, RobotiqError
 from .network.bus import Bus, Reply, Urgency
 from .remote.pending_request import is_refusal
 from .remote.persistence import HALT_S, until_answered

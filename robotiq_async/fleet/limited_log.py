@@ -6,8 +6,8 @@ import logging
 import math
 from typing import Final
 
-from ..log import Log, log
-from ..session.timing.clock import now
+from ..runtime.clock import now
+from ..runtime.log import Log, log
 
 EVERY_S: Final = 10.0
 

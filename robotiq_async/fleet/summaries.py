@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..enums import Fault, State
+from ..values.enums import Fault, State
 from .remote.mirror import AgentClock
 from .wire.names import GripperName
 from .wire.values import reading, words

@@ -10,11 +10,11 @@ from ..control.motion import Move, MoveResult
 from ..control.requests.pending import Command
 from ..control.state_machine import SEQUENCES
 from ..control.triggers import Trigger
-from ..enums import CLOSED, OPEN, Finger
-from ..errors import MoveSupersededError, MoveTimeoutError
-from ..grasping import GraspResult, check_at_least
-from ..session.timing.clock import now
-from ..wire.checks import check_byte, check_mask, check_optional_byte, check_timeout
+from ..runtime.clock import now
+from ..values.checks import check_byte, check_mask, check_optional_byte, check_timeout
+from ..values.enums import CLOSED, OPEN, Finger
+from ..values.errors import MoveSupersededError, MoveTimeoutError
+from ..values.grasp_result import GraspResult, check_at_least
 from .naming import tells_its_hand
 from .recovery import Recovery
 

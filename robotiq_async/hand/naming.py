@@ -7,7 +7,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-from ..errors import RobotiqError
+from ..values.errors import RobotiqError
 
 F = TypeVar("F", bound=Callable[..., Any])
 

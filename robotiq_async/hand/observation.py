@@ -6,18 +6,19 @@ import inspect
 from collections.abc import Callable
 from typing import TypeVar
 
-from ..calibration import Units
+from ..control.grip_watch import SLIP_COUNTS, GripWatch
 from ..control.state_machine import StateMachine
-from ..enums import Finger, State
-from ..errors import ConnectionLostError, NotStartedError
-from ..grasping import SLIP_COUNTS, GripEvent, GripWatch
 from ..session.options import Options
 from ..session.session import Session
 from ..session.state_waiters import check_states
 from ..session.statistics import Counters, Statistics
 from ..session.streams import Channel, Channels, SentRequest, Stream, Transition
-from ..wire.checks import check_int, check_timeout
-from ..wire.status import RobotiqStatus
+from ..values.calibration import Units
+from ..values.checks import check_int, check_timeout
+from ..values.enums import Finger, State
+from ..values.errors import ConnectionLostError, NotStartedError
+from ..values.grip_event import GripEvent
+from ..values.status import RobotiqStatus
 from .naming import tells_its_hand
 
 T = TypeVar("T")

@@ -8,10 +8,10 @@ import anyio
 
 from ..control.state_machine import RUNNING
 from ..control.triggers import Trigger
-from ..enums import Severity, State
-from ..errors import InvalidStateError, NotActivatedError, StateTimeoutError
 from ..session.stall_watch import STALLED_S, StallWatch
-from ..wire.checks import check_timeout
+from ..values.checks import check_timeout
+from ..values.enums import Severity, State
+from ..values.errors import InvalidStateError, NotActivatedError, StateTimeoutError
 from .naming import tells_its_hand
 from .observation import Observation
 

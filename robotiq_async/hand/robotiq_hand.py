@@ -5,11 +5,9 @@ from __future__ import annotations
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from ..calibration import ForceCalibration, SpeedCalibration
 from ..control.state_machine import StateMachine
-from ..enums import DEFAULT_FORCE, DEFAULT_SPEED
-from ..errors import NotStartedError
 from ..link.transport import Transport
+from ..runtime.event_loop import running_loop
 from ..session.options import (
     ACTIVATION_TIMEOUT_S,
     CONNECT_TIMEOUT_S,
@@ -22,8 +20,10 @@ from ..session.options import (
 from ..session.reconnecting import ReconnectPolicy
 from ..session.session import Session
 from ..session.streams import Channels
-from ..session.timing.event_loop import running_loop
-from ..wire.checks import check_flag, check_seconds
+from ..values.calibration import ForceCalibration, SpeedCalibration
+from ..values.checks import check_flag, check_seconds
+from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ..values.errors import NotStartedError
 from .commands import Commands
 from .naming import tells_its_hand
 

@@ -11,7 +11,7 @@ from typing import Any, Final
 from pymodbus import FramerType
 from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
 
-from ..errors import ConnectFailedError
+from ..values.errors import ConnectFailedError
 from .address import Address
 from .host_names import addresses_of, why_no_socket, why_unreachable
 from .pdus import register
@@ -92,7 +92,7 @@ def _make(address: Address, host: str, options: dict[str, Any]) -> Client:
         try:
             import serial  # noqa: F401, PLC0415
         except ImportError:
-            from ..extras import install  # noqa: PLC0415  # nothing else needs it
+            from ..runtime.extras import install  # noqa: PLC0415  # nothing else needs it
 
             raise ConnectFailedError(
                 str(address), f"serial ports need pyserial: {install('serial')}"

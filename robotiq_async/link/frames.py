@@ -10,8 +10,8 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Final, NamedTuple
 
-from ..errors import ProtocolError
-from ..wire.registers import REGISTER_COUNT
+from ..values.errors import ProtocolError
+from ..values.registers import REGISTER_COUNT
 
 _EXCEPTIONS = {
     1: "illegal function",

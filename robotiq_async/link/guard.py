@@ -8,16 +8,16 @@ from typing import TypeVar
 
 import anyio
 
-from ..concurrency import LateError
-from ..errors import (
+from ..runtime.concurrency import LateError
+from ..runtime.log import Log, log
+from ..values.errors import (
     ConnectFailedError,
     ConnectionLostError,
     ProtocolError,
     ResponseTimeoutError,
     RobotiqConnectionError,
 )
-from ..log import Log, log
-from ..wire.registers import Registers, check_registers
+from ..values.registers import Registers, check_registers
 from .transport import Transport
 from .worker import Worker
 

@@ -31,15 +31,15 @@ from pymodbus.exceptions import ModbusException
 from pymodbus.framer import FramerRTU
 from pymodbus.pdu import ModbusPDU
 
-from ..errors import (
+from ..runtime.log import Log, log
+from ..values.errors import (
     ConnectFailedError,
     ConnectionLostError,
     ProtocolError,
     ResponseTimeoutError,
     RobotiqConnectionError,
 )
-from ..log import Log, log
-from ..wire.registers import REGISTER_COUNT, RegisterMap, Registers
+from ..values.registers import REGISTER_COUNT, RegisterMap, Registers
 from .address import Address
 from .connecting import Client, connected_client
 from .frames import Expected, MisfitError, expected_reply, show

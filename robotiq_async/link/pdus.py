@@ -13,7 +13,7 @@ from struct import Struct, pack, unpack_from
 from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
 from pymodbus.pdu import ModbusPDU
 
-from ..wire.registers import REGISTER_COUNT, RegisterMap
+from ..values.registers import REGISTER_COUNT, RegisterMap
 
 _BLOCK = Struct(f">{REGISTER_COUNT}H")
 

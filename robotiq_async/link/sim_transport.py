@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from ..enums import Finger
-from ..errors import ConnectFailedError
-from ..wire.registers import RegisterMap, Registers
+from ..values.enums import Finger
+from ..values.errors import ConnectFailedError
+from ..values.registers import RegisterMap, Registers
 from .address import parse_address
 from .modbus import ModbusTransport
 from .simulation import Simulation

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Final
 
-from ..wire.checks import check_byte
+from ..values.checks import check_byte
 
 SLOWEST: Final = 0.01
 FASTEST: Final = 1000.0

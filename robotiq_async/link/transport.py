@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol, runtime_checkable
 
-from ..wire.registers import Registers
+from ..values.registers import Registers
 
 
 @runtime_checkable

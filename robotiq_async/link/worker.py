@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Awaitable, Callable
 from typing import Any, Final, TypeVar
 
-from ..concurrency import LateError
+from ..runtime.concurrency import LateError
 from .watchdog import GRACE_S, HELD_S
 
 T = TypeVar("T")

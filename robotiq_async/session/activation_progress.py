@@ -5,8 +5,8 @@ from __future__ import annotations
 import asyncio
 from typing import Final
 
-from ..enums import State
-from ..log import Log
+from ..runtime.log import Log
+from ..values.enums import State
 
 TOLD_EVERY_S: Final = 4.0
 ACTIVATING: Final = frozenset({State.DO_ACTIVATION, State.WF_ACTIVATION})

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from ..log import Log, log
+from ..runtime.log import Log, log
 
 Listener = Callable[[Any], None]
 

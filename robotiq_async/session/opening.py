@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import anyio
 
-from ..errors import (
+from ..values.errors import (
     ConnectFailedError,
     ConnectionLostError,
     ResponseTimeoutError,

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Final, NamedTuple
 
-from ..calibration import ForceCalibration, SpeedCalibration, Units
 from ..link.address import Address, parse_address
 from ..link.canonical import canonical_address
 from ..link.guard import GuardedTransport
 from ..link.modbus import ModbusTransport
 from ..link.sim_transport import SimulatedTransport, new_gripper
 from ..link.transport import Link, Transport
-from ..log import Log, log
-from ..wire.checks import check_byte, check_flag, check_int, check_seconds
-from ..wire.registers import REGISTER_COUNT, RTU_REGISTERS, TCP_REGISTERS, RegisterMap
+from ..runtime.log import Log, log
+from ..values.calibration import ForceCalibration, SpeedCalibration, Units
+from ..values.checks import check_byte, check_flag, check_int, check_seconds
+from ..values.registers import REGISTER_COUNT, RTU_REGISTERS, TCP_REGISTERS, RegisterMap
 from .claims import Gripper
 from .reconnecting import ReconnectPolicy
 

@@ -19,22 +19,22 @@ import anyio
 
 from ..control.controller import Controller
 from ..control.waiters import fail, resolve
-from ..errors import (
+from ..link.transport import Link
+from ..link.watchdog import HELD_S
+from ..runtime.tick import Tick
+from ..values.errors import (
     NotStartedError,
     ResponseTimeoutError,
     RobotiqConnectionError,
 )
-from ..link.transport import Link
-from ..link.watchdog import HELD_S
-from ..wire.registers import Registers
-from ..wire.request import Request
-from ..wire.status import RobotiqStatus
+from ..values.registers import Registers
+from ..values.request import Request
+from ..values.status import RobotiqStatus
 from .ending import Ending
 from .opening import Opener
 from .options import LONGEST_SPACING_S, Options
 from .statistics import Counters
 from .streams import Channels, SentRequest
-from .timing.tick import Tick
 
 # anyio loads its backend when it is first used: some 20 ms that would hold up the loop in which a hand
 # starts. Where it keeps it is not documented; a name that has changed costs those 20 ms and nothing else.

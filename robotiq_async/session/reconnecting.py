@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from ..wire.checks import check_seconds
+from ..values.checks import check_seconds
 
 SHORTEST_S: Final = 0.01
 """Between two tries, at least."""

@@ -8,13 +8,15 @@ from typing import Any, ClassVar, ParamSpec, TypeVar
 
 import anyio
 
-from ..concurrency import wait_shielded
 from ..control.controller import Controller
 from ..control.state_machine import RUNNING, SEQUENCES, StateMachine
 from ..control.triggers import Trigger
 from ..control.waiters import Waiter
-from ..enums import Fault, State
-from ..errors import (
+from ..runtime.clock import now
+from ..runtime.concurrency import wait_shielded
+from ..runtime.event_loop import check_loop
+from ..values.enums import Fault, State
+from ..values.errors import (
     ActivationTimeoutError,
     ConnectionLostError,
     GripperFaultError,
@@ -25,7 +27,7 @@ from ..errors import (
     RobotiqError,
     StateTimeoutError,
 )
-from ..wire.status import RobotiqStatus
+from ..values.status import RobotiqStatus
 from .activation_progress import ActivationProgress
 from .claims import Claims
 from .options import Options
@@ -34,8 +36,6 @@ from .stall_watch import STALLED_S, StallWatch
 from .state_waiters import StateWaiters
 from .statistics import Counters
 from .streams import Channels, Transition
-from .timing.clock import now
-from .timing.event_loop import check_loop
 
 P = ParamSpec("P")
 T = TypeVar("T")

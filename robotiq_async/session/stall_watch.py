@@ -9,9 +9,9 @@ from typing import Final, Self
 import anyio
 
 from ..control.state_machine import StateMachine
-from ..enums import Severity, State
-from ..wire.registers import Registers
-from ..wire.status import RobotiqStatus
+from ..values.enums import Severity, State
+from ..values.registers import Registers
+from ..values.status import RobotiqStatus
 from .listeners import Listeners
 
 STALLED_S: Final = 5.0

@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 
-from ..enums import State
-from ..errors import RobotiqError
+from ..values.enums import State
+from ..values.errors import RobotiqError
 
 _Waiter = tuple[Collection[State], Mapping[State, Callable[[], RobotiqError]], asyncio.Future[State]]
 

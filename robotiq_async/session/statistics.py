@@ -10,8 +10,8 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
 from ..control.motion import MoveResult
-from ..errors import RobotiqError
-from ..frozen_mapping import FrozenMapping
+from ..values.errors import RobotiqError
+from ..values.frozen_mapping import FrozenMapping
 
 SAMPLES: Final = 2000
 """Periods and round trips that percentiles are taken from: 10 s at 200 Hz."""

@@ -16,13 +16,13 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
 
 from ..control.triggers import Trigger
-from ..enums import AXES, State
-from ..errors import RobotiqError
-from ..log import Log, log
-from ..wire.request import Request
-from ..wire.status import RobotiqStatus
+from ..runtime.event_loop import check_loop
+from ..runtime.log import Log, log
+from ..values.enums import AXES, State
+from ..values.errors import RobotiqError
+from ..values.request import Request
+from ..values.status import RobotiqStatus
 from .listeners import Listeners
-from .timing.event_loop import check_loop
 
 T = TypeVar("T")
 U = TypeVar("U")

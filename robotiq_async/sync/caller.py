@@ -10,11 +10,11 @@ import sys
 from collections.abc import Callable, Coroutine
 from typing import Any, Final, TypeVar
 
-from ..concurrency import LateError
-from ..enums import State
-from ..errors import NotStartedError, RobotiqError
 from ..hand import RobotiqHand as AsyncRobotiqHand
-from ..log import Log, log
+from ..runtime.concurrency import LateError
+from ..runtime.log import Log, log
+from ..values.enums import State
+from ..values.errors import NotStartedError, RobotiqError
 from .loop_thread import LOOP_THREAD
 
 T = TypeVar("T")

@@ -6,8 +6,8 @@ Made from robotiq_async.hand.commands by docs/make_sync.py.
 from __future__ import annotations
 
 from ..control.motion import MoveResult
-from ..enums import Finger
-from ..grasping import GraspResult
+from ..values.enums import Finger
+from ..values.grasp_result import GraspResult
 from .recovery import Recovery
 
 

@@ -16,8 +16,8 @@ from collections.abc import Callable, Coroutine
 from queue import Empty, SimpleQueue
 from typing import Any, Final, Generic, TypeVar
 
-from ..concurrency import LateError
-from ..log import log
+from ..runtime.concurrency import LateError
+from ..runtime.log import log
 
 T = TypeVar("T")
 Function = Callable[[], Coroutine[Any, Any, T]]

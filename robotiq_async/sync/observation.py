@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..calibration import Units
-from ..enums import Finger, State
-from ..grasping import SLIP_COUNTS, GripEvent
+from ..control.grip_watch import SLIP_COUNTS
 from ..session.statistics import Statistics
 from ..session.streams import SentRequest, Transition
-from ..wire.status import RobotiqStatus
+from ..values.calibration import Units
+from ..values.enums import Finger, State
+from ..values.grip_event import GripEvent
+from ..values.status import RobotiqStatus
 from .blocking import BlockingHand
 from .streams import Stream
 

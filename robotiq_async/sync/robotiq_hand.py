@@ -5,8 +5,6 @@ Made from robotiq_async.hand.robotiq_hand by docs/make_sync.py.
 
 from __future__ import annotations
 
-from ..calibration import ForceCalibration, SpeedCalibration
-from ..enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..hand import RobotiqHand as AsyncRobotiqHand
 from ..link.transport import Transport
 from ..session.options import (
@@ -17,6 +15,8 @@ from ..session.options import (
     WRITE_SPACING_S,
 )
 from ..session.reconnecting import ReconnectPolicy
+from ..values.calibration import ForceCalibration, SpeedCalibration
+from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from .caller import Caller
 from .commands import Commands
 

@@ -11,11 +11,11 @@ from typing import NamedTuple, Self
 
 from robotiq_async import Finger, RobotiqError, State
 from robotiq_async.control.state_machine import RUNNING
-from robotiq_async.enums import AXES
 from robotiq_async.session.stall_watch import STALLED_S
 from robotiq_async.simulator import parse_troubles
 from robotiq_async.simulator.troubles.trouble import KINDS
-from robotiq_async.wire.registers import Registers
+from robotiq_async.values.enums import AXES
+from robotiq_async.values.registers import Registers
 from tests.adversity.phases import TARGET, Call, Phase
 from tests.adversity.world import World
 

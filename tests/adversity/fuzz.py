@@ -23,9 +23,9 @@ from pathlib import Path
 from pymodbus.framer import FramerRTU
 
 from robotiq_async import ReconnectPolicy, RobotiqError, RobotiqHand, RobotiqStatus, State
-from robotiq_async.errors import ProtocolError
 from robotiq_async.link.frames import expected_reply
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
+from robotiq_async.values.errors import ProtocolError
 from tests.adversity.world import HABITS
 
 READ, WRITE = 4, 16

@@ -10,7 +10,7 @@ import pytest
 
 from robotiq_async import Fault, Finger, NotActivatedError, RobotiqHand, State
 from robotiq_async.simulator import Trouble
-from robotiq_async.wire.request import Request
+from robotiq_async.values.request import Request
 from tests.adversity.world import world
 from tests.virtual import VirtualLoop, run
 

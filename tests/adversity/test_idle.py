@@ -8,7 +8,7 @@ import pytest
 
 from robotiq_async import ConnectionLostError, Finger, NotActivatedError, State
 from robotiq_async.simulator import Trouble
-from robotiq_async.wire.request import Request
+from robotiq_async.values.request import Request
 from tests.adversity.world import World, world
 from tests.virtual import run
 

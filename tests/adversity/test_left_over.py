@@ -10,7 +10,7 @@ import pytest
 
 from robotiq_async import ConnectionLostError, Finger, ProtocolError, RobotiqConnectionError, State
 from robotiq_async.simulator import Trouble
-from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.values.request import AxisRequest, Request
 from tests.adversity.world import World, world
 from tests.simulator.test_server import raw_client
 from tests.virtual import run

@@ -17,9 +17,9 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 
 from robotiq_async import Fault, Finger, MoveResult, ObjectStatus, RobotiqError, State
 from robotiq_async.control.state_machine import RUNNING
-from robotiq_async.enums import AXES
 from robotiq_async.simulator import Trouble
-from robotiq_async.wire.request import Request
+from robotiq_async.values.enums import AXES
+from robotiq_async.values.request import Request
 from tests.adversity.world import World, world
 from tests.register_words import only_holds
 from tests.virtual import VirtualLoop

@@ -9,7 +9,7 @@ import pytest
 
 from robotiq_async import Finger
 from robotiq_async.simulator import Trouble
-from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.values.request import AxisRequest, Request
 from tests.adversity.world import World, world
 from tests.virtual import run
 

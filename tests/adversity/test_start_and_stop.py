@@ -9,7 +9,7 @@ import pytest
 
 from robotiq_async import Finger, NotStartedError, RobotiqError, State
 from robotiq_async.simulator import Trouble
-from robotiq_async.wire.request import Request
+from robotiq_async.values.request import Request
 from tests.adversity.phases import PHASES, Phase
 from tests.adversity.world import world
 from tests.virtual import run

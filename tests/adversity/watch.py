@@ -9,8 +9,8 @@ import time
 from collections.abc import Iterator
 
 from robotiq_async.control.contact import agrees
-from robotiq_async.enums import AXES, ObjectStatus
-from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.values.enums import AXES, ObjectStatus
+from robotiq_async.values.request import AxisRequest, Request
 from tests.adversity.world import LONGEST_HOLD_S, World
 from tests.virtual import HoldWatch
 

@@ -13,12 +13,12 @@ from typing import Any
 import pytest
 
 from robotiq_async import Finger, RobotiqConnectionError, RobotiqHand, RobotiqStatus, State
-from robotiq_async.enums import AXES
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, parse_troubles
 from robotiq_async.simulator.server.framing import Frame
 from robotiq_async.simulator.troubles.fault_injector import FaultInjector
-from robotiq_async.wire.registers import Registers
-from robotiq_async.wire.request import Request
+from robotiq_async.values.enums import AXES
+from robotiq_async.values.registers import Registers
+from robotiq_async.values.request import Request
 from tests.grippers import activate_beforehand
 from tests.virtual import VirtualLoop
 from tests.virtual_line import VirtualLine

@@ -11,15 +11,15 @@ from statistics import mean
 import pytest
 
 from robotiq_async import Finger, MoveTimeoutError, RobotiqHand
-from robotiq_async.calibration import (
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.values.calibration import (
     ForceCalibration,
     SpeedCalibration,
     opening_mm,
     position_of_opening,
 )
-from robotiq_async.calibration.closing_time import closing_time
-from robotiq_async.calibration.csv_tables import FORCE, SPEED, TableError, thesis_table, write_table
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.values.calibration.closing_time import closing_time
+from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, TableError, thesis_table, write_table
 from tests.virtual import virtual
 
 # -- positions ---------------------------------------------------------------------------------------------
@@ -74,7 +74,9 @@ def test_the_table_has_been_read_when_a_hand_or_a_simulated_gripper_is_made(made
     """What is made may run in an event loop from then on, and no move is to wait for a disk there."""
     listen = "files = []; sys.addaudithook(lambda event, args: event == 'open' and files.append(args[0]))"
     move = "SpeedCalibration.thesis().closing_time(3); print(files)"
-    source = f"import sys; {made}; from robotiq_async.calibration import SpeedCalibration; {listen}; {move}"
+    source = (
+        f"import sys; {made}; from robotiq_async.values.calibration import SpeedCalibration; {listen}; {move}"
+    )
     run = subprocess.run(
         [sys.executable, "-c", source], capture_output=True, text=True, check=True, timeout=60
     )

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.calibration.csv_tables import (
+from robotiq_async.values.calibration.csv_tables import (
     FORCE,
     SPEED,
     Layout,

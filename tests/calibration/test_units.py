@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async import RobotiqHand, Units
-from robotiq_async.calibration import ForceCalibration, SpeedCalibration
-from robotiq_async.calibration.csv_tables import FORCE, SPEED, write_table
 from robotiq_async.fleet import RemoteHand
 from robotiq_async.protocol import Hand
+from robotiq_async.values.calibration import ForceCalibration, SpeedCalibration
+from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, write_table
 
 THESIS = Units()
 NOMINAL = Units(SpeedCalibration.nominal())

@@ -18,8 +18,8 @@ import pytest
 from robotiq_async import Fault, Finger, RobotiqStatus
 from robotiq_async.cli.commands.demo import _program
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.wire import registers as reg
-from robotiq_async.wire.request import Request
+from robotiq_async.values import registers as reg
+from robotiq_async.values.request import Request
 from tests.cli.conftest import Outcome, served
 
 if TYPE_CHECKING:

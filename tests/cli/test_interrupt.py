@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.wire.request import Request
+from robotiq_async.values.request import Request
 from tests import conftest
 
 if TYPE_CHECKING:

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from robotiq_async.calibration.csv_tables import FORCE, SPEED, read_table, thesis_table
 from robotiq_async.cli import main
-from robotiq_async.measure.campaigns import read_currents
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.tools.measure.campaigns import read_currents
+from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, read_table, thesis_table
 from tests.cli.conftest import served
 
 if TYPE_CHECKING:

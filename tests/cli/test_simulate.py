@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from robotiq_async import Fault, RobotiqHand, State
-from robotiq_async.enums import AXES
 from robotiq_async.simulator.troubles.trouble import KINDS
+from robotiq_async.values.enums import AXES
 from tests.cli.conftest import Outcome
 from tests.serial_line import SerialLine
 

@@ -16,8 +16,8 @@ from mcap.writer import Writer
 from robotiq_async import Finger, RobotiqHand, State
 from robotiq_async.cli import main
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.telemetry.recorder import Recorder
-from robotiq_async.telemetry.recordings import read_recording
+from robotiq_async.tools.recording.recorder import Recorder
+from robotiq_async.tools.recording.recordings import read_recording
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Call

@@ -17,8 +17,8 @@ from websockets.typing import Origin, Subprotocol
 from docs import make_layout
 from robotiq_async import RobotiqHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.telemetry.gate import is_loopback
-from robotiq_async.telemetry.services import SERVICES
+from robotiq_async.tools.viewer.gate import is_loopback
+from robotiq_async.tools.viewer.services import SERVICES
 from tests.foxglove_client import Client
 from tests.grippers import active_gripper
 

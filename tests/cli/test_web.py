@@ -18,15 +18,15 @@ from urllib.request import url2pathname
 import pytest
 
 from robotiq_async import Finger, NotStartedError, RobotiqHand, State
-from robotiq_async.actions import Operator
 from robotiq_async.cli.browser import opened
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.tools.actions import Operator
 
 pytest.importorskip("nicegui", reason="the page needs the extra web")
 
 from robotiq_async.cli.commands.web import AGAIN_S, _leave_all, _try_again
-from robotiq_async.web.server import PageServer
-from robotiq_async.web.settings import PageSettings
+from robotiq_async.tools.web.server import PageServer
+from robotiq_async.tools.web.settings import PageSettings
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Call, Shell

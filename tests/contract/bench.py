@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 
 from robotiq_async import Finger, RobotiqHand, State
-from robotiq_async.enums import AXES
 from robotiq_async.protocol import Hand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.wire.request import Request
+from robotiq_async.values.enums import AXES
+from robotiq_async.values.request import Request
 from tests.fleet.lab import SPEEDUP, Lab, lab
 from tests.grippers import activate_beforehand
 from tests.virtual import virtual

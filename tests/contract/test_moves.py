@@ -18,7 +18,7 @@ from robotiq_async import (
     ObjectStatus,
     RobotiqStatus,
 )
-from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.values.request import AxisRequest, Request
 from tests.contract.bench import A, B, C, at_rest, bench, contract, ended
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from robotiq_async.control.requests.shadow import RequestShadow
 from robotiq_async.control.requests.writes import WriteHistory
-from robotiq_async.enums import Finger
-from robotiq_async.wire.request import AxisRequest, Request
-from robotiq_async.wire.status import RobotiqStatus
+from robotiq_async.values.enums import Finger
+from robotiq_async.values.request import AxisRequest, Request
+from robotiq_async.values.status import RobotiqStatus
 from tests.register_words import status_of
 
 EPSILON = 0.001

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from robotiq_async.enums import AXES, Finger, State
-from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.values.enums import AXES, Finger, State
+from robotiq_async.values.request import AxisRequest, Request
 from tests.control.scan import Scan
 
 

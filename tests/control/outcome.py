@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from robotiq_async.control.motion import MoveResult
-from robotiq_async.errors import RobotiqError
+from robotiq_async.values.errors import RobotiqError
 
 
 class Outcome:

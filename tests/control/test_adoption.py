@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from robotiq_async.control.requests.adoption import DIRECTION_WAIT_S, Adoption
 from robotiq_async.control.requests.standstill import LAG_READS, LAG_S, Moment
-from robotiq_async.enums import AXES, Finger, Mode, ObjectStatus
-from robotiq_async.wire.request import AxisRequest, Request
-from robotiq_async.wire.status import RobotiqStatus
+from robotiq_async.values.enums import AXES, Finger, Mode, ObjectStatus
+from robotiq_async.values.request import AxisRequest, Request
+from robotiq_async.values.status import RobotiqStatus
 from tests.register_words import status_of
 
 A, B, C, S = AXES

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from robotiq_async.control.callers import Callers
 from robotiq_async.control.requests.pending import Command
-from robotiq_async.enums import AXES, Fault, Finger
-from robotiq_async.errors import ConnectionLostError, GripperFaultError
+from robotiq_async.values.enums import AXES, Fault, Finger
+from robotiq_async.values.errors import ConnectionLostError, GripperFaultError
 from tests.control.outcome import Outcome
 
 A, B, C, S = AXES

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async.control.contact import agrees, drifts
-from robotiq_async.enums import AXES, Finger, ObjectStatus
-from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.values.enums import AXES, Finger, ObjectStatus
+from robotiq_async.values.request import AxisRequest, Request
 from tests.register_words import status_of
 
 A, B, C, S = AXES

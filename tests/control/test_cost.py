@@ -7,8 +7,8 @@ from collections.abc import Callable
 from types import FrameType
 
 from robotiq_async.control.requests.writes import WriteHistory
-from robotiq_async.wire.request import AxisRequest, Request
-from robotiq_async.wire.status import RobotiqStatus
+from robotiq_async.values.request import AxisRequest, Request
+from robotiq_async.values.status import RobotiqStatus
 
 PERIOD_S = 0.005
 

@@ -6,7 +6,7 @@ import pytest
 
 from robotiq_async import Fault, Finger, GripperFaultError, NotActivatedError, State
 from robotiq_async.control.passing_fault import LASTS_READS
-from robotiq_async.wire.request import Request
+from robotiq_async.values.request import Request
 from tests.control.other_client import moved_by_another
 from tests.control.scan import POLL_S, Scan
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async import Fault, Finger, MoveSupersededError, State
-from robotiq_async.enums import AXES
+from robotiq_async.values.enums import AXES
 from tests.control.other_client import image, moved_by_another, used_by_another
 from tests.control.scan import Scan
 

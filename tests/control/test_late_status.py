@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from robotiq_async import Finger, MoveResult, MoveSupersededError, ObjectStatus
 from robotiq_async.control.requests.standstill import LAG_READS, LAG_S, LONG_AGO, Moment, Standstill
-from robotiq_async.enums import AXES
+from robotiq_async.values.enums import AXES
 from tests.control.other_client import image
 from tests.control.outcome import Outcome
 from tests.control.scan import POLL_S, Scan, started

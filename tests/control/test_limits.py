@@ -8,10 +8,10 @@ import pytest
 
 from robotiq_async import Finger, MoveSupersededError, ObjectStatus, RobotiqStatus
 from robotiq_async.control.requests.limits import ALONE_S, Limits
-from robotiq_async.enums import AXES
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.wire.registers import Registers, gPR
-from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.values.enums import AXES
+from robotiq_async.values.registers import Registers, gPR
+from robotiq_async.values.request import AxisRequest, Request
 from tests.control.scan import Scan
 from tests.register_words import status_of
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async.control.motion import LiveMoves, Move
-from robotiq_async.enums import AXES, Finger
-from robotiq_async.errors import MoveSupersededError
+from robotiq_async.values.enums import AXES, Finger
+from robotiq_async.values.errors import MoveSupersededError
 from tests.control.outcome import Outcome
 from tests.register_words import status_of
 

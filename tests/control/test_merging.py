@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from robotiq_async.control.requests.merging import merged
 from robotiq_async.control.requests.pending import Command, PendingCommand
-from robotiq_async.enums import AXES, NO_AXES, Finger, Mode
-from robotiq_async.errors import MoveSupersededError
-from robotiq_async.wire.request import AxisRequest, Request
-from robotiq_async.wire.status import RobotiqStatus
+from robotiq_async.values.enums import AXES, NO_AXES, Finger, Mode
+from robotiq_async.values.errors import MoveSupersededError
+from robotiq_async.values.request import AxisRequest, Request
+from robotiq_async.values.status import RobotiqStatus
 from tests.control.outcome import Outcome
 from tests.register_words import status_of
 

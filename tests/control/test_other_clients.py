@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async import Finger, MoveSupersededError, NotActivatedError, RobotiqStatus, State
-from robotiq_async.enums import AXES
-from robotiq_async.wire.request import Request
+from robotiq_async.values.enums import AXES
+from robotiq_async.values.request import Request
 from tests.control.other_client import image, used_by_another
 from tests.control.scan import POLL_S, Scan
 

@@ -9,7 +9,7 @@ import pytest
 from robotiq_async import Fault, Finger, GripperFaultError, RobotiqStatus, State
 from robotiq_async.control.passing_fault import LASTS_READS, LASTS_S, PassingFault
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.wire.registers import Registers
+from robotiq_async.values.registers import Registers
 from tests.control.other_client import going_to
 from tests.control.scan import POLL_S, Scan
 from tests.register_words import status_of

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async.control.requests.pending import Command, PendingCommand
-from robotiq_async.enums import AXES, Finger
-from robotiq_async.errors import ConnectionLostError, MoveSupersededError
+from robotiq_async.values.enums import AXES, Finger
+from robotiq_async.values.errors import ConnectionLostError, MoveSupersededError
 from tests.control.outcome import Outcome
 
 A, B, C, S = AXES

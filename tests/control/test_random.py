@@ -10,8 +10,8 @@ from robotiq_async import Finger, MoveResult, ObjectStatus, State
 from robotiq_async.control.contact import TOLERANCE
 from robotiq_async.control.motion import Move
 from robotiq_async.control.state_machine import RUNNING
-from robotiq_async.enums import AXES
-from robotiq_async.wire.request import Request
+from robotiq_async.values.enums import AXES
+from robotiq_async.values.request import Request
 from tests.control.outcome import Outcome
 from tests.control.scan import Scan
 from tests.register_words import only_holds

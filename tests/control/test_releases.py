@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async import Fault, Finger, State
-from robotiq_async.wire.request import Request
+from robotiq_async.values.request import Request
 from tests.control.scan import Scan
 
 

@@ -8,10 +8,10 @@ from dataclasses import replace
 import pytest
 
 from robotiq_async.control.sequences import Sequence, activation, automatic_release, reset, shutdown
-from robotiq_async.enums import Fault, Mode
-from robotiq_async.errors import GripperFaultError, NotActivatedError
-from robotiq_async.wire.request import AxisRequest, Request
-from robotiq_async.wire.status import RobotiqStatus
+from robotiq_async.values.enums import Fault, Mode
+from robotiq_async.values.errors import GripperFaultError, NotActivatedError
+from robotiq_async.values.request import AxisRequest, Request
+from robotiq_async.values.status import RobotiqStatus
 from tests.register_words import status_of
 
 IMAGE = Request(

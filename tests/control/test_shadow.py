@@ -5,8 +5,8 @@ from __future__ import annotations
 from robotiq_async.control.requests.adoption import DIRECTION_WAIT_S
 from robotiq_async.control.requests.shadow import RequestShadow
 from robotiq_async.control.requests.writes import SILENT_S, WINDOW_S
-from robotiq_async.enums import AXES, NO_AXES, Finger
-from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.values.enums import AXES, NO_AXES, Finger
+from robotiq_async.values.request import AxisRequest, Request
 from tests.control.histories import EPSILON, Shadow, image, shows
 from tests.register_words import status_of
 

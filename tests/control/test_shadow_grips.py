@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from robotiq_async.enums import AXES, NO_AXES, Finger
-from robotiq_async.wire.status import RobotiqStatus
+from robotiq_async.values.enums import AXES, NO_AXES, Finger
+from robotiq_async.values.status import RobotiqStatus
 from tests.control.histories import Shadow, image, shows
 from tests.register_words import status_of
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from robotiq_async import Finger, Mode, NotStartedError, State
-from robotiq_async.wire.request import Request
+from robotiq_async.values.request import Request
 from tests.control.other_client import activated_by_another, asked, image
 from tests.control.scan import LAG, POLL_S, Scan
 

@@ -15,8 +15,8 @@ from robotiq_async.control.state_machine import (
     states_allowing,
 )
 from robotiq_async.control.triggers import Trigger
-from robotiq_async.enums import Fault, State
-from robotiq_async.errors import (
+from robotiq_async.values.enums import Fault, State
+from robotiq_async.values.errors import (
     ConnectionLostError,
     GripperFaultError,
     InvalidStateError,

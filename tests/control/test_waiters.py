@@ -7,8 +7,8 @@ import asyncio
 import pytest
 
 from robotiq_async.control.waiters import another, fail, resolve
-from robotiq_async.enums import Fault
-from robotiq_async.errors import ConnectionLostError, GripperFaultError, RobotiqError
+from robotiq_async.values.enums import Fault
+from robotiq_async.values.errors import ConnectionLostError, GripperFaultError, RobotiqError
 from tests.control.outcome import Outcome
 
 

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robotiq_async.control.requests.writes import SILENT_S, WINDOW_S
-from robotiq_async.wire.request import Request
-from robotiq_async.wire.status import RobotiqStatus
+from robotiq_async.values.request import Request
+from robotiq_async.values.status import RobotiqStatus
 from tests.control.histories import EPSILON, History, image, shows
 
 # -- one write ---------------------------------------------------------------------------------------------

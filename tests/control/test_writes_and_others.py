@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async.control.requests.writes import WINDOW_S, WriteHistory
-from robotiq_async.wire.status import RobotiqStatus
+from robotiq_async.values.status import RobotiqStatus
 from tests.control.histories import EPSILON, History, image, shows
 from tests.register_words import status_of
 

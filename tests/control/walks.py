@@ -6,7 +6,7 @@ from collections import deque
 
 from robotiq_async.control.state_machine import TABLE, StateMachine
 from robotiq_async.control.triggers import Trigger
-from robotiq_async.enums import State
+from robotiq_async.values.enums import State
 
 Change = tuple[State, State, Trigger]
 

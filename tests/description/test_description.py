@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.description import HandModel, Pose, hand_model, urdf
-from robotiq_async.description.geometry import Vector, from_rpy, turned
-from robotiq_async.kinematics import FINGER_NAMES, JOINTS, finger_angles, palm_angle
+from robotiq_async.tools.description import HandModel, Pose, hand_model, urdf
+from robotiq_async.tools.description.geometry import Vector, from_rpy, turned
+from robotiq_async.tools.description.kinematics import FINGER_NAMES, JOINTS, finger_angles, palm_angle
 
 MODEL = hand_model()
 ANGLE = st.floats(-pi, pi)

@@ -13,7 +13,6 @@ from typing import Any, Final
 import pytest
 
 from robotiq_async import Finger, MoveResult, ObjectStatus, RobotiqHand, State, Transition, Trigger
-from robotiq_async.errors import ControlLostError
 from robotiq_async.fleet import GripperName
 from robotiq_async.fleet.agent.agent_file import AgentSettings, GripperSettings, read_agent_file
 from robotiq_async.fleet.agent.publisher import AT_ONCE, KEPT, HandPublisher
@@ -26,8 +25,9 @@ from robotiq_async.fleet.wire.names import ROOT
 from robotiq_async.fleet.wire.status_message import StatusMessage
 from robotiq_async.fleet.wire.values import request_fields, result_fields, transition_fields
 from robotiq_async.session.streams import SentRequest
-from robotiq_async.wire.request import AxisRequest, Request
-from robotiq_async.wire.status import RobotiqStatus
+from robotiq_async.values.errors import ControlLostError
+from robotiq_async.values.request import AxisRequest, Request
+from robotiq_async.values.status import RobotiqStatus
 from tests.docs.pages import DOCS, blocks
 from tests.fleet.network import Network
 

@@ -34,7 +34,7 @@ from robotiq_async import (
     sync,
 )
 from robotiq_async.cli.app import COMMANDS
-from robotiq_async.wire.request import Request
+from robotiq_async.values.request import Request
 from tests.docs.pages import DOCS
 from tests.register_words import status_of
 

@@ -19,7 +19,7 @@ from tests.docs.pages import DOCS, PAGES, ROOT, blocks, prose
 CONFIGURATION = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
 NAVIGATION = re.findall(r"^ +- (?:.*: )?(\S+\.md)$", CONFIGURATION.partition("\nnav:\n")[2], re.MULTILINE)
 NOT_PUBLIC = {
-    "robotiq_async.doctor": "the command's; what it finds is for people",
+    "robotiq_async.tools.doctor": "the command's; what it finds is for people",
     "robotiq_async.grasping": "robotiq_async has what programs use of it",
     "robotiq_async.hand": "robotiq_async has it",
 }
@@ -154,7 +154,7 @@ def test_the_page_on_stability_names_what_is_described() -> None:
         ("See :class:`~robotiq_async.RobotiqHand`.", "See `RobotiqHand`."),
         ("as :attr:`Hand.statistics` does", "as `Hand.statistics` does"),
         ("(:mod:`.feed`)", "(`feed`)"),
-        ("in :mod:`robotiq_async.calibration.closing_time`", "in `closing_time`"),
+        ("in :mod:`robotiq_async.values.calibration.closing_time`", "in `closing_time`"),
         ("Like this::\n\n    code", "Like this:\n\n    code"),
         ("``a::b`` and [::1]", "``a::b`` and [::1]"),
     ],

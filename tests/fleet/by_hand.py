@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import asyncio
 
-from robotiq_async.errors import AgentError
 from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.wire.envelope import Call, unpack_answer
 from robotiq_async.fleet.wire.names import GripperName
+from robotiq_async.values.errors import AgentError
 from tests.fleet.cell import Doing, moving
 from tests.fleet.world import Client, World
 

@@ -9,9 +9,9 @@ from itertools import pairwise
 from typing import Any
 
 from robotiq_async import Finger, RobotiqConnectionError, RobotiqError, State
-from robotiq_async.enums import AXES
-from robotiq_async.errors import ControlLostError
-from robotiq_async.wire.request import Request
+from robotiq_async.values.enums import AXES
+from robotiq_async.values.errors import ControlLostError
+from robotiq_async.values.request import Request
 from tests.fleet.troubles import Trouble
 from tests.fleet.world import PROMPT_S, WINDOW_S, World, motions
 

@@ -26,7 +26,7 @@ from robotiq_async.fleet.network.zenoh_bus import open_bus
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import Call
 from robotiq_async.simulator import SimulatorServer
-from robotiq_async.wire.request import Request
+from robotiq_async.values.request import Request
 from tests.fleet.cuts import ENDPOINT, ROOT, Namespaces, missing
 from tests.fleet.programs import address, say
 from tests.grippers import active_gripper

@@ -25,7 +25,7 @@ from robotiq_async.fleet.network.configuration import (
 from robotiq_async.fleet.network.zenoh_bus import open_bus
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.values.request import AxisRequest, Request
 
 NAMES = ("left", "right")
 B_STANDS = {"left": 0, "right": 100}

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robotiq_async.errors import AgentError, ControlLostError
 from robotiq_async.fleet.control.admission import Admission
 from robotiq_async.fleet.control.lease import Lease
 from robotiq_async.fleet.wire.envelope import Call
+from robotiq_async.values.errors import AgentError, ControlLostError
 
 BASE, EPOCH = "robotiq/v1/lab/cell/left", 77
 NOW = 100.0

@@ -7,10 +7,10 @@ import asyncio
 import pytest
 
 from robotiq_async import Finger, State
-from robotiq_async.errors import AgentError, ControlLostError
 from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.wire.envelope import Call
-from robotiq_async.wire.request import Request as Image
+from robotiq_async.values.errors import AgentError, ControlLostError
+from robotiq_async.values.request import Request as Image
 from tests.fleet.cell import told
 from tests.fleet.lab import lab
 from tests.fleet.spoiling import Garbling, Spoiling

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.errors import AgentError, ProtocolError
 from robotiq_async.fleet.wire.envelope import Answer, Call, failure, unpack_answer, unpack_call
+from robotiq_async.values.errors import AgentError, ProtocolError
 
 JSON: st.SearchStrategy[Any] = st.recursive(
     st.none() | st.booleans() | st.integers(-(2**70), 2**70) | st.floats() | st.text(max_size=8),

@@ -13,9 +13,6 @@ from typing import Any
 import pytest
 
 from robotiq_async import Finger
-from robotiq_async.doctor import Finding, Level, examine_remote
-from robotiq_async.doctor.certificates import examine_keys
-from robotiq_async.doctor.findings import GiveUpError
 from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.keys.access_list import Role
 from robotiq_async.fleet.keys.certificates import issue, make_authority
@@ -24,6 +21,9 @@ from robotiq_async.fleet.wire.envelope import Answer
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.hand import RobotiqHand
 from robotiq_async.simulator import SimulatorServer
+from robotiq_async.tools.doctor import Finding, Level, examine_remote
+from robotiq_async.tools.doctor.certificates import examine_keys
+from robotiq_async.tools.doctor.findings import GiveUpError
 from tests.fleet.lab import Lab, lab
 from tests.fleet.network import MemoryBus, Network
 from tests.virtual import virtual

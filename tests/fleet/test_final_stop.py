@@ -11,7 +11,7 @@ import pytest
 
 from robotiq_async import Finger, NotStartedError, State
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
-from robotiq_async.wire.request import Request
+from robotiq_async.values.request import Request
 from tests.contract.bench import until
 from tests.fleet.lab import Lab, lab
 from tests.virtual import virtual

@@ -12,11 +12,11 @@ import gc
 import pytest
 
 from robotiq_async import Finger, State
-from robotiq_async.errors import NotAllStoppedError, RobotiqStateError
 from robotiq_async.fleet.fleet import Fleet
 from robotiq_async.fleet.remote.persistence import until_answered
 from robotiq_async.fleet.wire.envelope import Call
 from robotiq_async.fleet.wire.names import GripperName
+from robotiq_async.values.errors import NotAllStoppedError, RobotiqStateError
 from tests.fleet.by_hand import LEFT, ask, move_slowly
 from tests.fleet.cell import told
 from tests.fleet.world import motions, world

@@ -8,7 +8,7 @@ import pytest
 
 from robotiq_async import Finger, RobotiqError
 from robotiq_async.simulator.physics.inbox import Write
-from robotiq_async.wire.request import Request
+from robotiq_async.values.request import Request
 from tests.fleet.by_hand import move_slowly
 from tests.fleet.world import POLL_S, world
 from tests.virtual import LATENCY_S, virtual

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from robotiq_async import Finger
-from robotiq_async.errors import AgentError, ProtocolError, RobotiqError
 from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.wire.envelope import Call, unpack_answer
 from robotiq_async.fleet.wire.names import GripperName
+from robotiq_async.values.errors import AgentError, ProtocolError, RobotiqError
 from tests.fleet.by_hand import LEFT, ask, move_slowly
 from tests.fleet.lab import lab
 from tests.fleet.world import world

@@ -10,12 +10,12 @@ from typing import Any, cast
 import pytest
 
 from robotiq_async import Finger, State
-from robotiq_async.errors import ControlLostError
 from robotiq_async.fleet.network.bus import Bus, Reply, Urgency
 from robotiq_async.fleet.remote.outbox import UNDER_WAY
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import Call, unpack_call
-from robotiq_async.wire.request import Request
+from robotiq_async.values.errors import ControlLostError
+from robotiq_async.values.request import Request
 from tests.fleet.lab import Lab, lab
 from tests.fleet.network import MemoryBus
 from tests.virtual import virtual

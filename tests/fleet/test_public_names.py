@@ -7,8 +7,9 @@ import sys
 
 import pytest
 
-from robotiq_async import errors, fleet
-from robotiq_async.extras import install
+from robotiq_async import fleet
+from robotiq_async.runtime.extras import install
+from robotiq_async.values import errors
 
 WITHOUT = """\
 import sys

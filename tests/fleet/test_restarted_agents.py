@@ -9,7 +9,7 @@ import pytest
 from robotiq_async import Finger
 from robotiq_async.fleet.remote.settings import Settings
 from robotiq_async.fleet.wire.envelope import Call
-from robotiq_async.wire.request import Request
+from robotiq_async.values.request import Request
 from tests.fleet.world import World, world
 from tests.virtual import virtual
 

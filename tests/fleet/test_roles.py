@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from robotiq_async import RobotiqHand
-from robotiq_async.errors import ConnectFailedError, NotAllowedError
 from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.fleet import Fleet
 from robotiq_async.fleet.keys.access_list import Role
@@ -19,6 +18,7 @@ from robotiq_async.fleet.network.configuration import agent_configuration
 from robotiq_async.fleet.network.route import Route
 from robotiq_async.fleet.network.zenoh_bus import open_bus
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
+from robotiq_async.values.errors import ConnectFailedError, NotAllowedError
 from tests.fleet.sessions import PATIENCE, free_port
 
 

@@ -15,13 +15,13 @@ from typing import Any, cast
 import pytest
 
 from robotiq_async import Finger, MoveSupersededError, RobotiqHand
-from robotiq_async.errors import AgentError, ControlLostError
 from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.network.bus import Bus, Reply, Urgency
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import Call, unpack_call
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.wire.request import Request
+from robotiq_async.values.errors import AgentError, ControlLostError
+from robotiq_async.values.request import Request
 from tests.fleet.by_hand import LEFT, ask
 from tests.fleet.lab import lab
 from tests.fleet.network import MemoryBus, Network

@@ -10,7 +10,7 @@ import pytest
 from robotiq_async import Finger, State
 from robotiq_async.fleet.wire.envelope import Call
 from robotiq_async.fleet.wire.settings import read_settings, settings_fields, settings_of
-from robotiq_async.wire.request import Request
+from robotiq_async.values.request import Request
 from tests.fleet.lab import lab
 from tests.fleet.world import World, world
 from tests.virtual import virtual

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async import State
-from robotiq_async.errors import ProtocolError
 from robotiq_async.fleet.wire.status_message import SIZE, StatusMessage, unpack
+from robotiq_async.values.errors import ProtocolError
 
 U32, U64 = st.integers(0, 2**32 - 1), st.integers(0, 2**64 - 1)
 TIME = st.floats(allow_nan=False, allow_infinity=False, width=64)

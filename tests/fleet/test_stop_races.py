@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 
 from robotiq_async import ConnectionLostError, Finger, NotStartedError, RobotiqError
-from robotiq_async.errors import ControlLostError
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import Call, unpack_answer
-from robotiq_async.wire.request import Request
+from robotiq_async.values.errors import ControlLostError
+from robotiq_async.values.request import Request
 from tests.contract.bench import until
 from tests.fleet.by_hand import LEFT
 from tests.fleet.lab import Lab, lab

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import pytest
 
 from robotiq_async import ConnectionLostError, Finger, RobotiqHand, State
-from robotiq_async.errors import AgentError, ControlLostError, NotAllStoppedError
 from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.fleet import Fleet
 from robotiq_async.fleet.network.bus import is_any
@@ -20,6 +19,7 @@ from robotiq_async.fleet.remote.pending_request import is_refusal, of_its_run
 from robotiq_async.fleet.wire.envelope import Answer, Call, failure
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.values.errors import AgentError, ControlLostError, NotAllStoppedError
 from tests.fleet.lab import SPEEDUP, Lab, lab
 from tests.fleet.world import ServingAgent, world
 from tests.grippers import activate_beforehand

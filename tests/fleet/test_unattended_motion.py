@@ -10,9 +10,9 @@ import asyncio
 import pytest
 
 from robotiq_async import Finger, RobotiqError, State
-from robotiq_async.errors import AgentError
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import Answer
+from robotiq_async.values.errors import AgentError
 from tests.fleet.by_hand import move_slowly
 from tests.fleet.lab import lab
 from tests.fleet.spoiling import Spoiling

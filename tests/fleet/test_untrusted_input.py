@@ -7,12 +7,12 @@ import asyncio
 import pytest
 
 from robotiq_async import State
-from robotiq_async.errors import AgentError, ControlLostError
 from robotiq_async.fleet.limited_log import EVERY_S
 from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.wire.envelope import Call, unpack_answer
 from robotiq_async.fleet.wire.status_message import StatusMessage
 from robotiq_async.fleet.wire.values import read_error
+from robotiq_async.values.errors import AgentError, ControlLostError
 from tests.fleet.by_hand import LEFT
 from tests.fleet.lab import lab
 from tests.virtual import virtual

@@ -18,10 +18,12 @@ from robotiq_async import (
     SentRequest,
     State,
     Transition,
-    errors,
 )
 from robotiq_async.control.triggers import Trigger
-from robotiq_async.errors import (
+from robotiq_async.fleet.wire import values
+from robotiq_async.session.statistics import Statistics
+from robotiq_async.values import errors
+from robotiq_async.values.errors import (
     AgentError,
     ConnectFailedError,
     ControlLostError,
@@ -31,9 +33,7 @@ from robotiq_async.errors import (
     ProtocolError,
     RobotiqError,
 )
-from robotiq_async.fleet.wire import values
-from robotiq_async.session.statistics import Statistics
-from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.values.request import AxisRequest, Request
 
 KINDS = sorted(
     (kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, RobotiqError)),

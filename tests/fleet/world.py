@@ -11,12 +11,12 @@ from operator import itemgetter
 from typing import Any, TypeVar
 
 from robotiq_async import Finger, RobotiqError, RobotiqHand, RobotiqStatus, State
-from robotiq_async.enums import AXES
 from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.simulator import SimulatorServer
-from robotiq_async.wire.request import Request
+from robotiq_async.values.enums import AXES
+from robotiq_async.values.request import Request
 from tests.adversity.world import StampedGripper
 from tests.fleet.hosts import Host
 from tests.fleet.network import LINK_LEASE_S, RECONNECT_S, MemoryBus, Network

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async import Finger, GraspResult, MoveResult, ObjectStatus
-from robotiq_async.enums import AXES
+from robotiq_async.values.enums import AXES
 from tests.register_words import status_of
 
 A, B, C, S = AXES

@@ -9,12 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.enums import AXES, Finger, ObjectStatus
-from robotiq_async.grasping import SLIP_COUNTS, GripChange, GripEvent, GripWatch
+from robotiq_async.control.grip_watch import SLIP_COUNTS, GripWatch
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.wire.registers import Registers
-from robotiq_async.wire.request import AxisRequest, Request
-from robotiq_async.wire.status import RobotiqStatus
+from robotiq_async.values.enums import AXES, Finger, ObjectStatus
+from robotiq_async.values.grip_event import GripChange, GripEvent
+from robotiq_async.values.registers import Registers
+from robotiq_async.values.request import AxisRequest, Request
+from robotiq_async.values.status import RobotiqStatus
 from tests.register_words import status_of, with_object_status
 
 A, B, C, S = AXES

@@ -7,11 +7,11 @@ import math
 from collections import deque
 from collections.abc import Sequence
 
-from robotiq_async.enums import Fault
-from robotiq_async.errors import ConnectFailedError, ConnectionLostError
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.wire.registers import Registers, gPR
-from robotiq_async.wire.request import Request
+from robotiq_async.values.enums import Fault
+from robotiq_async.values.errors import ConnectFailedError, ConnectionLostError
+from robotiq_async.values.registers import Registers, gPR
+from robotiq_async.values.request import Request
 from tests.register_words import with_object_status
 
 DEVICE_CYCLE_S = 0.005

@@ -19,7 +19,7 @@ from robotiq_async import (
     State,
 )
 from robotiq_async.simulator import SimulatorServer, parse_troubles
-from robotiq_async.wire.request import Request
+from robotiq_async.values.request import Request
 from tests.hand.watching import until_moving
 
 ROOT = Path(__file__).parents[2]

@@ -18,8 +18,8 @@ from robotiq_async import (
 )
 from robotiq_async.control.state_machine import SEQUENCES
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.wire.registers import Registers
-from robotiq_async.wire.request import Request
+from robotiq_async.values.registers import Registers
+from robotiq_async.values.request import Request
 from tests.conftest import Clock
 from tests.virtual import VirtualLoop
 

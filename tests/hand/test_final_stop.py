@@ -12,8 +12,8 @@ import pytest
 
 from robotiq_async import Fault, Finger, NotStartedError, RobotiqHand, State
 from robotiq_async.simulator import Habits, SerialSimulatorServer, SimulatedGripper, SimulatorServer
-from robotiq_async.wire.registers import Registers
-from robotiq_async.wire.request import Request
+from robotiq_async.values.registers import Registers
+from robotiq_async.values.request import Request
 from tests.contract.bench import until
 from tests.grippers import activate_beforehand
 from tests.session.wire import Wire

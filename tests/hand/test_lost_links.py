@@ -16,7 +16,7 @@ from robotiq_async import (
     State,
 )
 from robotiq_async.simulator import SimulatorServer
-from robotiq_async.wire.request import Request
+from robotiq_async.values.request import Request
 from tests.hand.watching import settled, travels, until_moving
 
 A = Finger.A

@@ -12,9 +12,9 @@ import anyio
 import pytest
 
 from robotiq_async import ConnectionLostError, Finger, MoveSupersededError, RobotiqError, RobotiqHand, State
-from robotiq_async.enums import AXES
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.wire.request import Request
+from robotiq_async.values.enums import AXES
+from robotiq_async.values.request import Request
 from tests.conftest import Clock
 
 pytestmark = pytest.mark.virtual_time

@@ -17,8 +17,8 @@ from robotiq_async import (
     RobotiqStatus,
     State,
 )
-from robotiq_async.enums import AXES
 from robotiq_async.simulator import SimulatorServer
+from robotiq_async.values.enums import AXES
 from tests.hand.watching import last_write
 
 pytestmark = pytest.mark.virtual_time

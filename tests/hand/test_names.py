@@ -29,8 +29,8 @@ from robotiq_async import (
 )
 from robotiq_async.session.options import LONGEST_NAME
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
-from robotiq_async.telemetry.payloads import reading_fields, state_fields, title
-from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.tools.recording.payloads import reading_fields, state_fields, title
+from robotiq_async.values.request import AxisRequest, Request
 from tests.conftest import Clock, started
 
 pytestmark = pytest.mark.virtual_time

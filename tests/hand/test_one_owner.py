@@ -19,7 +19,7 @@ from robotiq_async import (
     State,
 )
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
-from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.values.request import AxisRequest, Request
 from tests.hand.watching import settled, until_moving
 from tests.serial_line import SerialLine
 

@@ -13,8 +13,8 @@ from robotiq_async import (
     RobotiqHand,
     State,
 )
-from robotiq_async.enums import AXES
 from robotiq_async.simulator import SimulatorServer
+from robotiq_async.values.enums import AXES
 from tests.hand.watching import last_write, travels
 
 pytestmark = pytest.mark.virtual_time

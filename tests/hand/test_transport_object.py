@@ -19,10 +19,10 @@ from robotiq_async import (
     State,
     Transport,
 )
-from robotiq_async.session.timing.clock import now
+from robotiq_async.runtime.clock import now
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.wire.registers import Registers
-from robotiq_async.wire.request import Request
+from robotiq_async.values.registers import Registers
+from robotiq_async.values.request import Request
 from tests.virtual import VirtualLoop, run
 
 

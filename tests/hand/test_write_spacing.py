@@ -12,7 +12,7 @@ import pytest
 
 from robotiq_async import Finger, RobotiqHand
 from robotiq_async.simulator import Habits, SimulatedGripper, SimulatorServer
-from robotiq_async.wire.request import Request
+from robotiq_async.values.request import Request
 from tests.contract.bench import until
 from tests.grippers import activate_beforehand
 from tests.session.wire import Wire

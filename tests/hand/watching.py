@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from robotiq_async import Finger, RobotiqHand, State
-from robotiq_async.enums import AXES
 from robotiq_async.simulator import SerialSimulatorServer, SimulatorServer
-from robotiq_async.wire.request import Request
+from robotiq_async.values.enums import AXES
+from robotiq_async.values.request import Request
 
 
 def last_write(server: SimulatorServer) -> Request:

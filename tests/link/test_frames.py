@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.errors import ProtocolError
 from robotiq_async.link.frames import Expected, expected_reply
+from robotiq_async.values.errors import ProtocolError
 
 TRANSACTION = "12 34"
 VALUES = "31 00 00 00 ff 06 00 00 07 00 00 06 00 00 89 00"

@@ -14,9 +14,9 @@ from robotiq_async import Finger, RobotiqHand, State
 from robotiq_async.link.address import parse_address
 from robotiq_async.link.modbus import ModbusTransport
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.wire.registers import TCP_REGISTERS
-from robotiq_async.wire.request import AxisRequest, Request
-from robotiq_async.wire.status import RobotiqStatus
+from robotiq_async.values.registers import TCP_REGISTERS
+from robotiq_async.values.request import AxisRequest, Request
+from robotiq_async.values.status import RobotiqStatus
 
 A = Finger.A
 

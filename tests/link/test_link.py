@@ -27,7 +27,7 @@ from robotiq_async import (
 )
 from robotiq_async.link.address import parse_address
 from robotiq_async.link.modbus import ModbusTransport
-from robotiq_async.wire.registers import TCP_REGISTERS
+from robotiq_async.values.registers import TCP_REGISTERS
 
 STATUS = bytes(range(16))
 REGISTERS = tuple(int.from_bytes(STATUS[n : n + 2], "big") for n in range(0, 16, 2))

@@ -20,7 +20,7 @@ from robotiq_async import ConnectFailedError, ProtocolError, ResponseTimeoutErro
 from robotiq_async.link.address import parse_address
 from robotiq_async.link.modbus import ModbusTransport
 from robotiq_async.link.serial_ports import FORBIDDEN, MISSING, NO_PORT, TAKEN
-from robotiq_async.wire.registers import RTU_REGISTERS
+from robotiq_async.values.registers import RTU_REGISTERS
 from tests.serial_line import SerialLine
 from tests.virtual_line import VirtualLine
 

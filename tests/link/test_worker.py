@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from robotiq_async.concurrency import LateError
 from robotiq_async.link.worker import Worker
-from robotiq_async.session.timing.clock import now
+from robotiq_async.runtime.clock import now
+from robotiq_async.runtime.concurrency import LateError
 from tests.virtual import run
 
 

@@ -10,10 +10,11 @@ from pathlib import Path
 import pytest
 
 from robotiq_async import Finger, RobotiqHand
-from robotiq_async.calibration.closing_time import closing_time
-from robotiq_async.calibration.csv_tables import FORCE, SPEED, TableError, read_table, thesis_table
-from robotiq_async.errors import MeasuringError
-from robotiq_async.measure.campaigns import (
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.simulator.physics.mechanics.axis import PRESSING
+from robotiq_async.simulator.physics.mechanics.motor import peak
+from robotiq_async.simulator.physics.mechanics.scale import SimulatedScale
+from robotiq_async.tools.measure.campaigns import (
     GRASP_S,
     Campaign,
     force_campaign,
@@ -26,10 +27,9 @@ from robotiq_async.measure.campaigns import (
     time_closing,
     write_currents,
 )
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.simulator.physics.mechanics.axis import PRESSING
-from robotiq_async.simulator.physics.mechanics.motor import peak
-from robotiq_async.simulator.physics.mechanics.scale import SimulatedScale
+from robotiq_async.values.calibration.closing_time import closing_time
+from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, TableError, read_table, thesis_table
+from robotiq_async.values.errors import MeasuringError
 from tests.virtual import VirtualLoop, run
 
 POLL_S = 0.005

@@ -10,15 +10,15 @@ from pathlib import Path
 import pytest
 
 from robotiq_async import Finger
-from robotiq_async.enums import AXES
-from robotiq_async.measure.campaigns import force_values
-from robotiq_async.measure.plots import (
+from robotiq_async.tools.measure.campaigns import force_values
+from robotiq_async.tools.measure.plots import (
     LONGEST,
     plot_current_over_time,
     plot_peak_currents,
     plot_recording,
 )
-from robotiq_async.telemetry.recordings import Entry
+from robotiq_async.tools.recording.recordings import Entry
+from robotiq_async.values.enums import AXES
 
 
 def words(picture: Path) -> list[str]:

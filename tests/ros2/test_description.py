@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from robotiq_async.description import HandModel, hand_model, urdf
 from robotiq_async.ros2.translation.description import prefixed, robot_description
 from robotiq_async.ros2.translation.joints import joint_names
+from robotiq_async.tools.description import HandModel, hand_model, urdf
 
 URDF = (
     "<robot name='hand'><link name='palm' /><link name='tip' /><joint name='j' type='revolute'>"

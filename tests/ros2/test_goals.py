@@ -17,7 +17,7 @@ from robotiq_async.ros2.translation.joints import Targets
 from robotiq_async.ros2.translation.readiness import is_connected, why_not
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_settings
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.wire.request import Request
+from robotiq_async.values.request import Request
 from tests.fake_hand import FakeHand
 from tests.grippers import active_gripper
 

@@ -10,8 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async import Finger, RobotiqStatus
-from robotiq_async.description import hand_model
-from robotiq_async.kinematics import JOINTS, joint_angles
 from robotiq_async.ros2.translation.joints import (
     LIMITS,
     GoalError,
@@ -21,6 +19,8 @@ from robotiq_async.ros2.translation.joints import (
     positions,
     targets,
 )
+from robotiq_async.tools.description import hand_model
+from robotiq_async.tools.description.kinematics import JOINTS, joint_angles
 from tests.register_words import status_of
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR

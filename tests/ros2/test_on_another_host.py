@@ -13,7 +13,7 @@ from robotiq_async.ros2.gripper.goals import Ending
 from robotiq_async.ros2.translation.diagnosis import Level, diagnose
 from robotiq_async.ros2.translation.joints import Targets
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_settings
-from robotiq_async.session.timing.clock import now
+from robotiq_async.runtime.clock import now
 from tests.fleet.lab import lab
 from tests.virtual import virtual
 

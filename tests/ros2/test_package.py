@@ -12,9 +12,9 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import robotiq_async
-from robotiq_async.description import HandModel, hand_model
 from robotiq_async.ros2.gripper.connection import COMMANDS
 from robotiq_async.ros2.translation.settings import PARAMETERS
+from robotiq_async.tools.description import HandModel, hand_model
 
 ROOT = Path(__file__).parents[2]
 SHARED: dict[str, str] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"][

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from robotiq_async.calibration import Units
 from robotiq_async.control.state_machine import StateMachine
-from robotiq_async.errors import ConnectionLostError
 from robotiq_async.session.claims import Gripper
 from robotiq_async.session.options import Options
 from robotiq_async.session.reconnecting import ReconnectPolicy
 from robotiq_async.session.session import Session
 from robotiq_async.session.streams import Channels
+from robotiq_async.values.calibration import Units
+from robotiq_async.values.errors import ConnectionLostError
 from tests.session.wire import Wire
 
 LOST = ConnectionLostError("unplugged")

@@ -12,9 +12,9 @@ from importlib.util import find_spec
 import pytest
 
 from robotiq_async import Finger, RobotiqHand, RobotiqStatus, SentRequest, Transition
-from robotiq_async.session.timing.clock import clock_of, now
+from robotiq_async.runtime.clock import clock_of, now
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.values.request import AxisRequest, Request
 from tests.virtual import VirtualLoop
 
 

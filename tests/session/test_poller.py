@@ -9,17 +9,17 @@ import pytest
 
 from robotiq_async.control.requests.pending import Command
 from robotiq_async.control.triggers import Trigger
-from robotiq_async.enums import Finger, State
-from robotiq_async.errors import (
+from robotiq_async.session.poller import READS, STOP_S
+from robotiq_async.session.reconnecting import ReconnectPolicy
+from robotiq_async.values.enums import Finger, State
+from robotiq_async.values.errors import (
     ConnectFailedError,
     ConnectionLostError,
     ProtocolError,
     ResponseTimeoutError,
     RobotiqConnectionError,
 )
-from robotiq_async.session.poller import READS, STOP_S
-from robotiq_async.session.reconnecting import ReconnectPolicy
-from robotiq_async.wire.request import Request
+from robotiq_async.values.request import Request
 from tests.session.polled import LOST, POLL_S, Polled, polled
 from tests.virtual import virtual
 

@@ -11,14 +11,14 @@ import pytest
 
 from robotiq_async.control.requests.pending import Command
 from robotiq_async.control.triggers import Trigger
-from robotiq_async.enums import Finger, State
-from robotiq_async.errors import (
+from robotiq_async.session.session import Session
+from robotiq_async.values.enums import Finger, State
+from robotiq_async.values.errors import (
     ConnectFailedError,
     ConnectionLostError,
     InvalidStateError,
     NotStartedError,
 )
-from robotiq_async.session.session import Session
 from tests.session.sessions import LOST, Run, running
 from tests.session.wire import Wire
 from tests.virtual import VirtualLoop, run, virtual

@@ -7,8 +7,9 @@ import asyncio
 import pytest
 
 from robotiq_async.control.requests.pending import Command
-from robotiq_async.enums import Fault, Finger, State
-from robotiq_async.errors import (
+from robotiq_async.session.reconnecting import ReconnectPolicy
+from robotiq_async.values.enums import Fault, Finger, State
+from robotiq_async.values.errors import (
     ActivationTimeoutError,
     ConnectionLostError,
     GripperFaultError,
@@ -16,7 +17,6 @@ from robotiq_async.errors import (
     NotStartedError,
     StateTimeoutError,
 )
-from robotiq_async.session.reconnecting import ReconnectPolicy
 from tests.session.sessions import LOST, running
 from tests.virtual import virtual
 

@@ -8,7 +8,7 @@ import threading
 import anyio
 import pytest
 
-from robotiq_async.concurrency import in_a_thread, wait_shielded
+from robotiq_async.runtime.concurrency import in_a_thread, wait_shielded
 
 
 async def test_a_cancellation_waits_for_the_end() -> None:

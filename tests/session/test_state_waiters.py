@@ -7,9 +7,9 @@ import gc
 
 import pytest
 
-from robotiq_async.enums import Fault, State
-from robotiq_async.errors import ConnectionLostError, GripperFaultError, RobotiqError
 from robotiq_async.session.state_waiters import StateWaiters
+from robotiq_async.values.enums import Fault, State
+from robotiq_async.values.errors import ConnectionLostError, GripperFaultError, RobotiqError
 
 
 def lost() -> RobotiqError:

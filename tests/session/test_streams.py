@@ -12,10 +12,10 @@ import anyio
 import pytest
 
 from robotiq_async.control.triggers import Trigger
-from robotiq_async.enums import State
-from robotiq_async.errors import ConnectionLostError, RobotiqError
 from robotiq_async.session.listeners import Listeners
 from robotiq_async.session.streams import Channel, Stream, Transition
+from robotiq_async.values.enums import State
+from robotiq_async.values.errors import ConnectionLostError, RobotiqError
 
 
 def lost() -> RobotiqError:

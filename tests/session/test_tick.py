@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from robotiq_async.session.timing.tick import Tick
+from robotiq_async.runtime.tick import Tick
 from tests.virtual import VirtualLoop, run
 
 INTERVAL = 0.005

@@ -5,10 +5,10 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Sequence
 
-from robotiq_async.errors import ResponseTimeoutError, RobotiqConnectionError
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.wire.registers import Registers
-from robotiq_async.wire.request import Request
+from robotiq_async.values.errors import ResponseTimeoutError, RobotiqConnectionError
+from robotiq_async.values.registers import Registers
+from robotiq_async.values.request import Request
 
 EXCHANGE_S = 0.001
 SILENCE_S = 0.4

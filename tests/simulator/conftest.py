@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from robotiq_async.enums import AXES, Fault, Finger, Initialization, Mode, ObjectStatus
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.wire.request import AxisRequest, Request
-from robotiq_async.wire.status import RobotiqStatus
+from robotiq_async.values.enums import AXES, Fault, Finger, Initialization, Mode, ObjectStatus
+from robotiq_async.values.request import AxisRequest, Request
+from robotiq_async.values.status import RobotiqStatus
 
 if TYPE_CHECKING:
     from collections.abc import Callable

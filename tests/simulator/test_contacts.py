@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from robotiq_async.enums import AXES, NO_AXES, Fault, Finger, Initialization, Mode, ObjectStatus
 from robotiq_async.simulator import Habits
 from robotiq_async.simulator.physics.mechanics.axis import PRESSING
+from robotiq_async.values.enums import AXES, NO_AXES, Fault, Finger, Initialization, Mode, ObjectStatus
 from tests.simulator.conftest import CYCLE
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from robotiq_async.enums import AXES, Finger
+from robotiq_async.values.enums import AXES, Finger
 from tests.simulator.conftest import CYCLE
 
 if TYPE_CHECKING:

@@ -13,13 +13,13 @@ from typing import Any
 import pytest
 import serial
 
-from robotiq_async.enums import AXES, Fault, Mode
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.simulator import parse_troubles as plan_of
 from robotiq_async.simulator.server.endpoint import SimulatorEndpoint
 from robotiq_async.simulator.troubles.trouble import KINDS
-from robotiq_async.wire.request import AxisRequest, Request
-from robotiq_async.wire.status import RobotiqStatus
+from robotiq_async.values.enums import AXES, Fault, Mode
+from robotiq_async.values.request import AxisRequest, Request
+from robotiq_async.values.status import RobotiqStatus
 from tests.simulator.test_server import RawClient, raw_client
 from tests.virtual import run
 from tests.virtual_line import VirtualLine

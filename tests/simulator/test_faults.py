@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from robotiq_async.calibration.closing_time import closing_time
-from robotiq_async.enums import Fault, Finger, Initialization, ObjectStatus, Severity
+from robotiq_async.values.calibration.closing_time import closing_time
+from robotiq_async.values.enums import Fault, Finger, Initialization, ObjectStatus, Severity
 
 if TYPE_CHECKING:
     from tests.simulator.conftest import Bench

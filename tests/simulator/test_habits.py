@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from robotiq_async.enums import AXES, Fault, Finger, Initialization, Mode, ObjectStatus
 from robotiq_async.simulator import Habits
-from robotiq_async.wire.request import AxisRequest
+from robotiq_async.values.enums import AXES, Fault, Finger, Initialization, Mode, ObjectStatus
+from robotiq_async.values.request import AxisRequest
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -7,12 +7,12 @@ import struct
 
 import pytest
 
-from robotiq_async.enums import Fault, Finger, Initialization
 from robotiq_async.simulator import Habits, SimulatorServer, Trouble
 from robotiq_async.simulator import parse_troubles as plan_of
 from robotiq_async.simulator.physics.habits import REAL_ACTIVATION
 from robotiq_async.simulator.troubles.trouble import KINDS
-from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.values.enums import Fault, Finger, Initialization
+from robotiq_async.values.request import AxisRequest, Request
 from tests.simulator.test_fault_injector import (
     SerialClient,
     activate,

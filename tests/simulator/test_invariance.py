@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, NamedTuple
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robotiq_async.enums import AXES, Fault, Initialization, Mode
 from robotiq_async.simulator import Habits, SimulatedGripper
-from robotiq_async.wire.request import AxisRequest, Request
-from robotiq_async.wire.status import RobotiqStatus
+from robotiq_async.values.enums import AXES, Fault, Initialization, Mode
+from robotiq_async.values.request import AxisRequest, Request
+from robotiq_async.values.status import RobotiqStatus
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 import robotiq_async
-from robotiq_async.calibration.closing_time import closing_time
-from robotiq_async.enums import AXES, CLOSED_READING, OPEN_READING, STROKE_COUNTS, Finger, ObjectStatus
+from robotiq_async.values.calibration.closing_time import closing_time
+from robotiq_async.values.enums import AXES, CLOSED_READING, OPEN_READING, STROKE_COUNTS, Finger, ObjectStatus
 from tests.simulator.conftest import CYCLE
 
 if TYPE_CHECKING:

@@ -6,9 +6,9 @@ import asyncio
 
 import pytest
 
-from robotiq_async.enums import Fault
 from robotiq_async.simulator import SimulatorServer, Trouble, parse_troubles
 from robotiq_async.simulator import parse_troubles as plan_of
+from robotiq_async.values.enums import Fault
 from tests.simulator.test_fault_injector import cancelled, is_answered, is_let_in, simulator, status, virtual
 from tests.simulator.test_server import raw_client
 

@@ -11,7 +11,7 @@ import pytest
 
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
 from robotiq_async.simulator.server.framing import Frame, take_rtu
-from robotiq_async.wire.status import RobotiqStatus
+from robotiq_async.values.status import RobotiqStatus
 
 pytest.importorskip("serial")
 pty = pytest.importorskip("pty")

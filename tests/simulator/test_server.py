@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import pytest
 from pymodbus.client import AsyncModbusTcpClient
 
-from robotiq_async.enums import Finger
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.simulator.server.endpoint import connections
-from robotiq_async.wire.request import AxisRequest, Request
-from robotiq_async.wire.status import RobotiqStatus
+from robotiq_async.values.enums import Finger
+from robotiq_async.values.request import AxisRequest, Request
+from robotiq_async.values.status import RobotiqStatus
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator

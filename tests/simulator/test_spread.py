@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from robotiq_async.calibration.closing_time import closing_time
-from robotiq_async.enums import AXES, Finger, Mode, ObjectStatus
 from robotiq_async.simulator import SimulatedGripper
+from robotiq_async.values.calibration.closing_time import closing_time
+from robotiq_async.values.enums import AXES, Finger, Mode, ObjectStatus
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from robotiq_async.enums import Finger
+from robotiq_async.values.enums import Finger
 
 if TYPE_CHECKING:
     from tests.simulator.conftest import Bench

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from robotiq_async.enums import Finger
+from robotiq_async.values.enums import Finger
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -11,13 +11,13 @@ from typing import Any, TypeVar
 
 import pytest
 
-from robotiq_async.enums import Finger
-from robotiq_async.errors import ConnectionLostError
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.sync import RobotiqHand, caller
 from robotiq_async.sync.loop_thread import NAME
-from robotiq_async.wire.registers import Registers
-from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.values.enums import Finger
+from robotiq_async.values.errors import ConnectionLostError
+from robotiq_async.values.registers import Registers
+from robotiq_async.values.request import AxisRequest, Request
 
 T = TypeVar("T")
 PATIENCE = 5.0

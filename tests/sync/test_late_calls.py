@@ -15,7 +15,7 @@ from robotiq_async import Finger, RobotiqError, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.sync import RobotiqHand, caller
 from robotiq_async.sync.loop_thread import LOOP_THREAD
-from robotiq_async.wire.request import Request
+from robotiq_async.values.request import Request
 from tests.conftest import Clock
 from tests.docs.pages import ROOT
 from tests.sync.conftest import Wire, in_a_thread, until

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from functools import cached_property
 
-from robotiq_async.enums import CLOSED, Finger
+from robotiq_async.values.enums import CLOSED, Finger
 
 
 class Gauge:

@@ -10,7 +10,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from robotiq_async import Finger, GripperFaultError, MoveSupersededError, RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.telemetry.metrics import serve_metrics
+from robotiq_async.tools.metrics import serve_metrics
 
 Samples = dict[tuple[str, str], float]
 

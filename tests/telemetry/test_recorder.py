@@ -20,12 +20,12 @@ from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from robotiq_async import ConnectionLostError, Finger, RobotiqHand, RobotiqStatus, State
-from robotiq_async.errors import RecordingError
-from robotiq_async.kinematics import JOINTS, joint_angles
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
-from robotiq_async.telemetry.joint_states import SCHEMA, SCHEMA_NAME, JointStateEncoder
-from robotiq_async.telemetry.recorder import Recorder
-from robotiq_async.telemetry.recordings import read_recording, recover
+from robotiq_async.tools.description.joint_states import SCHEMA, SCHEMA_NAME, JointStateEncoder
+from robotiq_async.tools.description.kinematics import JOINTS, joint_angles
+from robotiq_async.tools.recording.recorder import Recorder
+from robotiq_async.tools.recording.recordings import read_recording, recover
+from robotiq_async.values.errors import RecordingError
 
 ROOT = Path(__file__).parents[2]
 
@@ -384,7 +384,7 @@ async def test_a_killed_recording_loses_less_than_a_second_and_is_made_whole(
     program = f"""
 import asyncio
 from robotiq_async import RobotiqHand
-from robotiq_async.telemetry.recorder import Recorder
+from robotiq_async.tools.recording.recorder import Recorder
 
 async def main():
     hand = RobotiqHand()

@@ -19,16 +19,16 @@ from websockets.typing import Origin, Subprotocol
 
 from docs import make_layout
 from robotiq_async import Fault, Finger, RobotiqHand, RobotiqStatus, State
-from robotiq_async.actions import Operator
-from robotiq_async.description import HandModel, urdf
-from robotiq_async.errors import ViewerError
-from robotiq_async.kinematics import JOINTS, joint_angles
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.telemetry.gate import Gate
-from robotiq_async.telemetry.payloads import SCHEMAS
-from robotiq_async.telemetry.robot_description import transforms
-from robotiq_async.telemetry.services import SERVICES
-from robotiq_async.telemetry.viewer import SHOWN, Viewer
+from robotiq_async.tools.actions import Operator
+from robotiq_async.tools.description import HandModel, urdf
+from robotiq_async.tools.description.kinematics import JOINTS, joint_angles
+from robotiq_async.tools.description.robot_description import transforms
+from robotiq_async.tools.recording.payloads import SCHEMAS
+from robotiq_async.tools.viewer.gate import Gate
+from robotiq_async.tools.viewer.services import SERVICES
+from robotiq_async.tools.viewer.viewer import SHOWN, Viewer
+from robotiq_async.values.errors import ViewerError
 from tests.foxglove_client import Client, client
 from tests.grippers import active_gripper
 

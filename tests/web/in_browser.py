@@ -22,11 +22,11 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 
 from robotiq_async import OPEN, WIDTH_NORMAL, Fault, Finger, RobotiqHand, RobotiqStatus, State
-from robotiq_async.description import hand_model
-from robotiq_async.enums import AXES, DEFAULT_SPEED
-from robotiq_async.kinematics import JOINTS, joint_angles
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.web.server import PageServer
+from robotiq_async.tools.description import hand_model
+from robotiq_async.tools.description.kinematics import JOINTS, joint_angles
+from robotiq_async.tools.web.server import PageServer
+from robotiq_async.values.enums import AXES, DEFAULT_SPEED
 from tests.conftest import watched
 from tests.fake_hand import FakeHand
 from tests.virtual import HoldWatch

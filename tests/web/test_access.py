@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from robotiq_async.web.page.access import Access, Head, Verdict
-from robotiq_async.web.page.guard import Guard
-from robotiq_async.web.settings import PageSettings
+from robotiq_async.tools.web.page.access import Access, Head, Verdict
+from robotiq_async.tools.web.page.guard import Guard
+from robotiq_async.tools.web.settings import PageSettings
 
 PORT = 8766
 HERE = f"127.0.0.1:{PORT}"

@@ -17,10 +17,10 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import InvalidStatus
 from websockets.typing import Origin
 
-from robotiq_async.actions import ACTIONS
-from robotiq_async.errors import ViewerError
-from robotiq_async.web.server import PageServer
-from robotiq_async.web.settings import PageSettings
+from robotiq_async.tools.actions import ACTIONS
+from robotiq_async.tools.web.server import PageServer
+from robotiq_async.tools.web.settings import PageSettings
+from robotiq_async.values.errors import ViewerError
 from tests.conftest import watched
 from tests.fake_hand import FakeHand
 

@@ -9,10 +9,10 @@ from math import hypot
 import pytest
 
 from robotiq_async import Finger, RobotiqStatus
-from robotiq_async.description import Pose, hand_model
-from robotiq_async.description.geometry import Vector
-from robotiq_async.kinematics import FINGER_NAMES, JOINTS, joint_angles
-from robotiq_async.web.page.widgets.held import Thing, grasp, pads
+from robotiq_async.tools.description import Pose, hand_model
+from robotiq_async.tools.description.geometry import Vector
+from robotiq_async.tools.description.kinematics import FINGER_NAMES, JOINTS, joint_angles
+from robotiq_async.tools.web.page.widgets.held import Thing, grasp, pads
 from tests.register_words import status_of
 
 MODEL = hand_model()

@@ -15,9 +15,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.enums import AXES, Finger
-from robotiq_async.wire import registers as reg
-from robotiq_async.wire.checks import (
+from robotiq_async.values import registers as reg
+from robotiq_async.values.checks import (
     check_axis,
     check_byte,
     check_int,
@@ -25,6 +24,7 @@ from robotiq_async.wire.checks import (
     check_seconds,
     check_timeout,
 )
+from robotiq_async.values.enums import AXES, Finger
 
 
 class Index:

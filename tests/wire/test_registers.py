@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.wire import registers as reg
+from robotiq_async.values import registers as reg
 from tests.register_words import REQUEST_RESERVED, bytes_of, registers_of
 
 BLOCKS = st.tuples(*[st.integers(0, 0xFFFF)] * 8)

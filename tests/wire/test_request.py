@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.enums import AXES, Finger, Mode
-from robotiq_async.wire.request import AxisRequest, Request
+from robotiq_async.values.enums import AXES, Finger, Mode
+from robotiq_async.values.request import AxisRequest, Request
 from tests.register_words import REQUEST_RESERVED, bytes_of, registers_of
 
 BYTES = st.integers(0, 255)

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async import Fault, Finger, Initialization, Mode, ObjectStatus, RobotiqStatus
-from robotiq_async.enums import AXES
-from robotiq_async.wire.status import NO_REQUEST
+from robotiq_async.values.enums import AXES
+from robotiq_async.values.status import NO_REQUEST
 from tests.register_words import bytes_of, registers_of, status_of
 
 A, B, C, S = AXES

@@ -51,9 +51,9 @@ def demo(
 @asynccontextmanager
 async def _shown(hand: Hand) -> AsyncIterator[None]:
     """Show a hand on a page, and begin when somebody looks."""
-    from ...telemetry.payloads import title
-    from ...web.server import PageServer
-    from ...web.settings import PageSettings
+    from ...tools.recording.payloads import title
+    from ...tools.web.server import PageServer
+    from ...tools.web.settings import PageSettings
 
     async with (
         PageServer([hand], PageSettings(port=0, addresses=(title(hand),))) as page,

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 from ...fleet.network.route import is_remote
 from ...link.address import parse_address
-from ...log import printable
+from ...runtime.log import printable
 from ...session.options import registers_of
 from ..addresses import full_address, gripper_words
 from ..arguments import Address, Unit, need
 from ..failures import CommandError, UsageError, usage
 
 if TYPE_CHECKING:
-    from ...doctor import Finding
+    from ...tools.doctor import Finding
 
 
 async def doctor(
@@ -40,7 +40,7 @@ async def doctor(
     Args:
         device_id: Modbus unit id (default: 2 over TCP, 9 over a serial line).
     """
-    from ...doctor import Level, examine, examine_remote
+    from ...tools.doctor import Level, examine, examine_remote
 
     full = full_address(address)
     bad: list[str] = []

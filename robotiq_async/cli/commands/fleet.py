@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ...log import printable
-from ...session.timing.clock import now
+from ...runtime.clock import now
+from ...runtime.log import printable
 from ..arguments import Flag, need
 from ..failures import CommandError, usage
 
@@ -78,8 +78,8 @@ async def halt(site: Site = None, /) -> None:
         robotiq-async fleet halt lab
     """
     need("zenoh", "fleet")
-    from ...errors import NotAllStoppedError
     from ...fleet.fleet import Fleet
+    from ...values.errors import NotAllStoppedError
 
     with usage():
         seen = Fleet(site)

@@ -9,7 +9,7 @@ from typing import Annotated, Final
 
 from cyclopts import Parameter
 
-from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..addresses import gripper_words
 from ..arguments import USUAL, Address, Byte, Flag, Link, need
 from ..consent import forget_keys

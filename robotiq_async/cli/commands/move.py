@@ -7,8 +7,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ...enums import Finger
-from ...wire.checks import check_timeout
+from ...values.checks import check_timeout
+from ...values.enums import Finger
 from ..addresses import gripper_words
 from ..arguments import USUAL, Address, Byte, Fingers, Flag, Link, Position, Yes
 from ..consent import consent

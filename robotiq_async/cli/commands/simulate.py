@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ...enums import Finger
-from ...errors import RobotiqError
 from ...link.serial_ports import why_no_port
-from ...telemetry.gate import is_loopback
-from ...wire.registers import RTU_REGISTERS
+from ...tools.viewer.gate import is_loopback
+from ...values.enums import Finger
+from ...values.errors import RobotiqError
+from ...values.registers import RTU_REGISTERS
 from ..arguments import Byte, Flag, Host, Port, Unit
 from ..failures import usage
 from ..output.notices import tell

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ...telemetry.payloads import reading_fields
+from ...tools.recording.payloads import reading_fields
 from ..addresses import gripper_words
 from ..arguments import USUAL, Address, Flag, Link
 from ..output.notices import tell

@@ -9,8 +9,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
-from ...telemetry.gate import is_loopback
+from ...tools.viewer.gate import is_loopback
+from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..addresses import gripper_words
 from ..arguments import USUAL, Address, Byte, Flag, Host, Link, Port, need
 from ..failures import CommandError, UsageError
@@ -62,7 +62,7 @@ async def view(
         _write(layout)
         return
     need("foxglove", "view")
-    from ...telemetry.viewer import ORIGINS, Viewer
+    from ...tools.viewer.viewer import ORIGINS, Viewer
     from ..connect import make_operator, operated
     from ..output.log_capture import forwarded_warnings
 

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Parameter
 
-from ...actions import Operator
-from ...concurrency import wait_shielded
-from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
-from ...errors import RobotiqError
-from ...telemetry.payloads import title
+from ...runtime.concurrency import wait_shielded
+from ...tools.actions import Operator
+from ...tools.recording.payloads import title
+from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ...values.errors import RobotiqError
 from ..addresses import gripper_words
 from ..arguments import USUAL, Address, Byte, Flag, Host, Link, Port, need
 from ..browser import opened
@@ -22,9 +22,9 @@ from ..failures import CommandError, UsageError, usage
 from ..output.notices import tell
 
 if TYPE_CHECKING:
-    from ...web.news import HandNews
-    from ...web.server import PageServer
-    from ...web.settings import PageSettings
+    from ...tools.web.news import HandNews
+    from ...tools.web.server import PageServer
+    from ...tools.web.settings import PageSettings
 
 AGAIN_S: Final = 3.0
 """Between two attempts to reach a gripper of several."""
@@ -71,8 +71,8 @@ async def web(
         force: Force of all axes from the first command on. A grip made with more loosens.
     """
     need("nicegui", "web")
-    from ...web.server import PageServer
-    from ...web.settings import PageSettings
+    from ...tools.web.server import PageServer
+    from ...tools.web.settings import PageSettings
     from ..connect import make_operator
     from ..output.log_capture import forwarded_warnings
 

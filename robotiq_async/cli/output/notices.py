@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from ...log import printable
+from ...runtime.log import printable
 
 
 def tell(words: str) -> None:

@@ -9,14 +9,14 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Final
 
-from ...concurrency import in_a_thread
-from ...enums import Fault, State
+from ...runtime.clock import now
+from ...runtime.concurrency import in_a_thread
 from ...session.streams import Transition
-from ...session.timing.clock import now
-from ...telemetry.feed import compact
-from ...telemetry.payloads import Fields, fault_fields, transition_fields
-from ...telemetry.raw_output import write_all
-from ...wire.status import RobotiqStatus
+from ...tools.recording.feed import compact
+from ...tools.recording.payloads import Fields, fault_fields, transition_fields
+from ...tools.recording.raw_output import write_all
+from ...values.enums import Fault, State
+from ...values.status import RobotiqStatus
 from .log_capture import forwarded_warnings
 from .text import clock, event_line, status_line
 

@@ -9,7 +9,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from ...enums import AXES, Fault, Finger
+from ...values.enums import AXES, Fault, Finger
 from .text import axis_words
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ from datetime import datetime
 from typing import Any, Final
 
 from ...control.triggers import Trigger
-from ...enums import AXES, State
-from ...telemetry.payloads import Fields
-from ...wire.status import NO_REQUEST
+from ...tools.recording.payloads import Fields
+from ...values.enums import AXES, State
+from ...values.status import NO_REQUEST
 
 NOTHING: Final = "-"
 """Stands for what means nothing."""

@@ -11,8 +11,8 @@ from typing import Final, Protocol
 
 from rich.text import Text
 
-from ...enums import AXES, CLOSED, Finger
-from ...session.timing.clock import now
+from ...runtime.clock import now
+from ...values.enums import AXES, CLOSED, Finger
 
 READING_S: Final = 0.3
 """A yes counts only after this time: it may have been typed before the question could be read."""

@@ -16,13 +16,13 @@ from textual.binding import BindingType
 from textual.widgets import RichLog, Static
 from textual.worker import Worker
 
-from ...actions import ACTIONS, Operator
-from ...enums import AXES, Fault, Finger, State
-from ...errors import RobotiqError
-from ...session.timing.clock import now
-from ...telemetry.payloads import fault_fields, title
-from ...telemetry.refusal_words import refusal_words
-from ...wire.status import RobotiqStatus
+from ...runtime.clock import now
+from ...tools.actions import ACTIONS, Operator
+from ...tools.recording.payloads import fault_fields, title
+from ...tools.viewer.refusal_words import refusal_words
+from ...values.enums import AXES, Fault, Finger, State
+from ...values.errors import RobotiqError
+from ...values.status import RobotiqStatus
 from ..output.text import clock, event_line
 from .asking import Asking, Question, Target
 from .widgets import Axes, Line, link_text, state_text

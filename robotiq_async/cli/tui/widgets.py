@@ -10,10 +10,10 @@ from rich.text import Text
 from textual.widget import Widget
 from textual.widgets import Static
 
-from ...enums import AXES, Fault, Finger, ObjectStatus, Severity, State
 from ...session.statistics import Statistics
-from ...telemetry.state_words import STATE_WORDS
-from ...wire.status import NO_REQUEST, RobotiqStatus
+from ...tools.viewer.state_words import STATE_WORDS
+from ...values.enums import AXES, Fault, Finger, ObjectStatus, Severity, State
+from ...values.status import NO_REQUEST, RobotiqStatus
 from ..output.text import NOTHING
 from .words import HINTS
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from ...enums import AXES, CLOSED, OPEN, Finger, ObjectStatus
-from ...wire.request import AxisRequest, Request
-from ...wire.status import RobotiqStatus
+from ...values.enums import AXES, CLOSED, OPEN, Finger, ObjectStatus
+from ...values.request import AxisRequest, Request
+from ...values.status import RobotiqStatus
 from ..contact import agrees
 from .standstill import Moment
 

@@ -19,10 +19,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from ...enums import AXES, Finger
-from ...wire.registers import Echo
-from ...wire.request import Request
-from ...wire.status import RobotiqStatus
+from ...values.enums import AXES, Finger
+from ...values.registers import Echo
+from ...values.request import Request
+from ...values.status import RobotiqStatus
 from ..contact import TOLERANCE
 
 ALONE_S: Final = 10.0

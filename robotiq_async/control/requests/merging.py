@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ...enums import AXES, NO_AXES, Finger
-from ...wire.request import AxisRequest, Request
-from ...wire.status import RobotiqStatus
+from ...values.enums import AXES, NO_AXES, Finger
+from ...values.request import AxisRequest, Request
+from ...values.status import RobotiqStatus
 from ..contact import drifts
 from .pending import PendingCommand
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from functools import reduce
 from operator import or_
 
-from ...enums import AXES, NO_AXES, Finger
-from ...errors import RobotiqError
+from ...values.enums import AXES, NO_AXES, Finger
+from ...values.errors import RobotiqError
 from ..waiters import Waiter, fail
 
 

@@ -12,10 +12,10 @@ from functools import reduce
 from operator import or_
 from typing import Final
 
-from ...enums import AXES, NO_AXES, Finger, ObjectStatus
-from ...log import Log, log
-from ...wire.request import AxisRequest, Request
-from ...wire.status import RobotiqStatus
+from ...runtime.log import Log, log
+from ...values.enums import AXES, NO_AXES, Finger, ObjectStatus
+from ...values.request import AxisRequest, Request
+from ...values.status import RobotiqStatus
 from ..contact import TOLERANCE, agrees
 from ..triggers import Trigger, classify
 from .adoption import Adoption

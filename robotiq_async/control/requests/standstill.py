@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from ...enums import ObjectStatus
+from ...values.enums import ObjectStatus
 from ..contact import agrees
 
 LAG_S: Final = 0.25

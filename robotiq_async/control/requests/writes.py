@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
-from ...enums import Finger
-from ...wire.registers import Echo
-from ...wire.request import Request
-from ...wire.status import RobotiqStatus
+from ...values.enums import Finger
+from ...values.registers import Echo
+from ...values.request import Request
+from ...values.status import RobotiqStatus
 from .limits import Limits
 
 WINDOW_S: Final = 0.5

@@ -9,10 +9,10 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from ...errors import AgentError
 from ...hand import RobotiqHand
-from ...log import Log
-from ...session.timing.clock import now
+from ...runtime.clock import now
+from ...runtime.log import Log
+from ...values.errors import AgentError
 from ..control.lease import WINDOW_S
 from ..limited_log import LimitedLog
 from ..network.bus import Bus, Query, Undo

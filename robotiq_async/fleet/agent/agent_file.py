@@ -13,7 +13,6 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any, Final
 
-from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...hand.robotiq_hand import RobotiqHand
 from ...session.options import (
     ACTIVATION_TIMEOUT_S,
@@ -24,7 +23,8 @@ from ...session.options import (
     Options,
     check_options,
 )
-from ...wire.checks import check_seconds
+from ...values.checks import check_seconds
+from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..control.lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
 from ..keys.access_list import AccessList
 from ..keys.key_folder import ACCESS, check_key_folder

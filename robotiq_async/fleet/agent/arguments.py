@@ -5,8 +5,8 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import Final
 
-from ...enums import NO_AXES, Finger
-from ...log import printable
+from ...runtime.log import printable
+from ...values.enums import NO_AXES, Finger
 from ..wire.envelope import Call
 from ..wire.values import Fields
 

@@ -11,11 +11,11 @@ from collections import deque
 from itertools import islice
 from typing import Any, Final
 
-from ...errors import RobotiqError
 from ...hand import RobotiqHand
+from ...runtime.clock import now
 from ...session.streams import SentRequest, Transition
-from ...session.timing.clock import now
-from ...wire.status import RobotiqStatus
+from ...values.errors import RobotiqError
+from ...values.status import RobotiqStatus
 from ..control.lease import Lease
 from ..network.bus import Bus, Urgency
 from ..wire.names import GripperName

@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 from typing import Final
 
-from ...log import log
+from ...runtime.log import log
 from ..control.budget import Budget
 from ..limited_log import EVERY_S
 

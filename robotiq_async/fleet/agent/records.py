@@ -14,8 +14,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final, Protocol
 
-from ...concurrency import in_a_thread
-from ...log import log
+from ...runtime.concurrency import in_a_thread
+from ...runtime.log import log
 from ..wire.names import GripperName
 from ..wire.values import Fields
 

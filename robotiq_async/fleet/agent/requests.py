@@ -7,8 +7,8 @@ from collections.abc import Callable, Coroutine
 from typing import Any, Final, TypeVar
 
 from ...control.motion import MoveResult
-from ...errors import AgentError, ControlLostError, RobotiqError
-from ...log import Log
+from ...runtime.log import Log
+from ...values.errors import AgentError, ControlLostError, RobotiqError
 from ..network.bus import Query
 from ..wire.envelope import Answer, Call, failure
 from ..wire.values import result_fields

@@ -11,13 +11,13 @@ from typing import Final
 from ...control.grip_keeper import KEEP_S
 from ...control.motion import MoveResult
 from ...control.state_machine import RUNNING
-from ...enums import Finger
-from ...errors import AgentError, ControlLostError, RobotiqConnectionError, RobotiqError
 from ...hand import RobotiqHand
-from ...log import Log
-from ...session.timing.clock import now
+from ...runtime.clock import now
+from ...runtime.log import Log
+from ...values.checks import check_byte, check_mask
+from ...values.enums import Finger
+from ...values.errors import AgentError, ControlLostError, RobotiqConnectionError, RobotiqError
 from ...version import __version__
-from ...wire.checks import check_byte, check_mask
 from ..control.admission import Admission
 from ..control.lease import Lease
 from ..network.bus import Bus, Query

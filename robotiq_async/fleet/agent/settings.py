@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ...enums import AXES
-from ...errors import RobotiqError
 from ...hand import RobotiqHand
 from ...session.streams import SentRequest
+from ...values.enums import AXES
+from ...values.errors import RobotiqError
 from ..wire.settings import Setting
 
 

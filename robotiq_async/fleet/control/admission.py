@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from ...errors import AgentError, ControlLostError
+from ...values.errors import AgentError, ControlLostError
 from ..wire.envelope import Call
 from .lease import Holder, Lease
 

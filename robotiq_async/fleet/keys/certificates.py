@@ -17,7 +17,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Final
 
-from ...wire.checks import check_int
+from ...values.checks import check_int
 from .access_list import AccessList, Role, check_subject
 from .authority import DAYS_MAX, Authority, Pair
 from .key_folder import ACCESS, AUTHORITY, CERTIFICATE, DAYS, KEY

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from enum import Enum
 from typing import Final
 
-from ...log import log
+from ...runtime.log import log
 from ..limited_log import EVERY_S, LimitedLog
 
 GATHER_S: Final = 0.001

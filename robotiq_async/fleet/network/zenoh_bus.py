@@ -17,12 +17,12 @@ try:
     import zenoh
     from zenoh.handlers import Callback
 except ModuleNotFoundError as error:
-    from ...extras import install
+    from ...runtime.extras import install
 
     raise ImportError(f"hands on other hosts need zenoh: {install('fleet')}") from error
 
-from ...concurrency import in_a_thread
-from ...errors import ConnectFailedError
+from ...runtime.concurrency import in_a_thread
+from ...values.errors import ConnectFailedError
 from .bus import Query, Reply, Undo, Urgency, is_any, is_anything
 from .locators import locators
 from .mailbox import Kind, Mailbox

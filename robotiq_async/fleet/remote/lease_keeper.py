@@ -6,10 +6,10 @@ import asyncio
 from collections.abc import Coroutine
 from typing import Any, Final, Protocol
 
-from ...errors import ControlLostError, RobotiqError
-from ...log import Log
+from ...runtime.clock import now
+from ...runtime.log import Log
 from ...session.ending import Ending
-from ...session.timing.clock import now
+from ...values.errors import ControlLostError, RobotiqError
 from ..wire.envelope import Call
 from ..wire.names import GripperName
 from ..wire.values import Fields, reading

@@ -7,10 +7,10 @@ from dataclasses import replace
 from typing import Final
 
 from ...control.triggers import Trigger
-from ...enums import State
-from ...log import Log, log
+from ...runtime.log import Log, log
 from ...session.streams import Channels, Transition
-from ...wire.status import RobotiqStatus
+from ...values.enums import State
+from ...values.status import RobotiqStatus
 from ..control.lease import WINDOW_S
 from ..wire.status_message import StatusMessage
 from ..wire.values import Fields, read_request, read_transition, reading

@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable, Coroutine
 from typing import Any, Final
 
-from ...errors import RobotiqError
+from ...values.errors import RobotiqError
 from ..wire.values import reading
 from .mirror import Mirror
 

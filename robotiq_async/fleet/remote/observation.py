@@ -5,16 +5,17 @@ from __future__ import annotations
 import asyncio
 from typing import TypeVar
 
-from ...calibration import Units
-from ...enums import Finger, State
-from ...errors import ConnectionLostError, NotStartedError, StateTimeoutError
-from ...grasping import SLIP_COUNTS, GripEvent, GripWatch
+from ...control.grip_watch import SLIP_COUNTS, GripWatch
+from ...runtime.event_loop import check_loop
 from ...session.state_waiters import check_states
 from ...session.statistics import Counters, Statistics
 from ...session.streams import Channel, Channels, SentRequest, Stream, Transition
-from ...session.timing.event_loop import check_loop
-from ...wire.checks import check_int, check_timeout
-from ...wire.status import RobotiqStatus
+from ...values.calibration import Units
+from ...values.checks import check_int, check_timeout
+from ...values.enums import Finger, State
+from ...values.errors import ConnectionLostError, NotStartedError, StateTimeoutError
+from ...values.grip_event import GripEvent
+from ...values.status import RobotiqStatus
 from ..wire.names import GripperName
 from .outbox import Outbox
 from .session import RemoteSession

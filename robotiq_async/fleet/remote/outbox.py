@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, Final
 
-from ...enums import AXES, Finger
-from ...errors import ControlLostError, NotStartedError, RobotiqError
+from ...values.enums import AXES, Finger
+from ...values.errors import ControlLostError, NotStartedError, RobotiqError
 from ..network.bus import Urgency
 from ..wire.envelope import Call
 from .pending_request import PendingRequest

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from ...errors import RobotiqError
-from ...session.timing.clock import now
+from ...runtime.clock import now
+from ...values.errors import RobotiqError
 from ..network.bus import Reply, Urgency
 from ..wire.envelope import Answer, Call, unpack_answer
 

@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Any, Final, TypeVar
 
-from ...errors import AgentError, NotAllowedError, ProtocolError
-from ...session.timing.clock import now
+from ...runtime.clock import now
+from ...values.errors import AgentError, NotAllowedError, ProtocolError
 from .requests import NoAnswerError
 
 HALT_S: Final = 2.0

@@ -5,15 +5,15 @@ from __future__ import annotations
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from ...calibration import ForceCalibration, SpeedCalibration
-from ...enums import State
-from ...errors import InvalidStateError, NotStartedError
-from ...log import Log
+from ...runtime.event_loop import running_loop
+from ...runtime.log import Log
 from ...session.ending import Ending
 from ...session.options import LONGEST_WAIT_S, check_units
 from ...session.streams import Channels
-from ...session.timing.event_loop import running_loop
-from ...wire.checks import check_flag, check_seconds
+from ...values.calibration import ForceCalibration, SpeedCalibration
+from ...values.checks import check_flag, check_seconds
+from ...values.enums import State
+from ...values.errors import InvalidStateError, NotStartedError
 from ..network.bus import Bus
 from ..network.route import parse_remote_address
 from .commands import RemoteCommands

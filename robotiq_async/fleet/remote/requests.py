@@ -12,8 +12,8 @@ from contextlib import contextmanager
 from typing import Any, Final
 
 from ...control.waiters import another
-from ...errors import AgentError, ConnectionLostError, NotAllowedError, NotStartedError, RobotiqError
-from ...session.timing.clock import now
+from ...runtime.clock import now
+from ...values.errors import AgentError, ConnectionLostError, NotAllowedError, NotStartedError, RobotiqError
 from ..network.bus import Bus, Reply, Urgency
 from ..wire.envelope import Answer, Call, unpack_answer
 from ..wire.names import GripperName

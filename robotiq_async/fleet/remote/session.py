@@ -8,10 +8,18 @@ from collections.abc import Coroutine, Mapping
 from contextlib import suppress
 from typing import Any, Final
 
-from ...concurrency import wait_shielded
 from ...control.triggers import Trigger
-from ...enums import State
-from ...errors import (
+from ...runtime.clock import now
+from ...runtime.concurrency import wait_shielded
+from ...runtime.event_loop import check_loop
+from ...runtime.log import Log
+from ...session.ending import Ending
+from ...session.state_waiters import StateWaiters
+from ...session.statistics import Counters, Statistics
+from ...session.streams import Channels
+from ...values.checks import check_seconds
+from ...values.enums import State
+from ...values.errors import (
     AgentError,
     ConnectFailedError,
     ConnectionLostError,
@@ -21,14 +29,6 @@ from ...errors import (
     NotStartedError,
     RobotiqError,
 )
-from ...log import Log
-from ...session.ending import Ending
-from ...session.state_waiters import StateWaiters
-from ...session.statistics import Counters, Statistics
-from ...session.streams import Channels
-from ...session.timing.clock import now
-from ...session.timing.event_loop import check_loop
-from ...wire.checks import check_seconds
 from ..control.lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
 from ..limited_log import LimitedLog
 from ..network.bus import Bus, Undo

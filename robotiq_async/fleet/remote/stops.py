@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Coroutine
 from typing import Any, Final, Protocol
 
-from ...errors import RobotiqError
 from ...session.ending import Ending
+from ...values.errors import RobotiqError
 from ..network.bus import Urgency
 from ..wire.envelope import Call
 from ..wire.values import Fields

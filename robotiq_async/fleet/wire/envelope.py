@@ -7,7 +7,7 @@ import sys
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from ...errors import AgentError, ProtocolError
+from ...values.errors import AgentError, ProtocolError
 from .values import Clock, Fields, error_fields, read_error
 
 VERSION: Final = 1

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-from ...enums import AXES, Finger
-from ...wire.checks import check_byte, check_mask
+from ...values.checks import check_byte, check_mask
+from ...values.enums import AXES, Finger
 from .values import Fields
 
 SETTINGS: Final = ("speed", "force")

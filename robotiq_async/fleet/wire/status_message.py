@@ -22,9 +22,9 @@ import struct
 from math import isfinite
 from typing import Final, NamedTuple
 
-from ...enums import State
-from ...errors import ProtocolError
-from ...wire.registers import Registers
+from ...values.enums import State
+from ...values.errors import ProtocolError
+from ...values.registers import Registers
 
 _LAYOUT: Final = struct.Struct("<BBBxIIIQQdf8H")
 VERSION: Final = 1

@@ -6,11 +6,14 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Final
 
-from ... import errors
 from ...control.motion import MoveResult
 from ...control.triggers import Trigger
-from ...enums import Fault, Finger, ObjectStatus, State
-from ...errors import (
+from ...runtime.log import printable
+from ...session.statistics import Statistics
+from ...session.streams import SentRequest, Transition
+from ...values import errors
+from ...values.enums import Fault, Finger, ObjectStatus, State
+from ...values.errors import (
     AgentError,
     ConnectFailedError,
     ControlLostError,
@@ -20,11 +23,8 @@ from ...errors import (
     ProtocolError,
     RobotiqError,
 )
-from ...log import printable
-from ...session.statistics import Statistics
-from ...session.streams import SentRequest, Transition
-from ...wire.request import Request
-from ...wire.status import RobotiqStatus
+from ...values.request import Request
+from ...values.status import RobotiqStatus
 
 Fields = dict[str, Any]
 Clock = Callable[[float], float]

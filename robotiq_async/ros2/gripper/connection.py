@@ -6,10 +6,10 @@ import asyncio
 from collections.abc import Callable
 from typing import Final
 
-from ...actions import ACTIONS, Operator
-from ...errors import NotStartedError, RobotiqConnectionError, RobotiqError
-from ...log import Log
 from ...protocol import Hand
+from ...runtime.log import Log
+from ...tools.actions import ACTIONS, Operator
+from ...values.errors import NotStartedError, RobotiqConnectionError, RobotiqError
 from ..translation.joints import Targets
 from ..translation.readiness import why_not
 from ..translation.settings import Settings

@@ -9,10 +9,10 @@ from enum import Enum
 from typing import Final
 
 from ...control.motion import MoveResult
-from ...enums import Finger
-from ...errors import RobotiqConnectionError, RobotiqError
-from ...log import Log
 from ...protocol import Hand
+from ...runtime.log import Log
+from ...values.enums import Finger
+from ...values.errors import RobotiqConnectionError, RobotiqError
 from ..translation.joints import Targets
 
 FEEDBACK_S: Final = 0.05

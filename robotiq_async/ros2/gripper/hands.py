@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
-from ...errors import RobotiqError
-from ...extras import install
 from ...fleet.network.route import is_remote
 from ...fleet.remote.remote_hand import RemoteHand
 from ...hand import RobotiqHand
 from ...protocol import Hand
+from ...runtime.extras import install
 from ...session.options import POLL_INTERVAL_S
+from ...values.errors import RobotiqError
 from ..translation.settings import USUAL, Settings
 
 

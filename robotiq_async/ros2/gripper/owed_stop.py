@@ -6,17 +6,17 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Final
 
-from ...enums import State
-from ...errors import (
+from ...protocol import Hand
+from ...runtime.clock import now
+from ...runtime.log import Log
+from ...values.enums import State
+from ...values.errors import (
     ControlLostError,
     NotStartedError,
     RobotiqConnectionError,
     RobotiqError,
     StateTimeoutError,
 )
-from ...log import Log
-from ...protocol import Hand
-from ...session.timing.clock import now
 
 OWED_S: Final = 60.0
 """Later nothing can move any more that was moving when the link was lost: the longest is a release."""

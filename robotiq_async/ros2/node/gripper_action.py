@@ -15,7 +15,7 @@ from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 
-from ...errors import NotStartedError
+from ...values.errors import NotStartedError
 from ..gripper.connection import Connection, RefusedError
 from ..gripper.goals import Ending, Outcome
 from ..translation.joints import GoalError, Targets, targets

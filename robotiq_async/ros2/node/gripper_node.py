@@ -17,7 +17,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
-from ...errors import RobotiqError
+from ...values.errors import RobotiqError
 from ..gripper.connection import COMMANDS, Connection, RefusedError
 from ..gripper.hands import make_hand
 from ..translation.description import robot_description

@@ -13,10 +13,10 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ROSClock
 from sensor_msgs.msg import JointState
 
-from ...kinematics import JOINTS
-from ...session.timing.clock import now
-from ...telemetry.joint_states import JointStateEncoder
-from ...wire.status import RobotiqStatus
+from ...runtime.clock import now
+from ...tools.description.joint_states import JointStateEncoder
+from ...tools.description.kinematics import JOINTS
+from ...values.status import RobotiqStatus
 from ..translation.diagnosis import Diagnosis
 from ..translation.joints import Motion, joint_names, positions
 

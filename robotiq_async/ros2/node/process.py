@@ -18,7 +18,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from ...log import log
+from ...runtime.log import log
 from .bridge import Bridge
 from .gripper_node import GripperNode
 from .logs import handed_to

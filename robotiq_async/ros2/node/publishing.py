@@ -16,7 +16,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from ...session.timing.clock import now
+from ...runtime.clock import now
 from ..gripper.connection import Connection
 from ..translation.diagnosis import diagnose, status_text
 from ..translation.pace import Pace

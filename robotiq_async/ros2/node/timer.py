@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable
 from contextlib import suppress
 
-from ...errors import NotStartedError
+from ...values.errors import NotStartedError
 
 
 class Timer:

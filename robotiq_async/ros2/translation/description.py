@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Final
 
-from ...description import urdf
+from ...tools.description import urdf
 
 _REFERENCES: Final = {"parent": "link", "child": "link", "mimic": "joint"}
 """Elements of a joint that name another part, and how."""

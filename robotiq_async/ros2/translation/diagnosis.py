@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-from ...enums import AXES, Severity
-from ...errors import NotStartedError
 from ...protocol import Hand
-from ...wire.status import RobotiqStatus
+from ...values.enums import AXES, Severity
+from ...values.errors import NotStartedError
+from ...values.status import RobotiqStatus
 from .readiness import is_connected
 
 

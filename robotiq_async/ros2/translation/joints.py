@@ -2,7 +2,7 @@
 
 A finger has one motor for three joints, so a goal for a finger is a goal for one of them: the base joint
 (``joint_1``) as far as it turns alone, the middle one (``joint_2``) beyond. The third joint and the second
-palm joint only follow. See :mod:`robotiq_async.kinematics` for where the angles come from.
+palm joint only follow. See :mod:`robotiq_async.tools.description.kinematics` for where the angles come from.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from math import degrees, radians
 from types import MappingProxyType
 from typing import Final
 
-from ...enums import Finger
-from ...kinematics import BASE, FINGER_NAMES, JOINTS, MIDDLE, PALM, Points, joint_angles
-from ...wire.status import RobotiqStatus
+from ...tools.description.kinematics import BASE, FINGER_NAMES, JOINTS, MIDDLE, PALM, Points, joint_angles
+from ...values.enums import Finger
+from ...values.status import RobotiqStatus
 
 FINGERS: Final = "fingers"
 """The name of what stands for all three fingers in a goal: one angle, base and middle joint together."""

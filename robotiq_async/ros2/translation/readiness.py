@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ...control.state_machine import RUNNING
-from ...enums import State
 from ...protocol import Hand
+from ...values.enums import State
 
 
 def is_connected(hand: Hand) -> bool:

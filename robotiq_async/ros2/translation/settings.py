@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from ...enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...fleet.network.route import is_remote, parse_remote_address
 from ...link.address import parse_address
 from ...session.options import (
@@ -17,7 +16,8 @@ from ...session.options import (
     RESPONSE_TIMEOUT_S,
     WRITE_SPACING_S,
 )
-from ...wire.checks import check_int, check_number, check_seconds
+from ...values.checks import check_int, check_number, check_seconds
+from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 
 Value = str | int | float | bool
 USUAL: Final = -1

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from robotiq_async.calibration.closing_time import closing_time
-from robotiq_async.enums import (
+from robotiq_async.values.calibration.closing_time import closing_time
+from robotiq_async.values.checks import check_int
+from robotiq_async.values.enums import (
     CLOSED,
     OPEN,
     OPEN_READING,
@@ -17,14 +18,13 @@ from robotiq_async.enums import (
     WIDTH_WIDE,
     Mode,
 )
-from robotiq_async.wire.checks import check_int
 
 from .mechanics.goal import Goal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from robotiq_async.wire.request import AxisRequest, Request
+    from robotiq_async.values.request import AxisRequest, Request
 
 
 Goals = tuple[Goal | None, ...]

@@ -11,7 +11,7 @@ from collections import deque
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
-from robotiq_async.enums import (
+from robotiq_async.values.enums import (
     AXES,
     CLOSED_READING,
     OPEN_READING,
@@ -32,7 +32,7 @@ from .mechanics.spread import Spread
 from .status_trail import NOTHING, Statuses, StatusTrail
 
 if TYPE_CHECKING:
-    from robotiq_async.wire.request import Request
+    from robotiq_async.values.request import Request
 
     from .habits import Habits
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from robotiq_async.enums import Fault, Severity
+from robotiq_async.values.enums import Fault, Severity
 
 BLOCKED_AFTER: Final = 20.0
 """Seconds of interference on the scissor after which the minor fault becomes a major one (manual)."""

@@ -9,9 +9,9 @@ from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING, Final
 
-from robotiq_async.enums import AXES, NO_AXES, Fault, Finger
-from robotiq_async.wire import registers as reg
-from robotiq_async.wire.checks import check_axis, check_int, check_seconds
+from robotiq_async.values import registers as reg
+from robotiq_async.values.checks import check_axis, check_int, check_seconds
+from robotiq_async.values.enums import AXES, NO_AXES, Fault, Finger
 
 from .clock import Clock
 from .control_modes import SCISSOR_HIGH, SCISSOR_LOW, check_scissor_limit
@@ -38,8 +38,8 @@ class SimulatedGripper(Surroundings):
     depend on how often anybody looks. Use one from one thread only.
 
     A write takes effect one device cycle later, as on the device. Speeds are the measured ones of
-    :mod:`robotiq_async.calibration.closing_time`; the scissor moves the same counts a second, as none are
-    published. What the motors draw stands in :mod:`.mechanics.motor`, and by how much axes miss what they are
+    :mod:`robotiq_async.values.calibration.closing_time`; the scissor moves the same counts a second, as
+    none are published. What the motors draw is in :mod:`.mechanics.motor`, by how much axes miss what they are
     asked in :mod:`.mechanics.spread`: as with a real gripper, who waits for gPO = rPR may wait for ever.
 
     Choices where no source settles the behaviour; those that can be made otherwise stand in :class:`Habits`:

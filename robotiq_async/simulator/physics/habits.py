@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from robotiq_async.wire.checks import check_seconds
+from robotiq_async.values.checks import check_seconds
 
 _LONGEST: Final = 1e9
 

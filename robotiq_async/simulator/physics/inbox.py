@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import deque
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from robotiq_async.wire import registers as reg
-from robotiq_async.wire.checks import check_int
-from robotiq_async.wire.request import Request
+from robotiq_async.values import registers as reg
+from robotiq_async.values.checks import check_int
+from robotiq_async.values.request import Request
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

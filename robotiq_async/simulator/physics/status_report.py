@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from robotiq_async.enums import ObjectStatus
-from robotiq_async.wire import registers as reg
+from robotiq_async.values import registers as reg
+from robotiq_async.values.enums import ObjectStatus
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from robotiq_async.enums import Fault
+    from robotiq_async.values.enums import Fault
 
     from .controller import Controller
 

@@ -6,7 +6,7 @@ import math
 from collections import deque
 from typing import NamedTuple
 
-from robotiq_async.enums import AXES, ObjectStatus
+from robotiq_async.values.enums import AXES, ObjectStatus
 
 NOTHING = (ObjectStatus.IN_MOTION,) * len(AXES)
 """What gDT says of four axes when it says nothing: zeros."""

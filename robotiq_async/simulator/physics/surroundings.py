@@ -5,8 +5,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Final
 
-from robotiq_async.enums import AXES, Fault, Finger
-from robotiq_async.wire.checks import check_byte, check_int, check_mask, check_seconds
+from robotiq_async.values.checks import check_byte, check_int, check_mask, check_seconds
+from robotiq_async.values.enums import AXES, Fault, Finger
 
 from .mechanics.axis import Axis, Obstacle
 

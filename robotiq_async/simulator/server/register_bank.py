@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from robotiq_async.wire.registers import REGISTER_COUNT, RTU_REGISTERS
+from robotiq_async.values.registers import REGISTER_COUNT, RTU_REGISTERS
 
 from ..functions import READ_HOLDING, READ_INPUT, READ_WRITE
 

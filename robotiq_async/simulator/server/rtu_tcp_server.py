@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from pymodbus import FramerType
 from pymodbus.server import ModbusTcpServer
 
-from robotiq_async.wire.checks import check_flag, check_int
-from robotiq_async.wire.registers import RTU_REGISTERS
+from robotiq_async.values.checks import check_flag, check_int
+from robotiq_async.values.registers import RTU_REGISTERS
 
 from ..functions import RTU_FUNCTIONS
 from .framing import Frame, take_rtu

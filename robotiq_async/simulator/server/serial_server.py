@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Final
 
 from pymodbus.server import ModbusSerialServer
 
-from robotiq_async.wire.checks import check_flag, check_int
-from robotiq_async.wire.registers import RTU_REGISTERS
+from robotiq_async.values.checks import check_flag, check_int
+from robotiq_async.values.registers import RTU_REGISTERS
 
 from ..functions import RTU_FUNCTIONS
 from .endpoint import SimulatorEndpoint
@@ -91,7 +91,7 @@ class SerialSimulatorServer(SimulatorEndpoint):
             OSError: the serial port cannot be opened.
         """
         if importlib.util.find_spec("serial") is None:
-            from robotiq_async.extras import install  # noqa: PLC0415  # nothing else needs it
+            from robotiq_async.runtime.extras import install  # noqa: PLC0415  # nothing else needs it
 
             raise ImportError(f"a serial line needs pyserial: {install('serial')}")
         await super().start()

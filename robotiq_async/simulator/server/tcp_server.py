@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, Final
 
 from pymodbus.server import ModbusTcpServer
 
-from robotiq_async.wire.checks import check_int, check_seconds
+from robotiq_async.values.checks import check_int, check_seconds
 
 from ..functions import TCP_FUNCTIONS
 from ..troubles.trouble import Trouble

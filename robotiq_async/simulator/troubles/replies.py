@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from robotiq_async.wire.checks import check_int, check_seconds
+from robotiq_async.values.checks import check_int, check_seconds
 
 from .corruption import unchanged
 

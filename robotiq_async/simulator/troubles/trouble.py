@@ -16,7 +16,7 @@ import math
 from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple, get_args
 
-from robotiq_async.wire.checks import as_float, as_int, check_seconds
+from robotiq_async.values.checks import as_float, as_int, check_seconds
 
 from . import corruption
 from .corruption import Corruption, Parts, Reply

@@ -11,7 +11,7 @@ from rclpy.time import Time
 from sensor_msgs.msg import JointState
 
 from robotiq_async.ros2.node.messages import JointStates, stamp
-from robotiq_async.session.timing.clock import now
+from robotiq_async.runtime.clock import now
 from tests.register_words import status_of
 
 

@@ -14,7 +14,7 @@ from multiprocessing.connection import Connection
 from typing import Any, Final, Self
 
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.wire.request import Request
+from robotiq_async.values.request import Request
 from tests.ros2.live.processes import PATIENCE_S
 
 SPAWN: Final = multiprocessing.get_context("spawn")  # a fork would take over what ROS has open

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from robotiq_async import Finger
-from robotiq_async.description import HandModel
 from robotiq_async.ros2.translation.joints import joint_names
+from robotiq_async.tools.description import HandModel
 from tests.ros2.live.bench import SUCCEEDED, Client
 from tests.ros2.live.goals import position
 from tests.ros2.live.processes import node

@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ....errors import MeasuringError
+from ....values.errors import MeasuringError
 from ...addresses import full_address, is_simulated
 from ...arguments import Flag, need
 from ...consent import read_line
 from ...failures import CommandError, UsageError
 
 if TYPE_CHECKING:
-    from ....measure.campaigns import Campaign
     from ....protocol import Hand
     from ....simulator import SimulatedGripper
+    from ....tools.measure.campaigns import Campaign
 
 SPEEDUP = 15.0
 """How much faster than real time the simulated gripper of sim:// runs by default."""
@@ -110,7 +110,7 @@ async def carry_out(
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-    from ....calibration.csv_tables import TableError
+    from ....values.calibration.csv_tables import TableError
 
     done, left = len(campaign.table), campaign.left
     if done and left:
@@ -186,7 +186,7 @@ def refused() -> Iterator[None]:
     Raises:
         CommandError: in place of TableError and OSError.
     """
-    from ....calibration.csv_tables import TableError
+    from ....values.calibration.csv_tables import TableError
 
     try:
         yield

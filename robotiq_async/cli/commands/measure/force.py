@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from ....enums import DEFAULT_SPEED
+from ....values.enums import DEFAULT_SPEED
 from ...addresses import full_address, gripper_words, is_simulated
 from ...arguments import Address, Byte, Yes
 from ...consent import consent
@@ -18,9 +18,9 @@ from ...failures import CommandError, UsageError
 from .campaign import NoPlot, Runs, Speedup, asked, carry_out, check, gripper, load_rich, refused, told
 
 if TYPE_CHECKING:
-    from ....calibration.csv_tables import Table
-    from ....measure.campaigns import Campaign, Currents
     from ....simulator import SimulatedGripper
+    from ....tools.measure.campaigns import Campaign, Currents
+    from ....values.calibration.csv_tables import Table
 
 WARNING = """the fingers MOVE: they open and close on what lies between them, {count} times.
 If it is not active yet it is activated first, and what it holds drops."""
@@ -70,8 +70,8 @@ def force(
     if scale is not None and scale.resolve() == path.resolve():
         raise UsageError("--scale must be another file than --output")
     factor = check(address, path, speedup, runs, step, not no_plot)
-    from ....calibration.csv_tables import FORCE, read_table
-    from ....measure.campaigns import force_campaign
+    from ....tools.measure.campaigns import force_campaign
+    from ....values.calibration.csv_tables import FORCE, read_table
 
     with refused():
         readings = None if scale is None else read_table(scale, FORCE)
@@ -99,8 +99,8 @@ async def _measure(
     bar: bool,
     plot: bool,
 ) -> None:
-    from ....calibration.closing_time import closing_time
-    from ....measure.campaigns import GRASP_S, grasp, write_currents
+    from ....tools.measure.campaigns import GRASP_S, grasp, write_currents
+    from ....values.calibration.closing_time import closing_time
 
     output = campaign.path
     currents_file = currents_beside(output)
@@ -139,7 +139,7 @@ def _currents_of(campaign: Campaign) -> Currents:
         TableError: they cannot be read.
         CommandError: those of some runs are missing.
     """
-    from ....measure.campaigns import read_currents
+    from ....tools.measure.campaigns import read_currents
 
     file = currents_beside(campaign.path)
     currents = read_currents(file) if campaign.table else {}
@@ -150,7 +150,7 @@ def _currents_of(campaign: Campaign) -> Currents:
 
 
 def _place_scale(simulated: SimulatedGripper, surface: str) -> None:
-    from ....enums import Finger
+    from ....values.enums import Finger
 
     simulated.place_object(Finger.ABC, position=150, soft=40 if surface == "foam" else 0)
 
@@ -194,8 +194,8 @@ def _scale(
 
 
 def _plot(output: Path, surface: str, table: Table, label: str) -> None:
-    from ....measure.campaigns import read_currents
-    from ....measure.plots import plot_current_over_time, plot_force, plot_peak_currents
+    from ....tools.measure.campaigns import read_currents
+    from ....tools.measure.plots import plot_current_over_time, plot_force, plot_peak_currents
 
     with refused():
         currents = read_currents(currents_beside(output))

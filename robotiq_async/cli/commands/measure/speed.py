@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ....enums import Finger
+from ....values.enums import Finger
 from ...addresses import full_address, gripper_words, is_simulated
 from ...arguments import Address, Fingers, Yes
 from ...consent import consent
@@ -16,7 +16,7 @@ from ...failures import UsageError
 from .campaign import NoPlot, Runs, Speedup, carry_out, check, gripper, load_rich, refused, told
 
 if TYPE_CHECKING:
-    from ....measure.campaigns import Campaign
+    from ....tools.measure.campaigns import Campaign
 
 WARNING = """the fingers MOVE: they open and close fully, {count} times. Nothing may be between them.
 If it is not active yet it is activated first, and what it holds drops."""
@@ -59,7 +59,7 @@ def speed(
     if Finger.SCISSOR in fingers:
         raise UsageError("--fingers takes A, B and C only: the scissor has a different stroke")
     factor = check(address, output, speedup, runs, step, not no_plot)
-    from ....measure.campaigns import speed_campaign
+    from ....tools.measure.campaigns import speed_campaign
 
     with refused():
         origin = {"gripper": full_address(address), "fingers": str(fingers.name)}
@@ -70,7 +70,7 @@ def speed(
 
 
 async def _measure(address: str, campaign: Campaign, fingers: Finger, speedup: float, plot: bool) -> None:
-    from ....measure.campaigns import expected_seconds, time_closing
+    from ....tools.measure.campaigns import expected_seconds, time_closing
 
     output = campaign.path
     if not campaign.left:
@@ -86,7 +86,7 @@ async def _measure(address: str, campaign: Campaign, fingers: Finger, speedup: f
             await carry_out(campaign, run, lambda value: expected_seconds(value) / speedup, "speed")
     told([output])
     if plot:
-        from ....measure.plots import plot_speed
+        from ....tools.measure.plots import plot_speed
 
         label = "simulated" if is_simulated(address) else "measured"
         with refused():

@@ -16,7 +16,7 @@ from ...failures import UsageError
 
 if TYPE_CHECKING:
     from ....protocol import Hand
-    from ....telemetry.recorder import Recorder
+    from ....tools.recording.recorder import Recorder
 
 WHOLE = "robotiq-async recover makes a whole file of it"
 
@@ -38,7 +38,7 @@ async def record(
     ROS 2 open only one made with --ros2. One named .csv is a table with a row for each
     poll, for spreadsheets and pandas; it needs no extra but cli. Commands are those of
     this program, so that a recording made by this command has none: record from your own program with
-    robotiq_async.telemetry.recorder.Recorder. A killed recording loses at most the last
+    robotiq_async.tools.recording.recorder.Recorder. A killed recording loses at most the last
     second; recover makes its file whole.
 
     For example:
@@ -54,7 +54,7 @@ async def record(
         ros2: Record /joint_states alone, in a file with the profile ros2.
         as_csv: Record a table; the file must be named .csv, which alone is enough.
     """
-    from ....telemetry.recorder import Recorder, is_table
+    from ....tools.recording.recorder import Recorder, is_table
     from ...connect import connected
 
     if seconds is not None and not 0 < seconds < 1e9:

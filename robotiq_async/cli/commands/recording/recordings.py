@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from cyclopts import Parameter
 
-from ....log import printable
+from ....runtime.log import printable
 from ...arguments import Flag, need
 from ...failures import CommandError, UsageError
 from ...output.text import FORMATTERS, brief_line, clock
 
 if TYPE_CHECKING:
-    from ....telemetry.recordings import Entry
+    from ....tools.recording.recordings import Entry
 
 Overwrite = Annotated[Flag, Parameter(help="Replace a file that is there already.")]
 KINDS: Final = {"statuses": "status", "commands": "command", "events": "event"}
@@ -59,8 +59,8 @@ def replay(
 def _in_order(file: Path) -> Iterator[Entry]:
     """The JSON messages of a recording by their time."""
     need("mcap", "record")
-    from ....telemetry.files.export import in_order
-    from ....telemetry.recordings import read_recording
+    from ....tools.recording.export import in_order
+    from ....tools.recording.recordings import read_recording
 
     return in_order(entry for entry in read_recording(file) if entry.is_json)
 
@@ -121,8 +121,8 @@ def export(
         of: What has a row.
     """
     need("mcap", "record")
-    from ....telemetry.files.export import export as write
-    from ....telemetry.recordings import read_recording
+    from ....tools.recording.export import export as write
+    from ....tools.recording.recordings import read_recording
 
     table = target or file.with_suffix(".csv")
     if table.suffix.lower() != ".csv":
@@ -164,8 +164,8 @@ def plot(file: Path, picture: Path | None = None, /, *, overwrite: Overwrite = F
     """
     need("mcap", "record")
     need("matplotlib", "plot")
-    from ....measure.plots import plot_recording
-    from ....telemetry.recordings import read_recording
+    from ....tools.measure.plots import plot_recording
+    from ....tools.recording.recordings import read_recording
 
     target = picture or file
     if target.suffix in (".mcap", ".png", ".svg"):
@@ -193,7 +193,7 @@ def recover(file: Path, target: Path | None = None, /) -> None:
         target: The repaired one (default: FILE.recovered.mcap).
     """
     need("mcap", "record")
-    from ....telemetry.recordings import recover as save
+    from ....tools.recording.recordings import recover as save
 
     whole = target or file.with_name(f"{file.stem}.recovered.mcap")
     found = save(file, whole)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from robotiq_async.enums import ObjectStatus
+from robotiq_async.values.enums import ObjectStatus
 
 from .motor import Motor, peak
 

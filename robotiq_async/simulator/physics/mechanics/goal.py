@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from robotiq_async.calibration.closing_time import closing_time
-from robotiq_async.enums import STROKE_COUNTS
+from robotiq_async.values.calibration.closing_time import closing_time
+from robotiq_async.values.enums import STROKE_COUNTS
 
 
 class Goal(NamedTuple):

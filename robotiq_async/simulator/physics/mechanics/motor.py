@@ -14,8 +14,8 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from robotiq_async.calibration.closing_time import closing_time
-from robotiq_async.enums import SPEED_MAX, STROKE_COUNTS
+from robotiq_async.values.calibration.closing_time import closing_time
+from robotiq_async.values.enums import SPEED_MAX, STROKE_COUNTS
 
 _FULL_RATE: Final = STROKE_COUNTS / closing_time(SPEED_MAX)
 _SHARE_OF_FRICTION: Final = 0.5

@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from typing import Literal
 
-from robotiq_async.wire.checks import check_byte
+from robotiq_async.values.checks import check_byte
 
 Surface = Literal["foam", "rigid"]
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 from random import Random
 from typing import Final
 
-from robotiq_async.enums import Finger
+from robotiq_async.values.enums import Finger
 
 SEED: Final = 4
 """Of this gripper an open hand reads 7, 6, 6, as the manual prints it."""

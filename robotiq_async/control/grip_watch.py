@@ -1,0 +1,157 @@
+"""GripWatch: sees from statuses what becomes of grips."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from ..values.checks import check_int, check_mask
+from ..values.enums import Finger, ObjectStatus
+from ..values.grip_event import GripChange, GripEvent
+from ..values.status import RobotiqStatus
+from .contact import agrees
+from .passing_fault import PassingFault
+
+SLIP_COUNTS: Final = 3
+"""Counts that an axis in contact may move without being told: more than the 2 by which readings and requests
+differ (manual). What a slip is on real hardware has not been seen."""
+
+LATE_S: Final = 1.0
+"""No status of a hand comes later than that after a newer one."""
+
+
+@dataclass(slots=True)
+class _Grip:
+    """The contact of one axis.
+
+    Attributes:
+        contact: which one: while closing, or while opening.
+        touched: where it was made.
+        position: the same, or where the axis has slipped to since.
+        was_pressed: whether a request beyond it was ever echoed. The echo of an axis under simple control may
+            tell nothing, and then its contact cannot be seen to be released.
+        is_slipping: whether the axis has moved on and reports no contact yet.
+    """
+
+    contact: ObjectStatus
+    touched: int
+    position: int
+    was_pressed: bool = False
+    is_slipping: bool = False
+
+    def is_pressed(self, request: int) -> bool:
+        """Whether a request lies beyond the contact: it is what keeps an axis there."""
+        return agrees(request, self.contact, self.touched, direction=0)
+
+    def is_left(self, moved: int) -> bool:
+        """Whether an axis that has moved so far has gone away from what it touched."""
+        return moved < 0 if self.contact is ObjectStatus.CONTACT_CLOSING else moved > 0
+
+
+class GripWatch:
+    """Is fed statuses in their order, and says what has become of the grips of some axes.
+
+    A contact lasts until the gripper reports something else. An axis that tries again under the same request,
+    as it does when more force is asked for, moves for a moment: that ends its contact only if it gets further
+    than a slip.
+    """
+
+    def __init__(
+        self,
+        fingers: Finger | int = Finger.ABC,
+        *,
+        since: RobotiqStatus | None = None,
+        slip: int = SLIP_COUNTS,
+    ) -> None:
+        """Watch some axes.
+
+        Args:
+            fingers: the axes.
+            since: the status to begin with: its contacts are there already, and no events. None for the first
+                one that is seen.
+            slip: counts that an axis in contact may move without being told, 1..255.
+
+        Raises:
+            TypeError, ValueError: an argument of the wrong type or outside its range.
+        """
+        self._axes = tuple(check_mask(fingers))
+        self._slip = check_int("slip", slip, 1, 255)
+        if since is not None and not isinstance(since, RobotiqStatus):
+            raise TypeError(f"since must be None or a RobotiqStatus, got {since!r}")
+        self._grips: dict[Finger, _Grip] = {}
+        self._last: RobotiqStatus | None = None
+        self._passing_fault = PassingFault()
+        if since is not None:
+            self.see(since)
+
+    @property
+    def holds(self) -> Finger:
+        """The axes in contact, as far as has been seen; one that is slipping is not among them."""
+        return Finger(sum(axis for axis, grip in self._grips.items() if not grip.is_slipping))
+
+    def see(self, status: RobotiqStatus) -> list[GripEvent]:
+        """Take in a status; returns what it tells.
+
+        One that is older than the last is late, and passed over. One that is older by a second or more is of
+        another clock, and believed: a watch that waits for the time to come back hears nothing.
+        """
+        last = self._last
+        if last is not None and 0 < last.timestamp - status.timestamp < LATE_S:
+            return []
+        self._last = status
+        judged = status
+        if self._passing_fault.reads or status.fault.is_serious:
+            judged = self._passing_fault.see(status, status.timestamp)
+        changes = [(axis, *change) for axis in self._axes for change in self._changes(axis, judged)]
+        if last is None:
+            return []
+        return [GripEvent(change, axis, moved, self.holds, status) for axis, change, moved in changes]
+
+    def _changes(self, axis: Finger, status: RobotiqStatus) -> list[tuple[GripChange, int]]:
+        """What has become of one axis, in its order, each with the counts it has moved."""
+        grip = self._grips.get(axis)
+        if grip is None:
+            return self._gain(axis, status)
+        is_touching = _contact(axis, status) is grip.contact
+        if is_touching and grip.is_slipping:
+            return self._gain(axis, status)
+        is_pressed = grip.is_pressed(status.requested_position(axis))
+        grip.was_pressed |= is_pressed
+        lets_go = not is_pressed and _follows_requests(status)
+        moved = status.position(axis) - grip.position
+        if is_touching or (is_pressed and _moves(axis, status)):
+            # gDT may trail the echo: an axis that was asked to let go does so before its contact ends.
+            is_leaving = lets_go and grip.was_pressed
+            if grip.is_slipping or is_leaving or abs(moved) <= self._slip:
+                return []
+            grip.position, grip.is_slipping = status.position(axis), not is_touching
+            return [(GripChange.SLIPPED, moved)]
+        del self._grips[axis]
+        is_released = lets_go and (grip.was_pressed or grip.is_left(moved))
+        change = GripChange.RELEASED if is_released else GripChange.LOST
+        return [(change, moved), *self._gain(axis, status)]
+
+    def _gain(self, axis: Finger, status: RobotiqStatus) -> list[tuple[GripChange, int]]:
+        """Begin with a contact, if there is one."""
+        contact, position = _contact(axis, status), status.position(axis)
+        if contact is None:
+            return []
+        self._grips[axis] = grip = _Grip(contact, position, position)
+        grip.was_pressed = grip.is_pressed(status.requested_position(axis))
+        return [(GripChange.GAINED, 0)]
+
+
+def _contact(axis: Finger, status: RobotiqStatus) -> ObjectStatus | None:
+    """The contact that an axis reports, if any; of a gripper that is not active nothing counts."""
+    what = status.finger_status(axis)
+    return what if what.is_contact and status.is_activated else None
+
+
+def _moves(axis: Finger, status: RobotiqStatus) -> bool:
+    """Whether an axis moves: in a fault it reads so, and stands."""
+    return axis in status.moving and not status.fault.is_serious
+
+
+def _follows_requests(status: RobotiqStatus) -> bool:
+    """Whether the axes do what is asked of them."""
+    return status.is_activated and status.go_echo and not status.fault.is_serious

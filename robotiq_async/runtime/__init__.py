@@ -1,0 +1,1 @@
+"""What runs below everything: clocks, timers, event loops and threads, logging, optional packages."""

@@ -1,1 +1,0 @@
-"""When polls are due, and by which clock."""

@@ -1,1 +1,0 @@
-"""A hand as messages: recordings, viewers, metrics. Each behind its extra."""

@@ -1,1 +1,0 @@
-"""What a recording is made of: MCAP, and tables."""

@@ -1,0 +1,292 @@
+"""What a person makes a hand do through a program: with a key of the monitor, a button of a viewer."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from ..control.motion import MoveResult
+from ..protocol import Hand
+from ..runtime.clock import now
+from ..values.checks import check_byte
+from ..values.enums import (
+    AXES,
+    DEFAULT_FORCE,
+    DEFAULT_SPEED,
+    FORCE_MAX,
+    SPEED_MAX,
+    WIDTH_NORMAL,
+    WIDTH_PINCH,
+    WIDTH_WIDE,
+    Fault,
+    Finger,
+    Initialization,
+    State,
+)
+from ..values.errors import MoveSupersededError, NotStartedError
+
+CANCELS_RECOVERY: Final = frozenset({"halt", "reset", "release"})
+"""Actions after which no recovery may go on by itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """Something a person can make a hand do, without arguments.
+
+    Attributes:
+        name: one word.
+        what: what it does, in a few words.
+        run: carries it out; returns how it ended, in words.
+        moves: whether fingers move, or may let go.
+        warning: a consequence that may surprise; a person is asked first. Empty if there is none.
+    """
+
+    name: str
+    what: str
+    run: Callable[[Hand], Awaitable[str]]
+    moves: bool = True
+    warning: str = ""
+
+
+class Operator:
+    """A person who operates a hand; knows whether this person has moved anything.
+
+    Attributes:
+        hand: the hand.
+        speed: of all axes, 0..255, as last set by this person.
+        force: of all axes, 0..255, as last set by this person.
+    """
+
+    def __init__(self, hand: Hand, *, speed: int = DEFAULT_SPEED, force: int = DEFAULT_FORCE) -> None:
+        """Listen to the requests of the hand; nothing is written.
+
+        Args:
+            hand: started before or after.
+            speed: what the hand was constructed with.
+            force: what the hand was constructed with.
+
+        Raises:
+            TypeError: speed or force is not an int.
+            ValueError: speed or force is outside 0..255.
+        """
+        self.hand = hand
+        self.speed = check_byte("speed", speed)
+        self.force = check_byte("force", force)
+        self._requests = hand.requests(1)
+        self._asking = 0
+        """Number of motions under way that this person has asked for."""
+        self._moved = False
+        self._changing = asyncio.Lock()
+        self._recoveries: set[asyncio.Future[str]] = set()
+
+    @property
+    def has_moved(self) -> bool:
+        """Whether a request was written while a motion of this person was under way, or may be right now."""
+        self._listen()
+        # A request is published only when it is known whether it was acknowledged.
+        return self._moved or self._asking > 0
+
+    async def act(self, action: Action) -> str:
+        """Carry out an action; returns how it ended, in words.
+
+        When cancelled, a move is held; a sequence under way (activation, release, reset) goes on.
+
+        Raises:
+            RobotiqError: it could not be carried out.
+        """
+        if action.name in CANCELS_RECOVERY:
+            for recovery in self._recoveries:
+                recovery.cancel()
+        if not action.moves:
+            return await action.run(self.hand)
+        with self._counted():
+            return await (self._recover(action) if action.name == "recover" else action.run(self.hand))
+
+    async def _recover(self, action: Action) -> str:
+        """Recover until something else is asked for: it waits for a fault to clear, then moves by itself."""
+        work = asyncio.ensure_future(action.run(self.hand))
+        self._recoveries.add(work)
+        try:
+            await asyncio.wait({work})
+        finally:
+            work.cancel()
+            self._recoveries.discard(work)
+        if work.cancelled():
+            raise MoveSupersededError("another action took over")
+        return work.result()
+
+    async def move(
+        self, position: int, fingers: Finger, *, speed: int | None = None, force: int | None = None
+    ) -> str:
+        """Move axes; returns how that ended, in words.
+
+        Raises:
+            TypeError, ValueError, RobotiqError: as :meth:`Hand.move`.
+        """
+        with self._counted():
+            return describe(await self.hand.move(position, fingers, speed=speed, force=force))
+
+    async def leave(self) -> str:
+        """Stop the hand, and the fingers only if this person has moved them; returns what became of them.
+
+        As bounded as :meth:`Hand.stop`.
+        """
+        has_moved, rests = self.has_moved, self.hand.state in (State.RESET, State.ATR_DONE)
+        began = now()
+        await self.hand.stop(halt=has_moved)
+        if not has_moved:
+            return "The fingers were left as they are: nothing here has moved them."
+        if rests or self._stands_still(began):
+            return "The fingers were stopped: they had been moved from here."
+        return "The fingers had been moved from here and may STILL MOVE: the gripper was not seen to stop."
+
+    async def set_speed(self, value: int) -> str:
+        """Set the speed of all axes, also of a motion under way; returns it as text.
+
+        Raises:
+            TypeError, ValueError, RobotiqError: as :meth:`Hand.set_speed`.
+        """
+        await self.hand.set_speed(value)
+        self.speed = check_byte("value", value)
+        return str(value)
+
+    async def set_force(self, value: int) -> str:
+        """Set the force of all axes; more tightens a grip. Returns it as text.
+
+        Raises:
+            TypeError, ValueError, RobotiqError: as :meth:`Hand.set_force`.
+        """
+        await self.hand.set_force(value)
+        self.force = check_byte("value", value)
+        return str(value)
+
+    async def change_speed(self, by: int) -> str:
+        """Change the speed of all axes, within 0..255; concurrent changes add up.
+
+        Raises:
+            RobotiqError: as :meth:`set_speed`.
+        """
+        async with self._changing:
+            return await self.set_speed(max(0, min(self.speed + by, SPEED_MAX)))
+
+    async def change_force(self, by: int) -> str:
+        """Change the force of all axes, within 0..255; concurrent changes add up.
+
+        Raises:
+            RobotiqError: as :meth:`set_force`.
+        """
+        async with self._changing:
+            return await self.set_force(max(0, min(self.force + by, FORCE_MAX)))
+
+    @contextmanager
+    def _counted(self) -> Iterator[None]:
+        """Around a motion: whatever is written meanwhile counts as caused by it."""
+        self._listen()
+        self._requests = self.hand.requests(1)  # the one before ends when the hand is stopped
+        self._asking += 1
+        try:
+            yield
+        except asyncio.CancelledError:
+            self._moved = True  # its request may still be written
+            raise
+        finally:
+            self._listen()
+            self._asking -= 1
+
+    def _listen(self) -> None:
+        for _ in self._requests.drain():
+            self._moved |= self._asking > 0
+
+    def _stands_still(self, since: float) -> bool:
+        """Whether a status since then shows that nothing moves: no go, activation or release."""
+        try:
+            status = self.hand.status
+        except NotStartedError:
+            return False
+        busy = status.go_echo or status.initialization is Initialization.ACTIVATING
+        return status.timestamp >= since and not busy and status.fault is not Fault.AUTOMATIC_RELEASE
+
+
+def describe(result: MoveResult) -> str:
+    """Describe how a move ended: ``A at 241, B in contact at 130, C at 241; 2.31 s``."""
+    ends = []
+    for axis in AXES:
+        if axis in result.outcomes:
+            how = " in contact" if axis in result.contacts else ""
+            ends.append(f"{axis.name}{how} at {result.positions[axis]}")
+    return f"{', '.join(ends)}; {result.duration:.2f} s"
+
+
+async def _open(hand: Hand) -> str:
+    return describe(await hand.open())
+
+
+async def _close(hand: Hand) -> str:
+    return describe(await hand.close())
+
+
+def _width(position: int) -> Callable[[Hand], Awaitable[str]]:
+    async def run(hand: Hand) -> str:
+        return describe(await hand.move(position, Finger.SCISSOR))
+
+    return run
+
+
+async def _halt(hand: Hand) -> str:
+    await hand.halt()
+    return "every axis stands still" + (": the gripper is reset" if hand.state is State.RESET else "")
+
+
+async def _activate(hand: Hand) -> str:
+    await hand.activate()
+    return "the gripper is active"
+
+
+async def _reset(hand: Hand) -> str:
+    await hand.reset()
+    return "the gripper is reset"
+
+
+async def _release(hand: Hand) -> str:
+    await hand.atr()
+    return "released; only a reset helps now"
+
+
+async def _recover(hand: Hand) -> str:
+    await hand.recover()
+    return "the gripper is active"
+
+
+_ALL: Final = (
+    Action("open", "open the fingers", _open),
+    Action("close", "close the fingers", _close),
+    Action("wide", "B and C furthest apart", _width(WIDTH_WIDE)),
+    Action("normal", "B and C as usual", _width(WIDTH_NORMAL)),
+    Action("pinch", "B and C together", _width(WIDTH_PINCH)),
+    Action("halt", "stop every axis", _halt, moves=False),
+    Action(
+        "activate",
+        "activate the gripper",
+        _activate,
+        warning="The fingers MOVE: they open and close to their stops.",
+    ),
+    Action("reset", "reset the gripper", _reset, warning="The gripper lets go: what it holds DROPS."),
+    Action(
+        "release",
+        "release in a fault",
+        _release,
+        warning="All fingers OPEN slowly, whatever the fault: what they hold DROPS.",
+    ),
+    Action(
+        "recover",
+        "do what the fault needs",
+        _recover,
+        warning="A major fault needs a reset and an activation: what it holds DROPS, the fingers MOVE.",
+    ),
+)
+ACTIONS: Final = MappingProxyType({action.name: action for action in _ALL})
+"""The actions by name."""

@@ -1,0 +1,91 @@
+"""sensor_msgs/msg/JointState as ROS 2 puts it on the wire (CDR, little endian), without ROS.
+
+The names never change, so the bytes before the numbers are encoded once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from struct import Struct, pack
+from typing import Final
+
+from .kinematics import JOINTS
+
+SCHEMA_NAME: Final = "sensor_msgs/msg/JointState"
+_RULE: Final = "=" * 80
+SCHEMA: Final = f"""std_msgs/Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+{_RULE}
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+{_RULE}
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+"""The message definition and those it refers to, in the format that MCAP calls ros2msg."""
+
+_ENCAPSULATION: Final = b"\x00\x01\x00\x00"
+_STAMP: Final = Struct("<iI")
+
+
+class JointStateEncoder:
+    """Encodes joint states of the eleven joints of the hand."""
+
+    def __init__(self, frame_id: str = "palm", names: Sequence[str] = JOINTS) -> None:
+        """Encode everything but the stamp and the numbers.
+
+        Args:
+            frame_id: of the header.
+            names: of the joints, in the order of their numbers.
+        """
+        body = bytearray(_STAMP.size)
+        _add_string(body, frame_id)
+        _align(body, 4)
+        body += pack("<I", len(names))
+        for name in names:
+            _align(body, 4)
+            _add_string(body, name)
+        self._count = len(names)
+        self._constant = bytes(body[_STAMP.size :])
+        # Three sequences of doubles: each count on a multiple of 4, its numbers on a multiple of 8.
+        layout, at = "<", len(body)
+        for _ in range(3):
+            layout += f"{-at % 4}xI"
+            at += -at % 4 + 4
+            layout += f"{-at % 8}x{len(names)}d"
+            at += -at % 8 + 8 * len(names)
+        self._numbers = Struct(layout)
+
+    def encode(
+        self,
+        nanoseconds: int,
+        positions: Sequence[float],
+        velocities: Sequence[float],
+        efforts: Sequence[float],
+    ) -> bytes:
+        """Encode one message.
+
+        Args:
+            nanoseconds: stamp, since 1970.
+            positions: radians, one for each joint.
+            velocities: radians per second, one for each joint.
+            efforts: motor currents in ampere, one for each joint.
+        """
+        stamp = _STAMP.pack(*divmod(nanoseconds, 1_000_000_000))
+        count = self._count
+        numbers = self._numbers.pack(count, *positions, count, *velocities, count, *efforts)
+        return _ENCAPSULATION + stamp + self._constant + numbers
+
+
+def _align(body: bytearray, size: int) -> None:
+    body += bytes(-len(body) % size)
+
+
+def _add_string(body: bytearray, text: str) -> None:
+    encoded = text.encode() + b"\0"
+    body += pack("<I", len(encoded)) + encoded

@@ -1,0 +1,132 @@
+"""Joint angles of the hand from the positions of its four axes, as ROS's joint states name them.
+
+Each finger has three phalanges and one motor: up to about 110 counts the base turns and the tip stays
+parallel to itself, to 140 the base turns alone, from there to 240 the middle one, and beyond nothing moves
+(Indiana University, technical report 711). The scissor turns the bases of B and C against each other.
+
+The slopes and limits below are those of the joint state publisher for ROS 1 (robotiq_3f_gripper_joint_states
+of ros-industrial), which cites that report for the fingers and says of the scissor that its author measured
+it. They are one formula, and no second source confirms them: public recordings of real hands, that of TAMS
+among them, have joint angles which that same publisher computed from the positions.
+
+Angles are what a mechanism without load and play would have: a finger that closes around something bends
+earlier. Nothing here has been checked on a real hand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cache, lru_cache
+from math import radians
+from types import MappingProxyType
+from typing import Final
+
+from ...values.checks import check_byte
+from ...values.enums import Finger
+from ...values.status import RobotiqStatus
+
+Points = tuple[tuple[int, float], ...]
+"""Position in counts, rising, and angle in degrees; straight in between, level beyond the ends."""
+
+BASE: Final[Points] = ((0, 0.0), (140, 70.0))
+"""joint_1. The ROS node has a slope of 70/148 with a jump at 140; a straight line to 70 degrees is meant."""
+MIDDLE: Final[Points] = ((140, 0.0), (240, 90.0))
+"""joint_2: still until the base stops, then up to its own stop."""
+TIP: Final[Points] = ((0, 0.0), (110, -55.0))
+"""joint_3: against the base, for the tip stays parallel, until its stop."""
+PALM: Final[Points] = ((15, 11.0), (240, -11.0))
+"""The palm joint of finger_1 against the scissor; that of finger_2 is its negative. The publisher's author
+measured about 11 degrees to each side, where the manual says 32 in all; where 15 and 240 are from is not
+said."""
+
+FINGER_NAMES: Final = MappingProxyType(
+    {Finger.C: "finger_1", Finger.B: "finger_2", Finger.A: "finger_middle"}
+)
+"""What the public ROS description of the hand calls the fingers, in the order of its joints.
+
+The one place that says so: joint states, goals, the URDF and every drawing follow it. Sources disagree about
+B and C, and a person has not looked yet: docs/decisions/finger-names.md.
+"""
+
+
+def _joints() -> Iterator[str]:
+    for name in FINGER_NAMES.values():
+        if name != "finger_middle":  # it does not turn on the palm
+            yield f"palm_{name}_joint"
+        yield from (f"{name}_joint_{number}" for number in (1, 2, 3))
+
+
+JOINTS: Final = tuple(_joints())
+"""The eleven names, in the order of :func:`joint_angles`: the palm joint of a finger before its own three."""
+
+
+def finger_angles(position: int) -> tuple[float, float, float]:
+    """The three joints of a finger in radians, from the palm on.
+
+    Args:
+        position: counts, 0..255.
+
+    Raises:
+        TypeError: position is not an int.
+        ValueError: position is outside 0..255.
+    """
+    return _finger_angles(check_byte("position", position))
+
+
+@cache
+def _finger_angles(counts: int) -> tuple[float, float, float]:
+    # Kept, 256 of them: a recording asks for nine fingers at every poll.
+    base, middle, tip = (radians(_between(counts, points)) for points in (BASE, MIDDLE, TIP))
+    return base, middle, tip
+
+
+def palm_angle(scissor: int) -> float:
+    """The palm joint of finger_1 in radians; that of finger_2 is its negative.
+
+    Args:
+        scissor: position of the scissor in counts, 0 (wide) .. 255 (pinch).
+
+    Raises:
+        TypeError: scissor is not an int.
+        ValueError: scissor is outside 0..255.
+    """
+    return radians(_between(check_byte("scissor", scissor), PALM))
+
+
+def joint_angles(status: RobotiqStatus) -> tuple[float, ...]:
+    """The eleven joints in radians, in the order of :data:`JOINTS`."""
+    return _joint_angles(*(status.position(axis) for axis in (Finger.SCISSOR, *FINGER_NAMES)))
+
+
+@lru_cache(maxsize=16)
+def _joint_angles(scissor: int, *fingers: int) -> tuple[float, ...]:
+    # Kept, for most of the time the fingers stand.
+    palm = palm_angle(scissor)
+    one, two, middle = map(_finger_angles, fingers)
+    return (palm, *one, -palm, *two, *middle)
+
+
+def joint_velocities(before: RobotiqStatus, after: RobotiqStatus) -> tuple[float, ...]:
+    """Radians a second between two statuses, in the order of :data:`JOINTS`.
+
+    A count is 0.5 degrees, so that between two polls this is either nothing or a lot: take statuses that are
+    some tens of milliseconds apart.
+
+    Raises:
+        ValueError: the second is not later than the first.
+    """
+    seconds = after.timestamp - before.timestamp
+    if seconds <= 0:
+        raise ValueError(f"after must be later than before, got {seconds} s")
+    return tuple(
+        (new - old) / seconds for old, new in zip(joint_angles(before), joint_angles(after), strict=True)
+    )
+
+
+def _between(counts: int, points: Sequence[tuple[int, float]]) -> float:
+    (first, at_first), (last, at_last) = points
+    if counts <= first:
+        return at_first
+    if counts >= last:
+        return at_last
+    return at_first + (at_last - at_first) * (counts - first) / (last - first)

@@ -1,0 +1,74 @@
+"""The hand for 3-D panels: its description as ROS 2 puts it on the wire, and where its links are."""
+
+from __future__ import annotations
+
+from struct import pack
+from typing import Any, Final
+
+from ...values.status import RobotiqStatus
+from . import hand_model, urdf
+from .kinematics import JOINTS, joint_angles
+
+SCHEMA_NAME: Final = "std_msgs/msg/String"
+SCHEMA: Final = "string data\n"
+TRANSFORMS_NAME: Final = "foxglove.FrameTransforms"
+"""The name by which viewers know it."""
+_TIME: Final = {
+    "type": "object",
+    "title": "time",
+    "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}},
+}
+
+
+def _numbers(*names: str) -> dict[str, object]:
+    return {"type": "object", "properties": {name: {"type": "number"} for name in names}}
+
+
+TRANSFORMS_SCHEMA: Final = {
+    "type": "object",
+    "properties": {
+        "transforms": {
+            "type": "array",
+            "items": {
+                "type": "object",
+                "properties": {
+                    "timestamp": _TIME,
+                    "parent_frame_id": {"type": "string"},
+                    "child_frame_id": {"type": "string"},
+                    "translation": _numbers("x", "y", "z"),
+                    "rotation": _numbers("x", "y", "z", "w"),
+                },
+            },
+        }
+    },
+}
+
+
+def description_message() -> bytes:
+    """The URDF, as a message."""
+    text = urdf().encode() + b"\0"
+    return b"\x00\x01\x00\x00" + pack("<I", len(text)) + text
+
+
+def transforms(status: RobotiqStatus, nanoseconds: int) -> dict[str, Any]:
+    """Every joint as a transform of its child in the frame of its parent.
+
+    Args:
+        status: where the fingers are.
+        nanoseconds: since 1970: when that was.
+    """
+    seconds, rest = divmod(nanoseconds, 1_000_000_000)
+    angles = dict(zip(JOINTS, joint_angles(status), strict=True))
+    found = []
+    for joint in hand_model().joints:
+        pose = joint.pose(angles.get(joint.name, 0.0))
+        found.append(
+            {
+                "timestamp": {"sec": seconds, "nsec": rest},
+                "parent_frame_id": joint.parent,
+                "child_frame_id": joint.child,
+                "translation": dict(zip("xyz", pose.position, strict=True)),
+                "rotation": dict(zip("xyzw", pose.quaternion, strict=True)),
+            }
+        )
+    return {"transforms": found}

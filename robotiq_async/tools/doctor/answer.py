@@ -1,0 +1,260 @@
+"""Who answers? The usual unit id and registers first, then others; and is that a gripper at all?"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Final
+
+from ...link.address import Address
+from ...link.modbus import ModbusTransport
+from ...link.sim_transport import SimulatedTransport, new_gripper
+from ...link.transport import Link
+from ...session.options import LONGEST_RESPONSE_S, registers_of
+from ...values.errors import (
+    ConnectFailedError,
+    ConnectionLostError,
+    ProtocolError,
+    ResponseTimeoutError,
+    RobotiqConnectionError,
+)
+from ...values.registers import RTU_REGISTERS, STATUS_RESERVED, TCP_REGISTERS, RegisterMap
+from ...values.status import RobotiqStatus
+from .findings import Finding, GiveUpError, Level, Report
+
+REACH_S: Final = 3.0
+"""Timeout for resolving the name, and for connecting to the port."""
+ANSWER_S: Final = 0.5
+"""For a reply; the last attempt with the usual unit id and registers has as long as a hand can have."""
+LET_GO_S: Final = 0.5
+"""After a failed attempt, for a gateway that serves one client to see that this one has gone."""
+TRIES: Final = 3
+"""Attempts with the usual unit id and registers, before others are tried: replies get lost."""
+UNITS: Final = (2, 9, 1, 0, 255)
+"""Unit ids that are tried when the usual one does not answer; on a serial line nobody has the last two."""
+ALONE: Final = "It may serve one client at a time"
+
+
+async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> Link:
+    """An open link to a gripper that answers.
+
+    No connection is made to try the port: a gateway that serves one client would be busy with that one.
+
+    Raises:
+        GiveUpError: nothing answers, or it is no gripper.
+    """
+    failure: RobotiqConnectionError | None = None
+    stranger: RobotiqStatus | None = None
+    for number, (registers, patience) in enumerate(_attempts(address, usual)):
+        link = _link(address, registers, patience)
+        try:
+            status, seconds = await _first_reading(link)
+        except ConnectFailedError as error:
+            _report_no_connection(address, error, report, is_first=number == 0)
+            raise GiveUpError from error
+        except RobotiqConnectionError as error:
+            if number == 0:
+                _report_port(address, report)
+            failure = failure or error
+            await asyncio.sleep(LET_GO_S if number < TRIES else 0)
+            continue
+        if number == 0:
+            _report_port(address, report)
+        if _strange_bits(status):
+            await link.close()
+            stranger = stranger or status
+            continue
+        report(_answers(failure if registers == usual else None, number + 1, seconds))
+        _report_place(usual, registers, report)
+        _report_silence(status, report)
+        return link
+    if stranger is not None:
+        _report_stranger(stranger, report)
+        raise GiveUpError
+    assert failure is not None
+    advice = await _other_frames(address) or _advice_for_silence(failure)
+    report(Finding(Level.BAD, "Modbus", str(failure), advice))
+    raise GiveUpError
+
+
+def long_enough(seconds: float) -> float:
+    """The response_timeout for replies that take so long: twice that, as far as a hand takes it."""
+    return min(LONGEST_RESPONSE_S, math.ceil(20 * seconds) / 10)
+
+
+def _attempts(address: Address, usual: RegisterMap) -> Iterator[tuple[RegisterMap, float]]:
+    """What to try, and how long to wait for a reply: first the usual, several times."""
+    if address.kind == "sim":
+        yield usual, ANSWER_S
+        return
+    units = UNITS[:-2] if address.is_rtu else UNITS
+    others = [replace(usual, read_function=7 - usual.read_function)]
+    others += [replace(usual, device_id=unit) for unit in units]
+    for kind in (RTU_REGISTERS, TCP_REGISTERS):
+        for function in dict.fromkeys((usual.read_function, 3, 4)):
+            moved = replace(usual, request=kind.request, status=kind.status, read_function=function)
+            others += [replace(moved, device_id=unit) for unit in dict.fromkeys((usual.device_id, *units))]
+    for number in range(TRIES):
+        yield usual, ANSWER_S if number < TRIES - 1 else LONGEST_RESPONSE_S
+    for each in dict.fromkeys(others):
+        if each != usual:
+            yield each, ANSWER_S
+
+
+async def _other_frames(address: Address) -> str:
+    """What to do if a socket speaks the other kind of frames: those of a serial line, or of Modbus TCP."""
+    if not address.is_socket:
+        return ""
+    other = replace(address, kind="tcp" if address.is_rtu else "rtu+tcp")
+    link = _link(other, registers_of(other), ANSWER_S)
+    try:
+        await _first_reading(link)
+    except RobotiqConnectionError:
+        return ""
+    await link.close()
+    return f"The frames there are others: write the address as {other}."
+
+
+def _link(address: Address, registers: RegisterMap, patience: float) -> Link:
+    if address.kind == "sim":
+        gripper = new_gripper(address.simulation)
+        return SimulatedTransport(gripper, registers, connect_timeout=REACH_S, response_timeout=patience)
+    return ModbusTransport(address, registers, connect_timeout=REACH_S, response_timeout=patience)
+
+
+async def _first_reading(link: Link) -> tuple[RobotiqStatus, float]:
+    """What is read once the link is open, and after how many seconds the reply came.
+
+    Raises:
+        RobotiqConnectionError: it cannot be opened, or nothing clean comes. The link is closed.
+    """
+    loop = asyncio.get_running_loop()
+    try:
+        await link.open()
+        asked = loop.time()
+        return RobotiqStatus.from_registers(await link.read()), loop.time() - asked
+    except BaseException:
+        await link.close()
+        raise
+
+
+# -- no connection -----------------------------------------------------------------------------------------
+
+
+def _report_port(address: Address, report: Report) -> None:
+    if address.is_socket:
+        report(Finding(Level.GOOD, "port", f"{address.port} is open"))
+
+
+def _report_no_connection(
+    address: Address, error: ConnectFailedError, report: Report, *, is_first: bool
+) -> None:
+    if not (address.is_socket and is_first):
+        report(Finding(Level.BAD, "open", error.args[0], _advice_for_opening(address, str(error))))
+        return
+    cause = error.__cause__
+    if isinstance(cause, ConnectionRefusedError):
+        advice = "The host is up, but nothing listens on this port: is it the right address and port?"
+    elif isinstance(cause, OSError) and not isinstance(cause, TimeoutError):
+        advice = "There is no way to it: check cable, IP address and subnet mask of this computer."
+    else:
+        advice = "Is it switched on, on this network, in this subnet? A firewall may drop the packets."
+    report(Finding(Level.BAD, "port", f"{address.port}: {error.args[0]}", advice))
+
+
+def _advice_for_opening(address: Address, why: str) -> str:
+    if "pip install" in why:
+        return "Install that, and look again."
+    if address.kind == "rtu":
+        return (
+            "ls -l /dev/ttyUSB* /dev/ttyACM* shows the ports and whose they are, dmesg what was plugged in."
+        )
+    return f"It took a connection before and refuses now. {ALONE}: stop the other."
+
+
+# -- no answer, or a late one ------------------------------------------------------------------------------
+
+
+def _answers(failure: RobotiqConnectionError | None, tries: int, seconds: float) -> Finding:
+    """How it answers.
+
+    Args:
+        failure: of the first attempt with the same unit id and registers; None if there was none.
+        tries: how many attempts it took.
+        seconds: after which the reply came.
+    """
+    if seconds > ANSWER_S:
+        advice = f"Pass response_timeout={long_enough(seconds):g}; a write, and a stop, take as long."
+        return Finding(Level.DOUBT, "Modbus", f"answers, after {seconds:.1f} s", advice)
+    if failure is None:
+        return Finding(Level.GOOD, "Modbus", "answers")
+    if isinstance(failure, ConnectionLostError):
+        advice = f"It hung up first. {ALONE}, and was busy with another: is another program connected?"
+    else:
+        advice = (
+            "Replies get lost or damaged: look at cable and switch, and for another client. "
+            f"{ALONE}, and was busy with another."
+        )
+    return Finding(Level.DOUBT, "Modbus", f"answers when asked {tries} times", advice)
+
+
+def _advice_for_silence(error: RobotiqConnectionError) -> str:
+    if isinstance(error, ResponseTimeoutError):
+        return (
+            "Connected, but no unit answers: another device, the gripper's fieldbus is not Modbus, or it "
+            "serves one client at a time and has another."
+        )
+    if isinstance(error, ProtocolError):
+        return "What answers is not this gripper: it has its registers elsewhere, or does not speak Modbus."
+    return f"It hangs up when asked. {ALONE}, or not speak Modbus."
+
+
+# -- what answers ------------------------------------------------------------------------------------------
+
+
+def _report_place(usual: RegisterMap, found: RegisterMap, report: Report) -> None:
+    """Under which unit id, and where the registers are."""
+    unit = Finding(Level.GOOD, "unit id", str(found.device_id))
+    if found.device_id != usual.device_id:
+        advice = f"Pass device_id={found.device_id}, or --device-id {found.device_id}."
+        unit = Finding(Level.DOUBT, "unit id", f"{found.device_id}, and not {usual.device_id}", advice)
+    report(unit)
+    at = f"status at {found.status}, requests at {found.request}, function {found.read_function}"
+    options = {
+        "request_address": (found.request, usual.request),
+        "status_address": (found.status, usual.status),
+        "read_function": (found.read_function, usual.read_function),
+    }
+    given = [f"{name}={value}" for name, (value, as_usual) in options.items() if value != as_usual]
+    where = Finding(Level.GOOD, "registers", at)
+    if given:
+        advice = f"Pass {', '.join(given)}, or the options so called."
+        if found.read_function != usual.read_function:
+            advice += (
+                " What this function reads may be the requests: see that status shows what the gripper does."
+            )
+        where = Finding(Level.DOUBT, "registers", f"{at}: unusual on this kind of link", advice)
+    report(where)
+
+
+def _report_silence(status: RobotiqStatus, report: Report) -> None:
+    """Tell when nothing speaks for a gripper behind what answers."""
+    if not any(status.registers):
+        found = "all registers read 0, which those of a gripper never do"
+        advice = "The gripper behind the fieldbus may be without power, or this is another device."
+        report(Finding(Level.DOUBT, "gripper", found, advice))
+
+
+def _strange_bits(status: RobotiqStatus) -> bool:
+    """Whether bits are set that the manual reserves. Random memory passes once in 4096 times."""
+    return any(field.read(status.registers) for field in STATUS_RESERVED)
+
+
+def _report_stranger(status: RobotiqStatus, report: Report) -> None:
+    report(Finding(Level.GOOD, "Modbus", "answers"))
+    words = " ".join(f"{word:04X}" for word in status.registers)
+    found = f"another device answers: its registers {words} have bits set that are 0 in a gripper"
+    advice = "Command nothing there: another machine may move. Are address, unit id and registers right?"
+    report(Finding(Level.BAD, "gripper", found, advice))

@@ -1,0 +1,158 @@
+"""A gripper that this host reaches: name, port, Modbus, rate, activation, fault, other clients.
+
+It only reads: nothing is written and nothing moves. It is one client, with one connection at a time.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from typing import Final
+
+from ...link.address import Address
+from ...link.host_names import addresses_of
+from ...link.transport import Link
+from ...session.options import (
+    POLL_INTERVAL_S,
+    RESPONSE_TIMEOUT_S,
+    SERIAL_POLL_INTERVAL_S,
+    registers_of,
+)
+from ...session.statistics import percentile
+from ...values.enums import Severity
+from ...values.errors import ConnectionLostError, RobotiqConnectionError
+from ...values.status import RobotiqStatus
+from .answer import REACH_S, find_gripper, long_enough
+from .findings import Finding, GiveUpError, Level, Report
+from .serial_line import report_adapter, report_damage
+
+PROBES: Final = 300
+"""Reads from which round trip and rate are determined."""
+WATCH_S: Final = 2.0
+"""How long to watch for another client."""
+LONGEST_PERIOD_S: Final = 0.1
+"""The longest poll_interval that a hand takes."""
+
+
+async def examine(address: Address, report: Report, *, device_id: int | None = None) -> None:
+    """Examine a connection; reports each finding at once, and never raises for a bad one.
+
+    Args:
+        address: the gripper.
+        report: called with each finding.
+        device_id: Modbus unit id; None for the usual one.
+
+    Raises:
+        ValueError: a unit id that no unit on such a link can have.
+    """
+    registers = registers_of(address, device_id=device_id)
+    try:
+        if address.is_socket:
+            await _resolve(address, report)
+        link = await find_gripper(address, registers, report)
+        try:
+            if address.kind == "rtu":
+                report_adapter(address, report)
+            await _timing(link, SERIAL_POLL_INTERVAL_S if address.is_rtu else POLL_INTERVAL_S, report)
+            report_state(RobotiqStatus.from_registers(await link.read()), report)
+            await _others(link, report)
+        finally:
+            await link.close()
+    except GiveUpError:
+        pass
+    except RobotiqConnectionError as error:
+        advice = "Look at cable, switch and power; something between here and the gripper drops packets."
+        if isinstance(error, ConnectionLostError):
+            advice = "It hung up: it may serve one client at a time, and another has come. Or it lost power."
+        report(Finding(Level.BAD, "link", f"lost during the examination: {error}", advice))
+
+
+async def _resolve(address: Address, report: Report) -> None:
+    try:
+        async with asyncio.timeout(REACH_S):
+            found = await addresses_of(address.host, address.port)
+    except (OSError, UnicodeError, TimeoutError) as error:
+        why = "no answer" if isinstance(error, TimeoutError) else getattr(error, "strerror", None) or error
+        advice = "Check the spelling, or use the IP address (shipped as 192.168.1.11)."
+        report(Finding(Level.BAD, "name", f"{address.host} cannot be resolved: {why}", advice))
+        raise GiveUpError from error
+    report(Finding(Level.GOOD, "name", f"{address.host} is {', '.join(found)}"))
+
+
+async def _timing(link: Link, interval: float, report: Report) -> None:
+    """Round trip, and the rate of reads that it allows; ``interval`` is the usual one on such a link."""
+    loop = asyncio.get_running_loop()
+    times, began = [], loop.time()
+    for _ in range(PROBES):
+        asked = loop.time()
+        await link.read()
+        times.append(loop.time() - asked)
+        if loop.time() - began > WATCH_S:
+            break
+    rate = len(times) / (loop.time() - began)
+    times.sort()
+    p50, p99 = percentile(times, 0.5), percentile(times, 0.99)
+    found = f"{1000 * p50:.1f} ms, 99th percentile {1000 * p99:.1f} ms"
+    if p99 < interval:
+        report(Finding(Level.GOOD, "round trip", found))
+    else:
+        hertz = f"{1 / interval:.0f} Hz"
+        advice = f"Too slow for {hertz} at times: use a wired network, or a larger poll_interval."
+        if p99 > RESPONSE_TIMEOUT_S / 2:
+            advice = f"Pass response_timeout={long_enough(p99):g}; a write, and a stop, take as long."
+        report(Finding(Level.DOUBT, "round trip", found, advice))
+    report_damage(link, len(times), report)
+    report(_rate(rate, interval))
+
+
+def _rate(rate: float, interval: float) -> Finding:
+    """The rate of reads, and the period that a hand needs for it."""
+    found = f"up to {rate:.0f} reads a second" if rate >= 10 else f"up to {rate:.1f} reads a second"
+    period = max(0.01, math.ceil(100 / rate) / 100)
+    if rate >= 1 / interval:
+        return Finding(Level.GOOD, "rate", found)
+    if period <= LONGEST_PERIOD_S:
+        return Finding(Level.DOUBT, "rate", found, f"Pass poll_interval={period:g}.")
+    advice = (
+        f"No poll_interval is so long (at most {LONGEST_PERIOD_S:g} s): the fingers are watched that late."
+    )
+    return Finding(Level.DOUBT, "rate", found, advice)
+
+
+def report_state(status: RobotiqStatus, report: Report) -> None:
+    """Activation and fault."""
+    if status.is_activated:
+        report(Finding(Level.GOOD, "activation", "active"))
+    elif status.activation_echo:
+        report(Finding(Level.DOUBT, "activation", "under way, or ended in a fault", "Wait, and look again."))
+    else:
+        advice = "activate() or start() activates it; the fingers MOVE then."
+        report(Finding(Level.GOOD, "activation", "not active", advice))
+    fault = status.fault
+    found = f"0x{int(fault):02X} {fault.name}: {fault.description}"
+    match fault.severity:
+        case Severity.NONE:
+            report(Finding(Level.GOOD, "fault", "none"))
+        case Severity.PRIORITY:
+            report(Finding(Level.GOOD, "fault", found, "This is a hint and not a failure."))
+        case Severity.MINOR:
+            report(Finding(Level.DOUBT, "fault", found, "It may clear by itself; recover() waits for that."))
+        case Severity.MAJOR:
+            advice = "recover() resets and activates: the part DROPS and the fingers MOVE."
+            report(Finding(Level.BAD, "fault", found, advice))
+
+
+async def _others(link: Link, report: Report) -> None:
+    """Whether the requests change although this program writes none."""
+    loop = asyncio.get_running_loop()
+    until, seen = loop.time() + WATCH_S, set()
+    while loop.time() < until:
+        seen.add(RobotiqStatus.from_registers(await link.read()).echo)
+        await asyncio.sleep(0.01)
+    if len(seen) == 1:
+        found = f"no request changed within {WATCH_S:g} s: none seen to write, unless always the same"
+        report(Finding(Level.GOOD, "other clients", found))
+    else:
+        found = f"the requests changed within {WATCH_S:g} s, to {len(seen) - 1} others"
+        advice = "Another program commands the gripper. Two that do so disturb each other: stop one."
+        report(Finding(Level.DOUBT, "other clients", found, advice))

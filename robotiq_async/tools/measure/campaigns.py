@@ -1,0 +1,334 @@
+"""Measurements of your own gripper, as in chapter 6 of the thesis: closing times, and the force of a grasp.
+
+The gripper's own clock may be faster than the program's (a simulated one): ``speedup`` converts times into
+the gripper's. Both campaigns save after every row, so that an interrupted one can be resumed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+from collections.abc import Awaitable, Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from ...protocol import Hand
+from ...runtime.clock import now
+from ...values.calibration.closing_time import closing_time
+from ...values.calibration.csv_tables import (
+    FORCE,
+    SPEED,
+    Layout,
+    Table,
+    TableError,
+    integer,
+    read_rows,
+    read_table,
+    write_rows,
+    write_table,
+)
+from ...values.enums import Finger
+from ...values.errors import MeasuringError
+
+REST_S: Final = 0.3
+"""Between two runs, in the gripper's time: a finger that has just stopped may still swing."""
+ATTEMPTS: Final = 20
+"""Attempts at a run: one in which the event loop was blocked is repeated."""
+TOLERATED: Final = 0.01
+"""Share of a run for which it may have been blocked, apart from two polls."""
+OPEN_BELOW: Final = 12
+CLOSED_ABOVE: Final = 234
+"""Limits, in counts, of a full closing; open reads 6-7, closed 240 or more."""
+GRASP_S: Final = 1.0
+"""How long a grasp is recorded after the fingers have stopped, in the gripper's time."""
+CURRENT_MA: Final = 2550
+"""The highest current that a status can report."""
+FINGERS: Final = (Finger.A, Finger.B, Finger.C)
+_CURRENTS_HEADER: Final = ["force_value", "run", "time_ms", "a_ma", "b_ma", "c_ma"]
+
+Sample = tuple[int, int, int, int]
+"""Milliseconds since the command, and the currents of A, B and C in milliampere."""
+Currents = dict[int, list[list[Sample]]]
+"""For each force value the samples of each run."""
+
+
+# -- what is measured, in which order ----------------------------------------------------------------------
+
+
+def speed_values(step: int = 4) -> list[int]:
+    """Speed values in steps from 0, and 255: slowest first."""
+    return sorted({*range(0, 256, step), 255})
+
+
+def force_values(step: int = 25) -> list[int]:
+    """Force values in steps from 0: every second one upwards, those in between downwards."""
+    values = list(range(0, 256, step))
+    return values[::2] + values[1::2][::-1]
+
+
+# -- speed -------------------------------------------------------------------------------------------------
+
+
+async def time_closing(hand: Hand, speed: int, fingers: Finger, speedup: float = 1.0) -> float:
+    """Open fully and at full speed, then close at a speed: seconds from the command until nothing moves.
+
+    A run in which the event loop was blocked is repeated. When cancelled, the fingers stop.
+
+    Args:
+        hand: the gripper.
+        speed: speed value, 0..255.
+        fingers: of A, B and C; the scissor has another stroke.
+        speedup: how much faster the gripper's clock is.
+
+    Raises:
+        ValueError: the scissor is among the fingers.
+        MeasuringError: the fingers met something, did not go the whole way, or the loop is too busy.
+        RobotiqError: as :meth:`Hand.move`.
+    """
+    if Finger.SCISSOR in fingers:
+        raise ValueError("fingers must be A, B and C only, got the scissor: it has a different stroke")
+    for _ in range(ATTEMPTS):
+        opened = await hand.open(fingers, speed=255)
+        await asyncio.sleep(REST_S / speedup)
+        before = hand.statistics
+        closed = await hand.close(fingers, speed=speed)
+        for result in (opened, closed):
+            if result.object_detected:
+                what = f"the fingers met something ({result.contacts!r})"
+                raise MeasuringError(f"{what}: nothing may be in their way")
+        if max(opened.positions.values()) > OPEN_BELOW or min(closed.positions.values()) < CLOSED_ABOVE:
+            raise MeasuringError(
+                f"no full closing: from {dict(opened.positions)} to {dict(closed.positions)}"
+            )
+        after = hand.statistics
+        missed = max(0, after.overruns - before.overruns - 2)
+        if missed * after.period_p50 <= TOLERATED * closed.duration:
+            return closed.duration * speedup
+    raise MeasuringError(f"the event loop was held up in each of {ATTEMPTS} runs: too busy to measure")
+
+
+def expected_seconds(speed: int) -> float:
+    """Estimate of the duration of one run, in the gripper's time: for progress bars."""
+    return closing_time(speed) + closing_time(255) + REST_S
+
+
+# -- force -------------------------------------------------------------------------------------------------
+
+
+async def grasp(hand: Hand, force: int, speed: int, speedup: float = 1.0) -> list[Sample]:
+    """Open, then close on what lies between the fingers; returns the currents from the command on.
+
+    The fingers stay closed, for the scale to be read. When cancelled, they stop.
+
+    Args:
+        hand: the gripper.
+        force: force value, 0..255.
+        speed: speed value, 0..255.
+        speedup: how much faster the gripper's clock is.
+
+    Raises:
+        MeasuringError: the fingers met nothing.
+        RobotiqError: as :meth:`Hand.move`.
+    """
+    opened = await hand.open(speed=255)
+    if opened.object_detected:
+        raise MeasuringError(f"something is in the way of opening ({opened.contacts!r})")
+    await asyncio.sleep(REST_S / speedup)
+    samples: list[Sample] = []
+    began = now()
+    with _watching(hand, lambda time, *milliampere: samples.append((time, *milliampere)), began, speedup):
+        result = await hand.close(speed=speed, force=force)
+        await asyncio.sleep(GRASP_S / speedup)
+    if not result.object_detected:
+        raise MeasuringError("the fingers closed on nothing: put the scale between them")
+    return samples
+
+
+@contextlib.contextmanager
+def _watching(
+    hand: Hand, take: Callable[[int, int, int, int], None], began: float, speedup: float
+) -> Iterator[None]:
+    """Sample the currents at every poll of a block."""
+    statuses = hand.statuses(buffer=10_000)
+
+    async def watch() -> None:
+        async for status in statuses:
+            time = max(0, round(1000 * (status.timestamp - began) * speedup))
+            a, b, c = (status.current_ma(finger) for finger in FINGERS)
+            take(time, a, b, c)
+
+    watcher = asyncio.get_running_loop().create_task(watch())
+    try:
+        yield
+    finally:
+        watcher.cancel()
+
+
+def peak_currents(runs: list[list[Sample]]) -> tuple[int, int, int]:
+    """The highest current of each finger in any run, in milliampere."""
+    samples = [sample for run in runs for sample in run]
+    a, b, c = (max((sample[at] for sample in samples), default=0) for at in (1, 2, 3))
+    return a, b, c
+
+
+# -- campaigns ---------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Campaign:
+    """A table in a file that is filled row by row.
+
+    Attributes:
+        path: the file; it is read if it is there.
+        layout: of the table.
+        origin: what was measured and how; kept beside the table, which only the same origin can resume.
+        values: the rows, in the order of measurement.
+        runs: number of columns.
+        table: what has been measured so far.
+    """
+
+    path: Path
+    layout: Layout
+    values: list[int]
+    runs: int
+    origin: dict[str, str] = field(default_factory=dict)
+    table: Table = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Resume the table if the file exists.
+
+        Raises:
+            TableError: the file exists and is not such a table, or it cannot be created.
+        """
+        if not self.path.parent.is_dir():
+            raise TableError(self.path, None, f"there is no folder {self.path.parent}")
+        if not os.access(self.path.parent, os.W_OK):
+            raise TableError(self.path, None, f"the folder {self.path.parent} cannot be written to")
+        if not self.path.exists():
+            return
+        self.table = read_table(self.path, self.layout)
+        for runs in self.table.values():
+            if len(runs) != self.runs:
+                raise TableError(self.path, None, f"holds {len(runs)} runs, asked for are {self.runs}")
+        was = read_origin(self.path)
+        if was != self.origin:
+            differs = ", ".join(
+                f"{name} {was.get(name, 'unknown')} there and {self.origin.get(name, 'unknown')} here"
+                for name in sorted({*was, *self.origin})
+                if was.get(name) != self.origin.get(name)
+            )
+            raise TableError(self.path, None, f"was measured otherwise: {differs}; choose another file")
+
+    @property
+    def left(self) -> list[int]:
+        """The values still to be measured, in their order."""
+        return [value for value in self.values if value not in self.table]
+
+    async def measure(self, measure_run: Callable[[int, int], Awaitable[int]]) -> None:
+        """Measure what is left; ``measure_run`` gets value and run (from 1), and returns the reading.
+
+        Raises:
+            TableError: a reading is beyond what the layout allows.
+            OSError: the file cannot be written.
+        """
+        for value in self.left:
+            readings = []
+            for run in range(1, self.runs + 1):
+                reading = await measure_run(value, run)
+                limit = f"0..{self.layout.high} {self.layout.unit}"
+                if not 0 <= reading <= self.layout.high:
+                    raise TableError(self.path, None, f"a reading of {reading} is beyond {limit}")
+                readings.append(reading)
+            table = {**self.table, value: tuple(readings)}
+            if not origin_beside(self.path).exists():
+                await asyncio.to_thread(write_origin, self.path, self.origin)
+            # In a thread: a disk may take its time, and the hand polls meanwhile.
+            await asyncio.to_thread(write_table, self.path, self.layout, table)
+            self.table = table
+
+
+def speed_campaign(path: Path, step: int = 4, runs: int = 3, **origin: str) -> Campaign:
+    """A campaign of closing times, for speed values in steps."""
+    return Campaign(path, SPEED, speed_values(step), runs, origin)
+
+
+def force_campaign(path: Path, step: int = 25, runs: int = 3, **origin: str) -> Campaign:
+    """A campaign of scale readings, for force values in steps."""
+    return Campaign(path, FORCE, force_values(step), runs, origin)
+
+
+def origin_beside(path: Path) -> Path:
+    """The file beside a table that holds its origin."""
+    return path.with_name(f"{path.name}.origin.csv")
+
+
+def read_origin(path: Path) -> dict[str, str]:
+    """Read the origin of a table; empty if it has none.
+
+    Raises:
+        TableError: the file beside the table cannot be read.
+    """
+    beside = origin_beside(path)
+    if not beside.exists():
+        return {}
+    return {cells[0]: cells[1] for _, cells in read_rows(beside) if len(cells) == 2}
+
+
+def write_origin(path: Path, origin: dict[str, str]) -> None:
+    """Write the origin of a table into the file beside it.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    write_rows(origin_beside(path), sorted(origin.items()))
+
+
+# -- currents in a file ------------------------------------------------------------------------------------
+
+
+def read_currents(path: Path) -> Currents:
+    """Read the currents of grasps, as :func:`write_currents` writes them.
+
+    Raises:
+        TableError: the file cannot be read, or is not one of currents.
+    """
+    currents: Currents = {}
+    for number, (line, cells) in enumerate(read_rows(path)):
+        if not number:
+            if cells != _CURRENTS_HEADER:
+                raise TableError(path, line, f"expected the columns {','.join(_CURRENTS_HEADER)}")
+            continue
+        if len(cells) != len(_CURRENTS_HEADER):
+            raise TableError(path, line, f"expected {len(_CURRENTS_HEADER)} columns, got {len(cells)}")
+        highs = (255, 1000, 10_000_000, CURRENT_MA, CURRENT_MA, CURRENT_MA)
+        force, run, *sample = (
+            integer(path, line, name, cell, high)
+            for name, cell, high in zip(_CURRENTS_HEADER, cells, highs, strict=True)
+        )
+        runs = currents.setdefault(force, [])
+        if run not in (len(runs), len(runs) + 1) or not run:
+            raise TableError(path, line, f"run {run} of force {force} is out of order")
+        if run > len(runs):
+            runs.append([])
+        time, a, b, c = sample
+        runs[-1].append((time, a, b, c))
+    if not currents:
+        raise TableError(path, None, "there are no currents in it")
+    return currents
+
+
+def write_currents(path: Path, currents: Currents) -> None:
+    """Write the currents of grasps into a file, which is replaced at once.
+
+    Raises:
+        OSError: it cannot be written; the file is what it was.
+    """
+    rows = (
+        (force, number, *sample)
+        for force in sorted(currents)
+        for number, run in enumerate(currents[force], 1)
+        for sample in run
+    )
+    write_rows(path, [_CURRENTS_HEADER, *rows])

@@ -1,0 +1,267 @@
+"""Plots of measurements and recordings, as PNG and SVG. Needs the extra ``plot`` (matplotlib)."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+try:
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+except ModuleNotFoundError as error:
+    from ...runtime.extras import install
+
+    raise ImportError(f"pictures need matplotlib: {install('plot')}") from error
+
+from ...runtime.log import printable
+from ...values.calibration.csv_tables import Table
+from ...values.calibration.scales import ForceCalibration, SpeedCalibration, mean, newton
+from .campaigns import Currents, peak_currents
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ..recording.recordings import Entry
+
+OURS: Final = "#0b6ea8"
+THEIRS: Final = "#d1731f"
+COLOURS: Final = ("#0b6ea8", "#2a8f4c", "#b03a6b")
+"""Colours of the fingers A, B and C."""
+WIDTHS: Final = {"A": 4.2, "B": 2.6, "C": 1.1, "SCISSOR": 1.4}
+"""Line widths in the plot of a recording."""
+DRAWN: Final = ("position", "requested_position", "current_ma")
+LABEL: Final = 0.012
+"""Width of a label, as a share of the picture's."""
+LONGEST: Final = 40
+"""Characters of a label."""
+STRIP: Final = 0.075
+"""Height of a character of a label, where that of the positions is 3."""
+SHOWN_FORCES: Final = (0, 125, 250)
+"""Force values whose currents are drawn over time, or the nearest to them."""
+
+Event = tuple[float, str, bool]
+"""When, what, and whether it is about a fault."""
+
+
+def plot_speed(path: Path, table: Table, label: str) -> list[Path]:
+    """Closing time against the speed value beside the thesis's, and how far the two are apart.
+
+    Args:
+        path: where to, without suffix.
+        table: closing times in milliseconds.
+        label: what the table is, for the legend.
+
+    Returns:
+        The files written.
+    """
+    thesis = SpeedCalibration.thesis()
+    values = sorted(table)
+    means = [mean(table[value]) / 1000 for value in values]
+    with _figure(path, "Full closing, 235 counts", rows=2, ratios=(3, 1)) as (axes, files):
+        times, apart = axes
+        times.plot(*zip(*thesis.points, strict=True), color=THEIRS, lw=4, alpha=0.45, label=thesis.source)
+        low = [mean_ - min(table[v]) / 1000 for v, mean_ in zip(values, means, strict=True)]
+        high = [max(table[v]) / 1000 - mean_ for v, mean_ in zip(values, means, strict=True)]
+        spread: Any = {"yerr": (low, high), "fmt": ".", "ms": 4, "lw": 1}
+        times.errorbar(values, means, color=OURS, label=f"{label}: mean and spread", **spread)
+        times.set_ylabel("closing time, s")
+        times.set_ylim(bottom=0)
+        times.legend()
+        off = [100 * (m / thesis.closing_time(v) - 1) for v, m in zip(values, means, strict=True)]
+        apart.axhline(0, color=THEIRS, lw=1)
+        apart.plot(values, off, ".", ms=4, color=OURS)
+        apart.set_ylabel("apart, %")
+        apart.set_xlabel("speed value")
+        reach = max(2.0, 1.1 * max(map(abs, off)))
+        apart.set_ylim(-reach, reach)
+    return files
+
+
+def plot_force(path: Path, table: Table, surface: str, label: str) -> list[Path]:
+    """Force against the force value, each run a point, beside the thesis's and the nominal figures."""
+    with _figure(path, f"Force of a grasp, {surface}") as ((axes,), files):
+        nominal, thesis = ForceCalibration.nominal(), ForceCalibration.thesis(surface)
+        axes.plot(*zip(*nominal.points, strict=True), color="0.6", ls="--", label=nominal.source)
+        name = f"{thesis.source}: mean"
+        axes.plot(*zip(*thesis.points, strict=True), color=THEIRS, lw=3, alpha=0.5, label=name)
+        values = sorted(table)
+        for number, runs in enumerate(zip(*(table[value] for value in values), strict=True)):
+            forces = [newton(reading) for reading in runs]
+            name = "" if number else f"{label}: runs"
+            axes.plot(values, forces, "o", ms=4, mfc="none", color=OURS, label=name)
+        axes.plot(values, [newton(mean(table[v])) for v in values], color=OURS, label=f"{label}: mean")
+        axes.set_xlabel("force value")
+        axes.set_ylabel("force, N (F = m g, g = 9.81 m/s²)")
+        axes.set_ylim(bottom=0)
+        axes.legend()
+    return files
+
+
+def plot_peak_currents(path: Path, currents: Currents, surface: str, label: str) -> list[Path]:
+    """The highest current of each finger against the force value."""
+    with _figure(path, f"Highest current of a grasp, {surface} ({label})") as ((axes,), files):
+        values = sorted(currents)
+        peaks = [peak_currents(currents[value]) for value in values]
+        # Fingers that are alike, those of the simulator are, would lie on each other: they are one curve.
+        alike: dict[tuple[int, ...], str] = {}
+        for finger, of_finger in zip("ABC", zip(*peaks, strict=True), strict=True):
+            alike[of_finger] = alike.get(of_finger, "") + finger
+        for (of_fingers, names), colour, marker in zip(alike.items(), COLOURS, "o^s", strict=False):
+            name = f"finger {names}" if len(names) == 1 else f"fingers {', '.join(names)}: the same"
+            axes.plot(values, of_fingers, color=colour, marker=marker, ms=5, mfc="none", label=name)
+        axes.set_xlabel("force value")
+        axes.set_ylabel("highest current, mA")
+        axes.set_ylim(bottom=0)
+        axes.legend()
+    return files
+
+
+def plot_current_over_time(path: Path, by_surface: Mapping[str, Currents], label: str) -> list[Path]:
+    """The current of finger A during the first grasp at some force values, surfaces one above the other."""
+    with _figure(path, f"Current of finger A during a grasp ({label})", rows=len(by_surface)) as (
+        axes,
+        files,
+    ):
+        for each, (surface, currents) in zip(axes, by_surface.items(), strict=True):
+            for force, colour in zip(_shown(currents), COLOURS, strict=False):
+                run = currents[force][0]
+                seconds = [sample[0] / 1000 for sample in run]
+                milliampere = [sample[1] for sample in run]
+                each.plot(seconds, milliampere, color=colour, lw=1.2, label=f"force {force}")
+            each.set_title(surface, loc="left", fontsize=10)
+            each.set_ylabel("current, mA")
+            each.set_ylim(bottom=0)
+            each.legend()
+        axes[-1].set_xlabel("time since the command, s")
+    return files
+
+
+def plot_recording(path: Path, entries: Iterable[Entry]) -> list[Path]:
+    """Positions, currents and events of a recording over time.
+
+    Args:
+        path: where to, without suffix.
+        entries: its JSON messages; only what is drawn of them is kept.
+
+    Returns:
+        The files; none when there is no status to draw.
+
+    Raises:
+        OSError: they cannot be written.
+        RecordingError: a message is not as a recorder writes it.
+    """
+    seconds, began = array("d"), 0
+    events: list[Event] = []
+    drawn = {axis: {what: array("h") for what in DRAWN} for axis in WIDTHS}
+
+    def take(status: dict[str, Any]) -> None:
+        for axis, columns in drawn.items():
+            for what, column in columns.items():
+                column.append(status[axis][what])
+
+    for entry in entries:
+        began = began or entry.nanoseconds
+        at = (entry.nanoseconds - began) / 1e9
+        if entry.topic == "/gripper/event" and (event := entry.read(_event)):
+            events.append((at, *event))
+        if entry.topic == "/gripper/status":
+            entry.read(take)
+            seconds.append(at)
+    if not seconds:
+        return []
+    labels = list(_labels(events, apart=LABEL * seconds[-1]))
+    height = STRIP * max((len(words) for _, words, _ in labels), default=1)
+    with _figure(path, path.name, rows=3, ratios=(height, 3, 3)) as (axes, files):
+        strip, positions, currents = axes
+        # Fingers that move together lie on each other: the first is the broadest, and shows at the sides.
+        for (name, width), colour in zip(WIDTHS.items(), (*COLOURS, "0.5"), strict=True):
+            line: Any = {"color": colour, "lw": width}
+            dotted: Any = {"color": colour, "lw": 0.8, "ls": ":", "drawstyle": "steps"}
+            positions.plot(seconds, drawn[name]["position"], label=name, **line)
+            positions.plot(seconds, drawn[name]["requested_position"], **dotted)
+            currents.plot(seconds, drawn[name]["current_ma"], **line)
+        positions.set_ylabel("position, counts\n(dotted: requested)")
+        positions.set_ylim(-5, 260)
+        positions.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
+        currents.set_ylabel("current, mA")
+        currents.set_ylim(bottom=0)
+        currents.set_xlabel("time, s")
+        _write_labels(strip, labels)
+        for when, _, is_fault in labels:
+            for each in (positions, currents):
+                each.axvline(when, color=_colour(is_fault), lw=0.8, zorder=0)
+    return files
+
+
+def _write_labels(strip: Axes, labels: Iterable[Event]) -> None:
+    """Above the curves, where they hide none."""
+    strip.set_axis_off()
+    strip.set_ylim(0, 1)
+    style: Any = {"fontsize": 7, "rotation": 90, "va": "bottom", "ha": "center", "parse_math": False}
+    style["in_layout"] = False  # it does not push the curves aside
+    for when, words, is_fault in labels:
+        strip.annotate(words, (when, 0), color=_colour(is_fault), **style)
+
+
+def _colour(is_fault: bool) -> str:
+    return "crimson" if is_fault else "0.4"
+
+
+def _event(fields: dict[str, Any]) -> tuple[str, bool] | None:
+    """What is told of an event, and whether it is a fault."""
+    # A control loop goes to RUNNING_CC and back with every command: that is no event to look at.
+    if "RUNNING_CC" in (fields.get("source"), fields.get("target")):
+        return None
+    is_fault = fields["kind"] == "fault"
+    name = _short(printable(fields["fault"] if is_fault else fields["target"]))
+    return "fault cleared" if name == "NONE" else name, is_fault
+
+
+def _labels(events: Iterable[Event], apart: float) -> Iterator[Event]:
+    """What comes too soon after a label joins it."""
+    began, words, is_fault = 0.0, "", False
+    for at, name, of_a_fault in events:
+        if words and at - began > apart:
+            yield began, _short(words), is_fault
+            words, is_fault = "", False
+        began = began if words else at
+        words += (", " if words else "") + name
+        is_fault = is_fault or of_a_fault
+    if words:
+        yield began, _short(words), is_fault
+
+
+def _short(words: str) -> str:
+    return words if len(words) <= LONGEST else f"{words[: LONGEST - 3]}..."
+
+
+def _shown(currents: Currents) -> list[int]:
+    """The force values to draw: of those that were measured the nearest to the usual ones."""
+    nearest = {min(currents, key=lambda force: abs(force - usual)) for usual in SHOWN_FORCES}
+    return sorted(nearest)
+
+
+@contextmanager
+def _figure(
+    path: Path, title: str, rows: int = 1, ratios: tuple[float, ...] | None = None
+) -> Iterator[tuple[list[Axes], list[Path]]]:
+    """A figure with axes one above the other; written at the end, always the same bytes for the same data."""
+    height = 4.6 if rows == 1 else 6.4 + 1.0 * (rows > 2)
+    figure = Figure(figsize=(8, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    grid = figure.subplots(rows, 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": ratios})
+    axes: list[Axes] = list(grid[:, 0])
+    figure.suptitle(printable(title), parse_math=False)
+    for each in axes:
+        each.grid(alpha=0.3)
+    files: list[Path] = []
+    yield axes, files
+    for suffix, options in (("png", {"dpi": 120}), ("svg", {"metadata": {"Date": None}})):
+        target = path.with_name(f"{path.name}.{suffix}")
+        with mpl.rc_context({"svg.hashsalt": "robotiq_async"}):
+            figure.savefig(target, **options)
+        files.append(target)

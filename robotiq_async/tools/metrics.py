@@ -1,0 +1,133 @@
+"""Metrics of long-running hands for Prometheus. Needs the extra ``metrics`` (prometheus-client).
+
+    async with serve_metrics(hand, port=9100):
+        ...
+
+They are collected when Prometheus scrapes them and cost nothing in between. They count from the hand's last
+start, as :attr:`Hand.statistics` does; Prometheus expects counters that start over.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections import Counter
+from collections.abc import AsyncIterator, Iterable, Iterator
+from typing import Final
+
+try:
+    from prometheus_client import CollectorRegistry, start_http_server
+    from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+    from prometheus_client.registry import Collector
+except ModuleNotFoundError as error:
+    from ..runtime.extras import install
+
+    raise ImportError(f"metrics need prometheus-client: {install('metrics')}") from error
+
+from ..protocol import Hand
+from ..session.statistics import Statistics
+from ..values.checks import check_int
+from ..values.enums import State
+
+LOOPBACK: Final = "127.0.0.1"
+TIMEOUT_S: Final = 5.0
+"""How long a scrape waits for an event loop that is blocked."""
+
+_COUNTERS: Final = {
+    "polls": "Statuses read.",
+    "writes": "Requests acknowledged.",
+    "overruns": "Polling ticks that were missed and skipped.",
+    "reconnects": "Times the link was opened again.",
+    "foreign_commands": "Times another client was seen commanding the gripper.",
+    "faults": "Times the gripper reported a minor or a major fault.",
+    "passing_faults": "Times fault 0x09 was shown for a moment and looked past.",
+}
+_GAUGES: Final = {
+    "period_p50": "Median time between two polls.",
+    "period_p99": "99th percentile of the time between two polls.",
+    "round_trip_p50": "Median time from a read to its reply.",
+    "round_trip_p99": "99th percentile of the time from a read to its reply.",
+    "longest_stall": "Longest time the event loop was blocked.",
+}
+
+
+class HandCollector(Collector):
+    """Collects the metrics of hands for a registry of your own."""
+
+    def __init__(self, hands: Iterable[Hand]) -> None:
+        """Create it in the event loop that the hands run in.
+
+        Args:
+            hands: the label ``hand`` of each is its name.
+
+        Raises:
+            ValueError: two of them have the same name.
+        """
+        self._hands = list(hands)
+        names = Counter(hand.name for hand in self._hands)
+        if twice := [name for name, count in names.items() if count > 1]:
+            raise ValueError(f"hands must have names that tell them apart, got {twice[0]!r} twice")
+        self._loop = asyncio.get_running_loop()
+
+    def describe(self) -> Iterable[Metric]:
+        """Nothing: a registry would collect at once otherwise, and block the event loop that it waits for."""
+        return []
+
+    def collect(self) -> Iterator[Metric]:
+        """Collect; called in a thread of the server, which has it done in the event loop."""
+        asking = asyncio.run_coroutine_threadsafe(self._figures(), self._loop)
+        figures = asking.result(TIMEOUT_S)
+        for name, meaning in _COUNTERS.items():
+            counter = CounterMetricFamily(f"robotiq_{name}", meaning, labels=["hand"])
+            for hand, (_, statistics) in figures.items():
+                counter.add_metric([hand], getattr(statistics, name))
+            yield counter
+        for name, meaning in _GAUGES.items():
+            gauge = GaugeMetricFamily(f"robotiq_{name}_seconds", meaning, labels=["hand"])
+            for hand, (_, statistics) in figures.items():
+                gauge.add_metric([hand], getattr(statistics, name))
+            yield gauge
+        moves = CounterMetricFamily("robotiq_moves", "Moves by outcome.", labels=["hand", "outcome"])
+        state = GaugeMetricFamily("robotiq_state", "1 for the present state.", labels=["hand", "state"])
+        for hand, (present, statistics) in figures.items():
+            for outcome, count in statistics.moves.items():
+                moves.add_metric([hand, outcome], count)
+            for each in State:
+                state.add_metric([hand, each.name], float(each is present))
+        yield moves
+        yield state
+
+    async def _figures(self) -> dict[str, tuple[State, Statistics]]:
+        return {hand.name: (hand.state, hand.statistics) for hand in self._hands}
+
+
+@contextlib.asynccontextmanager
+async def serve_metrics(
+    *hands: Hand, port: int = 9100, host: str = LOOPBACK
+) -> AsyncIterator[tuple[str, int]]:
+    """Serve the metrics of hands over HTTP while the block runs; yields host and port.
+
+    There is no password: on another interface than loopback, everybody there can read them.
+
+    Args:
+        hands: at least one.
+        port: 0 takes a free one.
+        host: the interface to listen on.
+
+    Raises:
+        ValueError: no hand, two of the same name, or a port outside 0..65535.
+        OSError: the port is taken.
+    """
+    if not hands:
+        raise ValueError("hands must name at least one hand, got none")
+    port = check_int("port", port, 0, 65535)
+    registry = CollectorRegistry()
+    registry.register(HandCollector(hands))
+    server, thread = start_http_server(port, addr=host, registry=registry)
+    try:
+        yield host, server.server_port
+    finally:
+        # It may be answering, and wait for this loop: close it in a thread.
+        await asyncio.to_thread(server.shutdown)
+        server.server_close()
+        thread.join()

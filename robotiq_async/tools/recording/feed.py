@@ -1,0 +1,210 @@
+"""Everything about a hand as messages on four topics, for recordings and for viewers.
+
+``/gripper/status`` (every poll), ``/gripper/command`` (every request that was written) and ``/gripper/event``
+(transitions and faults) are JSON with a JSON Schema; ``/joint_states`` is what ROS 2 encodes.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from ...protocol import Hand, HandStream
+from ...runtime.clock import now
+from ...runtime.log import Log
+from ...session.streams import SentRequest, Transition
+from ...values.enums import Fault
+from ...values.errors import RobotiqConnectionError
+from ...values.status import RobotiqStatus
+from ..description.joint_states import SCHEMA, SCHEMA_NAME, JointStateEncoder
+from ..description.kinematics import joint_angles, joint_velocities
+from .payloads import (
+    SCHEMAS,
+    Fields,
+    efforts,
+    fault_fields,
+    initial_state_fields,
+    transition_fields,
+)
+
+BUFFER: Final = 100_000
+"""Statuses kept while the event loop is busy with something else: minutes."""
+REOPEN_S: Final = 0.2
+"""Between two attempts to open the streams of a hand that has given up on its link."""
+VELOCITY_S: Final = 0.05
+"""Joint velocities are taken over this time: a count is half a degree."""
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """A topic and the type of its messages, as MCAP and Foxglove describe them.
+
+    Attributes:
+        name: the topic.
+        encoding: of its messages.
+        schema_name: the type of its messages.
+        schema_encoding: how the type is described.
+        schema: the description.
+    """
+
+    name: str
+    encoding: str
+    schema_name: str
+    schema_encoding: str
+    schema: bytes
+
+
+def json_topic(name: str, schema: object) -> Topic:
+    """A topic ``/gripper/NAME`` of JSON objects."""
+    return Topic(f"/gripper/{name}", "json", f"gripper.{name}", "jsonschema", json.dumps(schema).encode())
+
+
+def compact(fields: Fields) -> bytes:
+    """An object as JSON, in one line without spaces."""
+    return json.dumps(fields, separators=(",", ":")).encode()
+
+
+STATUS: Final = json_topic("status", SCHEMAS["status"])
+COMMAND: Final = json_topic("command", SCHEMAS["command"])
+EVENT: Final = json_topic("event", SCHEMAS["event"])
+JOINTS: Final = Topic("/joint_states", "cdr", SCHEMA_NAME, "ros2msg", SCHEMA.encode())
+TOPICS: Final = (STATUS, COMMAND, EVENT, JOINTS)
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One message.
+
+    Attributes:
+        topic: where it belongs.
+        nanoseconds: since 1970: when it happened.
+        data: encoded as the topic says.
+        sequence: the number of the status it was made from; commands, and events, are counted from 1.
+    """
+
+    topic: Topic
+    nanoseconds: int
+    data: bytes
+    sequence: int = 0
+
+
+class _Source:
+    """A stream of a hand that is opened again when it ends."""
+
+    def __init__(self, open_stream: Callable[[], HandStream[Any]], publish: Callable[[Any], None]) -> None:
+        self._open_stream = open_stream
+        self._publish = publish
+        self._stream: HandStream[Any]
+        self._missed_before = 0
+
+    @property
+    def missed(self) -> int:
+        return self._missed_before + self._stream.missed
+
+    def open(self) -> None:
+        self._stream = self._open_stream()
+
+    async def listen(self) -> None:
+        while True:
+            try:
+                async for item in self._stream:
+                    self._publish(item)
+            except RobotiqConnectionError:
+                await asyncio.sleep(REOPEN_S)  # until the hand is started again, its streams end at once
+            self._missed_before = self.missed
+            self.open()
+
+    def drain(self) -> None:
+        for item in self._stream.drain():
+            self._publish(item)
+
+
+class Feed:
+    """Publishes what happens to a hand as messages. It only listens, across stops and starts of the hand."""
+
+    def __init__(self, hand: Hand, publish: Callable[[Message], None]) -> None:
+        """Prepare; subscribes to nothing.
+
+        Args:
+            hand: started before or while the feed runs.
+            publish: is called with every message, in the event loop.
+        """
+        self._hand = hand
+        self._publish = publish
+        self._encoder = JointStateEncoder()
+        self._before: list[RobotiqStatus] = []
+        self._fault = Fault.NONE
+        self._epoch = 0.0
+        self._counts = {COMMAND: 0, EVENT: 0}
+        self._sources: tuple[_Source, ...] = (
+            _Source(lambda: hand.statuses(BUFFER), self._publish_status),
+            _Source(hand.requests, self._publish_request),
+            _Source(hand.transitions, self._publish_transition),
+        )
+        self._tasks: list[asyncio.Task[None]] = []
+
+    @property
+    def missed(self) -> int:
+        """Statuses that were dropped unpublished. A blocked event loop polls none: see ``overruns``."""
+        return self._sources[0].missed
+
+    def start(self) -> None:
+        """Listen from now on."""
+        loop = asyncio.get_running_loop()
+        # Statuses carry monotonic time; messages are stamped with wall-clock time.
+        began = now()
+        self._epoch = time.time() - began
+        self._publish_json(EVENT, began, initial_state_fields(self._hand.state, began))
+        for source in self._sources:
+            source.open()
+        self._tasks = [
+            loop.create_task(source.listen(), name="robotiq_async feed") for source in self._sources
+        ]
+
+    async def stop(self) -> None:
+        """Publish what has happened up to now, and stop listening."""
+        for task in self._tasks:
+            task.cancel()
+        for ended in await asyncio.gather(*self._tasks, return_exceptions=True):
+            if isinstance(ended, Exception):
+                Log(self._hand.name).critical(
+                    "a feed failed: what happens to the hand is no longer published", exc_info=ended
+                )
+        for source in self._sources:
+            source.drain()
+
+    def nanoseconds(self, timestamp: float) -> int:
+        """Nanoseconds since 1970, of a timestamp in monotonic seconds."""
+        return round((timestamp + self._epoch) * 1e9)
+
+    def _publish_json(self, topic: Topic, timestamp: float, fields: Fields) -> None:
+        self._counts[topic] += 1
+        self._publish(Message(topic, self.nanoseconds(timestamp), compact(fields), self._counts[topic]))
+
+    def _publish_status(self, status: RobotiqStatus) -> None:
+        stamp, data = self.nanoseconds(status.timestamp), compact(status.as_dict())
+        self._publish(Message(STATUS, stamp, data, status.sequence))
+        self._publish_joints(status)
+        if status.fault != self._fault:
+            self._fault = status.fault
+            self._publish_json(EVENT, status.timestamp, fault_fields(status))
+
+    def _publish_joints(self, status: RobotiqStatus) -> None:
+        while len(self._before) > 1 and status.timestamp - self._before[1].timestamp >= VELOCITY_S:
+            del self._before[0]
+        self._before.append(status)
+        angles, seconds = joint_angles(status), status.timestamp - self._before[0].timestamp
+        velocities = joint_velocities(self._before[0], status) if seconds else (0.0,) * len(angles)
+        stamp = self.nanoseconds(status.timestamp)
+        data = self._encoder.encode(stamp, angles, velocities, efforts(status))
+        self._publish(Message(JOINTS, stamp, data, status.sequence))
+
+    def _publish_request(self, sent: SentRequest) -> None:
+        self._publish_json(COMMAND, sent.timestamp, sent.as_dict())
+
+    def _publish_transition(self, transition: Transition) -> None:
+        self._publish_json(EVENT, transition.timestamp, transition_fields(transition))

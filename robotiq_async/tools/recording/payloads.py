@@ -1,0 +1,180 @@
+"""What happens to a hand as JSON objects, for files and for other programs, and their schemas.
+
+Statuses and requests are what their ``as_dict()`` gives, here and wherever else they are JSON.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from ...protocol import Hand
+from ...session.streams import Transition
+from ...values.enums import AXES, Fault, Finger, State
+from ...values.errors import NotStartedError
+from ...values.status import RobotiqStatus
+from ..description.kinematics import FINGER_NAMES
+
+Fields = dict[str, Any]
+
+_INTEGER: Final = {"type": "integer"}
+_NUMBER: Final = {"type": "number"}
+_STRING: Final = {"type": "string"}
+_BOOLEAN: Final = {"type": "boolean"}
+_REGISTERS: Final = {"type": "array", "items": _INTEGER}
+
+
+def _object(**properties: object) -> dict[str, object]:
+    return {"type": "object", "properties": properties}
+
+
+def _for_each_axis(**properties: object) -> dict[str, object]:
+    return {str(axis.name): _object(**properties) for axis in AXES}
+
+
+_FAULT: Final = {
+    "fault": _STRING,
+    "fault_code": _INTEGER,
+    "severity": _STRING,
+    "description": _STRING,
+}
+SCHEMAS: Final = {
+    "status": _object(
+        registers=_REGISTERS,
+        timestamp=_NUMBER,
+        sequence=_INTEGER,
+        fault=_STRING,
+        fault_code=_INTEGER,
+        is_activated=_BOOLEAN,
+        is_reset=_BOOLEAN,
+        is_moving=_BOOLEAN,
+        initialization=_STRING,
+        mode=_STRING,
+        activation_echo=_BOOLEAN,
+        go_echo=_BOOLEAN,
+        contacts={"type": "array", "items": _STRING},
+        **_for_each_axis(
+            position=_INTEGER, requested_position=_INTEGER, current_ma=_INTEGER, axis_state=_STRING
+        ),
+    ),
+    "command": _object(
+        timestamp=_NUMBER,
+        acknowledged=_BOOLEAN,
+        registers=_REGISTERS,
+        activate=_BOOLEAN,
+        go=_BOOLEAN,
+        release=_BOOLEAN,
+        mode=_STRING,
+        individual_fingers=_BOOLEAN,
+        individual_scissor=_BOOLEAN,
+        **_for_each_axis(position=_INTEGER, speed=_INTEGER, force=_INTEGER),
+    ),
+    "event": _object(
+        kind={"type": "string", "enum": ["state", "transition", "fault"]},
+        timestamp=_NUMBER,
+        source=_STRING,
+        target=_STRING,
+        trigger=_STRING,
+        **_FAULT,
+    ),
+    "state": _object(
+        name=_STRING,
+        address=_STRING,
+        state=_STRING,
+        age=_NUMBER,
+        **_FAULT,
+        polls=_INTEGER,
+        writes=_INTEGER,
+        overruns=_INTEGER,
+        period_p50=_NUMBER,
+        period_p99=_NUMBER,
+        round_trip_p50=_NUMBER,
+        round_trip_p99=_NUMBER,
+        longest_stall=_NUMBER,
+        reconnects=_INTEGER,
+        foreign_commands=_INTEGER,
+        tick=_STRING,
+        faults=_INTEGER,
+        moves={"type": "object", "additionalProperties": _INTEGER},
+        passing_faults=_INTEGER,
+    ),
+}
+"""A JSON Schema for each kind of object."""
+
+
+def title(hand: Hand) -> str:
+    """Which hand, for people: its name and its address, where the one is not the other.
+
+    A simulated one is called that.
+    """
+    words = hand.address if hand.name == hand.address else f"{hand.name} ({hand.address})"
+    return f"{words}, simulated" if hand.address.startswith("sim:") else words
+
+
+def initial_state_fields(state: State, now: float) -> Fields:
+    """The event that opens a feed: the state the hand is in."""
+    return {"kind": "state", "timestamp": now, "target": state.name}
+
+
+def transition_fields(transition: Transition) -> Fields:
+    """The event for a change of state."""
+    return {"kind": "transition", **transition.as_dict()}
+
+
+def fault_fields(status: RobotiqStatus) -> Fields:
+    """The event for a fault that has appeared, or cleared (NONE); the status is the first that shows it."""
+    return {"kind": "fault", "timestamp": status.timestamp, **_in_words(status.fault)}
+
+
+def _in_words(fault: Fault) -> Fields:
+    return {
+        "fault": fault.name,
+        "fault_code": int(fault),
+        "severity": fault.severity.name,
+        "description": fault.description,
+    }
+
+
+def reading_fields(hand: Hand) -> Fields:
+    """A hand and its newest status.
+
+    Raises:
+        NotStartedError: there is no status yet.
+    """
+    status = hand.status
+    return {
+        "name": hand.name,
+        "address": hand.address,
+        "state": hand.state.name,
+        **status.as_dict(),
+        **_in_words(status.fault),
+    }
+
+
+def state_fields(hand: Hand, now: float) -> Fields:
+    """State and statistics of a hand; the fault and the age of the last status only while they are known.
+
+    Args:
+        hand: the hand.
+        now: monotonic seconds.
+    """
+    fields: Fields = {
+        "name": hand.name,
+        "address": hand.address,
+        "state": hand.state.name,
+        **hand.statistics.as_dict(),
+    }
+    try:
+        status = hand.status
+    except NotStartedError:
+        return fields
+    fields["age"] = round(now - status.timestamp, 6)
+    if hand.state not in (State.DISCONNECTED, State.SHUTDOWN):
+        fields |= _in_words(status.fault)
+    return fields
+
+
+def efforts(status: RobotiqStatus) -> list[float]:
+    """Motor currents in ampere, each at the joint its motor drives first; torques are not known."""
+    scissor = status.current_ma(Finger.SCISSOR) / 1000
+    one, two, middle = (status.current_ma(finger) / 1000 for finger in FINGER_NAMES)
+    return [scissor, one, 0.0, 0.0, scissor, two, 0.0, 0.0, middle, 0.0, 0.0]

@@ -1,0 +1,233 @@
+"""Records everything about a hand in an MCAP file (extra ``record``), or its polls in a table, ``.csv``.
+
+    hand = RobotiqHand(address)
+    async with Recorder(hand, "grasp.mcap"), hand:
+        ...
+
+In this order the start and the stop are in it too, and nothing that concerns the file delays the stop.
+
+Four channels: ``/gripper/status`` (every poll), ``/gripper/command`` (every request that was written) and
+``/gripper/event`` (transitions and faults) as JSON with a JSON Schema; ``/joint_states`` as ROS 2 encodes it.
+Tools of ROS 2 refuse a file with channels that are not ROS's: ``ros2=True`` leaves them out. A table has a
+row for every poll (:mod:`.files.table`), and no commands.
+What is recorded reaches the disk twice a second, from a thread: a program that is killed loses no more than
+that, and ``robotiq-async recover`` makes its file whole.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import errno
+import os
+from io import FileIO
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Protocol, Self
+
+from ...protocol import Hand
+from ...runtime.concurrency import in_a_thread, wait_shielded
+from ...values.errors import RecordingError
+from .csv_file import CsvFile
+from .feed import JOINTS, Feed, Message
+from .raw_output import write_all
+
+_missing = ""
+try:  # Here and not in a constructor: it takes a tenth of a second, in which a hand could not poll.
+    from .mcap_file import McapFile
+except ImportError as error:
+    _missing = str(error)
+
+FLUSH_S: Final = 0.5
+"""Seconds between two writes to the disk."""
+DISK_S: Final = 10.0
+"""How long the last write may take."""
+
+
+class _Outbox:
+    """What the file is made in: keeps the bytes until a thread writes them to the disk."""
+
+    def __init__(self) -> None:
+        self._waiting: list[bytes] = []
+        self._count = 0
+
+    def write(self, data: bytes) -> int:
+        self._waiting.append(bytes(data))
+        self._count += len(data)
+        return len(data)
+
+    def tell(self) -> int:
+        return self._count
+
+    def flush(self) -> None:
+        """Nothing: the disk is a thread's business."""
+
+    def take(self) -> bytes:
+        data, self._waiting = b"".join(self._waiting), []
+        return data
+
+
+class _Format(Protocol):
+    """Makes the bytes of a file, in memory."""
+
+    def take(self, message: Message) -> None: ...
+
+    def flush(self) -> None: ...
+
+    def finish(self) -> None: ...
+
+
+def is_table(path: Path | str) -> bool:
+    """Whether a recording of this name is a table, and no MCAP file."""
+    return Path(path).suffix.lower() == ".csv"
+
+
+class Recorder:
+    """Records a hand while a block runs. It only listens: the gripper is not touched, whatever fails.
+
+    Attributes:
+        path: the file.
+        recorded: polls in it so far; the last half second of them may not have reached the disk.
+        saved: polls that have; 0 once the file has been deleted. Of a write that was cut off none count.
+    """
+
+    def __init__(self, hand: Hand, path: Path | str, *, ros2: bool = False) -> None:
+        """Prepare; opens nothing.
+
+        Args:
+            hand: started before or while it is recorded.
+            path: a file that is not there yet; with the suffix ``.csv`` it is a table, else MCAP.
+            ros2: write the joint states alone, in the profile ``ros2``: a file that tools of ROS 2 open.
+
+        Raises:
+            ImportError: MCAP without the extra ``record``.
+            ValueError: a table of ROS 2's.
+        """
+        if ros2 and is_table(path):
+            raise ValueError(f"ros2 is for MCAP files, and {path} is a table")
+        self.path = Path(path)
+        self.recorded = 0
+        self.saved = 0
+        self._hand = hand
+        self._feed = Feed(hand, self._take)
+        self._outbox = _Outbox()
+        self._format = self._make_format(ros2=ros2)
+        self._file: FileIO
+        self._saving: asyncio.Task[None]
+        self._over: asyncio.Event
+        self._failed: asyncio.Future[RecordingError]
+
+    @property
+    def missed(self) -> int:
+        """Statuses that were dropped unrecorded; a blocked event loop polls none: see ``overruns``."""
+        return self._feed.missed
+
+    @property
+    def size(self) -> int:
+        """Approximate size of the file in bytes."""
+        return self._outbox.tell()
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether something could not be written: nothing is recorded any more."""
+        return self._failed.done()
+
+    async def __aenter__(self) -> Self:
+        """Create the file and start recording.
+
+        Raises:
+            RecordingError: the file is there already, or cannot be made.
+        """
+        loop = asyncio.get_running_loop()
+        self._failed = loop.create_future()
+        self._over = asyncio.Event()
+        opening = in_a_thread(lambda: FileIO(self.path, "x"))
+        try:
+            await wait_shielded(opening)
+        except asyncio.CancelledError:
+            if opening.exception() is None:
+                opening.result().close()
+                self.path.unlink(missing_ok=True)
+            raise
+        try:
+            self._file = opening.result()
+        except OSError as error:
+            raise RecordingError(f"{self.path}: {error.strerror}") from error
+        self._feed.start()
+        self._saving = loop.create_task(self._save_again_and_again(), name="robotiq_async recorder")
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Write what is left and close the file, also when cancelled meanwhile.
+
+        Raises:
+            RecordingError: something could not be written; never in place of another exception.
+        """
+        await wait_shielded(asyncio.ensure_future(self._end()))
+        if self._failed.done() and error is None:
+            raise self._failed.result()
+
+    async def failure(self) -> RecordingError:
+        """Wait until the recording fails (a full disk, say); what was saved before stays readable."""
+        return await asyncio.shield(self._failed)
+
+    def _make_format(self, *, ros2: bool) -> _Format:
+        if is_table(self.path):
+            return CsvFile(self._outbox.write)
+        if _missing:
+            raise ImportError(_missing)
+        return McapFile(self._hand, self._outbox, ros2=ros2)
+
+    def _take(self, message: Message) -> None:
+        if self._failed.done():
+            return
+        self._format.take(message)
+        self.recorded += message.topic is JOINTS  # the last that is told of a poll
+
+    # -- the disk --------------------------------------------------------------------------------------
+
+    async def _save_again_and_again(self) -> None:
+        while not (self._over.is_set() or self._failed.done()):
+            self._format.flush()
+            await self._save()
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(FLUSH_S):
+                    await self._over.wait()
+
+    async def _end(self) -> None:
+        await self._feed.stop()
+        self._over.set()
+        try:
+            async with asyncio.timeout(DISK_S):
+                await self._saving
+                if not self._failed.done():
+                    self._format.finish()
+                    await self._save()
+                await in_a_thread(self._file.close)
+        except TimeoutError:
+            self._fail(f"the disk does not answer within {DISK_S:g} s")
+        except OSError as error:
+            self._fail(error.strerror)
+
+    async def _save(self) -> None:
+        """Write what waits to the disk; a failure ends the recording."""
+        data, polls = self._outbox.take(), self.recorded
+        try:
+            await in_a_thread(lambda: self._write(data))
+            self.saved = polls
+        except OSError as error:
+            if isinstance(error, FileNotFoundError):
+                self.saved = 0
+            self._fail(error.strerror)
+
+    def _fail(self, why: str | None) -> None:
+        if not self._failed.done():
+            self._failed.set_result(RecordingError(f"{self.path}: {why}"))
+
+    def _write(self, data: bytes) -> None:
+        write_all(self._file.fileno(), data)
+        os.fsync(self._file.fileno())
+        if os.fstat(self._file.fileno()).st_nlink == 0:
+            raise FileNotFoundError(errno.ENOENT, "the file has been deleted")

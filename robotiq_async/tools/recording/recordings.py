@@ -1,0 +1,266 @@
+"""Reads recordings back: whole ones, and what a killed recorder has left. Needs the extra ``record``.
+
+A file may come from anywhere: no length that it tells is believed, and chunks are unpacked up to a limit.
+"""
+
+from __future__ import annotations
+
+import json
+import reprlib
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from itertools import chain
+from pathlib import Path
+from typing import IO, Any, Final, TypeVar
+
+try:
+    import zstandard
+    from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
+    from mcap.records import Channel, Chunk, Footer, Header, McapRecord, Message, Metadata, Schema
+    from mcap.stream_reader import StreamReader, breakup_chunk
+    from mcap.writer import Writer
+except ModuleNotFoundError as error:
+    from ...runtime.extras import install
+
+    raise ImportError(f"recordings need mcap: {install('record')}") from error
+
+from ...runtime.log import log
+from ...values.errors import RecordingError
+
+LARGEST: Final = 16 * 2**20
+"""Bytes of a record, and of an unpacked chunk; the writers of MCAP make chunks of a sixteenth of it."""
+NOT_OURS: Final = (LookupError, TypeError, ValueError, AttributeError, OverflowError)
+"""What comes of reading a message that has other fields, or fields of another type."""
+BROKEN: Final = (
+    "%s breaks off after %d messages: its program was killed, or still writes it, or it is damaged there; "
+    "robotiq-async recover makes a whole file of what is before"
+)
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One message of a recording.
+
+    Attributes:
+        topic: the channel's name.
+        nanoseconds: since 1970.
+        sequence: the number of the status; of commands, and of events, counted from 1.
+        data: the bytes.
+        is_json: whether they are said to be JSON.
+        path: the file.
+    """
+
+    topic: str
+    nanoseconds: int
+    sequence: int
+    data: bytes
+    is_json: bool
+    path: str = field(default="", compare=False)
+
+    @property
+    def fields(self) -> dict[str, Any]:
+        """What a JSON message says.
+
+        Raises:
+            RecordingError: it is no JSON object.
+        """
+        try:
+            fields = json.loads(self.data)
+        except (ValueError, RecursionError) as error:
+            raise self._refused(f"is no JSON: {error}") from None
+        if not isinstance(fields, dict):
+            raise self._refused("is no JSON object")
+        return fields
+
+    def read(self, what: Callable[[dict[str, Any]], T]) -> T:
+        """What a function makes of the fields.
+
+        Raises:
+            RecordingError: they are not as a recorder writes them.
+        """
+        fields = self.fields
+        try:
+            return what(fields)
+        except KeyError as error:
+            why = f"is not one of ours, or of another version of robotiq_async: it has no {error!s:.80}"
+            raise self._refused(why) from error
+        except NOT_OURS as error:
+            raise self._refused("is not one of ours") from error
+
+    def _refused(self, why: str) -> RecordingError:
+        return RecordingError(f"{self.path}: a message on {reprlib.repr(self.topic)} {why}")
+
+
+@dataclass
+class Recovered:
+    """What :func:`recover` has found.
+
+    Attributes:
+        messages: number of messages saved.
+        is_whole: whether the file was whole to begin with.
+    """
+
+    messages: int = 0
+    is_whole: bool = False
+
+
+def read_recording(path: Path | str) -> Iterator[Entry]:
+    """The messages of a recording in their order; of a broken one, those that are there, and a warning.
+
+    Raises:
+        RecordingError: it cannot be read, is no MCAP file, or is one that no recorder writes: a chunk that
+            would fill the memory, a message without a channel.
+    """
+    channels: _Known[Channel] = _Known(path, "channel")
+    count, is_whole = 0, False
+    for record in _records(path):
+        if isinstance(record, Channel):
+            channels[record.id] = record
+        elif isinstance(record, Message):
+            channel, count = channels[record.channel_id], count + 1
+            is_json = channel.message_encoding == "json"
+            yield Entry(channel.topic, record.log_time, record.sequence, record.data, is_json, str(path))
+        elif isinstance(record, Footer):
+            is_whole = True
+    if not is_whole:
+        log.warning(BROKEN, path, count)
+
+
+def recover(path: Path | str, target: Path | str) -> Recovered:
+    """Write what is in a broken recording into a whole one.
+
+    Raises:
+        RecordingError: as :func:`read_recording`, what came before is in the target then; or the target is
+            there already.
+    """
+    found = Recovered()
+    records = _records(path)
+    header = next(records)  # refuses what is no recording before there is a target
+    assert isinstance(header, Header)
+    refused: RecordingError | None = None
+    try:
+        with open(target, "xb") as file:
+            writer = Writer(file)
+            writer.start(header.profile, header.library)
+            try:
+                _copy(records, writer, found, path)
+            except RecordingError as error:
+                refused = error
+            writer.finish()  # type: ignore[no-untyped-call]
+    except FileExistsError as error:
+        raise RecordingError(f"{target}: {error.strerror}") from error
+    except OSError as error:
+        Path(target).unlink(missing_ok=True)  # half of it looks like the whole
+        raise RecordingError(f"{target}: {error.strerror}") from error
+    if refused is not None:
+        raise RecordingError(f"{refused}; what stands before it is in {target}") from refused
+    return found
+
+
+def _copy(records: Iterator[McapRecord], writer: Writer, found: Recovered, path: Path | str) -> None:
+    schemas: _Known[int] = _Known(path, "schema")
+    schemas[0] = 0
+    channels: _Known[int] = _Known(path, "channel")
+    for record in records:
+        if isinstance(record, Schema) and record.id not in schemas:
+            schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
+        elif isinstance(record, Channel) and record.id not in channels:
+            schema = schemas[record.schema_id]
+            channels[record.id] = writer.register_channel(
+                record.topic, record.message_encoding, schema, record.metadata
+            )
+        elif isinstance(record, Message):
+            channel = channels[record.channel_id]
+            writer.add_message(channel, record.log_time, record.data, record.publish_time, record.sequence)
+            found.messages += 1
+        elif isinstance(record, Metadata):
+            writer.add_metadata(record.name, record.metadata)
+        elif isinstance(record, Footer):
+            found.is_whole = True
+
+
+class _Known(dict[int, T]):
+    """What a recording has told of; that it refers to something else is an error."""
+
+    def __init__(self, path: Path | str, kind: str) -> None:
+        super().__init__()
+        self._path = path
+        self._kind = kind
+
+    def __missing__(self, number: int) -> T:
+        raise RecordingError(f"{self._path}: there is no {self._kind} {number}, to which it refers")
+
+
+# -- records -----------------------------------------------------------------------------------------------
+
+
+def _records(path: Path | str) -> Iterator[McapRecord]:
+    """The records of a file, from its header up to its end, or to where it breaks off."""
+    try:
+        with open(path, "rb") as file:
+            reader = StreamReader(
+                _Bounded(file),  # type: ignore[arg-type]
+                emit_chunks=True,
+                validate_crcs=True,
+                record_size_limit=LARGEST,
+            )
+            records = iter(reader.records)
+            header = None
+            with suppress(Exception):  # any bytes, which may raise anything
+                header = next(records)
+            if not isinstance(header, Header):
+                raise RecordingError(f"{path}: not an MCAP file")
+            try:
+                for record in chain([header], records):
+                    yield from _unpacked(path, record)
+            except RecordingError:
+                raise
+            except Exception:  # noqa: BLE001  # damaged bytes may raise anything
+                return  # a killed recorder leaves a file that ends anywhere
+    except OSError as error:
+        raise RecordingError(f"{path}: {error.strerror}") from error
+
+
+class _Bounded:
+    """A file that gives no more at a time than a record may have, whatever is asked for."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+
+    def read(self, size: int) -> bytes:
+        if size > LARGEST:
+            raise ValueError(f"{size} bytes are no record")
+        return self._file.read(size)
+
+
+def _unpacked(path: Path | str, record: McapRecord) -> list[McapRecord]:
+    """The records of a chunk; any other record is alone.
+
+    Raises:
+        RecordingError: the chunk is larger than one may be, or than it says, or compressed in an unknown way.
+        Exception: it is damaged.
+    """
+    if not isinstance(record, Chunk):
+        return [record]
+    size = record.uncompressed_size
+    if size > LARGEST:
+        raise RecordingError(f"{path}: a chunk of {size} bytes, more than {LARGEST}: not one of ours")
+    match record.compression:
+        case "":
+            data = record.data
+        case "zstd":
+            # What the frame says of its size and of the memory it needs is as little to be believed.
+            unpacking = zstandard.ZstdDecompressor(max_window_size=LARGEST)
+            data = unpacking.stream_reader(record.data).read(size + 1)
+        case "lz4":
+            data = LZ4FrameDecompressor().decompress(record.data, max_length=size + 1)
+        case other:
+            raise RecordingError(f"{path}: a chunk is compressed as {reprlib.repr(other)}: unknown here")
+    if len(data) > size:
+        raise RecordingError(f"{path}: a chunk has more than the {size} bytes that it says: not one of ours")
+    if len(data) < size:
+        raise ValueError(f"{len(data)} bytes of {size}")
+    return breakup_chunk(replace(record, compression="", data=data), validate_crc=True)

@@ -1,0 +1,87 @@
+"""What happens to a hand as rows of a table, for spreadsheets and pandas.
+
+A column has the name of the JSON key, that of an axis before it: ``A.position``. ``time`` is the wall clock,
+in UTC and ISO 8601; ``timestamp`` is in seconds of the program's monotonic clock.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from typing import Any, Final
+
+from .payloads import SCHEMAS, Fields
+
+_SECOND: Final = 10**9
+_FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
+"""A spreadsheet takes a text that begins so for a formula."""
+STATE: Final = "state"
+"""The column of a status that is not in its JSON: the state of the hand as of the last event."""
+
+
+def _names(schema: Mapping[str, Any], prefix: str = "") -> list[str]:
+    names: list[str] = []
+    for name, part in schema["properties"].items():
+        is_axis = part.get("type") == "object"
+        names += _names(part, f"{prefix}{name}.") if is_axis else [f"{prefix}{name}"]
+    return names
+
+
+COLUMNS: Final = {
+    "status": ["time", STATE, *_names(SCHEMAS["status"])],
+    "command": ["time", *_names(SCHEMAS["command"])],
+    "event": ["time", *_names(SCHEMAS["event"])],
+}
+"""The columns of the three tables."""
+
+
+class Table:
+    """The rows of one table, made of messages in the order in which they happened."""
+
+    def __init__(self, kind: str) -> None:
+        """Make rows of "status", "command" or "event"."""
+        self._kind = kind
+        self._names = COLUMNS[kind]
+        self._state = ""
+
+    def row(self, kind: str, nanoseconds: int, fields: Fields) -> list[object] | None:
+        """The row that a message makes; None if it makes none.
+
+        Args:
+            kind: of the message.
+            nanoseconds: since 1970, when it happened.
+            fields: its JSON.
+
+        Raises:
+            LookupError, TypeError: it is not as a recorder writes it.
+        """
+        if kind == "event" and "target" in fields:
+            self._state = fields["target"]
+        if kind != self._kind:
+            return None
+        given = {"time": wall_clock(nanoseconds), STATE: self._state}
+        return [_cell(given[name] if name in given else _value(fields, name, kind)) for name in self._names]
+
+
+def wall_clock(nanoseconds: int) -> str:
+    """The time in UTC, ISO 8601 to the microsecond, of nanoseconds since 1970."""
+    seconds, rest = divmod(nanoseconds, _SECOND)
+    return f"{datetime.fromtimestamp(seconds, UTC):%Y-%m-%dT%H:%M:%S}.{rest // 1000:06d}Z"
+
+
+def _value(fields: Fields, name: str, kind: str) -> Any:  # noqa: ANN401  # as JSON has it
+    """What a column shows; an event has only what is of its kind."""
+    axis, _, key = name.rpartition(".")
+    if kind == "event":
+        return fields.get(name)
+    return fields[axis][key] if axis else fields[name]
+
+
+def _cell(value: object) -> object:
+    """A value in a cell: lists with blanks between, nothing for null, a text never as a formula."""
+    if isinstance(value, list):
+        return " ".join(map(str, value))
+    if isinstance(value, dict):
+        return json.dumps(value)
+    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value

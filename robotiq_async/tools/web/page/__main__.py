@@ -1,0 +1,53 @@
+"""The process of the page: its settings come as the first line, then what is newest, until the end."""
+
+from __future__ import annotations
+
+import os
+import signal
+import ssl
+import sys
+from contextlib import suppress
+from tempfile import mkdtemp
+
+from ...viewer.gate import listen
+from ..settings import PageSettings
+from .pipes import Pipes
+
+
+def main() -> int:
+    """Serve until standard input ends; returns the exit code."""
+    # A Ctrl-C in a terminal is for the process that has the hands: it ends this one when it has stopped them.
+    for name in ("SIGINT", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    if hasattr(os, "nice"):
+        os.nice(5)  # the hand comes first
+    # NiceGUI remembers visitors in files, if it is asked to; it is not, but it looks for them at once.
+    os.environ["NICEGUI_STORAGE_PATH"] = mkdtemp(prefix="robotiq_async-")
+    pipes = Pipes()
+    line = pipes.first_line()
+    if not line:
+        return 1
+    settings = PageSettings.read(line)
+    try:
+        listening = listen(settings.host, settings.port)
+    except OSError as error:
+        pipes.say({"failed": f"{settings.host}:{settings.port}: {error.strerror or error}"})
+        return 1
+    try:
+        if settings.certificate:
+            ssl.create_default_context().load_cert_chain(settings.certificate, settings.key)
+        from .serve import run  # noqa: PLC0415  # a second, which what is refused need not wait for
+
+        run(settings, listening, pipes)
+    except OSError as error:  # a certificate that cannot be read
+        pipes.say({"failed": f"{settings.certificate or settings.host}: {error.strerror or error}"})
+        return 1
+    finally:
+        with suppress(OSError):
+            os.rmdir(os.environ["NICEGUI_STORAGE_PATH"])
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

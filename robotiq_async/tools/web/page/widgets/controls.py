@@ -1,0 +1,119 @@
+"""What a person makes the hand do: buttons, sliders, questions, and the halt."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import monotonic
+from typing import Any, Final
+
+from nicegui import events, ui
+
+from .....values.enums import FORCE_MAX, SPEED_MAX
+from ....actions import ACTIONS, Action
+from ..heartbeat import PRESS, PRESS_WITH_VALUE, Heartbeat
+from ..mirror import HandMirror, Mirror
+from .positions import Positions
+from .slider import Slider
+
+ARMED_S: Final = 0.3
+"""A question takes no yes before: nobody has read it."""
+DIRECT: Final = ("open", "close", "wide", "normal", "pinch")
+ASKED: Final = tuple(name for name, action in ACTIONS.items() if action.warning)
+
+
+class Controls:
+    """The part of the page that commands; only there when the page may."""
+
+    def __init__(
+        self, mirror: Mirror, hand: HandMirror, page: str, heartbeat: Heartbeat, told: Callable[[str], None]
+    ) -> None:
+        """Build it where the page is being built.
+
+        Args:
+            mirror: the way to the hand.
+            hand: which one.
+            page: who asks.
+            heartbeat: between it and its browser.
+            told: is called with how each command ended.
+        """
+        self._mirror, self._hand, self._page = mirror, hand, page
+        self._heartbeat, self._told = heartbeat, told
+        self._dialogs: list[ui.dialog] = []
+        with ui.row().classes("w-full gap-2"):
+            for name in DIRECT:
+                self._button(ACTIONS[name])
+        self._positions = Positions(hand, self._pressed)
+        with ui.grid(columns="auto 1fr auto").classes("w-full items-center gap-x-3 gap-y-0"):
+            self._slider("speed", SPEED_MAX, mirror.speed)
+            self._slider("force", FORCE_MAX, mirror.force)
+        with ui.row().classes("w-full gap-2"):
+            for name in ASKED:
+                self._question(ACTIONS[name])
+        self._outcome = ui.label("").classes("text-sm").props("data-testid=outcome")
+
+    def show(self) -> None:
+        """Take in what is newest."""
+        self._positions.show()
+
+    def halt(self) -> None:
+        """Stop every axis; it is never too old and never asked about. Closes what is open."""
+        for dialog in self._dialogs:
+            dialog.close()
+        self._ask("halt", {}, at=monotonic())
+
+    def _button(self, action: Action) -> None:
+        button = ui.button(action.name).props(f"data-testid={action.name} no-caps").classes("grow")
+        button.tooltip(action.what)
+        button.on("click", lambda e: self._pressed(action.name, {}, e.args), js_handler=PRESS)
+
+    def _question(self, action: Action) -> None:
+        asked_at = 0.0
+
+        def ask() -> None:
+            nonlocal asked_at
+            asked_at = monotonic()
+            dialog.open()
+
+        def yes(event: events.GenericEventArguments) -> None:
+            if monotonic() - asked_at >= ARMED_S:
+                dialog.close()
+                self._pressed(action.name, {"confirm": True}, event.args)
+
+        with ui.dialog() as dialog, ui.card():
+            ui.label(f"{action.name.capitalize()}: {action.what}").classes("text-lg")
+            ui.label(action.warning).classes("rq-red")
+            with ui.row().classes("w-full justify-end"):
+                ui.button("no", on_click=dialog.close).props("flat no-caps")
+                sure = ui.button(f"yes, {action.name}", color="negative").props("no-caps")
+                sure.props(f"data-testid=yes-{action.name}").on("click", yes, js_handler=PRESS)
+        self._dialogs.append(dialog)
+        ui.button(f"{action.name}...", on_click=ask).props(f"outline no-caps data-testid={action.name}")
+
+    def _slider(self, what: str, highest: int, value: int) -> None:
+        def change(event: events.GenericEventArguments) -> None:
+            sent_back, value = event.args
+            self._pressed(f"set_{what}", {"value": value}, sent_back)
+
+        ui.label(what)
+        slider = Slider(min=0, max=highest, value=value).props(f"data-testid={what}")
+        # Sent when it is let go, and not for every value on the way.
+        slider.on("change", change, js_handler=PRESS_WITH_VALUE)
+        ui.label().bind_text_from(slider, "value", lambda each: f"{each:.0f}").classes("w-8 text-right")
+
+    def _pressed(self, name: str, arguments: dict[str, Any], sent_back: object) -> None:
+        self._ask(name, arguments, at=self._heartbeat.heard(sent_back))
+
+    def _ask(self, name: str, arguments: dict[str, Any], *, at: float) -> None:
+        self._outcome.set_text(f"{name} ...")
+
+        def answered(ok: bool, words: str) -> None:
+            self._show(name, ok, words)
+
+        self._mirror.ask(self._page, self._hand.index, name, arguments, answered, at=at)
+
+    def _show(self, name: str, ok: bool, words: str) -> None:
+        if self._outcome.is_deleted:
+            return
+        self._outcome.set_text(f"{name}: {words}")
+        self._outcome.classes(add="" if ok else "rq-red", remove="rq-red" if ok else "")
+        self._told(f"{name}: {words}")

@@ -1,0 +1,189 @@
+"""What the fingers hold, and how they stand around it. Pure.
+
+It is an idea of a grasp, for positions are all that is known.
+
+Fingertips that meet something before they meet each other are drawn as their positions say, with something
+between them. Beyond that no fingertip can hold anything: a real finger has bent around it, its base stopped
+earlier than the position alone would have it. How the counts are shared between base and middle joint
+depends on what is held. Here that is a round bar: it lies the deeper the further the fingers closed, and is
+thinner where they closed further than around one that lies on the palm.
+"""
+
+from __future__ import annotations
+
+import cmath
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from math import asin, degrees, dist, radians
+from typing import Final
+
+from .....values.enums import AXES, Finger, ObjectStatus
+from .....values.status import RobotiqStatus
+from ....description import HandModel, Pose
+from ....description.geometry import Vector
+from ....description.kinematics import BASE, FINGER_NAMES, JOINTS, MIDDLE, TIP, joint_angles
+
+ALONE_M: Final = 0.02
+"""How far something reaches from a finger that no other helps to hold it."""
+THIN_M: Final = 0.004
+"""Half of what fingertips hold at least: with less between them the fingers have bent around something."""
+HALF_TIP_M: Final = 0.011
+"""From the middle of a fingertip to its side."""
+THICK_M: Final = 0.033
+"""Half as thick as the bar is: thicker ones do not lie between the bases of the fingers on the palm."""
+LEAST_M: Final = 0.025
+"""Half as thick as it is at the end: thinner ones the middle joints cannot reach around."""
+
+# A finger in its own plane, from the URDF: complex numbers, real out of the palm from where the finger stands
+# on it, imaginary to the other side of the hand. A test draws the result with the URDF itself.
+_FOOT_M: Final = 0.0214
+"""Height of that point in the frame of the palm."""
+_BASE_JOINT: Final = 0.020 + 0j
+_BASE_LINK: Final = 0.050 - 0.028j
+_MIDDLE_M: Final = 0.039
+_BENT: Final = radians(30)
+"""Between base and middle link, and back at the tip, when all angles are 0."""
+_HALF_BASE_M: Final = 0.0095
+_HALF_MIDDLE_M: Final = 0.0085
+_PAD_M: Final = 0.010
+"""From the axis of the last joint to the face of the pad."""
+_INWARDS_M: Final = 0.0455
+"""From there to the middle of the hand."""
+_PALM_M: Final = -0.0054
+"""Height of the palm's face."""
+_HIGHEST_M: Final = 0.075
+"""Height of a bar at the knees, around which the fingers are hardly bent."""
+
+
+@dataclass(frozen=True, slots=True)
+class Thing:
+    """Something between the fingers, in the frame of the palm.
+
+    Attributes:
+        middle: of it, in metres.
+        radius: in metres.
+        length: of a bar along z, in metres; 0 for a ball.
+    """
+
+    middle: Vector
+    radius: float
+    length: float = 0.0
+
+
+def grasp(model: HandModel, status: RobotiqStatus) -> tuple[dict[str, float], Thing | None]:
+    """How the fingers stand, in radians by the names of joints, and what they hold; None for nothing."""
+    free = dict(zip(JOINTS, joint_angles(status), strict=True))
+    closing = _met_something_closing(status)
+    fingers = [finger for finger in FINGER_NAMES if finger & closing]
+    faces = pads(model, model.link_poses(free))
+    opposite = [finger for finger in fingers if finger is not Finger.A]
+    if Finger.A not in fingers or not opposite:
+        return free, _held_from_one_side(faces, fingers, closing)
+    one, other = faces[Finger.A].position, _middle([faces[finger].position for finger in opposite])
+    length = _length([faces[finger] for finger in fingers])
+    if one[0] - other[0] >= 2 * THIN_M:
+        x, y, _ = _middle([one, other])
+        return free, Thing((x, y, length[0]), dist(one[:2], other[:2]) / 2, length[1])
+    counts = (status.position(Finger.A) + sum(map(status.position, opposite)) / len(opposite)) / 2
+    height, radius, bent = _around_a_bar(round(counts))
+    for finger in fingers:
+        names = (f"{FINGER_NAMES[finger]}_joint_{number}" for number in (1, 2, 3))
+        free |= zip(names, bent, strict=True)
+    return free, Thing((0.0, _FOOT_M + height, length[0]), radius, length[1])
+
+
+def pads(model: HandModel, poses: Mapping[str, Pose]) -> dict[Finger, Pose]:
+    """The face of each fingertip; y looks to the other side of the hand."""
+    faces = {}
+    for finger, name in FINGER_NAMES.items():
+        link = f"{name}_link_3"
+        pad = model.pad(link)
+        face = poses[link] @ pad.origin
+        faces[finger] = Pose(face.apply((0.0, pad.size[1] / 2, 0.0)), face.rotation)
+    return faces
+
+
+def _met_something_closing(status: RobotiqStatus) -> Finger:
+    axes = Finger(0)
+    for axis in AXES:
+        if status.finger_status(axis) is ObjectStatus.CONTACT_CLOSING:
+            axes |= axis & status.contacts
+    return axes
+
+
+def _held_from_one_side(faces: Mapping[Finger, Pose], fingers: list[Finger], closing: Finger) -> Thing | None:
+    if fingers:
+        reach = _middle([faces[finger].apply((0.0, ALONE_M, 0.0)) for finger in fingers])
+        return Thing(
+            reach, ALONE_M, _length([faces[finger] for finger in fingers])[1] if fingers[1:] else 0.0
+        )
+    if closing & Finger.SCISSOR:
+        one, other = faces[Finger.B].position, faces[Finger.C].position
+        return Thing(_middle([one, other]), max(dist(one, other) / 2 - HALF_TIP_M, THIN_M))
+    return None
+
+
+def _length(faces: list[Pose]) -> tuple[float, float]:
+    """Middle and length along z of a bar that reaches beyond the fingertips."""
+    places = [face.position[2] for face in faces]
+    return (min(places) + max(places)) / 2, max(places) - min(places) + 4 * HALF_TIP_M
+
+
+@lru_cache(maxsize=256)
+def _around_a_bar(counts: int) -> tuple[float, float, tuple[float, float, float]]:
+    """Of a finger that has closed so far: height of the bar above its foot, the bar's radius, its joints."""
+    low, high = 0.0, 2.0
+    for _ in range(20):
+        share = (low + high) / 2
+        if _counts(_bent_around(*_bar(share))) < counts:
+            low = share
+        else:
+            high = share
+    height, radius = _bar(low)
+    return height, radius, _bent_around(height, radius)
+
+
+def _bar(share: float) -> tuple[float, float]:
+    """Height and radius: from the highest (0) down to the palm (1), and there to the thinnest (2)."""
+    low = _PALM_M + THICK_M
+    if share < 1:
+        return _HIGHEST_M + (low - _HIGHEST_M) * share, THICK_M
+    radius = THICK_M + (LEAST_M - THICK_M) * (share - 1)
+    return _PALM_M + radius, radius
+
+
+def _bent_around(height: float, radius: float) -> tuple[float, float, float]:
+    """The joints of a finger each of whose links lies on the bar, as far as its joint turns."""
+    bar = complex(height, _INWARDS_M)
+    base = _within(_towards(bar - _BASE_JOINT, radius + _HALF_BASE_M) - cmath.phase(_BASE_LINK), BASE)
+    knee = _BASE_JOINT + _BASE_LINK * cmath.exp(1j * base)
+    heading = base - _BENT
+    middle = _within(_towards(bar - knee, radius + _HALF_MIDDLE_M) - heading, MIDDLE)
+    last = knee + cmath.rect(_MIDDLE_M, heading + middle)
+    tip = _within(_towards(bar - last, radius + _PAD_M) - heading - middle - _BENT, TIP)
+    return base, middle, tip
+
+
+def _towards(bar: complex, apart: float) -> float:
+    """The direction of a straight line from here which passes a bar at a distance from its axis."""
+    return cmath.phase(bar) - asin(min(apart / abs(bar), 1.0))
+
+
+def _within(angle: float, points: tuple[tuple[int, float], ...]) -> float:
+    ends = sorted(radians(each) for _, each in points)
+    return min(max(angle, ends[0]), ends[-1])
+
+
+def _counts(joints: tuple[float, float, float]) -> float:
+    """What the one motor has gone for base and middle joint."""
+    base, middle, _ = joints
+    return sum(
+        degrees(angle) * (last - first) / (at_last - at_first)
+        for angle, ((first, at_first), (last, at_last)) in ((base, BASE), (middle, MIDDLE))
+    )
+
+
+def _middle(points: list[Vector]) -> Vector:
+    x, y, z = (sum(each) / len(points) for each in zip(*points, strict=True))
+    return x, y, z

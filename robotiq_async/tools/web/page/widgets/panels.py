@@ -1,0 +1,201 @@
+"""What the page says about a hand: state, axes, curves, events, statistics."""
+
+from __future__ import annotations
+
+from html import escape
+from time import monotonic
+from typing import Any, Final
+
+from nicegui import ui
+
+from .....values.enums import AXES
+from ..mirror import HISTORY_S, HandMirror
+from .words import COLORS, NAMES, axis_words, event_words, fault_words, state_words, timed
+
+CURVES_S: Final = 0.5
+WIDTHS: Final = (6, 4, 2, 2)
+"""Of the curves: fingers that move together are drawn on each other, and all of them are seen."""
+CURRENT_MAX: Final = 600
+"""The axis of the currents reaches at least so far, in mA."""
+
+
+class StatePanel:
+    """State and fault in words."""
+
+    def __init__(self) -> None:
+        """Build it where the page is being built."""
+        self._state = ui.badge("", color="grey").classes("text-base px-3 py-1").props("data-testid=state")
+        self._fault = ui.label("").classes("text-sm").props("data-testid=fault")
+
+    def show(self, hand: HandMirror, *, is_quiet: bool) -> None:
+        """Write what is newest."""
+        words, color = state_words(hand, is_quiet=is_quiet)
+        self._state.set_text(words)
+        self._state.props(f"color={color}")
+        words, is_serious = fault_words(hand)
+        self._fault.set_text(words)
+        self._fault.classes(add="rq-red" if is_serious else "", remove="" if is_serious else "rq-red")
+
+
+class AxesPanel:
+    """For each axis where it is, where it is asked to go, what it does, and its current."""
+
+    def __init__(self, *, wide: bool = False) -> None:
+        """Build it where the page is being built.
+
+        Args:
+            wide: a line for each axis where there is room, in place of two.
+        """
+        self._html = ui.html("", sanitize=False).classes("w-full").props("data-testid=axes")
+        self._classes = "rq-axes rq-line" if wide else "rq-axes"
+        self._shown = ""
+
+    def show(self, hand: HandMirror) -> None:
+        """Draw what is newest."""
+        rows = "".join(_axis_row(hand, index) for index in range(len(AXES)))
+        if rows != self._shown:
+            self._shown = rows
+            self._html.set_content(f'<div class="{self._classes}">{rows}</div>')
+
+
+def _axis_row(hand: HandMirror, index: int) -> str:
+    axis, status = AXES[index], hand.status
+    if status is None:
+        return f'<div class="rq-axis"><b>{NAMES[index]}</b></div>'
+    position, wanted = status.position(axis), status.requested_position(axis)
+    contact = " rq-contact" if axis & status.contacts and not hand.is_lost else ""
+    stale = " rq-stale" if hand.is_lost else ""
+    color = COLORS[index]
+    return (
+        f'<div class="rq-axis{contact}{stale}" data-axis="{NAMES[index]}" data-position="{position}">'
+        f'<b style="color:{color}">{NAMES[index]}</b>'
+        f'<span class="rq-bar"><i style="width:{position / 2.55:.1f}%;background:{color}"></i>'
+        f'<u style="left:calc((100% - 3px) * {wanted / 255:.3f})"></u></span>'
+        f'<span class="rq-number">{position}</span><span class="rq-wanted">&rarr; {wanted}</span>'
+        f'<span class="rq-number">{status.current_ma(axis)} mA</span>'
+        f'<span class="rq-does">{escape(axis_words(hand, axis))}</span></div>'
+    )
+
+
+class Curves:
+    """Positions and currents of the last half minute."""
+
+    def __init__(self) -> None:
+        """Build it where the page is being built."""
+        self._drawn_at = 0.0
+        self._positions = ui.echart(_options("position / counts", 255, 51)).classes("w-full h-40")
+        self._currents = ui.echart(_options("current / mA", CURRENT_MAX, 200)).classes("w-full h-40")
+
+    def show(self, hand: HandMirror) -> None:
+        """Draw what is newest, twice a second."""
+        now = monotonic()
+        if now - self._drawn_at < CURVES_S or not hand.samples:
+            return
+        self._drawn_at = now
+        ages = [round(sample.at - now, 2) for sample in hand.samples]
+        for index in range(len(AXES)):
+            # A gap, and not a line, where nothing was known.
+            places = [None if each.positions is None else each.positions[index] for each in hand.samples]
+            peaks = [None if each.positions is None else each.currents[index] for each in hand.samples]
+            for chart, values in ((self._positions, places), (self._currents, peaks)):
+                chart.options["series"][index]["data"] = [
+                    list(point) for point in zip(ages, values, strict=True)
+                ]
+        highest = max((max(each.currents) for each in hand.samples), default=0)
+        self._currents.options["yAxis"]["max"] = max(CURRENT_MAX, -(-highest // 200) * 200)
+        self._positions.update()
+        self._currents.update()
+
+
+def _options(title: str, highest: int, step: int) -> dict[str, Any]:
+    series = [
+        {
+            "type": "line",
+            "name": name,
+            "data": [],
+            "showSymbol": False,
+            "lineStyle": {"width": width},
+            "color": color,
+            "animation": False,
+        }
+        for name, color, width in zip(NAMES, COLORS, WIDTHS, strict=True)
+    ]
+    quiet = {"color": "#8a8f98"}
+    return {
+        "animation": False,
+        "title": {"text": title, "textStyle": {"fontSize": 12, **quiet}, "left": 8, "top": 2},
+        "legend": {
+            "right": 8,
+            "top": 2,
+            "textStyle": quiet,
+            "icon": "roundRect",
+            "itemWidth": 16,
+            "itemHeight": 5,
+        },
+        "grid": {"left": 44, "right": 12, "top": 28, "bottom": 22},
+        "xAxis": {
+            "type": "value",
+            "min": -HISTORY_S,
+            "max": 0,
+            "axisLabel": {"formatter": "{value} s", **quiet},
+            "splitLine": {"show": False},
+        },
+        "yAxis": {
+            "type": "value",
+            "min": 0,
+            "max": highest,
+            "interval": step,
+            "axisLine": {"onZero": False, "show": False},
+            "axisTick": {"show": False},
+            "axisLabel": quiet,
+            "splitLine": {"lineStyle": {"color": "#8883"}},
+        },
+        "series": series,
+    }
+
+
+class Events:
+    """What has happened, the newest last."""
+
+    def __init__(self) -> None:
+        """Build it where the page is being built."""
+        ui.label("events").classes("text-xs font-bold opacity-60 -mb-2")
+        self._log = ui.log(max_lines=100).classes("w-full h-32 text-xs").props("data-testid=events")
+        self._shown = -1
+
+    def show(self, hand: HandMirror) -> None:
+        """Add what is new; at first what happened before the page was opened."""
+        is_first, self._shown = self._shown < 0, max(self._shown, 0)
+        for number, event in hand.events:
+            if number > self._shown:
+                self._shown = number
+                self._log.push(event_words(event))
+        if is_first:
+            self._log.push(timed("this page was opened"))
+
+    def add(self, words: str) -> None:
+        """Add what this page has to say."""
+        self._log.push(words)
+
+
+class StatisticsPanel:
+    """How the polling goes."""
+
+    def __init__(self) -> None:
+        """Build it where the page is being built."""
+        self._label = ui.label("").classes("text-xs opacity-70").props("data-testid=statistics")
+
+    def show(self, hand: HandMirror) -> None:
+        """Write what is newest."""
+        figures = hand.statistics
+        if not figures:
+            return
+        moves = ", ".join(f"{name} {number}" for name, number in figures["moves"].items()) or "none"
+        self._label.set_text(
+            f"{figures['polls']} polls, period {1000 * figures['period_p50']:.2f} ms"
+            f" (99 %: {1000 * figures['period_p99']:.2f}),"
+            f" round trip {1000 * figures['round_trip_p50']:.2f} ms"
+            f" (99 %: {1000 * figures['round_trip_p99']:.2f}); {figures['overruns']} overruns,"
+            f" {figures['reconnects']} reconnects, {figures['foreign_commands']} commands of others,"
+            f" {figures['faults']} faults; moves: {moves}"
+        )

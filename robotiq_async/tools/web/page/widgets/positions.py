@@ -1,0 +1,79 @@
+"""Sends axes to positions, each to its own. A slider alone moves nothing: the button beside it does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from nicegui import events, ui
+
+from .....values.enums import AXES, CLOSED, OPEN, Finger
+from ..heartbeat import PRESS, PRESS_WITH_VALUE
+from ..mirror import HandMirror
+from .slider import Slider
+from .words import COLORS, NAMES
+
+ROWS: Final = (
+    ("fingers", Finger.ABC, "inherit"),
+    *((name, axis, color) for name, axis, color in zip(NAMES, AXES, COLORS, strict=True)),
+)
+"""Name, axes and colour. All fingers together, and each axis alone."""
+
+
+class Positions:
+    """A row for each axis: where it is to go, and the button that sends it there."""
+
+    def __init__(self, hand: HandMirror, pressed: Callable[[str, dict[str, Any], object], None]) -> None:
+        """Build it where the page is being built.
+
+        Args:
+            hand: which one; a slider that is not touched shows where its axis stands.
+            pressed: is called with name and arguments of the command, and what the browser sent back.
+        """
+        self._hand, self._pressed = hand, pressed
+        self._sliders: dict[str, Slider] = {}
+        self._targets: dict[str, object] = {}
+        """What each slider was let go at: the server knows its value a little later."""
+        self._touched: set[str] = set()
+        """Those that somebody has moved, and not sent yet."""
+        self._is_placing = False
+        with ui.grid(columns="auto 1fr 2rem auto").classes("w-full items-center gap-x-3 gap-y-1"):
+            for name, axes, color in ROWS:
+                self._row(name, axes, color)
+        self.show()
+
+    def show(self) -> None:
+        """Let the sliders that are not touched follow the axes, so that to send them moves nothing."""
+        status = self._hand.status
+        if status is None or status.is_moving:
+            return
+        self._is_placing = True
+        for name, axes, _ in ROWS:
+            if name not in self._touched:
+                self._targets[name] = place = status.position(next(axis for axis in AXES if axis in axes))
+                self._sliders[name].set_value(place)
+        self._is_placing = False
+
+    def _row(self, name: str, axes: Finger, color: str) -> None:
+        def touch() -> None:
+            if not self._is_placing:
+                self._touched.add(name)
+
+        def let_go(event: events.GenericEventArguments) -> None:
+            _, self._targets[name] = event.args
+            self._touched.add(name)
+
+        def send(event: events.GenericEventArguments) -> None:
+            words = ",".join(str(axis.name) for axis in AXES if axis in axes)
+            self._pressed("move", {"position": self._targets.get(name), "fingers": words}, event.args)
+            self._touched.discard(name)
+
+        ui.label(name).classes("font-bold").style(f"color:{color}")
+        slider = Slider(min=OPEN, max=CLOSED, value=OPEN).props(f"data-testid=position-{name}")
+        slider.on_value_change(touch)
+        slider.on("change", let_go, js_handler=PRESS_WITH_VALUE)
+        ui.label().bind_text_from(slider, "value", lambda each: f"{each:.0f}").classes("text-right")
+        button = ui.button("move").props(f"dense no-caps data-testid=move-{name}").classes("px-3")
+        button.tooltip(f"{name} to this position: 0 is open, 255 closed")
+        button.on("click", send, js_handler=PRESS)
+        self._sliders[name] = slider

@@ -1,0 +1,83 @@
+"""The state of a hand in words and colours."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from time import time
+from typing import Any, Final
+
+from .....values.enums import AXES, Fault, Finger, ObjectStatus, Severity, State
+from .....values.status import NO_REQUEST
+from ....viewer.state_words import STATE_WORDS
+from ..mirror import HandMirror
+
+NAMES: Final = tuple("scissor" if axis is Finger.SCISSOR else str(axis.name) for axis in AXES)
+COLORS: Final = ("#3b82f6", "#22a35a", "#e8890c", "#a855f7")
+"""Of A, B, C and the scissor, wherever they are drawn: to be told apart on light and on dark."""
+
+_AXIS_STATES: Final = {
+    NO_REQUEST: "-",
+    ObjectStatus.IN_MOTION.name: "moving",
+    ObjectStatus.CONTACT_OPENING.name: "contact while opening",
+    ObjectStatus.CONTACT_CLOSING.name: "contact while closing",
+    ObjectStatus.AT_POSITION.name: "there",
+}
+
+
+def state_words(hand: HandMirror, *, is_quiet: bool) -> tuple[str, str]:
+    """The state in words, and a colour of Quasar for it."""
+    if is_quiet:
+        return "the program that watches the gripper is silent", "negative"
+    if hand.problem:
+        return "not reached", "negative"
+    words = STATE_WORDS[hand.state]
+    if hand.state in (State.DISCONNECTED, State.FAULT):
+        return words, "negative"
+    if hand.state in (State.RUNNING_IDLE, State.RUNNING_CC):
+        moving = hand.status is not None and hand.status.is_moving
+        return ("moving", "primary") if moving else (words, "positive")
+    return words, "warning"
+
+
+def fault_words(hand: HandMirror) -> tuple[str, bool]:
+    """The fault in words, and whether it is a serious one."""
+    if hand.problem:
+        return hand.problem, True
+    if hand.is_lost:
+        seconds = f", last heard {hand.age:.1f} s ago" if hand.status is not None else ""
+        return f"no connection to the gripper{seconds}: what is shown is old", True
+    assert hand.status is not None
+    fault = hand.status.fault
+    if fault is Fault.NONE:
+        return "no fault", False
+    return (
+        f"0x{int(fault):02X} {fault.severity.value}: {fault.description}",
+        fault.severity is not Severity.PRIORITY,
+    )
+
+
+def axis_words(hand: HandMirror, axis: Finger) -> str:
+    """What an axis does."""
+    status = hand.status
+    if hand.is_lost or status is None or hand.state is State.RESET:
+        return "-"
+    return _AXIS_STATES[status.axis_state(axis)]
+
+
+def event_words(event: dict[str, Any]) -> str:
+    """An event as a line."""
+    if event["kind"] == "fault":
+        return timed(f"fault 0x{event['fault_code']:02X}: {event['description']}", event["time"])
+    words = STATE_WORDS[State[event["target"]]]
+    return timed(f"{words}  ({event['source']} to {event['target']})", event["time"])
+
+
+def timed(words: str, at: float | None = None) -> str:
+    """Words with the time of day before them.
+
+    Args:
+        words: what has happened.
+        at: seconds since 1970; None for now.
+    """
+    clock = datetime.fromtimestamp(time() if at is None else at).astimezone()
+    return f"{clock:%H:%M:%S.%f}"[:-4] + f"  {words}"

@@ -1,0 +1,219 @@
+"""Shows hands on a page while a block runs: starts its process, tells it what is newest, hears what it asks.
+
+    async with PageServer(hands, settings) as page:
+        print(page.url)
+
+What goes between the two processes are lines of JSON through two pipes.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import sys
+from asyncio.subprocess import PIPE, Process
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Self
+
+from ...protocol import Hand
+from ...runtime.clock import now
+from ...runtime.concurrency import wait_shielded
+from ...runtime.log import log
+from ...values.errors import ViewerError
+from ..actions import Operator
+from ..recording.payloads import Fields
+from .commands import PageCommands
+from .news import HandNews
+from .settings import PageSettings
+
+if find_spec("nicegui") is None:
+    from ...runtime.extras import install
+
+    raise ImportError(f"the page needs nicegui: {install('web')}")
+
+UPDATE_S: Final = 0.05
+START_S: Final = 30.0
+"""NiceGUI takes a second to import, on a busy machine several."""
+STOP_S: Final = 2.0
+BACKLOG: Final = 16_384
+"""Bytes that the page has not read yet. Beyond this it is told nothing until it has: then what is newest."""
+LINE: Final = 65_536
+SILENCE_S: Final = 2.0
+"""The page's process beats four times a second; after this its motions are held."""
+
+
+class PageServer:
+    """The page of some hands.
+
+    Attributes:
+        news: what is told, a hand each.
+        url: the address to open, once it serves.
+        pages: how many browsers look.
+    """
+
+    def __init__(
+        self, hands: Sequence[Hand], settings: PageSettings, *, operators: Sequence[Operator] = ()
+    ) -> None:
+        """Prepare; starts nothing.
+
+        Args:
+            hands: started before or while they are shown.
+            settings: how it is served.
+            operators: carry out what the pages ask for, one for each hand; without them nothing is.
+
+        Raises:
+            ValueError: operators of other hands, or the settings do not match them.
+        """
+        if operators and [operator.hand for operator in operators] != list(hands):
+            raise ValueError("operators must be those of the hands, in their order")
+        if settings.control != bool(operators):
+            raise ValueError("control needs operators, and operators need control")
+        self.news = [HandNews(hand) for hand in hands]
+        self.url = ""
+        self.pages = 0
+        self._settings = settings
+        self._commands = PageCommands(operators, self._answer)
+        self._process: Process
+        self._tasks: list[asyncio.Task[None]] = []
+        self._answers: list[Fields] = []
+        self._heard_at = 0.0
+        self._somebody = asyncio.Event()
+        self._over = asyncio.Event()
+
+    async def __aenter__(self) -> Self:
+        """Start the process, and wait until it serves.
+
+        Raises:
+            ViewerError: the port is taken, there is no such interface, or the process ended.
+        """
+        self._process = await _start()
+        try:
+            self._write(self._settings.line())
+            async with asyncio.timeout(START_S):
+                first = await self._read()
+            if first is None or "failed" in first:
+                raise ViewerError(first["failed"] if first else "the process of the page has ended")
+        except TimeoutError:
+            await self._end_process()
+            raise ViewerError(f"the process of the page did not serve within {START_S:g} s") from None
+        except BaseException:
+            await self._end_process()
+            raise
+        self.url = self._settings.url(first["serving"])
+        self._heard_at = now()
+        loop = asyncio.get_running_loop()
+        self._tasks = [
+            loop.create_task(work, name="robotiq_async page") for work in (self._listen(), self._tell())
+        ]
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Hold what pages have set in motion, and end the process; within 3 s, also when cancelled."""
+        await wait_shielded(asyncio.ensure_future(self._close()))
+
+    async def seen(self) -> None:
+        """Wait until a browser looks."""
+        await self._somebody.wait()
+
+    async def ended(self) -> None:
+        """Wait until the process of the page has ended by itself."""
+        await self._over.wait()
+
+    @property
+    def is_ending(self) -> bool:
+        """Whether nothing but halts is taken: :meth:`refuse_commands` was called, or the block is left."""
+        return self._commands.is_ending
+
+    def refuse_commands(self) -> None:
+        """Take nothing but halts from now on: for a program that is about to stop the hands."""
+        self._commands.refuse()
+
+    async def _close(self) -> None:
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await self._commands.close()
+        await self._end_process()
+
+    async def _end_process(self) -> None:
+        """Closing its input ends it; if it does not listen, a kill does."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        try:
+            async with asyncio.timeout(STOP_S):
+                await self._process.wait()
+        except TimeoutError:
+            self._process.kill()
+            await self._process.wait()
+
+    # -- what is told ----------------------------------------------------------------------------------
+
+    async def _tell(self) -> None:
+        assert self._process.stdin is not None
+        while not self._over.is_set():  # then nobody reads it
+            for news in self.news:
+                news.gather()
+            if self._commands.under_way and now() - self._heard_at > SILENCE_S:
+                self._commands.all_gone()
+            if self._process.stdin.transport.get_write_buffer_size() < BACKLOG:
+                hands = [news.take(index) for index, news in enumerate(self.news)]
+                self._write(json.dumps({"hands": hands, "answers": self._answers}).encode() + b"\n")
+                self._answers = []
+            await asyncio.sleep(UPDATE_S)
+
+    def _answer(self, answer: Fields) -> None:
+        self._answers.append(answer)
+
+    def _write(self, line: bytes) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.write(line)
+
+    # -- what is heard ---------------------------------------------------------------------------------
+
+    async def _listen(self) -> None:
+        try:
+            while (message := await self._read()) is not None:
+                self._heard_at = now()
+                self._hear(message)
+        except Exception:  # noqa: BLE001  # another process said it: whatever that was, the axes are held
+            log.exception("the page said something that means nothing: it is not listened to any more")
+        finally:
+            self._commands.all_gone()
+            self._over.set()
+
+    def _hear(self, message: Fields) -> None:
+        if "do" in message:
+            self._commands.do(message["do"])
+        if "gone" in message:
+            self._commands.gone(message["gone"])
+        if "pages" in message:
+            self.pages = message["pages"]
+            if self.pages:
+                self._somebody.set()
+
+    async def _read(self) -> Fields | None:
+        """The next line; None after the end."""
+        assert self._process.stdout is not None
+        line = await self._process.stdout.readline()
+        message: Fields | None = json.loads(line) if line else None
+        return message
+
+
+async def _start() -> Process:
+    """The process of the page: with this package, whatever the working directory holds under its name."""
+    package, here = __name__.partition(".")[0], str(Path(__file__).parents[2])
+    paths = os.pathsep.join(filter(None, (here, os.environ.get("PYTHONPATH"))))
+    return await asyncio.create_subprocess_exec(
+        sys.executable,
+        *("-P", "-m", f"{package}.web.page"),
+        stdin=PIPE,
+        stdout=PIPE,
+        limit=LINE,
+        env=os.environ | {"PYTHONPATH": paths},
+    )

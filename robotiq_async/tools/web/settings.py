@@ -1,0 +1,98 @@
+"""What the process of the page is told before anything else."""
+
+from __future__ import annotations
+
+import json
+import secrets
+from dataclasses import asdict, dataclass, field
+from socket import gethostname
+from typing import Final, Self
+
+from ...values.checks import check_int
+from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ..viewer.gate import is_loopback
+
+LOOPBACK: Final = "127.0.0.1"
+EVERYWHERE: Final = ("0.0.0.0", "::", "")
+"""Every interface of this machine: to be opened by its name."""
+PORT: Final = 8766
+"""Beside that of the viewers."""
+
+
+@dataclass(frozen=True, slots=True)
+class PageSettings:
+    """How the page is served, and to whom.
+
+    Attributes:
+        host: the interface to listen on.
+        port: the TCP port; 0 takes a free one.
+        control: whether the page may command.
+        addresses: what the hands are called on the page, in their order.
+        speed: where the slider of the speed begins.
+        force: where the slider of the force begins.
+        password: asked of everybody; empty for the token in the printed address.
+        certificate: PEM file with the certificate (chain) for https; empty for http.
+        key: PEM file with its private key.
+        token: in the printed address.
+        folder: the path under which everything is served. Cookies do not know ports: one for this path is
+            not sent to other servers of this machine.
+    """
+
+    host: str = LOOPBACK
+    port: int = PORT
+    control: bool = False
+    addresses: tuple[str, ...] = ()
+    speed: int = DEFAULT_SPEED
+    force: int = DEFAULT_FORCE
+    password: str = field(default="", repr=False)
+    certificate: str = ""
+    key: str = ""
+    token: str = field(default_factory=lambda: secrets.token_urlsafe(24), repr=False)
+    folder: str = field(default_factory=lambda: f"/{secrets.token_hex(8)}", repr=False)
+
+    def __post_init__(self) -> None:
+        """Keep who may not get in outside.
+
+        Raises:
+            TypeError: port, speed or force is not an int.
+            ValueError: one of them is outside its range; another interface without a password and without a
+                certificate, or half a certificate.
+        """
+        for name, high in (("port", 65535), ("speed", 255), ("force", 255)):
+            object.__setattr__(self, name, check_int(name, getattr(self, name), 0, high))
+        if bool(self.certificate) != bool(self.key):
+            raise ValueError("a certificate needs its key, and a key its certificate")
+        if not self.loopback and not (self.password or self.certificate):
+            raise ValueError(
+                f"{self.host} lets others in: that needs a password or a certificate of your own"
+            )
+
+    @property
+    def loopback(self) -> bool:
+        """Whether only programs of this machine reach the interface."""
+        return is_loopback(self.host)
+
+    @property
+    def scheme(self) -> str:
+        """How browsers reach the page."""
+        return "https" if self.certificate else "http"
+
+    def url(self, port: int) -> str:
+        """The address to open; it lets in whoever has it, unless a password is asked for."""
+        host = gethostname() if self.host in EVERYWHERE else self.host
+        host = f"[{host}]" if ":" in host else host
+        return f"{self.scheme}://{host}:{port}/" + ("" if self.password else f"?token={self.token}")
+
+    def line(self) -> bytes:
+        """All of it as a line, for a pipe: arguments of a process are there for everybody to read."""
+        return json.dumps(asdict(self)).encode() + b"\n"
+
+    @classmethod
+    def read(cls, line: bytes) -> Self:
+        """Of such a line.
+
+        Raises:
+            ValueError: it is none.
+        """
+        fields = json.loads(line)
+        return cls(**{**fields, "addresses": tuple(fields["addresses"])})

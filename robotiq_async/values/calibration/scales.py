@@ -1,0 +1,316 @@
+"""What the values 0..255 mean: millimetres, millimetres a second, newton, seconds.
+
+Three sources, told apart by :attr:`SpeedCalibration.source`: the manual's nominal figures, the thesis's
+measurements (the default), and an owner's own tables from ``robotiq-async measure``. Moves and statuses stay
+in counts; these helpers convert.
+
+The force value is a label and not a measurement: the manual gives 15 N at 0 and 60 N at 255 and says that it
+is not linear in between, and what a scale showed (thesis, chapter 6) depends on what is between the fingers
+more than on the value.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+from ..checks import check_byte, check_number
+from ..enums import CLOSED_READING, OPEN_READING, STROKE_COUNTS
+from .csv_tables import FORCE, SPEED, Layout, Table, TableError, read_table, thesis_table
+
+STROKE_MM: Final = 155.0
+"""Opening between the fingertips of an open gripper (manual, specifications)."""
+GRAVITY: Final = 9.81
+"""m/s2, as the thesis has it."""
+NOMINAL_SPEEDS_MM_S: Final = (22.0, 110.0)
+"""Finger speed at the values 0 and 255 (manual, specifications)."""
+NOMINAL_FORCES_N: Final = (15.0, 60.0)
+"""Grip force at the values 0 and 255 (manual, specifications)."""
+
+LONGEST_S: Final = 600.0
+"""No closing takes longer."""
+STRONGEST_N: Final = 1000.0
+"""No grasp is stronger."""
+
+Points = tuple[tuple[int, float], ...]
+
+
+def opening_mm(position: int) -> float:
+    """The opening at a position: 155 mm at the open reading 6 and below, 0 from the closed reading 241 on.
+
+    Nominal: the stroke of the manual, taken for linear in the counts. A real finger turns, and is not.
+
+    Args:
+        position: counts, 0..255.
+
+    Raises:
+        TypeError: position is not an int.
+        ValueError: position is outside 0..255.
+    """
+    # Requests beyond the stops are legal, and end there.
+    reached = min(max(check_byte("position", position), OPEN_READING), CLOSED_READING)
+    return STROKE_MM * (CLOSED_READING - reached) / STROKE_COUNTS
+
+
+def position_of_opening(millimetres: float) -> int:
+    """The position, in counts, that comes closest to an opening.
+
+    Args:
+        millimetres: 0 (closed) .. 155 (open).
+
+    Raises:
+        TypeError: not a number.
+        ValueError: outside 0..155.
+    """
+    opening = check_number("millimetres", millimetres, 0.0, STROKE_MM)
+    return round(CLOSED_READING - opening / STROKE_MM * STROKE_COUNTS)
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedCalibration:
+    """What speed values mean.
+
+    Attributes:
+        source: where the figures are from, for people.
+        points: speed values, rising, each with the seconds of a full closing.
+    """
+
+    source: str
+    points: Points
+
+    def __post_init__(self) -> None:
+        """Check the points.
+
+        Raises:
+            TypeError: a value or a figure of the wrong type.
+            ValueError: fewer than two, not rising, or outside 0..255 and 0..600 s.
+        """
+        object.__setattr__(self, "points", checked_points(self.points, LONGEST_S))
+        if not all(seconds for _, seconds in self.points):
+            raise ValueError("points: a closing time must be above 0 s")
+
+    @classmethod
+    def nominal(cls) -> SpeedCalibration:
+        """The manual's figures, linear in between: 22 mm/s at 0 and 110 mm/s at 255, over 155 mm."""
+        slow, fast = NOMINAL_SPEEDS_MM_S
+        points = ((value, STROKE_MM / (slow + (fast - slow) * value / 255)) for value in range(256))
+        return cls("nominal (manual)", tuple(points))
+
+    @classmethod
+    @cache
+    def thesis(cls) -> SpeedCalibration:
+        """The thesis's table A1.1: the mean of three runs for every fourth value. Read from its file once."""
+        return cls.from_table("thesis, table A1.1", thesis_table("closing_time_ms", SPEED))
+
+    @classmethod
+    def from_csv(cls, path: Path | str) -> SpeedCalibration:
+        """An owner's own table, as ``robotiq-async measure speed`` writes it.
+
+        Raises:
+            TableError: the file is not such a table, or has fewer than two rows.
+        """
+        table = _owners_table(path, SPEED)
+        if any(not all(runs) for runs in table.values()):
+            raise TableError(path, None, "a closing takes longer than 0 ms")
+        return cls.from_table(str(path), table)
+
+    @classmethod
+    def from_table(cls, source: str, table: Table) -> SpeedCalibration:
+        """A table of closing times in milliseconds."""
+        return cls(source, tuple((value, mean(table[value]) / 1000) for value in sorted(table)))
+
+    def closing_time(self, speed: int) -> float:
+        """Seconds of a full closing, 235 counts; linear between the points.
+
+        Raises:
+            TypeError: speed is not an int.
+            ValueError: speed is outside 0..255, or outside what was measured.
+        """
+        return interpolated("speed", speed, self.points)
+
+    def duration(self, counts: int, speed: int) -> float:
+        """Seconds of a way of so many counts, 0..255, at a speed.
+
+        Raises:
+            TypeError: an argument is not an int.
+            ValueError: an argument is outside 0..255, or the speed outside what was measured.
+        """
+        return check_byte("counts", counts) / STROKE_COUNTS * self.closing_time(speed)
+
+    def mm_per_s(self, speed: int) -> float:
+        """Millimetres of opening a second.
+
+        Raises:
+            TypeError: speed is not an int.
+            ValueError: speed is outside 0..255, or outside what was measured.
+        """
+        return STROKE_MM / self.closing_time(speed)
+
+    def speed_value(self, mm_per_s: float) -> int:
+        """The speed value that comes closest.
+
+        Raises:
+            TypeError: not a number.
+            ValueError: slower or faster than any value.
+        """
+        return nearest_in_range(
+            "mm_per_s", mm_per_s, {value: self.mm_per_s(value) for value in covered(self.points)}
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ForceCalibration:
+    """What force values mean, roughly; see the module.
+
+    Attributes:
+        source: where the figures are from, for people.
+        points: force values, rising, each with newton.
+    """
+
+    source: str
+    points: Points
+
+    def __post_init__(self) -> None:
+        """Check the points.
+
+        Raises:
+            TypeError: a value or a figure of the wrong type.
+            ValueError: fewer than two, not rising, or outside 0..255 and 0..1000 N.
+        """
+        object.__setattr__(self, "points", checked_points(self.points, STRONGEST_N))
+
+    @classmethod
+    def nominal(cls) -> ForceCalibration:
+        """The manual's figures, drawn as a straight line although it says that they are not one."""
+        return cls("nominal (manual)", ((0, NOMINAL_FORCES_N[0]), (255, NOMINAL_FORCES_N[1])))
+
+    @classmethod
+    def thesis(cls, surface: str) -> ForceCalibration:
+        """What the thesis's scale showed: the mean of three runs, with foam around it or rigid.
+
+        Args:
+            surface: "foam" or "rigid".
+
+        Raises:
+            ValueError: neither.
+        """
+        if surface not in ("foam", "rigid"):
+            raise ValueError(f"surface must be 'foam' or 'rigid', got {surface!r}")
+        return cls.from_table(f"thesis, {surface}", thesis_table(f"force_{surface}_grams", FORCE))
+
+    @classmethod
+    def from_csv(cls, path: Path | str) -> ForceCalibration:
+        """An owner's own table, as ``robotiq-async measure force`` writes it.
+
+        Raises:
+            TableError: the file is not such a table, or has fewer than two rows.
+        """
+        return cls.from_table(str(path), _owners_table(path, FORCE))
+
+    @classmethod
+    def from_table(cls, source: str, table: Table) -> ForceCalibration:
+        """A table of readings in grams."""
+        return cls(source, tuple((value, newton(mean(table[value]))) for value in sorted(table)))
+
+    def newton(self, force: int) -> float:
+        """Newton at a force value; linear between the points.
+
+        Raises:
+            TypeError: force is not an int.
+            ValueError: force is outside 0..255, or outside what was measured.
+        """
+        return interpolated("force", force, self.points)
+
+    def force_value(self, newton: float) -> int:
+        """The force value that comes closest, the lowest of several.
+
+        Raises:
+            TypeError: not a number.
+            ValueError: weaker or stronger than any value.
+        """
+        return nearest_in_range(
+            "newton", newton, {value: self.newton(value) for value in covered(self.points)}
+        )
+
+
+def _owners_table(path: Path | str, layout: Layout) -> Table:
+    """A table that makes a curve.
+
+    Raises:
+        TableError: the file is not such a table, or has fewer than two rows.
+    """
+    table = read_table(path, layout)
+    if len(table) < 2:
+        values = f"{layout.value.replace('_', ' ')}s"
+        raise TableError(path, None, f"at least two {values} are needed, got {len(table)}")
+    return table
+
+
+def mean(runs: Sequence[int]) -> float:
+    """The mean of the runs of a row."""
+    return sum(runs) / len(runs)
+
+
+def newton(grams: float) -> float:
+    """The force that a scale shows as a mass: F = m g, g = 9.81 m/s2."""
+    return grams / 1000 * GRAVITY
+
+
+def checked_points(given: Iterable[tuple[int, float]], high: float) -> Points:
+    """Points that stay as they are, plain numbers, from whatever they come in; refuses what is no curve.
+
+    Raises:
+        TypeError: a value or a figure of the wrong type.
+        ValueError: fewer than two points, values that do not rise, or a figure outside 0..high.
+    """
+    points = tuple(
+        (check_byte("a value of points", value), check_number("a figure of points", figure, 0.0, high))
+        for value, figure in given
+    )
+    if len(points) < 2:
+        raise ValueError(f"points: at least two are needed, got {len(points)}")
+    values = [value for value, _ in points]
+    if values != sorted(set(values)):
+        raise ValueError(f"points: the values must rise, got {values}")
+    return points
+
+
+def covered(points: Points) -> range:
+    """The values that points reach over."""
+    return range(points[0][0], points[-1][0] + 1)
+
+
+def interpolated(name: str, value: int, points: Sequence[tuple[int, float]]) -> float:
+    """The straight line between the neighbours of a value.
+
+    Raises:
+        TypeError: value is not an int.
+        ValueError: value is outside 0..255, or beyond the points.
+    """
+    low, high = points[0][0], points[-1][0]
+    value = check_byte(name, value)
+    if not low <= value <= high:
+        raise ValueError(f"{name} {value} lies outside what was measured: {low}..{high}")
+    after = min(bisect_right(points, value, key=lambda point: point[0]), len(points) - 1)
+    (left, at_left), (right, at_right) = points[after - 1], points[after]
+    return at_left + (at_right - at_left) * (value - left) / (right - left)
+
+
+def nearest_in_range(name: str, wanted: float, figures: Mapping[int, float]) -> int:
+    """The value whose figure comes closest, the lowest of several.
+
+    Raises:
+        TypeError: wanted is not a number.
+        ValueError: wanted is below or above all figures.
+    """
+    figure = check_number(name, wanted, min(figures.values()), max(figures.values()))
+    return nearest(figure, figures)
+
+
+def nearest(wanted: float, figures: Mapping[int, float]) -> int:
+    """The value whose figure comes closest, the lowest of several."""
+    return min(figures, key=lambda value: abs(figures[value] - wanted))

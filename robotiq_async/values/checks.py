@@ -1,0 +1,184 @@
+"""Argument checks: each names the argument, the value and the range, and nothing is clamped.
+
+An int is whatever says that it is one (``__index__``), numpy's integers too; a number is a real one or an
+int. What comes out is a plain int or float. No bool passes for either: it stands where an argument slipped.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+import sys
+from numbers import Real
+from typing import Final
+
+from .enums import Finger
+
+_BY_VALUE: Final = {int(axis): axis for axis in (Finger.A, Finger.B, Finger.C, Finger.SCISSOR)}
+
+
+def check_byte(name: str, value: object) -> int:
+    """A position, speed or force: an int in 0..255.
+
+    Raises:
+        TypeError: not an int (a bool is not one here).
+        ValueError: outside 0..255.
+    """
+    return check_int(name, value, 0, 255)
+
+
+def check_optional_byte(name: str, value: object) -> int | None:
+    """A value in 0..255, or None for what is left as it is.
+
+    Raises:
+        TypeError: neither None nor an int.
+        ValueError: outside 0..255.
+    """
+    return None if value is None else check_byte(name, value)
+
+
+def check_int(name: str, value: object, low: int, high: int) -> int:
+    """An int in low..high.
+
+    Raises:
+        TypeError: not an int (a bool is not one here).
+        ValueError: outside the range.
+    """
+    number = as_int(value)
+    if number is None:
+        raise TypeError(f"{name} must be an int in {low}..{high}, got {value!r}")
+    if not low <= number <= high:
+        raise ValueError(f"{name} must be in {low}..{high}, got {value!r}")
+    return number
+
+
+def as_int(value: object) -> int | None:
+    """The plain int that a value stands for; None if it is no int, or a bool."""
+    if isinstance(value, bool):
+        return None
+    try:
+        return int(operator.index(value))  # type: ignore[arg-type]  # what it refuses is what we ask
+    except TypeError:
+        return None
+
+
+def check_mask(fingers: object) -> Finger:
+    """A mask of axes: a Finger, or an int in 1..15.
+
+    Raises:
+        TypeError: not a Finger or an int.
+        ValueError: empty, or bits beyond the four axes.
+    """
+    mask = as_int(fingers)
+    if mask is None:
+        raise TypeError(f"fingers must be a Finger mask or an int in 1..15, got {fingers!r}")
+    if not 1 <= mask <= 15:
+        raise ValueError(f"fingers must be a mask of Finger members in 1..15, got {mask!r}")
+    return Finger(mask)
+
+
+def parse_fingers(name: str, text: str) -> Finger:
+    """A mask of axes from words: ``ABC``, ``A,B``, ``scissor``, ``all``.
+
+    Raises:
+        ValueError: it names something else, or nothing.
+    """
+    mask = Finger(0)
+    for word in text.upper().split(","):
+        word = word.strip()
+        if word in Finger.__members__:
+            mask |= Finger[word]
+        elif word and set(word) <= set("ABC"):
+            for letter in word:
+                mask |= Finger[letter]
+        else:
+            raise ValueError(f"{name} must name axes (ABC, or A,B, or scissor, or all), got {word!r}")
+    return mask
+
+
+def check_axis(finger: object) -> Finger:
+    """Exactly one axis.
+
+    Raises:
+        TypeError: not a Finger or an int.
+        ValueError: not one of A, B, C, SCISSOR.
+    """
+    if type(finger) is Finger and finger in _SINGLE:
+        return finger
+    value = as_int(finger)
+    if value is None:
+        raise TypeError(f"finger must be one Finger (A, B, C or SCISSOR), got {finger!r}")
+    axis = _BY_VALUE.get(value)
+    if axis is None:
+        raise ValueError(f"finger must be one of Finger.A, B, C or SCISSOR (1, 2, 4 or 8), got {finger!r}")
+    return axis
+
+
+def check_seconds(name: str, value: object, low: float, high: float) -> float:
+    """A duration in seconds within low..high.
+
+    Raises:
+        TypeError: not a number.
+        ValueError: not finite, or outside the range.
+    """
+    return check_number(name, value, low, high, "seconds")
+
+
+def check_number(name: str, value: object, low: float, high: float, what: str = "a number") -> float:
+    """A number within low..high; ``what`` is for the message.
+
+    Raises:
+        TypeError: not a number.
+        ValueError: not finite, or outside the range.
+    """
+    number = as_float(value)
+    if number is None:
+        raise TypeError(f"{name} must be {what} in {low}..{high}, got {value!r}")
+    if not low <= number <= high:
+        raise ValueError(f"{name} must be {what} in {low}..{high}, got {value!r}")
+    return number
+
+
+def as_float(value: object) -> float | None:
+    """The plain float that a value stands for, infinite beyond all; None if it is no number, or a bool.
+
+    ``__float__`` alone does not make a number: numpy's bool has it, and its complex, which loses a part.
+    """
+    number = value if isinstance(value, float | Real) and not isinstance(value, bool) else as_int(value)
+    try:
+        return None if number is None else float(number)
+    except OverflowError:
+        return math.inf
+    except TypeError:  # numpy's timedelta counts as an integer, and is none
+        return None
+
+
+def check_timeout(name: str, value: object) -> float | None:
+    """A timeout: None for no limit, or seconds above 0.
+
+    Raises:
+        TypeError: not None and not a number.
+        ValueError: not finite, or not above 0.
+    """
+    if value is None:
+        return None
+    number = as_float(value)
+    if number is None:
+        raise TypeError(f"{name} must be None or seconds above 0, got {value!r}")
+    if not 0 < number <= sys.float_info.max:
+        raise ValueError(f"{name} must be None or seconds above 0, got {value!r}")
+    return number
+
+
+def check_flag(name: str, value: object) -> bool:
+    """True or False.
+
+    Raises:
+        TypeError: neither.
+    """
+    if not isinstance(value, bool):
+        raise TypeError(f"{name} must be True or False, got {value!r}")
+    return value
+
+
+_SINGLE: Final = frozenset(_BY_VALUE.values())

@@ -1,0 +1,286 @@
+"""RobotiqStatus: one reading of the gripper's eight status registers."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any, Final
+
+from . import registers as reg
+from .checks import check_axis, check_int, check_seconds
+from .enums import AXES, Fault, Finger, Initialization, Mode, ObjectStatus, names_of
+
+NO_REQUEST: Final = "NO_REQUEST"
+"""What :meth:`RobotiqStatus.axis_state` says of an axis whose gDT of 0 does not mean motion."""
+
+_set = object.__setattr__
+_INDEX = {axis: index for index, axis in enumerate(AXES)}
+_NAMES = names_of(Finger.ALL)
+
+
+def _masks(wanted: Callable[[ObjectStatus], bool]) -> tuple[Finger, ...]:
+    """For each value of the byte that holds the four gDT: the axes that read what is wanted."""
+    return tuple(
+        Finger(
+            sum(
+                axis
+                for axis, field in zip(AXES, reg.gDT, strict=True)
+                if wanted(ObjectStatus(field.read([byte])))
+            )
+        )
+        for byte in range(256)
+    )
+
+
+_MOVING = _masks(lambda what: what is ObjectStatus.IN_MOTION)
+_CONTACTS = _masks(lambda what: what.is_contact)
+_CONTACT_NAMES = tuple(names_of(axes) for axes in _CONTACTS)
+_STATES = tuple(what.name for what in ObjectStatus)
+_STATES_WITHOUT_REQUEST = (NO_REQUEST, *_STATES[1:])
+
+
+class RobotiqStatus:
+    """What the gripper said at one moment. Immutable and hashable; decoded when asked.
+
+    Two statuses are equal when their registers, timestamp and sequence are.
+
+    Attributes:
+        registers: the eight registers as they came.
+        timestamp: monotonic seconds at which the reply arrived.
+        sequence: counts every poll of a hand, from 0.
+    """
+
+    __slots__ = ("_registers", "_sequence", "_timestamp")
+    _registers: reg.Registers
+    _timestamp: float
+    _sequence: int
+
+    # The hand makes one of these 200 times a second: it keeps the registers and nothing else.
+    def __init__(self, registers: reg.Registers, timestamp: float = 0.0, sequence: int = 0) -> None:
+        """Keep eight checked registers; :meth:`from_registers` checks them."""
+        if hasattr(self, "_sequence"):
+            raise AttributeError("RobotiqStatus is immutable: it is made once")
+        _set(self, "_registers", registers)
+        _set(self, "_timestamp", timestamp)
+        _set(self, "_sequence", sequence)
+
+    @classmethod
+    def from_registers(
+        cls, registers: Sequence[int], *, timestamp: float = 0.0, sequence: int = 0
+    ) -> RobotiqStatus:
+        """A status from eight registers.
+
+        Raises:
+            TypeError: a register or the sequence is not an int, or the timestamp not a number.
+            ValueError: not eight registers, or one outside 0..65535; a timestamp that is not finite, or a
+                sequence below 0.
+        """
+        at = check_seconds("timestamp", timestamp, -sys.float_info.max, sys.float_info.max)
+        return cls(reg.check_registers(registers), at, check_int("sequence", sequence, 0, sys.maxsize))
+
+    @property
+    def registers(self) -> reg.Registers:
+        """The eight registers as they came."""
+        return self._registers
+
+    @property
+    def timestamp(self) -> float:
+        """Monotonic seconds (``time.monotonic()``) at which the reply arrived."""
+        return self._timestamp
+
+    @property
+    def sequence(self) -> int:
+        """Counts every poll of the hand since its first start."""
+        return self._sequence
+
+    # One axis. Each takes one Finger member; a mask of several is a ValueError.
+
+    def finger_status(self, finger: Finger | int) -> ObjectStatus:
+        """Whether the axis moves, touches something or has arrived (gDT), as the gripper says it.
+
+        It says IN_MOTION of an axis that was never asked for anything, too: see :meth:`axis_state`.
+
+        Raises:
+            TypeError: not a Finger or an int.
+            ValueError: not exactly one axis.
+        """
+        return ObjectStatus(reg.gDT[_INDEX[check_axis(finger)]].read(self._registers))
+
+    def axis_state(self, finger: Finger | int) -> str:
+        """What the axis does, in a word for people and files: the name of its :meth:`finger_status`.
+
+        ``NO_REQUEST`` where that means nothing: gDT = 0 while no position request is in force (gGTO = 0, or
+        gIMC other than 3). So IN_MOTION are the axes in :attr:`moving`, and no others. In an activation and
+        in a release axes move of which the gripper says nothing.
+
+        Raises:
+            TypeError, ValueError: as :meth:`finger_status`.
+        """
+        return self._states[reg.gDT[_INDEX[check_axis(finger)]].read(self._registers)]
+
+    def position(self, finger: Finger | int) -> int:
+        """Position in counts, 0..255: open reads 6-7, closed 240 or more (gPO)."""
+        return reg.gPO[_INDEX[check_axis(finger)]].read(self._registers)
+
+    def requested_position(self, finger: Finger | int) -> int:
+        """Echo of the position request, 0..255 (gPR)."""
+        return reg.gPR[_INDEX[check_axis(finger)]].read(self._registers)
+
+    def current(self, finger: Finger | int) -> int:
+        """Motor current in counts, 0..255 (gCU)."""
+        return reg.gCU[_INDEX[check_axis(finger)]].read(self._registers)
+
+    def current_ma(self, finger: Finger | int) -> int:
+        """Motor current in milliampere, 10 a count."""
+        return self.current(finger) * reg.MILLIAMPERE_PER_COUNT
+
+    # The whole hand.
+
+    @property
+    def fault(self) -> Fault:
+        """The fault code (gFLT); an unassigned code keeps its number."""
+        return Fault(reg.gFLT.read(self._registers))
+
+    @property
+    def activation_echo(self) -> bool:
+        """Echo of the activation bit (gACT); true while the activation still runs."""
+        return bool(reg.gACT.read(self._registers))
+
+    @property
+    def go_echo(self) -> bool:
+        """Echo of the go bit (gGTO)."""
+        return bool(reg.gGTO.read(self._registers))
+
+    @property
+    def echo(self) -> reg.Echo:
+        """What is repeated of the request in force: gACT, gGTO, the positions of A, B, C and the scissor."""
+        # By hand for speed: this runs at every poll.
+        word = self._registers
+        return (
+            bool(word[0] & 0x0100),
+            bool(word[0] & 0x0800),
+            word[1] & 0xFF,
+            word[3] >> 8,
+            word[4] & 0xFF,
+            word[6] >> 8,
+        )
+
+    @property
+    def mode(self) -> Mode:
+        """Echo of the mode (gMOD)."""
+        return Mode(reg.gMOD.read(self._registers))
+
+    @property
+    def initialization(self) -> Initialization:
+        """How far activation or mode change is (gIMC)."""
+        return Initialization(reg.gIMC.read(self._registers))
+
+    @property
+    def motion(self) -> int:
+        """The motion summary of the three fingers, 0..3, as the gripper gives it (gSTA)."""
+        return reg.gSTA.read(self._registers)
+
+    @property
+    def is_activated(self) -> bool:
+        """Whether activation and mode change are complete (gIMC = 3)."""
+        return self.initialization is Initialization.COMPLETE
+
+    @property
+    def is_reset(self) -> bool:
+        """Whether gIMC = 0: reset, or in automatic release (the fault tells which)."""
+        return self.initialization is Initialization.RESET
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether an axis moves: gGTO = 1, gIMC = 3 and a gDT of 0.
+
+        gSTA = 0 or gDT = 0 alone do not mean motion: a gripper that is ready and was never told to go
+        reads 0 in both.
+        """
+        return bool(self.moving)
+
+    @property
+    def moving(self) -> Finger:
+        """The axes that move (empty when none does)."""
+        return _MOVING[self._registers[0] & 0xFF] if self._is_under_request else Finger(0)
+
+    @property
+    def _is_under_request(self) -> bool:
+        return self.go_echo and self.is_activated
+
+    @property
+    def _states(self) -> tuple[str, ...]:
+        """What :meth:`axis_state` says for each gDT."""
+        return _STATES if self._is_under_request else _STATES_WITHOUT_REQUEST
+
+    @property
+    def contacts(self) -> Finger:
+        """The axes stopped by a contact (empty when none is)."""
+        return _CONTACTS[self._registers[0] & 0xFF]
+
+    def as_dict(self) -> dict[str, Any]:
+        """All of it in types that JSON and pandas take, each under the name of its attribute.
+
+        Enumerations stand as their names, masks as lists of the names of axes; what is of one axis stands
+        below its name (``A``, ``B``, ``C``, ``SCISSOR``), and ``fault_code`` is the fault's number.
+        :meth:`from_registers` makes the same status of the first three again.
+        """
+        # By register and not by property where there are many: a recorder does this at every poll.
+        words, fault, states = self._registers, self.fault, self._states
+        return {
+            "registers": list(words),
+            "timestamp": self._timestamp,
+            "sequence": self._sequence,
+            "fault": fault.name,
+            "fault_code": int(fault),
+            "is_activated": self.is_activated,
+            "is_reset": self.is_reset,
+            "is_moving": self.is_moving,
+            "initialization": self.initialization.name,
+            "mode": self.mode.name,
+            "activation_echo": self.activation_echo,
+            "go_echo": self.go_echo,
+            "contacts": list(_CONTACT_NAMES[words[0] & 0xFF]),
+            **{
+                name: {
+                    "position": reg.gPO[n].read(words),
+                    "requested_position": reg.gPR[n].read(words),
+                    "current_ma": reg.gCU[n].read(words) * reg.MILLIAMPERE_PER_COUNT,
+                    "axis_state": states[reg.gDT[n].read(words)],
+                }
+                for n, name in enumerate(_NAMES)
+            },
+        }
+
+    def __eq__(self, other: object) -> bool:
+        """Equal registers, timestamp and sequence."""
+        if not isinstance(other, RobotiqStatus):
+            return NotImplemented
+        return self._key() == other._key()
+
+    def __hash__(self) -> int:
+        """Hash of what is compared."""
+        return hash(self._key())
+
+    def __reduce__(self) -> tuple[type[RobotiqStatus], tuple[reg.Registers, float, int]]:
+        """Copy and pickle."""
+        return RobotiqStatus, self._key()
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Refuse changes after construction."""
+        raise AttributeError(f"RobotiqStatus is immutable: cannot set {name!r}")
+
+    def __repr__(self) -> str:
+        """The words a person looks for first."""
+        axes = ", ".join(
+            f"{axis.name}={self.position(axis)}->{self.requested_position(axis)} "
+            f"{self.axis_state(axis)} {self.current_ma(axis)}mA"
+            for axis in AXES
+        )
+        return (
+            f"<RobotiqStatus #{self._sequence} {self.initialization.name} go={int(self.go_echo)} "
+            f"fault={self.fault.name} {axes}>"
+        )
+
+    def _key(self) -> tuple[reg.Registers, float, int]:
+        return self._registers, self._timestamp, self._sequence

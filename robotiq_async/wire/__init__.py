@@ -1,1 +1,0 @@
-"""The gripper's registers: what is asked in eight of them and what is answered in eight others. Pure."""
