@@ -23,8 +23,8 @@ if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
 
 from robotiq_async.control.state_machine import SEQUENCES, TABLE, Verdict, states_allowing  # noqa: E402
-from robotiq_async.control.triggers import Trigger  # noqa: E402
 from robotiq_async.values.enums import State  # noqa: E402
+from robotiq_async.values.trigger import Trigger  # noqa: E402
 
 PICTURE: Final = ROOT / "docs" / "state-machine.svg"
 

@@ -21,7 +21,6 @@ if __name__ == "__main__":
 
 from robotiq_async import ReconnectPolicy, RobotiqHand  # noqa: E402
 from robotiq_async.control.state_machine import TABLE, Verdict  # noqa: E402
-from robotiq_async.control.triggers import Trigger  # noqa: E402
 from robotiq_async.simulator.troubles.trouble import KINDS  # noqa: E402
 from robotiq_async.values import registers  # noqa: E402
 from robotiq_async.values.calibration.csv_tables import SPEED, read_table, thesis_table  # noqa: E402
@@ -34,6 +33,7 @@ from robotiq_async.values.enums import (  # noqa: E402
     State,
 )
 from robotiq_async.values.registers import RTU_REGISTERS, TCP_REGISTERS, Field  # noqa: E402
+from robotiq_async.values.trigger import Trigger  # noqa: E402
 
 DOCS: Final = ROOT / "docs"
 

@@ -2,32 +2,27 @@
 
 What a program needs is imported from here. Where it comes from, and what stands around it::
 
-    hand, protocol           RobotiqHand, and what every hand can do
-    session                  the task that polls, from start() to stop()
-    grasping                 who holds a part, and what becomes of the grip
-    control                  what to write next: state machine, moves, adoption
-    link                     addresses, transports, Modbus: the bytes
-    wire                     status and request, decoded and encoded
-    calibration, kinematics  what the values mean: mm/s, N, joint angles
-    description              the hand in three dimensions: its URDF, the poses of its links
-    actions, telemetry       operating a hand; recordings, viewers and metrics of one
-    web                      a page in the browser
-    measure, doctor          measurements of a gripper; what is wrong with a connection
-    sync                     blocking hands, for scripts and notebooks
-    fleet                    hands on other hosts: agents that serve them, remote hands
-    ros2                     a lifecycle node of ROS 2 around a hand
-    simulator, cli           a simulated gripper with its servers; the command line
+    values      what goes in and comes out: status, request, results, errors, units
+    hand        RobotiqHand; what every hand can do
+    session     the task that polls, from start() to stop()
+    control     what to write next: state machine, moves, adoption
+    link        addresses, transports, Modbus: the bytes
+    sync        blocking hands, for scripts and notebooks
+    fleet       hands on other hosts: agents that serve them, remote hands
+    tools       recordings, viewer, web page, measurements, diagnosis of a hand
+    ros2        a lifecycle node of ROS 2 around a hand
+    simulator   a simulated gripper with its servers
+    cli         the command line
+    runtime     below all of it: clocks, event loops, logging, optional packages
 
 Nothing of this has run on real hardware yet.
 """
 
-from .control.motion import MoveResult
-from .control.triggers import Trigger
 from .hand import RobotiqHand
 from .link.transport import Transport
+from .runtime.version import __version__ as __version__
 from .session.reconnecting import ReconnectPolicy
-from .session.statistics import Statistics
-from .session.streams import SentRequest, Stream, Transition
+from .session.streams import Stream
 from .values.calibration import Units
 from .values.enums import (
     CLOSED,
@@ -64,10 +59,13 @@ from .values.errors import (
     RobotiqStateError,
     StateTimeoutError,
 )
+from .values.events import SentRequest, Transition
 from .values.grasp_result import GraspResult
 from .values.grip_event import GripChange, GripEvent
+from .values.move_result import MoveResult
+from .values.statistics import Statistics
 from .values.status import RobotiqStatus
-from .version import __version__ as __version__
+from .values.trigger import Trigger
 
 __all__ = [
     "CLOSED",

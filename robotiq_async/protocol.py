@@ -12,13 +12,13 @@ from types import TracebackType
 from typing import Protocol, Self, TypeVar
 
 from .control.grip_watch import SLIP_COUNTS
-from .control.motion import MoveResult
-from .session.statistics import Statistics
-from .session.streams import SentRequest, Transition
 from .values.calibration import Units
 from .values.enums import Finger, State
+from .values.events import SentRequest, Transition
 from .values.grasp_result import GraspResult
 from .values.grip_event import GripEvent
+from .values.move_result import MoveResult
+from .values.statistics import Statistics
 from .values.status import RobotiqStatus
 
 T_co = TypeVar("T_co", covariant=True)

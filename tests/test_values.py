@@ -52,7 +52,7 @@ from robotiq_async.fleet.keys.credentials import Credentials
 from robotiq_async.fleet.network.endpoints import Endpoint
 from robotiq_async.link.address import parse_address
 from robotiq_async.link.simulation import Simulation
-from robotiq_async.session.statistics import Counters
+from robotiq_async.session.counters import Counters
 from robotiq_async.simulator import Habits, Trouble
 from robotiq_async.tools.doctor import Finding, Level
 from robotiq_async.tools.web.settings import PageSettings

@@ -26,10 +26,10 @@ DOOR: Final = """<!doctype html>
 
 def version() -> str:
     """That of the package, as its source has it."""
-    text = (ROOT / "robotiq_async" / "version.py").read_text(encoding="utf-8")
+    text = (ROOT / "robotiq_async" / "runtime" / "version.py").read_text(encoding="utf-8")
     found = re.search(r'^__version__: Final = "([^"]+)"$', text, re.MULTILINE)
     if found is None:
-        raise ValueError("robotiq_async/version.py has no version")
+        raise ValueError("robotiq_async/runtime/version.py has no version")
     return found[1]
 
 

@@ -24,6 +24,7 @@ from ..values.errors import (
 )
 from ..values.request import Request
 from ..values.status import RobotiqStatus
+from ..values.trigger import Trigger
 from .callers import Callers
 from .first_motion import IGNORED_S, FirstMotion
 from .grip_keeper import GripKeeper
@@ -34,7 +35,7 @@ from .requests.pending import Command
 from .requests.shadow import NEVER, RequestShadow
 from .sequences import Sequence, activation, automatic_release, reset, shutdown
 from .state_machine import RUNNING, StateMachine
-from .triggers import Trigger, classify
+from .triggers import classify
 from .waiters import Waiter
 
 _COMMANDED: Final = RUNNING | {State.FAULT}

@@ -15,12 +15,13 @@ from ..runtime.log import Log, log
 from ..values.enums import NO_AXES, Fault, Finger, State
 from ..values.request import Request
 from ..values.status import RobotiqStatus
+from ..values.trigger import Trigger
 from .requests.merging import merged
 from .requests.pending import PendingCommand
 from .requests.shadow import RequestShadow
 from .sequences import Sequence, stop_fingers
 from .state_machine import RUNNING
-from .triggers import Trigger, classify
+from .triggers import classify
 
 KEEP_S: Final = 0.5
 """How long axes have to come to rest. What is left of the time of a stop is enough to clear rGTO also on the

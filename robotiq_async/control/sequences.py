@@ -20,8 +20,9 @@ from ..values.enums import Fault, Severity
 from ..values.errors import GripperFaultError, NotActivatedError
 from ..values.request import Request
 from ..values.status import RobotiqStatus
+from ..values.trigger import Trigger
 from .requests.writes import WINDOW_S
-from .triggers import Trigger, classify
+from .triggers import classify
 
 Sequence = Generator[Request | None, RobotiqStatus, None]
 """Yields what to write now, is sent the next status that counts."""

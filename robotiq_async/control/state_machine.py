@@ -31,8 +31,9 @@ from ..values.errors import (
 )
 from ..values.request import Request
 from ..values.status import RobotiqStatus
+from ..values.trigger import Trigger
 from .sequences import Sequence
-from .triggers import Trigger, classify
+from .triggers import classify
 
 
 class Verdict(Enum):

@@ -6,15 +6,16 @@ import asyncio
 
 import anyio
 
-from ..control.motion import Move, MoveResult
+from ..control.motion import Move
 from ..control.requests.pending import Command
 from ..control.state_machine import SEQUENCES
-from ..control.triggers import Trigger
 from ..runtime.clock import now
 from ..values.checks import check_byte, check_mask, check_optional_byte, check_timeout
 from ..values.enums import CLOSED, OPEN, Finger
 from ..values.errors import MoveSupersededError, MoveTimeoutError
 from ..values.grasp_result import GraspResult, check_at_least
+from ..values.move_result import MoveResult
+from ..values.trigger import Trigger
 from .naming import tells_its_hand
 from .recovery import Recovery
 

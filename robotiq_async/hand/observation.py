@@ -8,16 +8,18 @@ from typing import TypeVar
 
 from ..control.grip_watch import SLIP_COUNTS, GripWatch
 from ..control.state_machine import StateMachine
+from ..session.counters import Counters
 from ..session.options import Options
 from ..session.session import Session
 from ..session.state_waiters import check_states
-from ..session.statistics import Counters, Statistics
-from ..session.streams import Channel, Channels, SentRequest, Stream, Transition
+from ..session.streams import Channel, Channels, Stream
 from ..values.calibration import Units
 from ..values.checks import check_int, check_timeout
 from ..values.enums import Finger, State
 from ..values.errors import ConnectionLostError, NotStartedError
+from ..values.events import SentRequest, Transition
 from ..values.grip_event import GripEvent
+from ..values.statistics import Statistics
 from ..values.status import RobotiqStatus
 from .naming import tells_its_hand
 

@@ -7,11 +7,11 @@ from typing import Final
 import anyio
 
 from ..control.state_machine import RUNNING
-from ..control.triggers import Trigger
 from ..session.stall_watch import STALLED_S, StallWatch
 from ..values.checks import check_timeout
 from ..values.enums import Severity, State
 from ..values.errors import InvalidStateError, NotActivatedError, StateTimeoutError
+from ..values.trigger import Trigger
 from .naming import tells_its_hand
 from .observation import Observation
 

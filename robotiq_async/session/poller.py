@@ -27,14 +27,15 @@ from ..values.errors import (
     ResponseTimeoutError,
     RobotiqConnectionError,
 )
+from ..values.events import SentRequest
 from ..values.registers import Registers
 from ..values.request import Request
 from ..values.status import RobotiqStatus
+from .counters import Counters
 from .ending import Ending
 from .opening import Opener
 from .options import LONGEST_SPACING_S, Options
-from .statistics import Counters
-from .streams import Channels, SentRequest
+from .streams import Channels
 
 # anyio loads its backend when it is first used: some 20 ms that would hold up the loop in which a hand
 # starts. Where it keeps it is not documented; a name that has changed costs those 20 ms and nothing else.

@@ -10,7 +10,6 @@ import anyio
 
 from ..control.controller import Controller
 from ..control.state_machine import RUNNING, SEQUENCES, StateMachine
-from ..control.triggers import Trigger
 from ..control.waiters import Waiter
 from ..runtime.clock import now
 from ..runtime.concurrency import wait_shielded
@@ -27,15 +26,17 @@ from ..values.errors import (
     RobotiqError,
     StateTimeoutError,
 )
+from ..values.events import Transition
 from ..values.status import RobotiqStatus
+from ..values.trigger import Trigger
 from .activation_progress import ActivationProgress
 from .claims import Claims
+from .counters import Counters
 from .options import Options
 from .poller import Poller
 from .stall_watch import STALLED_S, StallWatch
 from .state_waiters import StateWaiters
-from .statistics import Counters
-from .streams import Channels, Transition
+from .streams import Channels
 
 P = ParamSpec("P")
 T = TypeVar("T")

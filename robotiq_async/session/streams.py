@@ -12,80 +12,17 @@ import itertools
 import weakref
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
 
-from ..control.triggers import Trigger
 from ..runtime.event_loop import check_loop
 from ..runtime.log import Log, log
-from ..values.enums import AXES, State
 from ..values.errors import RobotiqError
-from ..values.request import Request
+from ..values.events import SentRequest, Transition
 from ..values.status import RobotiqStatus
 from .listeners import Listeners
 
 T = TypeVar("T")
 U = TypeVar("U")
-
-
-@dataclass(frozen=True, slots=True)
-class Transition:
-    """One change of state.
-
-    Attributes:
-        source: the state before.
-        target: the state after.
-        trigger: what made it happen.
-        timestamp: monotonic seconds, by the clock of the statuses.
-    """
-
-    source: State
-    target: State
-    trigger: Trigger
-    timestamp: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """All of it in types that JSON and pandas take; states and trigger by name."""
-        return {
-            "timestamp": self.timestamp,
-            "source": self.source.name,
-            "target": self.target.name,
-            "trigger": self.trigger.name,
-        }
-
-
-@dataclass(frozen=True, slots=True)
-class SentRequest:
-    """One image that was written.
-
-    Attributes:
-        request: the image.
-        timestamp: monotonic seconds, by the clock of the statuses, at which it was sent.
-        acknowledged: whether the gripper has acknowledged it; if not, it may have arrived or not.
-    """
-
-    request: Request
-    timestamp: float
-    acknowledged: bool
-
-    def as_dict(self) -> dict[str, Any]:
-        """All of it in types that JSON and pandas take, the request's attributes beside its own.
-
-        What is asked of one axis stands below its name: ``position``, ``speed`` and ``force``.
-        """
-        request = self.request
-        return {
-            "timestamp": self.timestamp,
-            "acknowledged": self.acknowledged,
-            "registers": list(request.registers),
-            "activate": request.activate,
-            "go": request.go,
-            "release": request.release,
-            "mode": request.mode.name,
-            "individual_fingers": request.individual_fingers,
-            "individual_scissor": request.individual_scissor,
-            **{str(axis.name): asdict(asked) for axis, asked in zip(AXES, request.axes, strict=True)},
-        }
 
 
 class Stream(Generic[T]):

@@ -5,9 +5,9 @@ Made from robotiq_async.hand.commands by docs/make_sync.py.
 
 from __future__ import annotations
 
-from ..control.motion import MoveResult
 from ..values.enums import Finger
 from ..values.grasp_result import GraspResult
+from ..values.move_result import MoveResult
 from .recovery import Recovery
 
 

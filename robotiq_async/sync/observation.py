@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..control.grip_watch import SLIP_COUNTS
-from ..session.statistics import Statistics
-from ..session.streams import SentRequest, Transition
 from ..values.calibration import Units
 from ..values.enums import Finger, State
+from ..values.events import SentRequest, Transition
 from ..values.grip_event import GripEvent
+from ..values.statistics import Statistics
 from ..values.status import RobotiqStatus
 from .blocking import BlockingHand
 from .streams import Stream

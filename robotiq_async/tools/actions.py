@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from ..control.motion import MoveResult
 from ..protocol import Hand
 from ..runtime.clock import now
 from ..values.checks import check_byte
@@ -28,6 +27,7 @@ from ..values.enums import (
     State,
 )
 from ..values.errors import MoveSupersededError, NotStartedError
+from ..values.move_result import MoveResult
 
 CANCELS_RECOVERY: Final = frozenset({"halt", "reset", "release"})
 """Actions after which no recovery may go on by itself."""

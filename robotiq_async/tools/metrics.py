@@ -25,9 +25,9 @@ except ModuleNotFoundError as error:
     raise ImportError(f"metrics need prometheus-client: {install('metrics')}") from error
 
 from ..protocol import Hand
-from ..session.statistics import Statistics
 from ..values.checks import check_int
 from ..values.enums import State
+from ..values.statistics import Statistics
 
 LOOPBACK: Final = "127.0.0.1"
 TIMEOUT_S: Final = 5.0

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ..control.motion import MoveResult
 from .checks import check_int
 from .enums import Finger, ObjectStatus
+from .move_result import MoveResult
 from .status import RobotiqStatus
 
 

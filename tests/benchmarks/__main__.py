@@ -18,7 +18,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from robotiq_async.session.statistics import percentile
+from robotiq_async.values.statistics import percentile
 from tests.benchmarks.contenders import INTERVAL_S, Figures, periods
 from tests.benchmarks.native import MissingToolError, build, grippers
 from tests.benchmarks.program import Row, main, say

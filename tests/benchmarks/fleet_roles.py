@@ -27,7 +27,8 @@ from robotiq_async.fleet.wire.envelope import Answer, unpack_call
 from robotiq_async.fleet.wire.status_message import StatusMessage
 from robotiq_async.fleet.wire.values import statistics_fields
 from robotiq_async.protocol import Hand
-from robotiq_async.session.statistics import Counters, percentile
+from robotiq_async.session.counters import Counters
+from robotiq_async.values.statistics import percentile
 
 INTERVAL_S = 0.005
 SETTLE_S = 0.5

@@ -24,8 +24,8 @@ from typing import Any
 
 from robotiq_async import Finger, RobotiqHand
 from robotiq_async.session.options import SERIAL_POLL_INTERVAL_S
-from robotiq_async.session.statistics import percentile
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
+from robotiq_async.values.statistics import percentile
 from tests.benchmarks.program import Row, main, say
 from tests.serial_line import SerialLine
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from robotiq_async.control.motion import MoveResult
 from robotiq_async.values.errors import RobotiqError
+from robotiq_async.values.move_result import MoveResult
 
 
 class Outcome:

@@ -14,12 +14,12 @@ from robotiq_async.control.controller import Controller
 from robotiq_async.control.motion import Move
 from robotiq_async.control.requests.pending import Command
 from robotiq_async.control.state_machine import StateMachine
-from robotiq_async.control.triggers import Trigger
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values.calibration.closing_time import closing_time
 from robotiq_async.values.enums import AXES
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import Request
+from robotiq_async.values.trigger import Trigger
 from tests.control.outcome import Outcome
 from tests.register_words import with_object_status
 

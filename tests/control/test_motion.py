@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.control.motion import MARGIN_S, Move, MoveResult
+from robotiq_async.control.motion import MARGIN_S, Move
 from robotiq_async.values.calibration.closing_time import closing_time
 from robotiq_async.values.enums import AXES, Finger, ObjectStatus
 from robotiq_async.values.errors import ConnectionLostError, MoveSupersededError, RobotiqError
+from robotiq_async.values.move_result import MoveResult
 from robotiq_async.values.status import RobotiqStatus
 from tests.control.outcome import Outcome
 from tests.register_words import status_of

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from robotiq_async.control.triggers import Trigger, classify
+from robotiq_async.control.triggers import classify
+from robotiq_async.values.trigger import Trigger
 from tests.register_words import status_of
 
 

@@ -24,8 +24,8 @@ from robotiq_async.fleet.wire.envelope import Answer, Call, failure
 from robotiq_async.fleet.wire.names import ROOT
 from robotiq_async.fleet.wire.status_message import StatusMessage
 from robotiq_async.fleet.wire.values import request_fields, result_fields, transition_fields
-from robotiq_async.session.streams import SentRequest
 from robotiq_async.values.errors import ControlLostError
+from robotiq_async.values.events import SentRequest
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
 from tests.docs.pages import DOCS, blocks

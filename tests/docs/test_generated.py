@@ -10,7 +10,7 @@ import pytest
 from docs import make_diagram, make_tables
 from robotiq_async import State
 from robotiq_async.control.state_machine import TABLE, Verdict
-from robotiq_async.control.triggers import Trigger
+from robotiq_async.values.trigger import Trigger
 from tests.docs.pages import DOCS
 
 Box = tuple[float, float, float, float]

@@ -16,9 +16,9 @@ import pytest
 from docs import make_diagram, make_pages
 from robotiq_async import Finger, RobotiqHand
 from robotiq_async.control.state_machine import TABLE, Verdict
-from robotiq_async.control.triggers import Trigger
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.enums import State
+from robotiq_async.values.trigger import Trigger
 from tests.docs import prompt
 from tests.docs.agents import ROOM, agent_of_the_pages
 from tests.docs.pages import DOCS, PAGES, ROOT, Block, blocks, outputs, prose, requirements

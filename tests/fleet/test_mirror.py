@@ -10,12 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async import State
-from robotiq_async.control.triggers import Trigger
 from robotiq_async.fleet.remote.mirror import DRIFT, AgentClock, Mirror
 from robotiq_async.fleet.wire.status_message import StatusMessage
 from robotiq_async.fleet.wire.values import transition_fields
-from robotiq_async.session.streams import Channels, Transition
+from robotiq_async.session.streams import Channels
 from robotiq_async.values.errors import ProtocolError
+from robotiq_async.values.events import Transition
+from robotiq_async.values.trigger import Trigger
 
 MARK = 5
 AHEAD = 1000.0

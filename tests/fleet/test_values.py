@@ -19,9 +19,7 @@ from robotiq_async import (
     State,
     Transition,
 )
-from robotiq_async.control.triggers import Trigger
 from robotiq_async.fleet.wire import values
-from robotiq_async.session.statistics import Statistics
 from robotiq_async.values import errors
 from robotiq_async.values.errors import (
     AgentError,
@@ -34,6 +32,8 @@ from robotiq_async.values.errors import (
     RobotiqError,
 )
 from robotiq_async.values.request import AxisRequest, Request
+from robotiq_async.values.statistics import Statistics
+from robotiq_async.values.trigger import Trigger
 
 KINDS = sorted(
     (kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, RobotiqError)),

@@ -8,7 +8,6 @@ from itertools import pairwise
 import pytest
 
 from robotiq_async.control.requests.pending import Command
-from robotiq_async.control.triggers import Trigger
 from robotiq_async.session.poller import READS, STOP_S
 from robotiq_async.session.reconnecting import ReconnectPolicy
 from robotiq_async.values.enums import Finger, State
@@ -20,6 +19,7 @@ from robotiq_async.values.errors import (
     RobotiqConnectionError,
 )
 from robotiq_async.values.request import Request
+from robotiq_async.values.trigger import Trigger
 from tests.session.polled import LOST, POLL_S, Polled, polled
 from tests.virtual import virtual
 

@@ -10,7 +10,6 @@ from dataclasses import replace
 import pytest
 
 from robotiq_async.control.requests.pending import Command
-from robotiq_async.control.triggers import Trigger
 from robotiq_async.session.session import Session
 from robotiq_async.values.enums import Finger, State
 from robotiq_async.values.errors import (
@@ -19,6 +18,7 @@ from robotiq_async.values.errors import (
     InvalidStateError,
     NotStartedError,
 )
+from robotiq_async.values.trigger import Trigger
 from tests.session.sessions import LOST, Run, running
 from tests.session.wire import Wire
 from tests.virtual import VirtualLoop, run, virtual

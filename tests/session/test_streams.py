@@ -11,11 +11,12 @@ from concurrent.futures import ThreadPoolExecutor
 import anyio
 import pytest
 
-from robotiq_async.control.triggers import Trigger
 from robotiq_async.session.listeners import Listeners
-from robotiq_async.session.streams import Channel, Stream, Transition
+from robotiq_async.session.streams import Channel, Stream
 from robotiq_async.values.enums import State
 from robotiq_async.values.errors import ConnectionLostError, RobotiqError
+from robotiq_async.values.events import Transition
+from robotiq_async.values.trigger import Trigger
 
 
 def lost() -> RobotiqError:

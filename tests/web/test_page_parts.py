@@ -13,7 +13,6 @@ pytest.importorskip("nicegui", reason="the page needs the extra web")
 
 from robotiq_async import CLOSED, Fault, Finger, RobotiqHand, State
 from robotiq_async.control.state_machine import TABLE, Verdict, refusal
-from robotiq_async.control.triggers import Trigger
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import Operator
 from robotiq_async.tools.viewer.refusal_words import refusal_words
@@ -24,6 +23,7 @@ from robotiq_async.tools.web.page.mirror import HISTORY_S, Mirror
 from robotiq_async.tools.web.page.widgets.words import event_words, fault_words, state_words
 from robotiq_async.tools.web.server import PageServer
 from robotiq_async.tools.web.settings import PageSettings
+from robotiq_async.values.trigger import Trigger
 from tests.fake_hand import FakeHand
 from tests.grippers import active_gripper
 

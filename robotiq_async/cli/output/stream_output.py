@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Final
 
 from ...runtime.clock import now
 from ...runtime.concurrency import in_a_thread
-from ...session.streams import Transition
 from ...tools.recording.feed import compact
 from ...tools.recording.payloads import Fields, fault_fields, transition_fields
 from ...tools.recording.raw_output import write_all
 from ...values.enums import Fault, State
+from ...values.events import Transition
 from ...values.status import RobotiqStatus
 from .log_capture import forwarded_warnings
 from .text import clock, event_line, status_line

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from datetime import datetime
 from typing import Any, Final
 
-from ...control.triggers import Trigger
 from ...tools.recording.payloads import Fields
 from ...values.enums import AXES, State
 from ...values.status import NO_REQUEST
+from ...values.trigger import Trigger
 
 NOTHING: Final = "-"
 """Stands for what means nothing."""

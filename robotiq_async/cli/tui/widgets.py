@@ -10,9 +10,9 @@ from rich.text import Text
 from textual.widget import Widget
 from textual.widgets import Static
 
-from ...session.statistics import Statistics
 from ...tools.viewer.state_words import STATE_WORDS
 from ...values.enums import AXES, Fault, Finger, ObjectStatus, Severity, State
+from ...values.statistics import Statistics
 from ...values.status import NO_REQUEST, RobotiqStatus
 from ..output.text import NOTHING
 from .words import HINTS

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Final
 
-from ...session.streams import Transition
 from ...tools.viewer.refusal_words import without_methods
 from ...tools.viewer.state_words import STATE_WORDS
 from ...values.enums import State
+from ...values.events import Transition
 
 KEYS: Final = """\
 o open  c close  1 wide  2 normal  3 pinch  SPACE halt  + - speed  ] [ force

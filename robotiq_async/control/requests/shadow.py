@@ -16,8 +16,9 @@ from ...runtime.log import Log, log
 from ...values.enums import AXES, NO_AXES, Finger, ObjectStatus
 from ...values.request import AxisRequest, Request
 from ...values.status import RobotiqStatus
+from ...values.trigger import Trigger
 from ..contact import TOLERANCE, agrees
-from ..triggers import Trigger, classify
+from ..triggers import classify
 from .adoption import Adoption
 from .limits import ALONE_S
 from .standstill import Moment, Standstill

@@ -13,8 +13,8 @@ from typing import Any, Final
 
 from ...hand import RobotiqHand
 from ...runtime.clock import now
-from ...session.streams import SentRequest, Transition
 from ...values.errors import RobotiqError
+from ...values.events import SentRequest, Transition
 from ...values.status import RobotiqStatus
 from ..control.lease import Lease
 from ..network.bus import Bus, Urgency

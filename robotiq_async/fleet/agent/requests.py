@@ -6,9 +6,9 @@ import asyncio
 from collections.abc import Callable, Coroutine
 from typing import Any, Final, TypeVar
 
-from ...control.motion import MoveResult
 from ...runtime.log import Log
 from ...values.errors import AgentError, ControlLostError, RobotiqError
+from ...values.move_result import MoveResult
 from ..network.bus import Query
 from ..wire.envelope import Answer, Call, failure
 from ..wire.values import result_fields

@@ -9,15 +9,15 @@ from inspect import signature
 from typing import Final
 
 from ...control.grip_keeper import KEEP_S
-from ...control.motion import MoveResult
 from ...control.state_machine import RUNNING
 from ...hand import RobotiqHand
 from ...runtime.clock import now
 from ...runtime.log import Log
+from ...runtime.version import __version__
 from ...values.checks import check_byte, check_mask
 from ...values.enums import Finger
 from ...values.errors import AgentError, ControlLostError, RobotiqConnectionError, RobotiqError
-from ...version import __version__
+from ...values.move_result import MoveResult
 from ..control.admission import Admission
 from ..control.lease import Lease
 from ..network.bus import Bus, Query

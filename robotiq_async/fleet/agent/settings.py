@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ...hand import RobotiqHand
-from ...session.streams import SentRequest
 from ...values.enums import AXES
 from ...values.errors import RobotiqError
+from ...values.events import SentRequest
 from ..wire.settings import Setting
 
 

@@ -7,13 +7,13 @@ from contextlib import nullcontext
 from dataclasses import replace
 from typing import Final
 
-from ...control.motion import MoveResult
 from ...control.state_machine import RUNNING, refusal
-from ...control.triggers import Trigger
 from ...values.checks import check_byte, check_mask, check_optional_byte, check_timeout
 from ...values.enums import CLOSED, OPEN, Finger
 from ...values.errors import NotAllowedError, NotStartedError, RobotiqConnectionError
 from ...values.grasp_result import GraspResult, check_at_least
+from ...values.move_result import MoveResult
+from ...values.trigger import Trigger
 from ..network.bus import Urgency
 from ..wire.values import Fields, read_result, reading
 from .observation import RemoteObservation

@@ -7,14 +7,16 @@ from typing import TypeVar
 
 from ...control.grip_watch import SLIP_COUNTS, GripWatch
 from ...runtime.event_loop import check_loop
+from ...session.counters import Counters
 from ...session.state_waiters import check_states
-from ...session.statistics import Counters, Statistics
-from ...session.streams import Channel, Channels, SentRequest, Stream, Transition
+from ...session.streams import Channel, Channels, Stream
 from ...values.calibration import Units
 from ...values.checks import check_int, check_timeout
 from ...values.enums import Finger, State
 from ...values.errors import ConnectionLostError, NotStartedError, StateTimeoutError
+from ...values.events import SentRequest, Transition
 from ...values.grip_event import GripEvent
+from ...values.statistics import Statistics
 from ...values.status import RobotiqStatus
 from ..wire.names import GripperName
 from .outbox import Outbox

@@ -8,14 +8,13 @@ from collections.abc import Coroutine, Mapping
 from contextlib import suppress
 from typing import Any, Final
 
-from ...control.triggers import Trigger
 from ...runtime.clock import now
 from ...runtime.concurrency import wait_shielded
 from ...runtime.event_loop import check_loop
 from ...runtime.log import Log
+from ...session.counters import Counters
 from ...session.ending import Ending
 from ...session.state_waiters import StateWaiters
-from ...session.statistics import Counters, Statistics
 from ...session.streams import Channels
 from ...values.checks import check_seconds
 from ...values.enums import State
@@ -29,6 +28,8 @@ from ...values.errors import (
     NotStartedError,
     RobotiqError,
 )
+from ...values.statistics import Statistics
+from ...values.trigger import Trigger
 from ..control.lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
 from ..limited_log import LimitedLog
 from ..network.bus import Bus, Undo

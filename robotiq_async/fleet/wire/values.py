@@ -6,11 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Final
 
-from ...control.motion import MoveResult
-from ...control.triggers import Trigger
 from ...runtime.log import printable
-from ...session.statistics import Statistics
-from ...session.streams import SentRequest, Transition
 from ...values import errors
 from ...values.enums import Fault, Finger, ObjectStatus, State
 from ...values.errors import (
@@ -23,8 +19,12 @@ from ...values.errors import (
     ProtocolError,
     RobotiqError,
 )
+from ...values.events import SentRequest, Transition
+from ...values.move_result import MoveResult
 from ...values.request import Request
+from ...values.statistics import Statistics
 from ...values.status import RobotiqStatus
+from ...values.trigger import Trigger
 
 Fields = dict[str, Any]
 Clock = Callable[[float], float]

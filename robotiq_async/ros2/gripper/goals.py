@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
-from ...control.motion import MoveResult
 from ...protocol import Hand
 from ...runtime.log import Log
 from ...values.enums import Finger
 from ...values.errors import RobotiqConnectionError, RobotiqError
+from ...values.move_result import MoveResult
 from ..translation.joints import Targets
 
 FEEDBACK_S: Final = 0.05

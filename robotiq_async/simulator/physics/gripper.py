@@ -39,7 +39,7 @@ class SimulatedGripper(Surroundings):
 
     A write takes effect one device cycle later, as on the device. Speeds are the measured ones of
     :mod:`robotiq_async.values.calibration.closing_time`; the scissor moves the same counts a second, as
-    none are published. What the motors draw is in :mod:`.mechanics.motor`, by how much axes miss what they are
+    none are published. What the motors draw is in :mod:`.mechanics.motor`; how much axes miss what they are
     asked in :mod:`.mechanics.spread`: as with a real gripper, who waits for gPO = rPR may wait for ever.
 
     Choices where no source settles the behaviour; those that can be made otherwise stand in :class:`Habits`:

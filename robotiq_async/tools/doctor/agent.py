@@ -15,10 +15,10 @@ from ...fleet.wire.names import GripperName
 from ...fleet.wire.status_message import StatusMessage, unpack
 from ...fleet.wire.values import Fields
 from ...runtime.clock import now
-from ...session.statistics import percentile
+from ...runtime.version import __version__
 from ...values.errors import AgentError, NotAllowedError, ProtocolError, RobotiqError
+from ...values.statistics import percentile
 from ...values.status import RobotiqStatus
-from ...version import __version__
 from .findings import Finding, GiveUpError, Level, Report
 from .gripper import report_state
 

@@ -18,9 +18,9 @@ from ...session.options import (
     SERIAL_POLL_INTERVAL_S,
     registers_of,
 )
-from ...session.statistics import percentile
 from ...values.enums import Severity
 from ...values.errors import ConnectionLostError, RobotiqConnectionError
+from ...values.statistics import percentile
 from ...values.status import RobotiqStatus
 from .answer import REACH_S, find_gripper, long_enough
 from .findings import Finding, GiveUpError, Level, Report

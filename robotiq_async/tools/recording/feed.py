@@ -16,9 +16,9 @@ from typing import Any, Final
 from ...protocol import Hand, HandStream
 from ...runtime.clock import now
 from ...runtime.log import Log
-from ...session.streams import SentRequest, Transition
 from ...values.enums import Fault
 from ...values.errors import RobotiqConnectionError
+from ...values.events import SentRequest, Transition
 from ...values.status import RobotiqStatus
 from ..description.joint_states import SCHEMA, SCHEMA_NAME, JointStateEncoder
 from ..description.kinematics import joint_angles, joint_velocities

@@ -12,7 +12,7 @@ except ModuleNotFoundError as error:
     raise ImportError(f"recordings need mcap: {install('record')}") from error
 
 from ...protocol import Hand
-from ...version import __version__
+from ...runtime.version import __version__
 from .feed import JOINTS, TOPICS, Message, Topic
 
 NOTE: Final = "never run on real hardware"

@@ -8,9 +8,9 @@ from __future__ import annotations
 from typing import Any, Final
 
 from ...protocol import Hand
-from ...session.streams import Transition
 from ...values.enums import AXES, Fault, Finger, State
 from ...values.errors import NotStartedError
+from ...values.events import Transition
 from ...values.status import RobotiqStatus
 from ..description.kinematics import FINGER_NAMES
 

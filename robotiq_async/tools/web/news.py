@@ -9,9 +9,9 @@ from typing import Final
 
 from ...protocol import Hand, HandStream
 from ...runtime.clock import now
-from ...session.streams import Transition
 from ...values.enums import AXES, Fault, State
 from ...values.errors import NotStartedError
+from ...values.events import Transition
 from ...values.status import RobotiqStatus
 from ..recording.payloads import Fields, fault_fields, transition_fields
 

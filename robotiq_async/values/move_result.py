@@ -1,0 +1,71 @@
+"""MoveResult: how a move ended."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from .enums import AXES, Finger, ObjectStatus, names_of
+from .frozen_mapping import FrozenMapping
+from .status import RobotiqStatus
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class MoveResult:
+    """How a move ended. A contact is a result, not an error. A value: compared, hashed, copied, pickled.
+
+    Attributes:
+        outcomes: for each addressed axis, how it ended.
+        positions: for each addressed axis, where it ended, in counts.
+        contacts: the addressed axes stopped by a contact.
+        duration: seconds from the call to the status that ended the move.
+        peak_current_ma: for each addressed axis, the highest motor current seen, in milliampere.
+        status: the status that ended the move.
+    """
+
+    outcomes: Mapping[Finger, ObjectStatus]
+    positions: Mapping[Finger, int]
+    contacts: Finger
+    duration: float
+    peak_current_ma: Mapping[Finger, int]
+    status: RobotiqStatus
+
+    def __post_init__(self) -> None:
+        """Keep mappings of our own."""
+        for name in ("outcomes", "positions", "peak_current_ma"):
+            object.__setattr__(self, name, FrozenMapping(getattr(self, name)))
+
+    @property
+    def object_detected(self) -> bool:
+        """Whether a contact stopped at least one addressed axis."""
+        return bool(self.contacts)
+
+    def as_dict(self) -> dict[str, Any]:
+        """All of it in types that JSON and pandas take; enumerations and masks as in a status.
+
+        What is of one axis stands below its name: ``outcome``, ``position`` and ``peak_current_ma``.
+        """
+        return {
+            "duration": self.duration,
+            "object_detected": self.object_detected,
+            "contacts": names_of(self.contacts),
+            **{
+                str(axis.name): {
+                    "outcome": self.outcomes[axis].name,
+                    "position": self.positions[axis],
+                    "peak_current_ma": self.peak_current_ma[axis],
+                }
+                for axis in AXES
+                if axis in self.outcomes
+            },
+            "status": self.status.as_dict(),
+        }
+
+    def __repr__(self) -> str:
+        """The words a person looks for first."""
+        axes = ", ".join(
+            f"{axis}={self.positions.get(axis)} {how.name} {self.peak_current_ma.get(axis)}mA"
+            for axis, how in self.outcomes.items()
+        )
+        return f"<MoveResult {axes} in {self.duration:.3f} s>"
