@@ -37,11 +37,7 @@ from robotiq_async.values.errors import MeasuringError
 from tests.fake_hand import FakeHand, FakeStream
 
 ROOT = Path(robotiq_async.__file__).parent
-AROUND = [
-    path
-    for room in ("actions.py", "telemetry", "measure", "cli")
-    for path in sorted((ROOT / room).rglob("*.py") if (ROOT / room).is_dir() else [ROOT / room])
-]
+AROUND = [path for room in ("tools", "cli") for path in sorted((ROOT / room).rglob("*.py"))]
 """What stands around a hand."""
 
 

@@ -64,9 +64,9 @@ def parts() -> dict[str, Part]:
     """Every page of the API, by its file's name."""
     origin = origins(PACKAGE)
     names = exports(PACKAGE)
-    enums = [name for name in names if origin[name] == "enums"]
+    enums = [name for name in names if origin[name] == "values.enums"]
     hand = [name for name in names if origin[name].split(".")[0] == "hand"]
-    errors = [name for name in names if origin[name] == "errors"]
+    errors = [name for name in names if origin[name] == "values.errors"]
     values = [name for name in names if name not in {*enums, *hand, *errors}]
     fleet = origins(f"{PACKAGE}.fleet")
     return {
@@ -92,7 +92,7 @@ def parts() -> dict[str, Part]:
         "errors.md": Part(
             "Errors",
             "Those of gripper and link are in `robotiq_async` itself, others in the room that raises them.",
-            tuple(classes(f"{PACKAGE}.errors")),
+            tuple(classes(f"{PACKAGE}.values.errors")),
         ),
         "simulator.md": Part(
             "The simulator",
@@ -108,22 +108,22 @@ def parts() -> dict[str, Part]:
             "What the values mean",
             "Millimetres, newtons and seconds; joint angles; the hand in three dimensions.",
             (
-                *exports(f"{PACKAGE}.calibration"),
-                f"{PACKAGE}.kinematics",
-                *exports(f"{PACKAGE}.description"),
+                *exports(f"{PACKAGE}.values.calibration"),
+                f"{PACKAGE}.tools.description.kinematics",
+                *exports(f"{PACKAGE}.tools.description"),
             ),
         ),
         "tools.md": Part(
             "Around a hand",
             "Each behind its extra. They listen; only what is asked through an `Operator` moves anything.",
             (
-                f"{PACKAGE}.actions.Operator",
-                f"{PACKAGE}.telemetry.recorder.Recorder",
-                f"{PACKAGE}.telemetry.recordings.read_recording",
-                f"{PACKAGE}.telemetry.recordings.recover",
-                f"{PACKAGE}.telemetry.viewer.Viewer",
-                f"{PACKAGE}.telemetry.metrics.serve_metrics",
-                f"{PACKAGE}.web.server.PageServer",
+                f"{PACKAGE}.tools.actions.Operator",
+                f"{PACKAGE}.tools.recording.recorder.Recorder",
+                f"{PACKAGE}.tools.recording.recordings.read_recording",
+                f"{PACKAGE}.tools.recording.recordings.recover",
+                f"{PACKAGE}.tools.viewer.viewer.Viewer",
+                f"{PACKAGE}.tools.metrics.serve_metrics",
+                f"{PACKAGE}.tools.web.server.PageServer",
             ),
         ),
     }

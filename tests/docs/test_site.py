@@ -20,7 +20,6 @@ CONFIGURATION = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
 NAVIGATION = re.findall(r"^ +- (?:.*: )?(\S+\.md)$", CONFIGURATION.partition("\nnav:\n")[2], re.MULTILINE)
 NOT_PUBLIC = {
     "robotiq_async.tools.doctor": "the command's; what it finds is for people",
-    "robotiq_async.grasping": "robotiq_async has what programs use of it",
     "robotiq_async.hand": "robotiq_async has it",
 }
 """Rooms with an ``__all__`` that is for the other rooms."""

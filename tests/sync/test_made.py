@@ -61,7 +61,7 @@ def test_what_has_coroutines_gets_a_blocking_class_of_its_own() -> None:
     text = make_sync.shaped(modules["toy"])
     for words in (
         "from tests.sync.toy import Gauge as AsyncGauge\n",
-        "from ..enums import CLOSED, Finger\n",
+        "from ..values.enums import CLOSED, Finger\n",
         "class Toy(BlockingHand):\n",
         "        return Gauge(self._inner.gauge, self._caller)\n",
         "    def find(self, *names: str, limit: int = CLOSED) -> Gauge:\n",

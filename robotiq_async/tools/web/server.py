@@ -207,11 +207,11 @@ class PageServer:
 
 async def _start() -> Process:
     """The process of the page: with this package, whatever the working directory holds under its name."""
-    package, here = __name__.partition(".")[0], str(Path(__file__).parents[2])
+    package, here = __name__.partition(".")[0], str(Path(__file__).parents[3])
     paths = os.pathsep.join(filter(None, (here, os.environ.get("PYTHONPATH"))))
     return await asyncio.create_subprocess_exec(
         sys.executable,
-        *("-P", "-m", f"{package}.web.page"),
+        *("-P", "-m", f"{package}.tools.web.page"),
         stdin=PIPE,
         stdout=PIPE,
         limit=LINE,
