@@ -12,7 +12,7 @@ import pytest
 from packaging.requirements import Requirement
 
 from robotiq_async import __version__
-from robotiq_async.runtime.extras import install, told
+from robotiq_async.runtime.extras import install, pip_command
 from tests.cli.test_project import EXTRAS, packages_of
 
 ROOT = Path(__file__).parents[1]
@@ -37,12 +37,12 @@ def test_the_library_itself_is_not_asked_for() -> None:
 def test_the_versions_are_those_that_the_library_needs() -> None:
     requirements = ["anyio>=4.5", "nicegui<4,>=3.18; extra == 'web'", 'robotiq-async[web]; extra == "all"']
     for extra in ("web", "all"):
-        assert told(extra, requirements) == f"pip install 'nicegui<4,>=3.18' (the extra {extra})"
+        assert pip_command(extra, requirements) == f"pip install 'nicegui<4,>=3.18' (the extra {extra})"
 
 
 def test_an_extra_that_there_is_not() -> None:
     with pytest.raises(ValueError, match="there is no extra 'wbe'"):
-        told("wbe", metadata.requires("robotiq-async") or [])
+        pip_command("wbe", metadata.requires("robotiq-async") or [])
 
 
 def test_no_message_asks_an_index_for_the_library() -> None:

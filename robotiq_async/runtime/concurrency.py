@@ -1,4 +1,4 @@
-"""Work that ends well, whatever happens to those who wait for it."""
+"""Waiting for work that must finish, and threads for calls that may block."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ T = TypeVar("T")
 
 
 class LateError(Exception):
-    """A call was not done in time."""
+    """A call did not finish in time."""
 
 
 async def wait_shielded(work: asyncio.Future[Any]) -> None:
-    """Wait until something is done, also when cancelled meanwhile; the cancellation is raised afterwards.
+    """Wait until the work is done, even when cancelled meanwhile; then raise the cancellation.
 
-    What the work itself raises is not raised here: ask it for its result.
+    Does not raise what the work raises: ask the future for its result.
     """
     cancelled: asyncio.CancelledError | None = None
     with anyio.CancelScope(shield=True):
@@ -34,10 +34,10 @@ async def wait_shielded(work: asyncio.Future[Any]) -> None:
 
 
 def in_a_thread(work: Callable[[], T]) -> asyncio.Future[T]:
-    """Begin what may block for ever (a disk, a pipe) in a thread of its own.
+    """Start a call that may block for ever (a disk, a pipe) in a daemon thread of its own.
 
-    Nobody has to wait for it: neither the loop's end nor the interpreter's does, and a program whose own
-    threads are all busy does not hold it up.
+    Neither the end of the loop nor the end of the interpreter waits for it, and a full thread pool does not
+    delay it.
     """
     loop = asyncio.get_running_loop()
     future: asyncio.Future[T] = loop.create_future()
@@ -47,13 +47,13 @@ def in_a_thread(work: Callable[[], T]) -> asyncio.Future[T]:
             if not future.done():
                 how(what)
 
-        with contextlib.suppress(RuntimeError):  # the loop has been closed meanwhile
+        with contextlib.suppress(RuntimeError):  # the loop was closed meanwhile
             loop.call_soon_threadsafe(say)
 
     def run() -> None:
         try:
             result = work()
-        except Exception as error:  # noqa: BLE001  # whoever waits gets it
+        except Exception as error:  # noqa: BLE001  # raised where the future is awaited
             tell(future.set_exception, error)
         else:
             tell(future.set_result, result)

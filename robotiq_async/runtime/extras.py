@@ -1,7 +1,7 @@
-"""How to install what an extra brings, whatever way the library came here.
+"""How to install the packages of an extra, however the library was installed.
 
-``pip install 'robotiq-async[web]'`` works only where an index has the library. What an extra consists of
-works everywhere: the library stays as it was installed, from a clone, a wheel or an index.
+``pip install 'robotiq-async[web]'`` works only where a package index has the library. Installing the packages
+of the extra works everywhere: from a clone, a wheel or an index.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ def install(extra: str) -> str:
     """
     try:
         requirements = metadata.requires(NAME) or []
-    except metadata.PackageNotFoundError:  # run from a clone that was not installed
+    except metadata.PackageNotFoundError:  # runs from a clone that is not installed
         return f"pip install '.[{extra}]' in the clone"
-    return told(extra, requirements)
+    return pip_command(extra, requirements)
 
 
-def told(extra: str, requirements: Sequence[str]) -> str:
-    """The command, by what the metadata of a distribution require.
+def pip_command(extra: str, requirements: Sequence[str]) -> str:
+    """The command, from the requirements in a distribution's metadata.
 
     Raises:
-        ValueError: they have no such extra.
+        ValueError: the requirements have no such extra.
     """
     packages = [shlex.quote(each) for each in dict.fromkeys(_packages(extra, requirements))]
     if not packages:

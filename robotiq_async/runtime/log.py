@@ -1,8 +1,8 @@
-"""The library's logger: it never fails, and its messages are one line each and tell which hand it is.
+"""The library's logger: never raises, one line a message, each beginning with the name of the hand.
 
 A handler of the application that raises (a full disk, a closed stream) must not end the task that owns the
-link, or keep it from stopping the fingers. Some of the words are others': a gripper's, or of clients on the
-network. They neither begin a line that looks like one of ours nor steer a terminal.
+link or keep it from stopping the fingers. Messages can contain text from grippers and network clients: such
+text can neither forge a line of the log nor send control sequences to a terminal.
 """
 
 from __future__ import annotations
@@ -14,33 +14,32 @@ from typing import Any, Final
 
 
 class Log(logging.LoggerAdapter[logging.Logger]):
-    """What is logged about one hand: its messages begin with the name of it, and its records have it.
+    """The log of one hand. Each message begins with its name; each record has it as attribute ``hand``.
 
     Attributes:
-        hand: the name; empty for what is about no hand in particular. Every record has it as ``hand``.
+        hand: the name; empty for messages about no particular hand.
     """
 
     def __init__(self, hand: str = "") -> None:
-        """Log about a hand."""
         super().__init__(logging.getLogger("robotiq_async"), {"hand": hand})
         self.hand = hand
 
     def log(self, level: int, msg: object, *args: object, **kwargs: Any) -> None:  # noqa: ANN401  # as the base class has it
-        """Log; what goes wrong with that is shown as the logging module shows it."""
+        """Log a message; print an error of a handler to stderr, as the logging module does."""
         if not self.isEnabledFor(level):
             return
         if self.hand:
-            # As an argument: a name may hold a percent sign.
+            # As an argument, because a name can contain a percent sign.
             msg, args = f"%s: {msg}", (self.hand, *args)
         try:
             super().log(level, msg, *args, **{"stacklevel": 2} | kwargs)
-        except Exception:  # noqa: BLE001  # whatever a handler raises
+        except Exception:  # noqa: BLE001  # a handler may raise anything
             if logging.raiseExceptions and sys.stderr is not None:
                 traceback.print_exc()
 
 
 def printable(text: str) -> str:
-    """A text of others with what steers a terminal written out, as Python does it."""
+    """The text with control characters written as Python escapes."""
     return text if text.isprintable() else "".join(map(_printable, text))
 
 
@@ -49,7 +48,7 @@ def _printable(character: str) -> str:
 
 
 def _in_one_line(record: logging.LogRecord) -> bool:
-    """A filter that lets everything pass, in one line."""
+    """A logging filter that passes every record and turns its message into one line."""
     message = record.getMessage()
     if not message.isprintable():
         record.msg, record.args = printable(message), None
@@ -57,5 +56,5 @@ def _in_one_line(record: logging.LogRecord) -> bool:
 
 
 log: Final = Log()
-"""For what is about no hand in particular."""
+"""For messages about no particular hand."""
 logging.getLogger("robotiq_async").addFilter(_in_one_line)

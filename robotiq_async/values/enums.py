@@ -1,7 +1,4 @@
-"""The names of the field: axes, modes, object states, faults, states of the hand.
-
-Everything here is a plain enumeration or a constant; nothing here imports the package.
-"""
+"""Enumerations and constants: axes, modes, object states, faults, states of the hand."""
 
 from __future__ import annotations
 
@@ -13,7 +10,7 @@ from typing import Final
 class Finger(IntFlag):
     """The four axes of the gripper, and masks of them.
 
-    ``A`` stands alone and closes between ``B`` and ``C``; ``SCISSOR`` spreads ``B`` and ``C``.
+    ``A`` is the single finger that closes between ``B`` and ``C``; ``SCISSOR`` spreads ``B`` and ``C``.
     """
 
     A = 1
@@ -24,7 +21,6 @@ class Finger(IntFlag):
     ALL = 15
 
     def __str__(self) -> str:
-        """The axes by name, ``A|B``; ``none`` for the empty mask."""
         return "|".join(str(axis.name) for axis in self) or "none"
 
 
@@ -60,9 +56,9 @@ FORCE_MAX: Final = 255
 """Strongest: 60 N nominal (manual)."""
 
 DEFAULT_SPEED: Final = 128
-"""What the axes get until somebody asks otherwise."""
+"""Used until ``set_speed()``, ``set_force()`` or an argument says otherwise."""
 DEFAULT_FORCE: Final = 64
-"""What the axes get until somebody asks otherwise."""
+"""Used until ``set_speed()``, ``set_force()`` or an argument says otherwise."""
 
 OPEN_READING: Final = 6
 """Position, in counts, that a fully open finger reads."""
@@ -73,13 +69,12 @@ STROKE_COUNTS: Final = CLOSED_READING - OPEN_READING
 
 
 class Code(IntEnum):
-    """A field of the status: it prints as its name, and is its number everywhere else.
+    """A field of the status: prints as its name and behaves as its number everywhere else.
 
-    ``print(fault)`` and ``f"{fault}"`` show ``NONE``; ``f"{fault:02X}"`` and JSON have the number.
+    ``print(fault)`` and ``f"{fault}"`` show ``NONE``; ``f"{fault:02X}"`` and JSON show the number.
     """
 
     def __str__(self) -> str:
-        """The name."""
         return self.name
 
 
@@ -93,11 +88,11 @@ class Mode(Code):
 
 
 class ObjectStatus(Code):
-    """gDTA, gDTB, gDTC, gDTS: what an axis does, as the gripper says it.
+    """gDTA, gDTB, gDTC, gDTS: what an axis does, as reported by the gripper.
 
-    It says IN_MOTION of an axis at rest, too, if that was never asked to go: what people read is
-    :meth:`RobotiqStatus.axis_state`. The thesis's table swaps 1 and 2; the hardware reports 1 for a contact
-    while opening (see docs/thesis-map.md).
+    The gripper also reports IN_MOTION for an axis at rest that was never asked to go; use
+    :meth:`RobotiqStatus.axis_state` to show people what an axis does. The thesis's table swaps 1 and 2; the
+    hardware reports 1 for a contact while opening (see docs/thesis-map.md).
     """
 
     IN_MOTION = 0
@@ -111,12 +106,12 @@ class ObjectStatus(Code):
 
     @property
     def is_contact(self) -> bool:
-        """Whether something is in the way of the axis."""
+        """Whether an obstacle stopped the axis."""
         return self in (ObjectStatus.CONTACT_OPENING, ObjectStatus.CONTACT_CLOSING)
 
 
 class Initialization(Code):
-    """gIMC: how far the activation or a mode change is."""
+    """gIMC: progress of the activation or of a mode change."""
 
     RESET = 0
     """Reset, or in automatic release."""
@@ -126,11 +121,11 @@ class Initialization(Code):
 
 
 class Severity(Enum):
-    """How serious a fault is, after the manual's classes."""
+    """How serious a fault is: the manual's classes."""
 
     NONE = "none"
     PRIORITY = "priority"
-    """Nothing is broken: the action waits or is ignored."""
+    """Not a defect: the gripper delays or ignores the action."""
     MINOR = "minor"
     """Clears by itself."""
     MAJOR = "major"
@@ -140,8 +135,8 @@ class Severity(Enum):
 class Fault(Code):
     """gFLT: the fault codes of the thesis's table 4.
 
-    A code the table does not know becomes a member of its own, ``Fault(0x0C).name == "UNKNOWN_0x0C"``,
-    with severity MAJOR: it is reported as its number and never as no fault.
+    A code that is missing in the table becomes a member of its own, ``Fault(0x0C).name == "UNKNOWN_0x0C"``,
+    with severity MAJOR: an unknown fault is never reported as no fault.
     """
 
     NONE = 0x00
@@ -167,8 +162,8 @@ class Fault(Code):
             return None
         if code in cls._value2member_map_:
             return cls(code)
-        # An IntEnum's own constructor refuses new values, so the member is made by hand and
-        # registered: Fault(12) is Fault(12), and it hashes, compares and prints like the others.
+        # IntEnum's constructor refuses new values. Make and register the member here, so that
+        # Fault(12) is Fault(12) and hashes, compares and prints like the others.
         member = int.__new__(cls, code)
         member._name_ = f"UNKNOWN_0x{code:02X}"
         member._value_ = code
@@ -176,7 +171,6 @@ class Fault(Code):
         return member
 
     def __reduce_ex__(self, protocol: object) -> tuple[type[Fault], tuple[int]]:
-        """Copy and pickle by value: some versions of Python go by name, and an unknown code has none."""
         return Fault, (int(self),)
 
     @property
@@ -186,14 +180,14 @@ class Fault(Code):
 
     @property
     def description(self) -> str:
-        """One sentence on what is wrong."""
+        """What is wrong, in one sentence."""
         if int(self) in _FAULTS:
             return _FAULTS[int(self)][1]
         return f"fault code 0x{int(self):02X}, which the manual does not assign"
 
     @property
     def is_serious(self) -> bool:
-        """Whether the fault is MINOR or MAJOR: one that ends a move."""
+        """Whether the fault is MINOR or MAJOR, and so ends a move."""
         return self.severity in (Severity.MINOR, Severity.MAJOR)
 
 
@@ -212,13 +206,13 @@ _FAULTS: Final[dict[int, tuple[Severity, str]]] = {
 
 
 class State(Enum):
-    """Where the hand is: the thirteen states of the thesis, and RESET.
+    """The state of a hand: the thirteen states of the thesis, and RESET.
 
     DO_ states last until their request is acknowledged, WF_ states (wait for) until the gripper reports
     the result.
     """
 
-    # Members are compared by identity; Enum's own hash goes by the name, and takes its time at every poll.
+    # Members compare by identity. Enum hashes the name, which is too slow for a lookup at every poll.
     __hash__ = object.__hash__
 
     DISCONNECTED = "disconnected"
@@ -234,11 +228,11 @@ class State(Enum):
     DO_ATR = "do_atr"
     WF_ATR = "wf_atr"
     ATR_DONE = "atr_done"
-    """The automatic release is complete; only a reset helps."""
+    """The automatic release is complete; only a reset leads out."""
     DO_RESET = "do_reset"
     WF_RESET = "wf_reset"
     RESET = "reset"
-    """Connected and not activated: waits for the user."""
+    """Connected but not activated: waits for activate()."""
     DO_SHUTDOWN = "do_shutdown"
     SHUTDOWN = "shutdown"
     """stop() has ended; the hand may be started again."""

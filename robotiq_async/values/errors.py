@@ -13,8 +13,8 @@
     |   +-- MoveTimeoutError (TimeoutError)     .status
     |   |   +-- MoveIgnoredError                acknowledged, echoed, and nothing has moved
     |   +-- MoveSupersededError                 another command took over an axis of this move
-    |   +-- ControlLostError                    on another host: somebody else commands the gripper, or nobody
-    |   +-- NotAllowedError                     on another host: the fleet's access rules say no
+    |   +-- ControlLostError                    on another host: this hand does not hold the lease
+    |   +-- NotAllowedError                     on another host: the fleet's access rules forbid it
     +-- RobotiqConnectionError (ConnectionError)
     |   +-- ConnectFailedError                  refused, unreachable, no such port; .address
     |   +-- ConnectionLostError
@@ -26,11 +26,11 @@
     +-- MeasuringError                          a measurement that went wrong
     +-- NotAllStoppedError                      the halt of a fleet; .outcomes, .unreached
 
-The three before the last concern neither gripper nor link: the hand goes on. They, and those about other
-hosts, stand here and not among the names of the package;
-so does MoveIgnoredError, which is caught as what it is a kind of.
+The package exports those of the gripper and the link. Import the errors of other hosts, of recordings,
+viewers and measurements, and MoveIgnoredError, from here. RecordingError, ViewerError and MeasuringError
+leave the hand running.
 
-Bad arguments are plain ValueError and TypeError: they are the program's mistake, not the gripper's.
+Bad arguments raise ValueError or TypeError.
 """
 
 from __future__ import annotations
@@ -48,27 +48,23 @@ class RobotiqError(Exception):
     """Base of everything the library raises, bad arguments aside. Can be pickled and copied.
 
     Attributes:
-        hand: the name of the hand it comes from, as that was given to its constructor; empty if none was. The
-            error as a text begins with it.
+        hand: the ``name`` given to the hand's constructor, or an empty string. ``str(error)`` begins with it.
     """
 
     hand: str = ""
 
     @property
     def message(self) -> str:
-        """What it says, without the name of the hand."""
+        """The text without the name of the hand."""
         return super().__str__()
 
     def __str__(self) -> str:
-        """The name of the hand, and what it says."""
         return f"{self.hand}: {self.message}" if self.hand else self.message
 
     def __repr__(self) -> str:
-        """The same, with the kind of error."""
         return f"{type(self).__name__}({str(self)!r})" if self.hand else super().__repr__()
 
     def __reduce__(self) -> tuple[Callable[..., RobotiqError], tuple[object, ...], dict[str, object]]:
-        """Restore message and attributes without the constructor, which asks for other arguments."""
         return _restore, (type(self), *self.args), vars(self)
 
 
@@ -79,7 +75,7 @@ def _restore(kind: type[RobotiqError], *args: object) -> RobotiqError:
 
 
 class RobotiqStateError(RobotiqError):
-    """The hand cannot do that now."""
+    """The hand cannot carry out the call in its present state."""
 
 
 class NotStartedError(RobotiqStateError):
@@ -95,7 +91,6 @@ class InvalidStateError(RobotiqStateError):
     """
 
     def __init__(self, message: str, state: State, allowed: Iterable[State] = ()) -> None:
-        """Keep the state and the states that would do."""
         self.state = state
         self.allowed = frozenset(allowed)
         super().__init__(message)
@@ -113,7 +108,6 @@ class GripperFaultError(RobotiqStateError):
     """
 
     def __init__(self, fault: Fault, message: str | None = None) -> None:
-        """Keep the fault."""
         self.fault = fault
         super().__init__(message or f"{fault.severity.value} fault 0x{int(fault):02X}: {fault.description}")
 
@@ -127,14 +121,13 @@ class StateTimeoutError(RobotiqStateError, TimeoutError):
 
 
 class MoveTimeoutError(RobotiqStateError, TimeoutError):
-    """An axis was still moving when the time of the move was over; its axes have been told to hold.
+    """An axis was still moving when the time limit of the move expired; the axes of the move now hold.
 
     Attributes:
         status: the last status seen.
     """
 
     def __init__(self, message: str, status: RobotiqStatus) -> None:
-        """Keep the last status."""
         self.status = status
         super().__init__(message)
 
@@ -142,9 +135,9 @@ class MoveTimeoutError(RobotiqStateError, TimeoutError):
 class MoveIgnoredError(MoveTimeoutError):
     """The gripper acknowledged and echoed the first motion on a connection, and moved nothing for a second.
 
-    Some grippers are said to need an image with rACT before they move on a new connection, or to lose their
-    activation while they are left alone. Its axes have been told to hold. The same move may do the next time;
-    if not, :meth:`reset` and :meth:`activate` (which DROPS the part, and MOVES the fingers).
+    Users report grippers that need an image with rACT before they move on a new connection, or that lose
+    their activation when idle. The axes of the move now hold. Try the move once more; if that fails too,
+    :meth:`reset` and :meth:`activate` (DROPS the part and MOVES the fingers).
     """
 
 
@@ -153,21 +146,20 @@ class MoveSupersededError(RobotiqStateError):
 
 
 class ControlLostError(RobotiqStateError):
-    """Commanding a gripper on another host takes a lease, and this hand does not hold it, or no longer.
+    """This hand does not hold the lease that commands a gripper on another host, or no longer holds it.
 
     Attributes:
-        reason: why not, in a word: "held" by somebody else, "taken" or "halted" by somebody else, "expired"
-            for it was not renewed in time, "released" by this hand, "late" for one request, or "closed".
+        reason: "held", "taken" or "halted" by another client, "expired" (not renewed in time), "released" by
+            this hand, "late" for one request, or "closed".
     """
 
     def __init__(self, message: str, reason: str) -> None:
-        """Keep the reason."""
         self.reason = reason
         super().__init__(message)
 
 
 class NotAllowedError(RobotiqStateError):
-    """The access rules of the fleet do not let this client do that."""
+    """The access rules of the fleet forbid this client the request."""
 
 
 class RobotiqConnectionError(RobotiqError, ConnectionError):
@@ -175,20 +167,19 @@ class RobotiqConnectionError(RobotiqError, ConnectionError):
 
 
 class ConnectFailedError(RobotiqConnectionError):
-    """Nobody answers at the address.
+    """No gripper could be reached at the address.
 
     Attributes:
         address: the address that was tried.
     """
 
     def __init__(self, address: str, reason: str) -> None:
-        """Keep the address."""
         self.address = address
         super().__init__(f"cannot connect to {address}: {reason}")
 
 
 class ConnectionLostError(RobotiqConnectionError):
-    """The link went down; what was not acknowledged by then has been dropped."""
+    """The link went down. Requests that were not acknowledged by then are dropped, never sent again."""
 
 
 class ResponseTimeoutError(RobotiqConnectionError, TimeoutError):
@@ -196,15 +187,15 @@ class ResponseTimeoutError(RobotiqConnectionError, TimeoutError):
 
 
 class ProtocolError(RobotiqConnectionError):
-    """A reply that is not the answer: an exception, a wrong function, length, echo or transaction."""
+    """The reply does not answer the request: an exception, a wrong function, length, echo or transaction."""
 
 
 class AgentError(RobotiqConnectionError):
-    """The agent of another host did not carry out a request, for a reason of its own."""
+    """An agent on another host failed to carry out a request."""
 
 
 class RecordingError(RobotiqError):
-    """A recording could not be written, or read."""
+    """A recording could not be written or read."""
 
 
 class ViewerError(RobotiqError):
@@ -212,19 +203,18 @@ class ViewerError(RobotiqError):
 
 
 class MeasuringError(RobotiqError):
-    """What was measured is not what was to be measured."""
+    """A measurement failed, or did not measure what it was meant to."""
 
 
 class NotAllStoppedError(RobotiqError):
     """Not every gripper of a fleet was seen to stop: some MAY STILL MOVE.
 
     Attributes:
-        outcomes: for each gripper how its halt ended; "stopped" is the good end.
-        unreached: endpoints to which there was no connection; nobody knows which grippers are behind them.
+        outcomes: for each gripper how its halt ended; "stopped" means seen to stop.
+        unreached: endpoints without a connection; the grippers behind them are unknown.
     """
 
     def __init__(self, message: str, outcomes: Mapping[Any, str], unreached: Iterable[str] = ()) -> None:
-        """Keep the outcomes."""
         self.outcomes = dict(outcomes)
         self.unreached = tuple(unreached)
         super().__init__(message)

@@ -1,4 +1,4 @@
-"""What happens to a hand: changes of its state, and requests that were written."""
+"""Transition and SentRequest: a change of a hand's state, and an image that was written."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from .trigger import Trigger
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """One change of state.
+    """A change of state.
 
     Attributes:
         source: the state before.
         target: the state after.
-        trigger: what made it happen.
-        timestamp: monotonic seconds, by the clock of the statuses.
+        trigger: what caused it.
+        timestamp: monotonic seconds, on the clock of the statuses.
     """
 
     source: State
@@ -27,7 +27,7 @@ class Transition:
     timestamp: float
 
     def as_dict(self) -> dict[str, Any]:
-        """All of it in types that JSON and pandas take; states and trigger by name."""
+        """The transition in types that JSON and pandas accept; states and trigger by name."""
         return {
             "timestamp": self.timestamp,
             "source": self.source.name,
@@ -38,12 +38,12 @@ class Transition:
 
 @dataclass(frozen=True, slots=True)
 class SentRequest:
-    """One image that was written.
+    """A request image that was written.
 
     Attributes:
         request: the image.
-        timestamp: monotonic seconds, by the clock of the statuses, at which it was sent.
-        acknowledged: whether the gripper has acknowledged it; if not, it may have arrived or not.
+        timestamp: monotonic seconds at which it was sent, on the clock of the statuses.
+        acknowledged: whether the gripper acknowledged it; if not, it may still have arrived.
     """
 
     request: Request
@@ -51,9 +51,9 @@ class SentRequest:
     acknowledged: bool
 
     def as_dict(self) -> dict[str, Any]:
-        """All of it in types that JSON and pandas take, the request's attributes beside its own.
+        """The image in types that JSON and pandas accept, with the attributes of the request.
 
-        What is asked of one axis stands below its name: ``position``, ``speed`` and ``force``.
+        The key of each axis holds its ``position``, ``speed`` and ``force``.
         """
         request = self.request
         return {

@@ -1,4 +1,4 @@
-"""A mapping that stays as it is made."""
+"""A dict that cannot be changed."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ V = TypeVar("V")
 
 
 class FrozenMapping(dict[K, V]):
-    """A dict that refuses to be changed. Can be hashed (if its values can), pickled and copied.
+    """A dict that raises TypeError on every change. Can be hashed (if its values can), pickled and copied.
 
-    A dict, and not a proxy for one, so that ``dataclasses.asdict`` and ``json`` know what to do with it.
+    A subclass of dict, so that ``dataclasses.asdict`` and ``json`` accept it.
     """
 
     __slots__ = ()
@@ -23,9 +23,7 @@ class FrozenMapping(dict[K, V]):
     clear = pop = popitem = setdefault = update = _refuse
 
     def __hash__(self) -> int:  # type: ignore[override]  # a dict has none because it can be changed
-        """Hash of what is compared."""
         return hash(frozenset(self.items()))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Copy and pickle."""
         return type(self), (dict(self),)

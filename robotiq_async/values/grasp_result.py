@@ -1,4 +1,4 @@
-"""GraspResult: what fingers that were closed have got hold of."""
+"""GraspResult: whether a closing has grasped a part, and with which axes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .status import RobotiqStatus
 
 
 def check_at_least(at_least: object, fingers: Finger) -> int:
-    """The contacts that make a grasp: 1..as many as there are axes; None for all of them.
+    """The number of contacts that make a grasp: 1 to the number of axes; None means all of them.
 
     Raises:
         TypeError: neither None nor an int.
@@ -26,11 +26,11 @@ def check_at_least(at_least: object, fingers: Finger) -> int:
 class GraspResult:
     """How a grasp ended. True if the part is held; too few contacts are a result, not an error.
 
-    A value: compared, hashed, copied, pickled.
+    Immutable; can be compared, hashed, copied and pickled.
 
     Attributes:
         move: how the closing ended: outcome and highest current of each addressed axis, duration.
-        at_least: so many contacts make a grasp.
+        at_least: the number of contacts that make a grasp.
     """
 
     move: MoveResult
@@ -38,31 +38,29 @@ class GraspResult:
 
     @property
     def holds(self) -> Finger:
-        """The axes that hold: stopped by a contact while closing. None of them if there was nothing."""
+        """The axes that a contact stopped while closing; empty if there was nothing to hold."""
         closing = ObjectStatus.CONTACT_CLOSING
         return Finger(sum(axis for axis, how in self.move.outcomes.items() if how is closing))
 
     @property
     def is_held(self) -> bool:
-        """Whether as many axes hold as make a grasp."""
+        """Whether enough axes hold."""
         return self.holds.bit_count() >= self.at_least
 
     @property
     def positions(self) -> Mapping[Finger, int]:
-        """For each addressed axis, where it ended, in counts; ``hand.units.mm()`` converts."""
+        """The final position of each addressed axis, in counts; ``hand.units.mm()`` converts."""
         return self.move.positions
 
     @property
     def status(self) -> RobotiqStatus:
-        """The status that ended it: ``hand.grip_events(since=result.status)`` goes on from there."""
+        """The status that ended the grasp: ``hand.grip_events(since=result.status)`` continues from there."""
         return self.move.status
 
     def __bool__(self) -> bool:
-        """Whether the part is held."""
         return self.is_held
 
     def __repr__(self) -> str:
-        """The words a person looks for first."""
         what = "held" if self.is_held else "not held"
         where = ", ".join(f"{axis}={position}" for axis, position in self.positions.items())
         return f"<GraspResult {what}: contact of {self.holds}, {self.at_least} needed; {where}>"

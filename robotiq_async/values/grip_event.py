@@ -1,4 +1,4 @@
-"""GripEvent: one thing that has become of a grip."""
+"""GripEvent: a grip gained, slipped, lost or released."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ from .status import RobotiqStatus
 
 
 class GripChange(Enum):
-    """What can become of the grip of an axis."""
+    """How the grip of an axis can change."""
 
     GAINED = "gained"
     """The gripper reports a contact: a new one, or again after a slip."""
     SLIPPED = "slipped"
     """An axis in contact has moved: it went on closing, or was pushed."""
     LOST = "lost"
-    """The gripper reports the contact no more, and nobody asked the axis to let go. A fault, a reset and a
-    lost activation are told like this, too: whether the part is held is not known any more."""
+    """The gripper stopped reporting the contact although the axis was not asked to let go. A fault, a reset
+    and a lost activation also count as LOST: whether the part is still held is then unknown."""
     RELEASED = "released"
-    """The contact has ended because of a request: to go the other way, or to stay where the axis stands."""
+    """A request ended the contact: to move the other way, or to stay at the present position."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class GripEvent:
-    """One change of one axis's grip. A value: compared, hashed, copied, pickled.
+    """One change in the grip of one axis. Immutable; can be compared, hashed, copied and pickled.
 
     Attributes:
-        change: what has become of it.
+        change: the kind of change.
         finger: the axis.
-        moved: counts that the axis has gone since its contact was made, or last slipped; above 0 closing.
-        holds: the watched axes that are in contact after the status.
-        status: the status that tells of it.
+        moved: counts the axis has moved since its contact or its last slip; positive means closing.
+        holds: the watched axes that are in contact in this status.
+        status: the status that shows the change.
     """
 
     change: GripChange
@@ -43,7 +43,7 @@ class GripEvent:
 
     @property
     def position(self) -> int:
-        """Where the axis is, in counts."""
+        """The position of the axis, in counts."""
         return self.status.position(self.finger)
 
     @property
@@ -52,7 +52,6 @@ class GripEvent:
         return self.status.timestamp
 
     def __repr__(self) -> str:
-        """The words a person looks for first."""
         moved = f" by {self.moved:+d}" if self.moved else ""
         what = f"{self.finger} {self.change.name}{moved} at {self.position}"
         return f"<GripEvent {what}; contact of {self.holds}>"

@@ -13,14 +13,16 @@ from .status import RobotiqStatus
 
 @dataclass(frozen=True, slots=True, repr=False)
 class MoveResult:
-    """How a move ended. A contact is a result, not an error. A value: compared, hashed, copied, pickled.
+    """How a move ended. A contact is a result, not an error.
+
+    Immutable; can be compared, hashed, copied and pickled.
 
     Attributes:
-        outcomes: for each addressed axis, how it ended.
-        positions: for each addressed axis, where it ended, in counts.
-        contacts: the addressed axes stopped by a contact.
+        outcomes: how each addressed axis ended.
+        positions: final position of each addressed axis, in counts.
+        contacts: the addressed axes that a contact stopped.
         duration: seconds from the call to the status that ended the move.
-        peak_current_ma: for each addressed axis, the highest motor current seen, in milliampere.
+        peak_current_ma: highest motor current seen of each addressed axis, in milliamperes.
         status: the status that ended the move.
     """
 
@@ -32,7 +34,6 @@ class MoveResult:
     status: RobotiqStatus
 
     def __post_init__(self) -> None:
-        """Keep mappings of our own."""
         for name in ("outcomes", "positions", "peak_current_ma"):
             object.__setattr__(self, name, FrozenMapping(getattr(self, name)))
 
@@ -42,9 +43,9 @@ class MoveResult:
         return bool(self.contacts)
 
     def as_dict(self) -> dict[str, Any]:
-        """All of it in types that JSON and pandas take; enumerations and masks as in a status.
+        """The result in types that JSON and pandas accept; enumerations and masks as in a status.
 
-        What is of one axis stands below its name: ``outcome``, ``position`` and ``peak_current_ma``.
+        The key of each axis holds its ``outcome``, ``position`` and ``peak_current_ma``.
         """
         return {
             "duration": self.duration,
@@ -63,7 +64,6 @@ class MoveResult:
         }
 
     def __repr__(self) -> str:
-        """The words a person looks for first."""
         axes = ", ".join(
             f"{axis}={self.positions.get(axis)} {how.name} {self.peak_current_ma.get(axis)}mA"
             for axis, how in self.outcomes.items()

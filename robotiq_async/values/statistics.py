@@ -12,25 +12,25 @@ from .frozen_mapping import FrozenMapping
 
 @dataclass(frozen=True, slots=True)
 class Statistics:
-    """A snapshot of a hand's polling since its start. Percentiles are of the last 2000 polls.
+    """Figures of a hand's polling since its start. Percentiles cover the last 2000 polls.
 
     Attributes:
         polls: statuses read.
         writes: requests acknowledged.
-        overruns: ticks that were missed and skipped.
+        overruns: ticks that were missed; they are skipped.
         period_p50: median seconds between two polls; 0 before the second poll.
-        period_p99: 99th percentile of the same.
+        period_p99: 99th percentile of that time.
         round_trip_p50: median seconds from sending a read to its reply; 0 before the first poll.
-        round_trip_p99: 99th percentile of the same.
-        longest_stall: longest time a tick came late, in seconds: the event loop was held up.
+        round_trip_p99: 99th percentile of that time.
+        longest_stall: longest delay of a tick, in seconds: how long the event loop was blocked.
         reconnects: times the link was opened again.
-        foreign_commands: times another client was seen to command the gripper.
-        tick: what the polls are timed by: "timerfd" (Linux), "loop timer", or nothing before the first.
+        foreign_commands: commands of other clients that were seen.
+        tick: what times the polls: "timerfd" (Linux) or "loop timer"; empty before the first poll.
         faults: times the gripper reported a minor or a major fault.
-        moves: how often :meth:`RobotiqHand.move` ended how: "reached", "contact", "cancelled", or the name
-            of the error.
-        passing_faults: times fault 0x09 was shown for a moment, as some grippers do after a second without a
-            poll: looked past.
+        moves: number of :meth:`RobotiqHand.move` calls by outcome: "reached", "contact", "cancelled", or the
+            name of the error.
+        passing_faults: times fault 0x09 was shown only briefly and ignored, as some grippers show it after a
+            second without a poll.
     """
 
     polls: int
@@ -49,11 +49,10 @@ class Statistics:
     passing_faults: int = 0
 
     def __post_init__(self) -> None:
-        """Keep a mapping of our own."""
         object.__setattr__(self, "moves", FrozenMapping(self.moves))
 
     def as_dict(self) -> dict[str, Any]:
-        """All of it in types that JSON and pandas take, each under the name of its attribute."""
+        """The figures in types that JSON and pandas accept, each under the name of its attribute."""
         return {**asdict(self), "moves": dict(self.moves)}
 
 

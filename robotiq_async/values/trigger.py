@@ -1,4 +1,4 @@
-"""Trigger: what can happen to a hand."""
+"""Trigger: the events of the state machine."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from enum import Enum
 
 
 class Trigger(Enum):
-    """What can happen to the hand.
+    """An event that can change the state of a hand.
 
-    ``ASK_`` is what its user asks for, ``SEEN_`` what a status shows; the others are what became of the
-    link and of a request.
+    ``ASK_`` marks a call of the user, ``SEEN_`` a condition that a status shows; the others concern the link
+    and the delivery of a request.
     """
 
     __hash__ = object.__hash__  # see State
@@ -34,5 +34,5 @@ class Trigger(Enum):
 
     @property
     def is_seen(self) -> bool:
-        """Whether this is something a status shows."""
+        """Whether a status shows this."""
         return self.name.startswith("SEEN_")

@@ -1,4 +1,4 @@
-"""What the values 0..255 mean: speeds, forces and closing times, of the thesis or of one's own gripper."""
+"""What the values 0..255 mean: speeds, forces, closing times; from the thesis or your own measurements."""
 
 from .scales import (
     NOMINAL_FORCES_N,

@@ -1,7 +1,7 @@
-"""How long a finger takes to close: the thesis's table A1.1, by which the simulated gripper moves.
+"""Closing times of a finger from the thesis's table A1.1; the simulated gripper moves by them.
 
-The manual gives two figures, 22 and 110 mm/s; a curve between them was measured by the thesis that this
-library follows (three runs of a full closing for every fourth speed value, without an object).
+The manual gives only two figures, 22 and 110 mm/s. The thesis measured the curve between them: three runs of
+a full closing for every fourth speed value, without an object.
 """
 
 from __future__ import annotations
@@ -10,15 +10,15 @@ from typing import Final
 
 from .scales import SpeedCalibration
 
-# Read when this is imported: whoever imports it may run in an event loop later, and waits for no disk there.
+# Read at import: a program may later run in an event loop, which must not wait for a disk.
 _THESIS: Final = SpeedCalibration.thesis()
 
 
 def closing_time(speed: int) -> float:
     """Seconds of a full closing, from the open reading 6 to the closed reading 241.
 
-    The mean of three measured runs, linear between the measured speed values. The runs of one value differ
-    by less than 2 %.
+    The mean of three measured runs, linear between the measured speed values. The runs of one value differ by
+    less than 2 %.
 
     Args:
         speed: speed value, 0 slowest .. 255 fastest.

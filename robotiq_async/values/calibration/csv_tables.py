@@ -1,12 +1,12 @@
-"""Tables of measured runs: one value a row, one run a column, in CSV files.
+"""CSV tables of measured runs: one value a row, one run a column.
 
 The layout is that of the thesis's own tables (``data/``)::
 
     speed_value,run_1_ms,run_2_ms,run_3_ms
     0,10021,10021,10021
 
-A file is read whole or refused with file, line and reason, and written whole or not at all: an interrupted
-program leaves the table as it was after the last row.
+Reading refuses a bad file with its line and the reason. Writing replaces the file in one step: an interrupted
+program leaves the table of the last complete write.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from pathlib import Path
 from typing import Final, TextIO
 
 Table = dict[int, tuple[int, ...]]
-"""The runs of each value."""
+"""For each value, its runs."""
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """What the columns hold.
+    """The columns of a table.
 
     Attributes:
         value: name of the first column; its values are 0..255.
-        unit: of the runs.
-        high: no run is above this; none is below 0.
+        unit: unit of the runs.
+        high: highest run allowed; the lowest is 0.
     """
 
     value: str
@@ -41,38 +41,36 @@ class Layout:
     high: int
 
     def header(self, runs: int) -> list[str]:
-        """The names of the columns of a table with so many runs."""
+        """The column names of a table with this number of runs."""
         return [self.value, *(f"run_{number}_{self.unit}" for number in range(1, runs + 1))]
 
 
 SPEED: Final = Layout("speed_value", "ms", 600_000)
-"""Closing times."""
+"""Closing times, at most 10 minutes."""
 FORCE: Final = Layout("force_value", "g", 100_000)
-"""Readings of a scale between the fingers."""
+"""Readings of a scale between the fingers, at most 100 kg."""
 LONGEST: Final = 10_000
-"""Characters of a line; a file without line ends is no table."""
+"""Characters of a line at most, so that a large file without line ends is not read into memory."""
 NEW: Final = 0o666
-"""Mode of a file that was not there, before the umask."""
+"""Mode of a new file, before the umask."""
 
 
 class TableError(ValueError):
-    """A file that is not such a table; tells file, line and reason."""
+    """A file that is not such a table; the message names file, line and reason."""
 
     def __init__(self, path: Path | str, line: int | None, reason: str) -> None:
-        """Keep what the message is made of; the line counts from 1."""
         super().__init__(str(path), line, reason)
 
     def __str__(self) -> str:
-        """File, line and reason."""
         path, line, reason = self.args
         return f"{path}{'' if line is None else f', line {line}'}: {reason}"
 
 
 def read_table(path: Path | str, layout: Layout) -> Table:
-    """A table from a file.
+    """Read a table from a file.
 
     Raises:
-        TableError: it cannot be read, or is not a table of this layout.
+        TableError: the file cannot be read or does not have this layout.
     """
     table: Table = {}
     columns = 0
@@ -99,28 +97,28 @@ def read_table(path: Path | str, layout: Layout) -> Table:
 
 
 def write_table(path: Path | str, layout: Layout, table: Mapping[int, Sequence[int]]) -> None:
-    """Put a table into a file, rows by rising value; what was there before is replaced at once.
+    """Write a table, rows by rising value, replacing the file in one step.
 
     Raises:
-        OSError: it cannot be written; the file is what it was.
+        OSError: the file cannot be written; it stays as it was.
     """
     runs = len(next(iter(table.values()), ()))
     write_rows(path, [layout.header(runs), *([value, *table[value]] for value in sorted(table))])
 
 
 def thesis_table(name: str, layout: Layout) -> Table:
-    """One of the thesis's own tables: closing_time_ms (A1.1), force_foam_grams or force_rigid_grams."""
+    """A table of the thesis: closing_time_ms (A1.1), force_foam_grams or force_rigid_grams."""
     return read_table(Path(__file__).parents[2] / "data" / f"{name}.csv", layout)
 
 
-# -- what other tables are made of too ---------------------------------------------------------------------
+# -- for other tables as well ------------------------------------------------------------------------------
 
 
 def read_rows(path: Path | str) -> Iterable[tuple[int, list[str]]]:
     """The rows of a CSV file with their line numbers; empty lines are left out.
 
     Raises:
-        TableError: it cannot be read.
+        TableError: the file cannot be read.
     """
     try:
         with open(path, encoding="utf-8-sig", newline="") as file:
@@ -142,7 +140,7 @@ def integer(path: Path | str, line: int, name: str, text: str, high: int) -> int
     """An integer in 0..high.
 
     Raises:
-        TableError: it is none.
+        TableError: it is not.
     """
     if not re.fullmatch(r"[0-9]{1,12}", text) or int(text) > high:
         raise TableError(path, line, f"{name} must be an integer in 0..{high}, got {text!r}")
@@ -150,20 +148,20 @@ def integer(path: Path | str, line: int, name: str, text: str, high: int) -> int
 
 
 def write_rows(path: Path | str, rows: Iterable[Sequence[object]]) -> None:
-    """Write a CSV file, whole or not at all. A file that is there keeps its mode.
+    """Write a CSV file completely or not at all. An existing file keeps its mode.
 
     Raises:
-        OSError: it cannot be written; the file is what it was.
+        OSError: the file cannot be written; it stays as it was.
     """
     mode = _mode(path)
-    target = Path(os.path.realpath(path))  # a link to a table stays a link
+    target = Path(os.path.realpath(path))  # a symbolic link stays a link
     beside = target.with_name(f".{target.name}.{secrets.token_hex(8)}")
-    # A new file, or none: where others write too, what has its name may be a link that they made.
+    # O_EXCL: in a folder that others can write to, a file of this name could be a link that they made.
     descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, NEW if mode is None else mode)
     try:
         with open(descriptor, "w", encoding="utf-8", newline="") as file:
             if mode is not None:
-                # Of the mode above the umask has taken some.
+                # The umask has removed bits from the mode given to os.open().
                 os.chmod(descriptor if os.chmod in os.supports_fd else beside, mode)
             csv.writer(file, lineterminator="\n").writerows(rows)
             file.flush()
@@ -175,11 +173,7 @@ def write_rows(path: Path | str, rows: Iterable[Sequence[object]]) -> None:
 
 
 def _mode(path: Path | str) -> int | None:
-    """Who may read and write a file; None if it is not there.
-
-    Raises:
-        OSError: nobody may know, or follow the link.
-    """
+    """The permission bits of a file; None if it does not exist."""
     try:
         return stat.S_IMODE(os.stat(path).st_mode)
     except FileNotFoundError:

@@ -1,12 +1,11 @@
-"""What the values 0..255 mean: millimetres, millimetres a second, newton, seconds.
+"""Scales of the values 0..255: millimetres, millimetres a second, seconds, newtons.
 
-Three sources, told apart by :attr:`SpeedCalibration.source`: the manual's nominal figures, the thesis's
-measurements (the default), and an owner's own tables from ``robotiq-async measure``. Moves and statuses stay
-in counts; these helpers convert.
+Three sources, named by :attr:`SpeedCalibration.source`: the manual's nominal figures, the thesis's
+measurements (the default), and your own tables from ``robotiq-async measure``. Moves and statuses use counts;
+these helpers convert.
 
-The force value is a label and not a measurement: the manual gives 15 N at 0 and 60 N at 255 and says that it
-is not linear in between, and what a scale showed (thesis, chapter 6) depends on what is between the fingers
-more than on the value.
+A force value is a label, not a measured force: the manual gives 15 N at 0 and 60 N at 255 and calls the curve
+between them not linear. Scale readings (thesis, chapter 6) depend more on the object than on the value.
 """
 
 from __future__ import annotations
@@ -25,16 +24,16 @@ from .csv_tables import FORCE, SPEED, Layout, Table, TableError, read_table, the
 STROKE_MM: Final = 155.0
 """Opening between the fingertips of an open gripper (manual, specifications)."""
 GRAVITY: Final = 9.81
-"""m/s2, as the thesis has it."""
+"""m/s2, the thesis's value."""
 NOMINAL_SPEEDS_MM_S: Final = (22.0, 110.0)
 """Finger speed at the values 0 and 255 (manual, specifications)."""
 NOMINAL_FORCES_N: Final = (15.0, 60.0)
 """Grip force at the values 0 and 255 (manual, specifications)."""
 
 LONGEST_S: Final = 600.0
-"""No closing takes longer."""
+"""Longest closing time that a table may contain."""
 STRONGEST_N: Final = 1000.0
-"""No grasp is stronger."""
+"""Strongest force that a table may contain."""
 
 Points = tuple[tuple[int, float], ...]
 
@@ -42,7 +41,7 @@ Points = tuple[tuple[int, float], ...]
 def opening_mm(position: int) -> float:
     """The opening at a position: 155 mm at the open reading 6 and below, 0 from the closed reading 241 on.
 
-    Nominal: the stroke of the manual, taken for linear in the counts. A real finger turns, and is not.
+    Nominal: the manual's stroke, treated as linear in counts although a real finger rotates.
 
     Args:
         position: counts, 0..255.
@@ -51,13 +50,13 @@ def opening_mm(position: int) -> float:
         TypeError: position is not an int.
         ValueError: position is outside 0..255.
     """
-    # Requests beyond the stops are legal, and end there.
+    # Requests beyond the end stops are legal; the finger ends at the stop.
     reached = min(max(check_byte("position", position), OPEN_READING), CLOSED_READING)
     return STROKE_MM * (CLOSED_READING - reached) / STROKE_COUNTS
 
 
 def position_of_opening(millimetres: float) -> int:
-    """The position, in counts, that comes closest to an opening.
+    """The position, in counts, closest to an opening.
 
     Args:
         millimetres: 0 (closed) .. 155 (open).
@@ -75,8 +74,8 @@ class SpeedCalibration:
     """What speed values mean.
 
     Attributes:
-        source: where the figures are from, for people.
-        points: speed values, rising, each with the seconds of a full closing.
+        source: where the figures come from, for people.
+        points: rising speed values, each with the seconds of a full closing.
     """
 
     source: str
@@ -108,19 +107,19 @@ class SpeedCalibration:
 
     @classmethod
     def from_csv(cls, path: Path | str) -> SpeedCalibration:
-        """An owner's own table, as ``robotiq-async measure speed`` writes it.
+        """Your own table, as ``robotiq-async measure speed`` writes it.
 
         Raises:
             TableError: the file is not such a table, or has fewer than two rows.
         """
-        table = _owners_table(path, SPEED)
+        table = _read_curve(path, SPEED)
         if any(not all(runs) for runs in table.values()):
             raise TableError(path, None, "a closing takes longer than 0 ms")
         return cls.from_table(str(path), table)
 
     @classmethod
     def from_table(cls, source: str, table: Table) -> SpeedCalibration:
-        """A table of closing times in milliseconds."""
+        """From a table of closing times in milliseconds."""
         return cls(source, tuple((value, mean(table[value]) / 1000) for value in sorted(table)))
 
     def closing_time(self, speed: int) -> float:
@@ -133,7 +132,7 @@ class SpeedCalibration:
         return interpolated("speed", speed, self.points)
 
     def duration(self, counts: int, speed: int) -> float:
-        """Seconds of a way of so many counts, 0..255, at a speed.
+        """Seconds for a distance in counts, 0..255, at a speed value.
 
         Raises:
             TypeError: an argument is not an int.
@@ -151,7 +150,7 @@ class SpeedCalibration:
         return STROKE_MM / self.closing_time(speed)
 
     def speed_value(self, mm_per_s: float) -> int:
-        """The speed value that comes closest.
+        """The speed value closest to a speed.
 
         Raises:
             TypeError: not a number.
@@ -164,11 +163,11 @@ class SpeedCalibration:
 
 @dataclass(frozen=True, slots=True)
 class ForceCalibration:
-    """What force values mean, roughly; see the module.
+    """What force values roughly mean; see the module.
 
     Attributes:
-        source: where the figures are from, for people.
-        points: force values, rising, each with newton.
+        source: where the figures come from, for people.
+        points: rising force values, each with newtons.
     """
 
     source: str
@@ -185,7 +184,7 @@ class ForceCalibration:
 
     @classmethod
     def nominal(cls) -> ForceCalibration:
-        """The manual's figures, drawn as a straight line although it says that they are not one."""
+        """The manual's two figures joined by a straight line, although it calls the curve not linear."""
         return cls("nominal (manual)", ((0, NOMINAL_FORCES_N[0]), (255, NOMINAL_FORCES_N[1])))
 
     @classmethod
@@ -196,7 +195,7 @@ class ForceCalibration:
             surface: "foam" or "rigid".
 
         Raises:
-            ValueError: neither.
+            ValueError: another surface.
         """
         if surface not in ("foam", "rigid"):
             raise ValueError(f"surface must be 'foam' or 'rigid', got {surface!r}")
@@ -204,20 +203,20 @@ class ForceCalibration:
 
     @classmethod
     def from_csv(cls, path: Path | str) -> ForceCalibration:
-        """An owner's own table, as ``robotiq-async measure force`` writes it.
+        """Your own table, as ``robotiq-async measure force`` writes it.
 
         Raises:
             TableError: the file is not such a table, or has fewer than two rows.
         """
-        return cls.from_table(str(path), _owners_table(path, FORCE))
+        return cls.from_table(str(path), _read_curve(path, FORCE))
 
     @classmethod
     def from_table(cls, source: str, table: Table) -> ForceCalibration:
-        """A table of readings in grams."""
+        """From a table of scale readings in grams."""
         return cls(source, tuple((value, newton(mean(table[value]))) for value in sorted(table)))
 
     def newton(self, force: int) -> float:
-        """Newton at a force value; linear between the points.
+        """Newtons at a force value; linear between the points.
 
         Raises:
             TypeError: force is not an int.
@@ -226,7 +225,7 @@ class ForceCalibration:
         return interpolated("force", force, self.points)
 
     def force_value(self, newton: float) -> int:
-        """The force value that comes closest, the lowest of several.
+        """The force value closest to a force, the lowest of several.
 
         Raises:
             TypeError: not a number.
@@ -237,8 +236,8 @@ class ForceCalibration:
         )
 
 
-def _owners_table(path: Path | str, layout: Layout) -> Table:
-    """A table that makes a curve.
+def _read_curve(path: Path | str, layout: Layout) -> Table:
+    """Read a table of at least two rows.
 
     Raises:
         TableError: the file is not such a table, or has fewer than two rows.
@@ -251,17 +250,17 @@ def _owners_table(path: Path | str, layout: Layout) -> Table:
 
 
 def mean(runs: Sequence[int]) -> float:
-    """The mean of the runs of a row."""
+    """The mean of a row's runs."""
     return sum(runs) / len(runs)
 
 
 def newton(grams: float) -> float:
-    """The force that a scale shows as a mass: F = m g, g = 9.81 m/s2."""
+    """The force, in newtons, that a scale shows as a mass: F = m g."""
     return grams / 1000 * GRAVITY
 
 
 def checked_points(given: Iterable[tuple[int, float]], high: float) -> Points:
-    """Points that stay as they are, plain numbers, from whatever they come in; refuses what is no curve.
+    """Copy points into tuples of plain numbers, and check that they form a curve.
 
     Raises:
         TypeError: a value or a figure of the wrong type.
@@ -280,12 +279,12 @@ def checked_points(given: Iterable[tuple[int, float]], high: float) -> Points:
 
 
 def covered(points: Points) -> range:
-    """The values that points reach over."""
+    """The values between the first and the last point."""
     return range(points[0][0], points[-1][0] + 1)
 
 
 def interpolated(name: str, value: int, points: Sequence[tuple[int, float]]) -> float:
-    """The straight line between the neighbours of a value.
+    """The figure at a value, on the straight line between its neighbours.
 
     Raises:
         TypeError: value is not an int.
@@ -301,7 +300,7 @@ def interpolated(name: str, value: int, points: Sequence[tuple[int, float]]) -> 
 
 
 def nearest_in_range(name: str, wanted: float, figures: Mapping[int, float]) -> int:
-    """The value whose figure comes closest, the lowest of several.
+    """The value with the closest figure, the lowest of several.
 
     Raises:
         TypeError: wanted is not a number.
@@ -312,5 +311,5 @@ def nearest_in_range(name: str, wanted: float, figures: Mapping[int, float]) -> 
 
 
 def nearest(wanted: float, figures: Mapping[int, float]) -> int:
-    """The value whose figure comes closest, the lowest of several."""
+    """The value with the closest figure, the lowest of several."""
     return min(figures, key=lambda value: abs(figures[value] - wanted))

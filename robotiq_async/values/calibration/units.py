@@ -1,4 +1,4 @@
-"""Units: between what people say (mm, mm/s, seconds, newton) and what the gripper takes (0..255)."""
+"""Units: converts between mm, mm/s, seconds or newtons and the gripper's values 0..255."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from .scales import (
 class Units:
     """Converts both ways: ``await hand.move(hand.units.position(mm=80))``.
 
-    **Openings are nominal**: the manual's stroke, taken for linear in the counts. A real finger turns. They
-    are those of the fingers; the scissor has none. Where fingertips meet early, as in the pinch mode at about
-    113 counts, the opening is 0 there, and not the 84 mm that this says.
+    **Openings are nominal**: the manual's stroke, treated as linear in counts although a real finger rotates.
+    They apply to the fingers, not to the scissor. Where the fingertips meet early, as at about 113 counts in
+    pinch mode, the real opening is 0 while these conversions give 84 mm.
 
-    **Forces are labels**, whatever the table: the manual's two figures on a straight line that it says is
-    none, or what a scale showed once. They order the force values; what a part feels is another matter.
+    **Forces are labels**: a straight line between the manual's two figures, which the manual calls not
+    linear, or the readings of one scale. They order the force values; they do not tell the force on a part.
 
     Attributes:
-        speeds: what speed values mean; the thesis's closing times unless it is told otherwise.
-        forces: what force values are labelled with; the manual's figures unless it is told otherwise.
+        speeds: what speed values mean; by default the thesis's closing times.
+        forces: labels of the force values; by default the manual's figures.
     """
 
     speeds: SpeedCalibration = field(default_factory=SpeedCalibration.thesis)
@@ -43,7 +43,7 @@ class Units:
         """Check the tables.
 
         Raises:
-            TypeError: one of them is none.
+            TypeError: a table has the wrong type.
         """
         for name, kind in (("speeds", SpeedCalibration), ("forces", ForceCalibration)):
             if not isinstance(getattr(self, name), kind):
@@ -70,15 +70,15 @@ class Units:
     def speed(self, *, closing_s: float) -> int: ...
 
     def speed(self, *, mm_per_s: float | None = None, closing_s: float | None = None) -> int:
-        """The speed value, 0..255, that comes closest to a speed, or to the time of a full closing.
+        """The speed value, 0..255, closest to a speed or to the time of a full closing.
 
         Args:
             mm_per_s: millimetres of opening a second.
-            closing_s: seconds from open to closed, in place of a speed.
+            closing_s: seconds from open to closed, instead of a speed.
 
         Raises:
-            TypeError: not a number, or not exactly one of the two.
-            ValueError: slower or faster than any value; told in the unit.
+            TypeError: not a number, or not exactly one of the two arguments.
+            ValueError: slower or faster than any value; the message uses the same unit.
         """
         if (mm_per_s is None) == (closing_s is None):
             raise TypeError("speed() takes one of mm_per_s and closing_s")
@@ -87,14 +87,14 @@ class Units:
         return _closest("mm_per_s", mm_per_s, _mm_per_s(self.speeds), "millimetres a second")
 
     def force(self, *, label_n: float) -> int:
-        """The force value, 0..255, whose label comes closest; the lowest of several.
+        """The force value, 0..255, with the closest label; the lowest of several.
 
         Args:
-            label_n: newton by the label, and not of a measurement; see the class.
+            label_n: newtons of the label, not a measured force; see the class.
 
         Raises:
             TypeError: not a number.
-            ValueError: no value has such a label; told in newton.
+            ValueError: outside the labels; the message uses newtons.
         """
         return _closest("label_n", label_n, _labels(self.forces), "newton of a label (no measured force)")
 
@@ -131,7 +131,7 @@ class Units:
         return self.speeds.closing_time(speed)
 
     def label_n(self, force: int) -> float:
-        """The label of a force value, in newton: no measured force; see the class.
+        """The label of a force value, in newtons: not a measured force; see the class.
 
         Raises:
             TypeError: not an int.
@@ -140,7 +140,6 @@ class Units:
         return self.forces.newton(force)
 
     def __repr__(self) -> str:
-        """Ranges and sources."""
         return (
             f"<Units 0..{STROKE_MM:g} mm (nominal), "
             f"{_words(_mm_per_s(self.speeds))} mm/s ({self.speeds.source}), "
@@ -148,7 +147,7 @@ class Units:
         )
 
 
-# Kept, for control loops ask at every turn, and a table takes a millisecond.
+# Cached: control loops ask in every cycle, and building a table takes a millisecond.
 
 
 @lru_cache(maxsize=8)
@@ -171,7 +170,7 @@ def _closest(name: str, wanted: object, figures: Mapping[int, float], unit: str)
 
 
 def _limits(figures: Mapping[int, float]) -> tuple[float, float]:
-    """To two digits, outwards: whoever asks for a limit as it was told gets it."""
+    """Rounded outwards to two digits, so that a limit copied from a message is accepted."""
     return floor(min(figures.values()) * 100) / 100, ceil(max(figures.values()) * 100) / 100
 
 
