@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import socket
-import sys
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -14,7 +13,6 @@ from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
 from ..values.errors import ConnectFailedError
 from .address import Address
 from .host_names import addresses_of, why_no_socket, why_unreachable
-from .pdus import register
 from .serial_ports import hasten, why_no_port
 
 Client = AsyncModbusTcpClient | AsyncModbusSerialClient
@@ -31,32 +29,31 @@ gone."""
 
 
 async def connected_client(
-    address: Address, trace_packet: Callable[[bool, bytes], bytes], trace_connect: Callable[[bool], None]
+    address: Address, on_data: Callable[[bytes], None], on_connection: Callable[[bool], None]
 ) -> Client:
-    """A client that is connected, to the first address of the host that can be reached.
+    """A client that is connected to the first reachable address of the host.
 
     Args:
         address: a tcp, rtu or rtu+tcp address.
-        trace_packet: is given every frame that is sent and the bytes received so far for one, and says what
-            goes on from there.
-        trace_connect: is told when the connection is made or lost.
+        on_data: called with the bytes that arrive, from the first one on.
+        on_connection: called with True when the connection is made and with False when it is lost.
 
     Raises:
         ConnectFailedError: refused, unreachable, no such port, or no pyserial.
     """
-    # timeout=None: wait_for becomes a plain await; whoever uses the client has a timeout of its own.
+    # timeout=None: the caller has a timeout of its own, and wait_for becomes a plain await.
     options: dict[str, Any] = {
         "retries": 0,
         "reconnect_delay": 0,
         "timeout": None,
-        "trace_packet": trace_packet,
-        "trace_connect": trace_connect,
+        "trace_connect": on_connection,
     }
     reasons: list[OSError] = []
     for host in await _hosts(address):
         client, connected = _make(address, host, options), False
-        # pymodbus drops what does not fit without a word; whatever comes is for frames.py to judge.
-        client.ctx.max_buffer_size = sys.maxsize
+        # Replaces pymodbus's receiver before the first byte can arrive: its buffer silently drops what does
+        # not fit, and its framer accepts replies that frames.py refuses.
+        client.ctx.data_received = on_data  # type: ignore[method-assign, assignment]
         _keep_reasons(client, reasons)
         try:
             connected = await client.connect()
@@ -99,7 +96,6 @@ def _make(address: Address, host: str, options: dict[str, Any]) -> Client:
             ) from None
         form: dict[str, Any] = {"baudrate": BAUD, "bytesize": 8, "parity": "N", "stopbits": 1}
         client = AsyncModbusSerialClient(host, framer=FramerType.RTU, **form, **options)
-    register(client)
     return client
 
 

@@ -1,17 +1,20 @@
-"""Checks every byte of a reply against the request it should answer.
+"""Request frames, and the check of every byte of a reply against the request that it should answer.
 
-pymodbus takes a reply with a wrong function code or too few registers for a success, accepts transaction
-id 0 for any request, and lets a lying byte count end in an unhandled exception. So each frame is looked
-at before pymodbus sees it. No I/O here: bytes in, a verdict out.
+A client that accepts a reply with a wrong function code, too few registers or another transaction id would
+report positions that are not true. No I/O here: bytes in, a verdict out.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
+from struct import Struct
 from typing import Final, NamedTuple
 
+from pymodbus.framer import FramerRTU
+
 from ..values.errors import ProtocolError
-from ..values.registers import REGISTER_COUNT
+from ..values.registers import REGISTER_COUNT, RegisterMap, Registers
 
 _EXCEPTIONS = {
     1: "illegal function",
@@ -26,9 +29,54 @@ _EXCEPTIONS = {
 
 
 _CHECKSUM: Final = 2
-"""Bytes of it at the end of a frame on a serial line."""
+"""Bytes of the checksum at the end of a frame on a serial line."""
 _WRITE: Final = 16
+"""Function code of a write of several registers."""
+_READ_REQUEST: Final = Struct(">BBHH")
+"""Unit, function, address, count."""
+_WRITE_REQUEST: Final = Struct(f">BBHHB{REGISTER_COUNT}H")
+"""Unit, function, address, count, number of bytes, registers."""
+_HEADER: Final = Struct(">HHH")
+"""Before a request over TCP: transaction, protocol 0, bytes that follow."""
+_BLOCK: Final = Struct(f">{REGISTER_COUNT}H")
 _WHOLE: Final = f": a hand writes all {REGISTER_COUNT} at once, and a gateway must let that through"
+
+
+def read_request(registers: RegisterMap, count: int) -> bytes:
+    """Unit and PDU of a read of the first ``count`` status registers, 1..8."""
+    return _READ_REQUEST.pack(registers.device_id, registers.read_function, registers.status, count)
+
+
+def write_request(registers: RegisterMap, image: Sequence[int]) -> bytes:
+    """Unit and PDU of the write of a whole image (FC16)."""
+    size = 2 * REGISTER_COUNT
+    return _WRITE_REQUEST.pack(registers.device_id, _WRITE, registers.request, REGISTER_COUNT, size, *image)
+
+
+def tcp_frame(number: int, request: bytes) -> bytes:
+    """A request with the header of Modbus TCP."""
+    return _HEADER.pack(number, 0, len(request)) + request
+
+
+@lru_cache(maxsize=16)  # a poll is always the same
+def serial_frame(request: bytes) -> bytes:
+    """A request with the checksum of a serial line."""
+    return request + FramerRTU.compute_CRC(request).to_bytes(_CHECKSUM, "big")
+
+
+def check_sum(frame: bytes) -> None:
+    """Refuse a damaged frame of a serial line.
+
+    Raises:
+        MisfitError: its checksum is wrong.
+    """
+    if not FramerRTU.check_CRC(frame[:-_CHECKSUM], int.from_bytes(frame[-_CHECKSUM:], "big")):
+        raise MisfitError(f"a wrong checksum: {show(frame)}")
+
+
+def registers_in(reply: bytes, *, serial: bool) -> Registers:
+    """The eight registers in a complete reply to a read of all."""
+    return _BLOCK.unpack_from(reply, 3 if serial else 9)
 
 
 class MisfitError(ProtocolError):
@@ -40,7 +88,7 @@ class Expected(NamedTuple):
 
     Attributes:
         start: how the good reply begins: header, function code and what must follow it.
-        size: bytes of the good reply, checksum included. (The checksum itself is left to pymodbus.)
+        size: bytes of the good reply, checksum included (:func:`check_sum` checks that).
         refusal: how an exception reply begins: header and function code.
         refusal_size: bytes of an exception reply.
     """
@@ -131,7 +179,7 @@ def _length(size: int) -> bytes:
 
 
 def show(frame: bytes) -> str:
-    """Bytes for a message; what talks nonsense often talks a lot."""
+    """Bytes for a message, shortened: a confused peer often sends long frames."""
     return frame.hex(" ") if len(frame) <= 32 else f"{frame[:32].hex(' ')}... ({len(frame)} bytes)"
 
 

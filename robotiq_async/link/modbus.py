@@ -1,18 +1,17 @@
-"""The link to one gripper: reads and writes over pymodbus.
+"""The link to one gripper: reads and writes over a connection that pymodbus opens.
 
-pymodbus does the framing and the transport; what it leaves to its user is done here:
+pymodbus's asynchronous client opens and closes the connection, TCP or serial. The exchanges on it are made
+here, because a client that may retry, reconnect or accept a doubtful reply could send a motion twice:
 
-* One client object per connection, no retries and no reconnecting of its own: both would send a motion
-  twice.
-* Every byte that arrives is checked before pymodbus sees it (frames.py). Anything but the whole right
-  answer, in time, ends the exchange *and* the connection: on a link that is out of step the next reply
-  could be the answer to this request.
-* Transaction ids are ours. pymodbus begins at 1 on every connection, so that a reply left over from an
-  earlier one would be taken for an answer. Here they begin anywhere, go on over connections, and come again
-  after 65,535 requests.
-* Timeouts are a watchdog of ours that looks once in a while. pymodbus's own is ``asyncio.wait_for``,
-  which on Python 3.11 swallows a cancellation that lands together with the reply, and which a loop that
-  was held up takes for silence although the reply is waiting in the socket.
+* One client object per connection, without retries and without reconnecting.
+* Every byte that arrives is checked against the one reply expected (frames.py). Anything but the whole right
+  answer, in time, ends the exchange *and* the connection: on a link that is out of step the next reply could
+  be the answer to this request.
+* Transaction ids start at random and continue over connections, so that a reply left over from an earlier
+  connection is recognised. They repeat after 65,535 requests.
+* Timeouts come from a watchdog that looks once in a while (watchdog.py). ``asyncio.wait_for`` costs more, on
+  Python 3.11 swallows a cancellation that lands together with the reply, and takes a blocked loop for silence
+  although the reply is waiting in the socket.
 * On a serial line a read whose answer is missing or damaged is asked once more; see :meth:`_read_again`.
 * Foreign exceptions stop here.
 """
@@ -24,12 +23,9 @@ import logging
 import math
 import secrets
 from collections.abc import Callable, Sequence
-from typing import Final
+from typing import Any, Final
 
 import anyio
-from pymodbus.exceptions import ModbusException
-from pymodbus.framer import FramerRTU
-from pymodbus.pdu import ModbusPDU
 
 from ..runtime.log import Log, log
 from ..values.errors import (
@@ -42,12 +38,22 @@ from ..values.errors import (
 from ..values.registers import REGISTER_COUNT, RegisterMap, Registers
 from .address import Address
 from .connecting import Client, connected_client
-from .frames import Expected, MisfitError, expected_reply, show
-from .pdus import ReadRequest, WriteRequest
+from .frames import (
+    Expected,
+    MisfitError,
+    check_sum,
+    expected_reply,
+    read_request,
+    registers_in,
+    serial_frame,
+    show,
+    tcp_frame,
+    write_request,
+)
 from .watchdog import Watchdog
 
-# pymodbus logs its send and receive history at ERROR on every timeout; what matters of it is said in our
-# exceptions. Whoever sets a level on its logger gets what they ask for.
+# pymodbus logs every failed connection attempt; our exceptions say the same. A level that the application
+# sets on its logger stays.
 _pymodbus_log = logging.getLogger("pymodbus.logging")
 if _pymodbus_log.level == logging.NOTSET:
     _pymodbus_log.setLevel(logging.CRITICAL + 1)
@@ -57,31 +63,24 @@ LAST_NUMBER: Final = 0xFFFF
 SETTLE_S: Final = 0.02
 """From connecting to the first request over TCP: a few round trips of a network in a building."""
 SILENCE_S: Final = 0.00175
-"""Between two frames on a serial line, at least: 3.5 characters, above 19200 baud so much (Modbus over Serial
-Line 2.5.1.1)."""
+"""Least silence between two frames on a serial line: 3.5 characters, above 19200 baud this fixed time (Modbus
+over Serial Line 2.5.1.1)."""
 TIMER_S: Final = 0.0001
-"""So much before its time a timer may come."""
+"""How early a timer of the loop may fire."""
 HUSH_S: Final = 0.02
-"""Silence after which the rest of a damaged reply does not come any more: a USB adapter may keep bytes for
-16 ms (the usual latency timer of FTDI's)."""
+"""Silence after which the rest of a damaged reply is over: a USB adapter may hold bytes back for 16 ms (the
+usual latency timer of FTDI chips)."""
 LONGEST_HUSH_S: Final = 0.1
-"""For which silence is waited for; who talks on is no gripper that was asked once."""
+"""Longest wait for that silence. A gripper that was asked one thing does not talk longer."""
 REPEAT_S: Final = 0.15
-"""For a read that is asked again, so that a write after it still fails within a second."""
+"""Time for a repeated read, so that a write after it still fails within a second."""
 USUAL_RESPONSE_S: Final = 0.4
-"""With a longer response timeout a line is slow, and a read that is asked again has that time once more."""
+"""A longer response timeout means a slow line: a repeated read then gets that timeout instead of REPEAT_S."""
 REPEAT_WARNING_S: Final = 60.0
-"""At most one line in the log about reads asked again in this time."""
+"""At most one warning about repeated reads in this time."""
 
-
-class _ExchangeEndedError(Exception):
-    """Carries the reason through pymodbus, which would take a TimeoutError for its own."""
-
-    def __init__(self, reason: RobotiqConnectionError, *, may_be_noise: bool) -> None:
-        self.reason = reason
-        self.may_be_noise = may_be_noise
-        """Whether a byte that was lost or damaged can be the reason."""
-        super().__init__(str(reason))
+NOISE: Final = (MisfitError, ResponseTimeoutError)
+"""Errors that a lost or damaged byte can cause."""
 
 
 class ModbusTransport:
@@ -119,21 +118,28 @@ class ModbusTransport:
         self._keeps_silence = not address.is_socket
         """Whether the pauses between frames are ours to keep, and not a serial server's."""
         self._client: Client | None = None
+        self._line: Any = None
+        """The asyncio transport of the connection; pymodbus's class for serial ports is not typed."""
+        self._answer: asyncio.Future[bytes] | None = None
+        """The reply of the exchange in flight."""
         self._expected: Expected | None = None
+        self._received = b""
+        """The part of the reply that has arrived."""
         self._failure: RobotiqConnectionError | None = None
+        """Why the link broke between two exchanges; the next exchange raises it."""
         self._number = secrets.randbelow(LAST_NUMBER)
-        """The transaction id of the last request; another program's are others, most likely."""
-        self._their_number = b""
-        """pymodbus's own transaction id of the request in flight."""
+        """Transaction id of the last request; starts at random to differ from those of other programs."""
         self._probe = 0
-        self._poll = ReadRequest(registers)
+        """Number of registers that the last read for :meth:`_resynchronise` asked for."""
+        self._poll = read_request(registers, REGISTER_COUNT)
         self._loop: asyncio.AbstractEventLoop
         self._watchdog: Watchdog
         self._heard = -math.inf
-        """When bytes came last, in the loop's time; kept on a serial line."""
+        """When the last bytes arrived, in the loop's time; kept for serial lines only."""
         self._is_hushing = False
-        """Whether what comes is dropped: it is the rest of a damaged reply."""
+        """Whether arriving bytes are dropped as the rest of a damaged reply."""
         self._warned = -math.inf
+        """When the last warning about a repeated read was logged, in the loop's time."""
 
     @property
     def is_open(self) -> bool:
@@ -145,21 +151,23 @@ class ModbusTransport:
 
         Raises:
             ConnectFailedError: refused, unreachable, no such port, or no pyserial.
-            ProtocolError: somebody answers, but not what was asked; or bytes come that nobody asked for.
-            ConnectionLostError: it was closed again at once.
-            ResponseTimeoutError: it can be opened, but nobody answers.
+            ProtocolError: the reply is not an answer, or bytes arrive without a request.
+            ConnectionLostError: the connection was closed at once.
+            ResponseTimeoutError: the connection is open, but no answer comes.
         """
         await self.close()
         self._loop = loop = asyncio.get_running_loop()
-        self._watchdog = Watchdog(loop, self._response_timeout, lambda: self._is_waiting, self._too_long)
+        self._watchdog = Watchdog(loop, self._response_timeout, lambda: self._is_waiting, self._on_timeout)
         self._failure = self._expected = None
+        self._received = b""
         try:
             with anyio.fail_after(self._connect_timeout):
-                self._client = await connected_client(self._address, self._trace_packet, self._trace_connect)
+                client = await connected_client(self._address, self._on_data, self._on_connection)
         except TimeoutError:
             raise ConnectFailedError(
                 str(self._address), f"no connection within {self._connect_timeout:g} s"
             ) from None
+        self._client, self._line = client, client.ctx.transport
         if self._address.is_socket:
             await self._settle(SETTLE_S)
         await self._resynchronise()
@@ -171,12 +179,12 @@ class ModbusTransport:
             RobotiqConnectionError: no clean answer in time; the transport is closed.
         """
         if not self._rtu:
-            return tuple((await self._exchange(self._poll)).registers)
+            return registers_in(await self._exchange(self._poll), serial=False)
         try:
             answer = await self._exchange(self._poll, bears_noise=True)
-        except _ExchangeEndedError as ended:
-            answer = await self._read_again(ended.reason)
-        return tuple(answer.registers)
+        except NOISE as error:
+            answer = await self._read_again(_plain(error))
+        return registers_in(answer, serial=True)
 
     async def send(self, decide: Callable[[], Sequence[int] | None]) -> bool:
         """Write what ``decide`` returns, if anything; on a serial line after the silence between frames.
@@ -198,7 +206,7 @@ class ModbusTransport:
         Raises:
             RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
         """
-        await self._exchange(WriteRequest(self._map, registers))
+        await self._exchange(write_request(self._map, registers))
 
     async def close(self) -> None:
         """Disconnect; does nothing when closed."""
@@ -206,74 +214,73 @@ class ModbusTransport:
 
     # -- one exchange ----------------------------------------------------------------------------------
 
-    def _connected(self) -> Client:
+    def _check_connected(self) -> None:
         if self._failure is not None:
-            # The link broke, or something arrived that nobody had asked for, between two requests.
+            # Between two requests the link broke, or bytes arrived without a request.
             failure, self._failure = self._failure, None
             self._drop()
             raise failure
         if self._client is None:
             raise ConnectionLostError(f"not connected to {self._address}")
-        return self._client
 
-    async def _exchange(
-        self,
-        request: ModbusPDU,
-        *,
-        by: float = math.inf,
-        bears_noise: bool = False,
-    ) -> ModbusPDU:
-        """Send one request and wait for its answer; on anything else the connection is given up.
+    async def _exchange(self, request: bytes, *, by: float = math.inf, bears_noise: bool = False) -> bytes:
+        """Send one request and wait for its reply; every other outcome closes the connection.
 
         Args:
-            request: what to send.
-            by: when it must be over, in the loop's time, even if the response timeout is not.
-            bears_noise: after what may be noise the connection is kept, and _ExchangeEndedError raised: the
-                caller gets the line back in step.
+            request: unit and PDU.
+            by: when it must be over, in the loop's time, even if the response timeout is longer.
+            bears_noise: keep the connection after an error of NOISE and raise it as it is: the caller brings
+                the line back in step.
         """
-        client = self._connected()
+        self._check_connected()
         if self._keeps_silence:
             await self._pause()
+        frame = serial_frame(request) if self._rtu else tcp_frame(self._next_number(), request)
+        self._expected = expected_reply(frame, serial=self._rtu)
+        answer: asyncio.Future[bytes] = self._loop.create_future()
+        self._answer = answer
         self._watchdog.watch(by)
         try:
-            response: ModbusPDU = await client.execute(False, request)
-        except _ExchangeEndedError as ended:
-            if bears_noise and ended.may_be_noise:
+            self._line.write(frame)
+            return await answer
+        except RobotiqConnectionError as error:
+            if bears_noise and isinstance(error, NOISE):
                 raise
             self._drop()
-            raise ended.reason from None
-        except ModbusException as error:
-            self._drop()
-            raise ConnectionLostError(str(error)) from error
+            raise _plain(error) from None
         except OSError as error:
             self._drop()
             raise ConnectionLostError(f"{self._address}: {error}") from error
         except BaseException:
             # Cancelled in the middle of an exchange: its answer must not become that of another one.
             self._drop()
+            if answer.done() and not answer.cancelled():
+                answer.exception()  # asyncio reports an exception that was never looked at
             raise
         finally:
-            self._expected = None
-        return response
+            self._answer = self._expected = None
+            self._received = b""
+
+    def _next_number(self) -> int:
+        """A transaction id. Never 0, which some devices answer to anything."""
+        self._number = self._number % LAST_NUMBER + 1
+        return self._number
 
     @property
     def _is_waiting(self) -> bool:
-        """Whether an exchange is under way."""
-        client = self._client
-        return client is not None and self._expected is not None and not client.ctx.response_future.done()
+        return self._answer is not None and not self._answer.done()
 
-    def _too_long(self) -> None:
-        waited = f"{self._response_timeout:g} s"
-        late = ResponseTimeoutError(f"{self._address} did not answer within {waited}")
-        self._fail(late, may_be_noise=True)
+    def _on_timeout(self) -> None:
+        self._fail(
+            ResponseTimeoutError(f"{self._address} did not answer within {self._response_timeout:g} s")
+        )
 
-    def _fail(self, error: RobotiqConnectionError, *, may_be_noise: bool = False) -> None:
-        """End the exchange in flight with an error; without one, keep the error for the next."""
-        if self._client is not None and self._is_waiting:
-            ended = _ExchangeEndedError(error, may_be_noise=may_be_noise)
-            self._client.ctx.response_future.set_exception(ended)
+    def _fail(self, error: RobotiqConnectionError) -> None:
+        """End the exchange in flight with an error; without one, keep the error for the next exchange."""
+        if self._answer is not None and not self._answer.done():
+            self._answer.set_exception(error)
         elif self._failure is None:
-            self._failure = error
+            self._failure = _plain(error)
 
     def _drop(self) -> None:
         client, self._client = self._client, None
@@ -281,38 +288,31 @@ class ModbusTransport:
             self._watchdog.stop()
             client.close()
 
-    # -- what pymodbus calls ---------------------------------------------------------------------------
+    # -- what the connection calls ---------------------------------------------------------------------
 
-    def _trace_packet(self, sending: bool, data: bytes) -> bytes:
-        """Every frame that is sent, and the bytes received so far for one: returns what goes on from here."""
-        if sending:
-            frame = data if self._rtu else self._numbered(data)
-            self._expected = expected_reply(frame, serial=self._rtu)
-            return frame
+    def _on_data(self, data: bytes) -> None:
+        """Take what has arrived; the last byte of the reply ends the exchange, or the first wrong one."""
         if self._rtu:
             self._heard = self._loop.time()
             if self._is_hushing:
-                return b""
+                return
+        frame, self._received = self._received + data, b""
         try:
-            if self._expected is None:
-                raise ProtocolError(f"{len(data)} bytes that nobody asked for: {show(data)}")
-            complete = self._expected.is_complete(data)
-            if complete and self._rtu:
-                _check_sum(data)
+            if self._expected is None or self._answer is None:
+                raise ProtocolError(f"{len(frame)} bytes without a request: {show(frame)}")
+            if not self._expected.is_complete(frame):
+                self._received = frame
+                return
+            if self._rtu:
+                check_sum(frame)
         except ProtocolError as error:
-            self._fail(ProtocolError(error.message), may_be_noise=isinstance(error, MisfitError))
-            return b""
-        if not complete:
-            return b""
-        return data if self._rtu else self._their_number + data[len(self._their_number) :]
+            self._fail(error)
+            return
+        self._expected = None  # every byte after this one has no request
+        if not self._answer.done():
+            self._answer.set_result(frame)
 
-    def _numbered(self, frame: bytes) -> bytes:
-        """The frame with a transaction id of ours; 0 is none, some devices answer it to anything."""
-        self._number = self._number % LAST_NUMBER + 1
-        self._their_number, rest = frame[:2], frame[2:]
-        return self._number.to_bytes(2, "big") + rest
-
-    def _trace_connect(self, connected: bool) -> None:
+    def _on_connection(self, connected: bool) -> None:
         if not connected:
             self._fail(ConnectionLostError(f"{self._address} closed the connection"))
 
@@ -330,7 +330,7 @@ class ModbusTransport:
         except BaseException:
             self._drop()
             raise
-        self._connected()
+        self._check_connected()
 
     async def _resynchronise(self, by: float = math.inf) -> None:
         """Make sure that no answer to an earlier request is still on its way.
@@ -341,9 +341,9 @@ class ModbusTransport:
         answers in order, so that once the right length is back nothing older can follow.
         """
         self._probe = self._probe % (REGISTER_COUNT - 1) + 1
-        await self._exchange(ReadRequest(self._map, self._probe), by=by)
+        await self._exchange(read_request(self._map, self._probe), by=by)
 
-    async def _read_again(self, why: RobotiqConnectionError) -> ModbusPDU:
+    async def _read_again(self, why: RobotiqConnectionError) -> bytes:
         """Read once more on a line that has lost or damaged a byte, as USB adapters do now and then.
 
         The second answer cannot be the first one that was only late. First the line must fall silent: what
@@ -403,11 +403,6 @@ class ModbusTransport:
             await self._settle(left)
 
 
-def _check_sum(frame: bytes) -> None:
-    """Refuse a frame of a serial line that was damaged; pymodbus would wait for another.
-
-    Raises:
-        MisfitError: its checksum does not fit.
-    """
-    if not FramerRTU.check_CRC(frame[:-2], int.from_bytes(frame[-2:], "big")):
-        raise MisfitError(f"a wrong checksum: {show(frame)}")
+def _plain(error: RobotiqConnectionError) -> RobotiqConnectionError:
+    """The error as users see it: MisfitError is for this link alone."""
+    return ProtocolError(error.message) if isinstance(error, MisfitError) else error

@@ -67,7 +67,7 @@ def test_after_what_was_left_over_the_next_start_finds_the_gripper() -> None:
             async with here.server.fault_injector.making(Trouble("multiplexer", 0.03)):
                 await ask_and_go(here)
                 await asyncio.sleep(0.1)
-                with pytest.raises(ProtocolError, match="nobody asked for"):
+                with pytest.raises(ProtocolError, match="without a request"):
                     await here.hand.start(activate=False)
                 await here.hand.start(activate=False)
                 with nobody_else_moves(here):

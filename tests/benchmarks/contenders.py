@@ -126,20 +126,19 @@ async def latency(seconds: float, ports: list[int]) -> Figures:
     link: Any = it._options.make_transport()
     it._options = replace(it._options, make_transport=lambda: link)
     arrived = written = 0.0
-    hear, write = link._trace_packet, link.write
+    hear, write = link._on_data, link.write
 
-    def note_arrival(sending: bool, data: bytes) -> bytes:
+    def note_arrival(data: bytes) -> None:
         nonlocal arrived
-        if not sending:
-            arrived = time.monotonic()
-        return hear(sending, data)  # type: ignore[no-any-return]
+        arrived = time.monotonic()
+        hear(data)
 
     async def note_write(registers: Any) -> None:
         nonlocal written
         written = time.monotonic()
         await write(registers)
 
-    link._trace_packet, link.write = note_arrival, note_write
+    link._on_data, link.write = note_arrival, note_write
     to_wire, to_reader, to_return = [], [], []
     async with it:
 
