@@ -310,7 +310,7 @@ async def test_a_release_that_is_done_is_at_rest(new: Someone, gripper: Simulate
 async def test_a_motion_that_is_on_its_way_counts(new: Someone, gripper: SimulatedGripper) -> None:
     """Its request has arrived, and its acknowledgement has not."""
     operator, server = new
-    server.replies.delay(0.05)
+    server.policy = lambda frame: [(0.05, frame)]
     closing = asyncio.create_task(operator.act(ACTIONS["close"]))
     async with asyncio.timeout(20):
         while not gripper.request_registers[0] & 0x0800:  # noqa: ASYNC110

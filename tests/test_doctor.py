@@ -199,7 +199,7 @@ async def test_firmware_that_reads_with_function_3_only(where: bytes, options: d
 @virtual_time
 async def test_a_gateway_that_is_slower_than_was_waited_for() -> None:
     async with SimulatorServer() as server:
-        server.replies.delay(1.3)
+        server.policy = lambda frame: [(1.3, frame)]
         found = await findings(server.address, seconds=60)
         hand = RobotiqHand(server.address, response_timeout=2.6)
         await hand.start(activate=False)  # the advice helps
@@ -390,7 +390,7 @@ async def test_a_wait_for_another_client_is_told(waits: bool) -> None:
 @virtual_time
 async def test_slow_replies_are_no_lost_ones() -> None:
     async with SimulatorServer() as server:
-        server.replies.delay(0.6)
+        server.policy = lambda frame: [(0.6, frame)]
         found = await findings(server.address)
     assert found["Modbus"].level is Level.DOUBT
     assert found["Modbus"].found == "answers, after 0.6 s"
@@ -405,7 +405,7 @@ async def test_slow_replies_are_no_lost_ones() -> None:
 @virtual_time
 async def test_replies_that_take_a_longer_timeout() -> None:
     async with SimulatorServer() as server:
-        server.replies.delay(0.45)
+        server.policy = lambda frame: [(0.45, frame)]
         found = await findings(server.address)
         hand = RobotiqHand(server.address, response_timeout=1.0)
         await hand.start(activate=False)  # the advice helps
@@ -423,7 +423,7 @@ def test_an_extra_that_is_missing_is_no_question_of_cables() -> None:
 @virtual_time
 async def test_a_slow_gripper() -> None:
     async with SimulatorServer() as server:
-        server.replies.delay(0.02)
+        server.policy = lambda frame: [(0.02, frame)]
         found = await findings(server.address)
     assert found["round trip"].level is Level.DOUBT
     assert found["rate"].level is Level.DOUBT

@@ -47,7 +47,6 @@ class Address:
         return self.kind in ("tcp", "rtu+tcp")
 
     def __str__(self) -> str:
-        """The address in its full form."""
         if self.is_socket:
             host = f"[{self.host}]" if ":" in self.host else self.host
             return f"{self.kind}://{host}:{self.port}"

@@ -1,4 +1,4 @@
-"""What all ways to write an address have in common, as far as that is known without asking anybody."""
+"""One spelling for all ways to write an address, without asking a name server."""
 
 from __future__ import annotations
 
@@ -16,40 +16,40 @@ HERE: Final = "localhost"
 
 
 def canonical_address(address: Address) -> str:
-    """Where an address leads, the same for all ways to write it.
+    """Where an address leads: equal strings for equal places.
 
-    Whatever means this machine is localhost. The links to a serial port are that port, at this moment. A
-    socket is the same place whatever is spoken there.
+    Every spelling of this machine becomes localhost. A symbolic link to a serial port becomes that port. A
+    socket is the same place whatever protocol it carries.
     """
     host = _serial_port(address.host) if address.kind == "rtu" else _host(address.host)
     return f"{'tcp' if address.is_socket else address.kind}://{host}:{address.port}"
 
 
 def _host(host: str) -> str:
-    """A host in one way to write it. Names are not looked up."""
+    """One spelling of a host. Names are not resolved."""
     if ":" in host:
         number, _, zone = host.partition("%")
         address = IPv6Address(number)
         if address.ipv4_mapped is None:
             if address.is_loopback or address.is_unspecified:
                 return HERE
-            # Only these belong to an interface.
+            # Only link-local addresses depend on an interface.
             return f"{address}%{_interface(zone)}" if address.is_link_local else str(address)
         host = str(address.ipv4_mapped)
     name = host.removesuffix(".")
-    # Who connects to 0.0.0.0 or :: gets this machine. Other addresses in 127.0.0.0/8 are others.
+    # Connecting to 0.0.0.0 or :: reaches this machine. Other addresses in 127.0.0.0/8 are other places.
     return HERE if name in (HERE, "127.0.0.1", "0.0.0.0") or name.endswith(f".{HERE}") else name
 
 
 def _interface(zone: str) -> str:
-    """The number of a network interface; what is written if there is no such interface."""
+    """The number of a network interface; its name as given if it does not exist."""
     with contextlib.suppress(OSError):
         return str(socket.if_nametoindex(zone))
     return str(int(zone)) if zone.isdecimal() else zone
 
 
 def _serial_port(device: str) -> str:
-    """A serial port in one way to write it: the number of a device that is there, else its path."""
+    """One spelling of a serial port: the device number if it exists, else its path."""
     windows = re.fullmatch(r"(?:\\\\[.?]\\)?(com[0-9]+)", device, re.IGNORECASE)
     if windows is not None:
         return windows[1].upper()

@@ -1,4 +1,4 @@
-"""pymodbus's client objects: made, connected, and set up for replies that come soon."""
+"""Opens connections with pymodbus's asynchronous clients."""
 
 from __future__ import annotations
 
@@ -18,14 +18,13 @@ from .serial_ports import hasten, why_no_port
 Client = AsyncModbusTcpClient | AsyncModbusSerialClient
 
 BAUD: Final = 115200
-"""Of the gripper's serial line, with 8 data bits, no parity, 1 stop bit (manual)."""
+"""Baud rate of the gripper's serial line; 8 data bits, no parity, 1 stop bit (manual)."""
 LARGEST_READ: Final = 4096
-"""Bytes taken from the socket at a time; the longest Modbus frame has 260."""
+"""Bytes read from the socket at a time; the longest Modbus frame has 260."""
 KEEPALIVE: Final = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 5}
-"""Seconds of silence before the system asks whether the other end lives, seconds between two such
-questions, and how many may go without an answer. A hand that polls is never so silent; but while its
-program stands still (a debugger, a suspended machine) nothing else shows either end that the other is
-gone."""
+"""TCP keepalive: seconds of silence before the first probe, seconds between probes, probes without an answer.
+A polling hand is never that silent. But while its program is suspended (a debugger, a sleeping machine),
+nothing else shows either end that the other is gone."""
 
 
 async def connected_client(
@@ -100,13 +99,13 @@ def _make(address: Address, host: str, options: dict[str, Any]) -> Client:
 
 
 def _set_up(client: Client, address: Address) -> None:
-    """What makes replies come sooner, and shows that the other end is gone. Nothing depends on it."""
+    """Tune the connection for quick replies and for noticing a dead peer. Nothing depends on it."""
     transport: Any = client.ctx.transport
     if not address.is_socket:
         hasten(transport.sync_serial)
         return
-    # asyncio asks the system for 256 KiB at a time, and taking and giving back that much memory costs
-    # several times what a reply does. Undocumented: where it is called otherwise, nothing is saved.
+    # asyncio reads into a buffer of 256 KiB, whose allocation costs several times the handling of a reply.
+    # The attribute is undocumented: without it nothing is lost but time.
     with contextlib.suppress(AttributeError):
         transport.max_size = LARGEST_READ
     line = transport.get_extra_info("socket")
@@ -118,7 +117,7 @@ def _set_up(client: Client, address: Address) -> None:
 
 
 def _keep_reasons(client: Client, reasons: list[OSError]) -> None:
-    """Add to a list why a client could not connect, which pymodbus keeps to itself."""
+    """Collect the errors of connecting, which pymodbus only logs."""
     create = client.ctx.call_create
 
     async def created() -> object:

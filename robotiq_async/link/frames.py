@@ -80,16 +80,16 @@ def registers_in(reply: bytes, *, serial: bool) -> Registers:
 
 
 class MisfitError(ProtocolError):
-    """Bytes that do not begin as the answer does; noise on a serial line may have made them of it."""
+    """Bytes that do not begin like the answer; noise on a serial line can cause that."""
 
 
 class Expected(NamedTuple):
     """The one reply that answers a request.
 
     Attributes:
-        start: how the good reply begins: header, function code and what must follow it.
+        start: the first bytes of the good reply: header, function code and what must follow it.
         size: bytes of the good reply, checksum included (:func:`check_sum` checks that).
-        refusal: how an exception reply begins: header and function code.
+        refusal: the first bytes of an exception reply: header and function code.
         refusal_size: bytes of an exception reply.
     """
 
@@ -102,11 +102,11 @@ class Expected(NamedTuple):
         """Whether the bytes so far are the whole answer; False while more must come.
 
         Raises:
-            MisfitError: the bytes can not become the answer.
-            ProtocolError: they are more than that, or the device refuses the request.
+            MisfitError: the bytes cannot become the answer.
+            ProtocolError: more bytes than the answer, or the device refuses the request.
         """
         if len(frame) == self.size and frame.startswith(self.start):
-            return True  # the usual case, quickly
+            return True  # the usual case
         if _agree(frame, self.start):
             if len(frame) > self.size:
                 raise ProtocolError(f"{len(frame) - self.size} bytes more than the answer: {show(frame)}")
@@ -118,7 +118,7 @@ class Expected(NamedTuple):
         raise ProtocolError(_refused(self.refusal[-1] & 0x7F, frame[len(self.refusal)]))
 
     def _misfit(self, frame: bytes) -> MisfitError:
-        """Why bytes are not the answer."""
+        """The error for bytes that are not the answer."""
         function, at = self.refusal[-1] & 0x7F, len(self.start) - 2
         count = int.from_bytes(frame[at : at + 2], "big")  # of registers, in the answer to a write
         is_shorter = len(frame) == self.size and frame.startswith(self.start[:at]) and count < REGISTER_COUNT
@@ -132,7 +132,7 @@ def expected_reply(request: bytes, *, serial: bool) -> Expected:
     """The reply that answers a request frame of function 3, 4 or 16."""
     if serial:
         return _expected(request, _CHECKSUM)
-    # Over TCP a header comes first: transaction and protocol, to be repeated, then the length.
+    # Over TCP a header precedes it: transaction and protocol as in the request, then the length.
     start, size, refusal, refusal_size = _expected_over_tcp(request[6:])
     header = request[:4]
     return Expected(header + start, size, header + refusal, refusal_size)
@@ -140,13 +140,13 @@ def expected_reply(request: bytes, *, serial: bool) -> Expected:
 
 @lru_cache(maxsize=16)
 def _expected_over_tcp(request: bytes) -> Expected:
-    """The same from the unit on, with the length before it; that of a poll is always the same."""
+    """The same from the length field on, cached because a poll never changes."""
     start, size, refusal, refusal_size = _expected(request, 0)
     return Expected(_length(size) + start, size + 6, _length(refusal_size) + refusal, refusal_size + 6)
 
 
 def _expected(request: bytes, checksum: int) -> Expected:
-    """The same for a frame that begins with the unit and ends with a checksum of so many bytes."""
+    """The same for a frame that begins with the unit and ends with a checksum of this size."""
     at = 1
     function = request[at]
     if function == 16:
@@ -164,7 +164,7 @@ def _expected(request: bytes, checksum: int) -> Expected:
 
 
 def _refused(function: int, code: int) -> str:
-    """What an exception reply says, and what to do about it if that is known."""
+    """The message for an exception reply, with advice where there is some."""
     said = f"the gripper refuses function {function}: exception {code} ({_EXCEPTIONS.get(code, 'unknown')})"
     if function == _WRITE and code in (1, 2, 3):
         return said + _WHOLE
@@ -174,7 +174,7 @@ def _refused(function: int, code: int) -> str:
 
 
 def _length(size: int) -> bytes:
-    """The length field: it counts from the unit on."""
+    """The length field, which counts the bytes from the unit on."""
     return size.to_bytes(2, "big")
 
 
@@ -184,6 +184,6 @@ def show(frame: bytes) -> str:
 
 
 def _agree(frame: bytes, start: bytes) -> bool:
-    """Whether the bytes so far fit the beginning."""
+    """Whether the bytes so far match the expected start."""
     size = min(len(frame), len(start))
     return frame[:size] == start[:size]

@@ -1,4 +1,4 @@
-"""Holds a transport that somebody else has written to what a hand relies on."""
+"""Makes a transport object of an application keep the promises that a hand relies on."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ T = TypeVar("T")
 
 
 class GuardedTransport:
-    """Bounds every call in time, lets no foreign exception through, and closes after a failure."""
+    """Limits the time of every call, converts foreign exceptions, and closes after a failure."""
 
     def __init__(
         self,
@@ -53,22 +53,22 @@ class GuardedTransport:
         self._response_timeout = response_timeout
         self._worker = Worker("robotiq_async transport")
         self._is_begun = False
-        """Whether it has been asked to open and not to close since."""
+        """Whether open() was called without a close() since."""
 
     @property
     def is_open(self) -> bool:
         """Whether requests can be sent."""
         try:
             return self._is_open and bool(self._inner.is_open)
-        except Exception as error:  # noqa: BLE001  # what cannot tell is not open
-            self._log.warning("the transport cannot tell whether it is open: %r", error)
+        except Exception as error:  # noqa: BLE001  # treated as not open
+            self._log.warning("is_open of the transport raised %r", error)
             return False
 
     async def open(self) -> None:
         """Connect.
 
         Raises:
-            RobotiqConnectionError: that failed, or took too long.
+            RobotiqConnectionError: the call failed or took too long.
         """
         self._drop()
         try:
@@ -81,20 +81,20 @@ class GuardedTransport:
         """The eight status registers.
 
         Raises:
-            RobotiqConnectionError: that failed or took too long, or what came is not eight registers.
+            RobotiqConnectionError: the call failed, took too long, or did not return eight registers.
         """
         registers = await self._bounded(self._inner.read, self._response_timeout)
         try:
             return check_registers(registers)
-        except Exception as error:  # what it gives may be anything that can be iterated over
+        except Exception as error:  # the result may be any iterable
             self._drop()
             raise ProtocolError(f"{self._name}: {error}") from error
 
     async def send(self, decide: Callable[[], Sequence[int] | None]) -> bool:
-        """Write what ``decide`` returns, if anything; it is called by the task that makes the call.
+        """Write what ``decide`` returns, if anything. The worker's task calls it just before the write.
 
         Raises:
-            RobotiqConnectionError: that failed, or took too long.
+            RobotiqConnectionError: the call failed or took too long.
         """
 
         async def write() -> bool:
@@ -111,11 +111,11 @@ class GuardedTransport:
         self._drop()
         with anyio.CancelScope(shield=True):
             if not await self._worker.ended(self._response_timeout):
-                self._log.warning("transport abandoned: its last call has not returned")
+                self._log.warning("transport abandoned: its last call did not return")
 
     def _drop(self) -> None:
-        """Have it closed as soon as it does nothing else; open() waits for that, and nobody else."""
-        # Whatever becomes of it, what comes later from this connection is no answer to a new request.
+        """Close it after its present call. Only the next open() waits for that."""
+        # Replies that this connection still delivers must not answer a new request.
         self._is_open = False
         if self._is_begun:
             self._is_begun = False
@@ -129,7 +129,7 @@ class GuardedTransport:
         try:
             async with asyncio.timeout(self._response_timeout):
                 await self._inner.close()
-        except Exception as error:  # noqa: BLE001  # there is nothing left to do about it
+        except Exception as error:  # noqa: BLE001  # nothing is left to do
             self._log.warning("the transport did not close: %r", error)
 
     async def _bounded(self, call: Callable[[], Awaitable[T]], seconds: float) -> T:
@@ -145,6 +145,6 @@ class GuardedTransport:
             self._drop()
             raise ConnectionLostError(f"{self._name}: {error!r}") from error
         except asyncio.CancelledError:
-            # In the middle of an exchange: its answer must not become that of another one.
+            # Cancelled in the middle of an exchange: its answer must not become that of another one.
             self._drop()
             raise

@@ -1,7 +1,7 @@
-"""What the name of a host stands for, and why nobody can be reached.
+"""Resolves host names, and explains why a host cannot be reached.
 
-The event loop's own look-up runs in threads that ``asyncio.run`` waits for at its end, and a resolver that
-does not answer keeps one for ten seconds and more, long after whoever asked has given up.
+The event loop's own look-up uses threads that ``asyncio.run`` waits for at its end. A resolver that does not
+answer keeps such a thread for ten seconds and more, long after the caller has given up.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from ..runtime.concurrency import in_a_thread
 
 
 async def addresses_of(host: str, port: int) -> list[str]:
-    """The numeric addresses of a host, in the order in which they are to be tried.
+    """The numeric addresses of a host, in the order in which to try them.
 
-    It ends when the resolver does, or when it is cancelled: bound it.
+    It can take as long as the resolver: limit its time.
 
     Raises:
-        OSError: it cannot be resolved.
-        UnicodeError: it can be no name.
+        OSError: the name cannot be resolved.
+        UnicodeError: not a host name.
     """
     with contextlib.suppress(ValueError):
         ip_address(host)
@@ -32,7 +32,7 @@ async def addresses_of(host: str, port: int) -> list[str]:
 
 
 def why_unreachable(error: OSError | None) -> str:
-    """Why there is no connection to a host, from the last attempt; None if nothing is known of it."""
+    """Why a connection failed, for a person. ``error`` is that of the last attempt, or None."""
     match error.errno if error is not None else None:
         case errno.ECONNREFUSED:
             return "connection refused: nothing listens there"
@@ -47,7 +47,7 @@ def why_unreachable(error: OSError | None) -> str:
 
 
 def why_no_socket() -> str:
-    """Why no socket can be made in this program; empty when one can."""
+    """Why this program cannot create a socket; empty if it can."""
     try:
         socket.socket().close()
     except OSError as error:

@@ -87,7 +87,7 @@ class ModbusTransport:
     """A gripper behind Modbus TCP or a serial line (Modbus RTU), of this machine or of a serial server.
 
     Attributes:
-        repeats: reads that were asked once more, because the answer was missing or damaged.
+        repeats: number of reads repeated because an answer was missing or damaged.
     """
 
     def __init__(
@@ -99,13 +99,13 @@ class ModbusTransport:
         response_timeout: float,
         log: Log = log,
     ) -> None:
-        """Keep what is needed to connect; opens nothing.
+        """Keep the settings; opens nothing.
 
         Args:
             address: a tcp, rtu or rtu+tcp address.
             registers: where the blocks lie, and the device id.
             connect_timeout: seconds for connecting.
-            response_timeout: seconds for one answer; on a serial line a read may be asked again after that.
+            response_timeout: seconds for one answer; on a serial line a read may be repeated after that.
             log: of the hand.
         """
         self.repeats = 0
@@ -116,7 +116,7 @@ class ModbusTransport:
         self._response_timeout = response_timeout
         self._rtu = address.is_rtu
         self._keeps_silence = not address.is_socket
-        """Whether the pauses between frames are ours to keep, and not a serial server's."""
+        """Whether this link must keep the pauses between frames; a serial server keeps its own."""
         self._client: Client | None = None
         self._line: Any = None
         """The asyncio transport of the connection; pymodbus's class for serial ports is not typed."""
@@ -319,11 +319,11 @@ class ModbusTransport:
     # -- in step -----------------------------------------------------------------------------------------
 
     async def _settle(self, seconds: float) -> None:
-        """Give what is left over from an earlier connection time to show itself before anything is asked.
+        """Wait for bytes left over from an earlier connection before the first request.
 
-        A gateway that keeps its own connection to the gripper may send late replies to whoever connects
-        next. Their numbers tell as well; but by then a request of ours is on its way, whose reply would be
-        left over for the next connection, and so on without end.
+        A gateway that keeps its own connection to the gripper may send late replies to its next client. Their
+        transaction ids give them away too, but only when a request is already on its way. The reply to that
+        request would be left over for the next connection, and so on without end.
         """
         try:
             await asyncio.sleep(seconds)
@@ -335,29 +335,27 @@ class ModbusTransport:
     async def _resynchronise(self, by: float = math.inf) -> None:
         """Make sure that no answer to an earlier request is still on its way.
 
-        Serial replies carry no number, and a gateway from TCP to a serial line gives a late one the number
-        of what it is asked next. So after opening, one to seven registers are read instead of eight, a
-        different count each time: a late answer has another length and is found out, and the gripper
-        answers in order, so that once the right length is back nothing older can follow.
+        Serial replies carry no transaction id, and a gateway from TCP to a serial line gives a late reply the
+        id of the next request. So this reads one to seven registers instead of eight, a different count each
+        time. A late answer has another length and ends the connection. The gripper answers in order, so
+        after an answer of the right length nothing older can follow.
         """
         self._probe = self._probe % (REGISTER_COUNT - 1) + 1
         await self._exchange(read_request(self._map, self._probe), by=by)
 
     async def _read_again(self, why: RobotiqConnectionError) -> bytes:
-        """Read once more on a line that has lost or damaged a byte, as USB adapters do now and then.
+        """Read once more on a line that lost or damaged a byte, as USB adapters occasionally do.
 
-        The second answer cannot be the first one that was only late. First the line must fall silent: what
-        is left of a damaged reply is dropped. Then the line is brought in step as when it is opened, by a
-        read of another length: if the first answer comes now, it has the wrong length, and the link is given
-        up; if the right length comes, the gripper, which answers in order, has nothing older to send. Only
-        then the status is asked for. All of that must be quick. A write is never sent again:
-        whether the first was carried out cannot be known.
+        The second answer must not be the first one that was only late. So first wait for silence and drop the
+        rest of a damaged reply. Then bring the line in step as after opening, with a read of another length:
+        if the first answer arrives now, it has the wrong length and ends the connection. Only then read the
+        status. A write is never repeated: whether the first one was carried out is unknown.
 
         Args:
-            why: the first answer did not come.
+            why: the error of the first read.
 
         Raises:
-            RobotiqConnectionError: again no clean answer; it is the first reason. The connection is closed.
+            RobotiqConnectionError: ``why``, if there is again no clean answer; the connection is closed.
         """
         is_slow = self._response_timeout > USUAL_RESPONSE_S
         by = self._loop.time() + (self._response_timeout if is_slow else REPEAT_S)
@@ -374,16 +372,16 @@ class ModbusTransport:
         return answer
 
     async def _hush(self) -> None:
-        """Wait until nothing comes any more; that is dropped.
+        """Drop what arrives until the line is silent.
 
         Raises:
-            ProtocolError: something comes all the time; the connection is closed.
+            ProtocolError: the line does not fall silent; the connection is closed.
         """
         loop = self._loop
         began = loop.time()
         self._is_hushing, until = True, began + HUSH_S
         if isinstance(self._failure, ProtocolError):
-            self._failure = None  # more of the same came before this task had its turn
+            self._failure = None  # more of the damaged reply came before this task ran
         try:
             while (left := until - loop.time()) > 0:
                 if loop.time() - began > LONGEST_HUSH_S:
@@ -397,7 +395,7 @@ class ModbusTransport:
             self._is_hushing = False
 
     async def _pause(self) -> None:
-        """Keep the silence that ends a frame: what follows too soon may be taken for a part of it."""
+        """Keep the silence between frames: what follows sooner may be taken for part of the last frame."""
         left = self._heard + SILENCE_S - self._loop.time()
         if left > TIMER_S:
             await self._settle(left)

@@ -1,4 +1,4 @@
-"""Serial ports: why one cannot be opened, for a person, and how long its adapter keeps what it has heard."""
+"""Serial ports: why one cannot be opened, and the latency timer of USB adapters."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Final
 MISSING: Final = "there is no such device; is it plugged in?"
 FORBIDDEN: Final = "not allowed to open it; is this user in its group (ls -l; on Linux often dialout)?"
 TAKEN: Final = "another program has opened it"
-NO_PORT: Final = "it is no serial port"
+NO_PORT: Final = "it is not a serial port"
 
 USB_SERIAL: Final = Path("/sys/bus/usb-serial/devices")
 """Where Linux has a folder for each USB adapter."""
@@ -26,10 +26,10 @@ _WHY: Final = {
 
 
 def why_no_port(error: OSError | None) -> str:
-    """Why a serial port cannot be opened, from what pyserial has raised; None if that is not known."""
+    """Why a serial port cannot be opened, for a person. ``error`` is pyserial's, or None."""
     if error is None:
         return "cannot open the serial port"
-    # Of a port that it cannot configure pyserial gives no number; the error of termios, its context, has it.
+    # For a port that it cannot configure, pyserial gives no number; its context, the error of termios, does.
     numbers = (error.errno, *getattr(error.__context__, "args", ()))
     return next(
         (_WHY[each] for each in numbers if isinstance(each, int) and each in _WHY),
@@ -38,24 +38,24 @@ def why_no_port(error: OSError | None) -> str:
 
 
 def hasten(port: object) -> None:
-    """Have a USB adapter pass on what it hears at once, where it can be told so.
+    """Switch a USB adapter to low latency, where the system can do that.
 
-    An FTDI adapter keeps what it has heard for its latency timer, 16 ms unless told otherwise, which
-    triples the time of a read; in low-latency mode that is 1 ms (Linux). Other ports know no such mode.
+    An FTDI adapter holds received bytes back for its latency timer, by default 16 ms, which triples the time
+    of a read; in low-latency mode 1 ms (Linux). Other ports have no such mode.
 
     Args:
-        port: pyserial's.
+        port: the port object of pyserial.
     """
     with contextlib.suppress(AttributeError, NotImplementedError, OSError, ValueError):
         port.set_low_latency_mode(True)  # type: ignore[attr-defined]
 
 
 def latency_timer(device: str, folder: Path = USB_SERIAL) -> int | None:
-    """Milliseconds for which the adapter of a port keeps what it has heard; None where none is known.
+    """How long the adapter of a port holds received bytes back, in milliseconds; None if unknown.
 
     Args:
         device: the port, or a link to it.
-        folder: where the system tells of its adapters.
+        folder: where the system lists its adapters.
     """
     with contextlib.suppress(OSError, ValueError):
         return int(latency_file(device, folder).read_text())

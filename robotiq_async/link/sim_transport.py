@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
 
 def new_gripper(simulation: Simulation) -> SimulatedGripper:
-    """A gripper for a hand at ``sim://``, as the address has it.
+    """The gripper that a ``sim://`` address describes.
 
-    The simulator is imported here, and so only for sim:// and when the hand is made: it takes tens of
-    milliseconds, for which a loop that runs already would be held up.
+    Imports the simulator, which takes tens of milliseconds: only for sim://, and when the hand is made,
+    because a later import would block the running loop.
     """
     from ..simulator import SimulatedGripper  # noqa: PLC0415
 
@@ -41,7 +41,6 @@ class SimulatedTransport:
         connect_timeout: float,
         response_timeout: float,
     ) -> None:
-        """Keep what is needed to connect; starts nothing."""
         from ..simulator import SimulatorServer  # noqa: PLC0415
 
         self._server = SimulatorServer(gripper)

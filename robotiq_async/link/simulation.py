@@ -1,4 +1,4 @@
-"""What may be said of a simulated gripper in its address: ``sim://?speedup=10&object=150``."""
+"""Options of a simulated gripper in its address: ``sim://?speedup=10&object=150``."""
 
 from __future__ import annotations
 
@@ -16,19 +16,18 @@ _OPTIONS: Final = ("speedup", "object")
 
 @dataclass(frozen=True, slots=True)
 class Simulation:
-    """A simulated gripper, as far as its address tells.
+    """The options of a simulated gripper.
 
     Attributes:
         speedup: simulated seconds in one second of the clock, 0.01..1000.
-        object: count at which the fingers A, B and C meet something when they close, 0..255; None for
-            nothing there.
+        object: position in counts, 0..255, at which the fingers A, B and C meet an object when they close;
+            None for no object.
     """
 
     speedup: float = 1.0
     object: int | None = None
 
     def __str__(self) -> str:
-        """What stands behind ``sim://``: options that are not as usual."""
         speedup = int(self.speedup) if self.speedup == int(self.speedup) else self.speedup
         options = [f"speedup={speedup!r}"] if speedup != 1 else []
         options += [] if self.object is None else [f"object={self.object}"]
@@ -39,10 +38,10 @@ NOTHING_SPECIAL: Final = Simulation()
 
 
 def parse_simulation(query: str) -> Simulation:
-    """Read what stands behind ``sim://``: nothing, or ``?OPTION=VALUE&...``.
+    """Parse the part after ``sim://``: nothing, or ``?OPTION=VALUE&...``.
 
     Raises:
-        ValueError: an option that there is not, that is given twice, or that is outside its range.
+        ValueError: an unknown option, one given twice, or a value outside its range.
     """
     given: dict[str, str] = {}
     for part in query.removeprefix("?").split("&") if query else ():

@@ -1,4 +1,4 @@
-"""What a hand needs of a link."""
+"""Transport: the connection to a gripper, as a hand uses it."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from ..values.registers import Registers
 
 @runtime_checkable
 class Transport(Protocol):
-    """What a hand needs of a link. Pass an object of this shape instead of an address for other buses.
+    """A connection to a gripper. Pass an object of this shape instead of an address to use another bus.
 
-    One task calls it, one call at a time. After any failure the transport is closed, and :meth:`open`
-    begins anew.
+    One task makes all calls, one at a time. After any failure the transport is closed; :meth:`open` starts
+    again.
     """
 
     @property
@@ -24,7 +24,7 @@ class Transport(Protocol):
         """Connect.
 
         Raises:
-            RobotiqConnectionError: nobody answers, or not what was expected.
+            RobotiqConnectionError: there is no answer, or not the expected one.
         """
 
     async def read(self) -> Registers:
@@ -46,7 +46,7 @@ class Transport(Protocol):
 
 
 class Link(Protocol):
-    """A transport as the poller uses it: what is written is decided on at the last moment."""
+    """A transport as the poller uses it: the image is decided in the moment of the write."""
 
     @property
     def is_open(self) -> bool:

@@ -1,4 +1,4 @@
-"""Tells when an exchange takes too long, at no cost for those that do not."""
+"""Detects exchanges that take too long, at almost no cost for those that do not."""
 
 from __future__ import annotations
 
@@ -8,16 +8,22 @@ from collections.abc import Callable
 from typing import Final
 
 HELD_S: Final = 0.01
-"""A timer, or a tick, that comes so late was kept from coming: the loop was held up."""
+"""A timer or tick that fires this late shows that the event loop was blocked."""
 GRACE_S: Final = 0.02
-"""A peer in the same loop (the simulated gripper) was held up with it, and gets so much more time."""
+"""Extra time after a block for a peer in the same loop (the simulated gripper), which was blocked as well."""
 
 
 class Watchdog:
     """Watches one exchange at a time.
 
-    Setting a timer for each exchange and cancelling it costs more than the exchange's own Python. So one
-    timer stands until it expires, and then looks when the exchange of that moment is due.
+    Setting and cancelling a timer for each exchange would cost more than the exchange itself. So one timer
+    runs until it expires, and then checks when the exchange of that moment is due.
+
+    Args:
+        loop: the running loop.
+        seconds: time limit of one exchange.
+        is_waiting: whether an exchange is under way.
+        on_timeout: called when the exchange is not over in time.
     """
 
     def __init__(
@@ -25,26 +31,18 @@ class Watchdog:
         loop: asyncio.AbstractEventLoop,
         seconds: float,
         is_waiting: Callable[[], bool],
-        too_long: Callable[[], None],
+        on_timeout: Callable[[], None],
     ) -> None:
-        """Prepare; watches nothing yet.
-
-        Args:
-            loop: runs.
-            seconds: for one exchange.
-            is_waiting: whether an exchange is under way.
-            too_long: is called when it is not over in time.
-        """
         self._loop = loop
         self._seconds = seconds
         self._is_waiting = is_waiting
-        self._too_long = too_long
+        self._on_timeout = on_timeout
         self._due = 0.0
         self._has_grace = False
         self._timer: asyncio.TimerHandle | None = None
 
     def watch(self, by: float = math.inf) -> None:
-        """An exchange begins; ``by`` is when it must be over at the latest, in the loop's time."""
+        """Start watching an exchange; ``by`` is its latest end, in the loop's time."""
         self._due = min(self._loop.time() + self._seconds, by)
         self._has_grace = False
         if self._timer is not None and self._timer.when() > self._due:
@@ -53,16 +51,13 @@ class Watchdog:
             self._timer = self._loop.call_at(self._due, self._look, self._due)
 
     def stop(self) -> None:
-        """Watch no longer."""
+        """Stop watching."""
         timer, self._timer = self._timer, None
         if timer is not None:
             timer.cancel()
 
     def _look(self, when: float) -> None:
-        """The timer has expired.
-
-        A loop that was held up reads before it looks at its timers: a reply that was waiting is in time.
-        """
+        # After a block asyncio handles sockets before timers, so a reply that was waiting counts as in time.
         self._timer = None
         if not self._is_waiting():
             return
@@ -72,4 +67,4 @@ class Watchdog:
         if now < self._due:
             self._timer = self._loop.call_at(self._due, self._look, self._due)
         else:
-            self._too_long()
+            self._on_timeout()

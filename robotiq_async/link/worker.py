@@ -1,4 +1,4 @@
-"""Calls of somebody else's code, made where they can keep nobody waiting."""
+"""Calls of foreign coroutines, made in a task of their own so that they cannot block the caller."""
 
 from __future__ import annotations
 
@@ -16,30 +16,28 @@ T = TypeVar("T")
 class Worker:
     """Makes calls one after the other, all of them in one task.
 
-    Whoever asks waits for so long and no longer. A call that is late is cancelled, and what it gives after
-    that is nobody's. One that does not end for all that delays those after it: two are never made at once.
+    The caller waits for a limited time. A late call is cancelled and its result dropped. A call that survives
+    its cancellation delays the next ones: two calls never run at once.
+
+    Args:
+        name: of the task, which starts with the first call.
     """
 
     def __init__(self, name: str) -> None:
-        """Begin without a task; the first call makes it.
-
-        Args:
-            name: of the task.
-        """
         self._name = name
         self._task: asyncio.Task[None] | None = None
         self._calls: _Calls
 
     async def call(self, what: Callable[[], Awaitable[T]], seconds: float) -> T:
-        """Make a call, and wait for it.
+        """Make a call and wait for its result.
 
         Args:
-            what: makes it; what it raises before there is anything to await is raised as well.
-            seconds: until it is given up.
+            what: makes the call; it may raise before it returns an awaitable.
+            seconds: time limit.
 
         Raises:
-            LateError: it was not done in time.
-            Exception: what the call has raised; a cancellation of its own is a RuntimeError.
+            LateError: the time limit expired.
+            Exception: raised by the call; a CancelledError of its own becomes a RuntimeError.
         """
         loop = asyncio.get_running_loop()
         call = self._put(what)
@@ -47,7 +45,7 @@ class Worker:
         try:
             await asyncio.wait({call.done}, timeout=seconds)
             if not call.done.done() and loop.time() - due > HELD_S:
-                # The loop was held up: what was waiting to be seen is in time.
+                # The loop was blocked: a result that was waiting meanwhile is in time.
                 await asyncio.wait({call.done}, timeout=GRACE_S)
         finally:
             call.give_up()
@@ -62,11 +60,11 @@ class Worker:
         raise RuntimeError(f"it ended by itself with {call.error!r}") from call.error
 
     def end(self, what: Callable[[], Awaitable[None]]) -> None:
-        """Make a last call, which must be bounded in time and not fail, and end the task. Does not wait."""
+        """Make a last call, which must limit its own time and not fail, then end the task. Does not wait."""
         self._put(what, is_last=True)
 
     async def ended(self, seconds: float) -> bool:
-        """Whether the task has ended; waits for that."""
+        """Wait for the end of the task; returns whether it has ended."""
         if self._task is not None:
             await asyncio.wait({self._task}, timeout=seconds)
         return self._task is None or self._task.done()
@@ -85,7 +83,7 @@ class Worker:
         self._task.add_done_callback(self._on_end)
 
     def _on_end(self, task: asyncio.Task[None]) -> None:
-        """The task has ended, perhaps by a cancellation that was meant for all (asyncio.run() ends so)."""
+        """Start again if calls remain: asyncio.run() cancels all tasks at its end."""
         if task is self._task and self._calls.waiting:
             self._start(task.get_loop())
 
@@ -100,12 +98,12 @@ async def _work(calls: _Calls) -> None:
 
 
 class _Calls:
-    """What is still to be made. A queue of asyncio's complains if its loop is closed while somebody waits."""
+    """The queue of calls. ``asyncio.Queue`` raises when its loop is closed while a task waits for an item."""
 
     def __init__(self) -> None:
         self.waiting: deque[_Call] = deque()
         self.has_ended = False
-        """Whether the last one that was begun is the last one."""
+        """Whether the call that was started last is the last one."""
         self._more = asyncio.Event()
 
     def put(self, call: _Call) -> None:
@@ -120,7 +118,7 @@ class _Calls:
 
 
 class _Call:
-    """One call, and what came of it."""
+    """One call and its outcome."""
 
     def __init__(self, what: Callable[[], Awaitable[Any]], done: asyncio.Future[None], is_last: bool) -> None:
         self._what: Final = what
@@ -128,12 +126,12 @@ class _Call:
         self.is_last: Final = is_last
         self.is_given_up = False
         self.task: asyncio.Task[Any] | None = None
-        """Makes it, once it has begun."""
+        """The task that runs the call, once it has begun."""
         self.result: Any = None
         self.error: BaseException | None = None
 
     async def make(self) -> None:
-        """Make it; only what ends the task is raised."""
+        """Run the call; raises only what ends the task."""
         self.task = task = asyncio.current_task()
         assert task is not None
         try:
@@ -149,7 +147,7 @@ class _Call:
             task.uncancel()
 
     def give_up(self) -> None:
-        """Nobody waits for it any more."""
+        """Cancel the call if it has not ended."""
         if not self.done.done():
             self.is_given_up = True
             if self.task is not None:

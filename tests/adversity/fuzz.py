@@ -25,6 +25,7 @@ from pymodbus.framer import FramerRTU
 from robotiq_async import ReconnectPolicy, RobotiqError, RobotiqHand, RobotiqStatus, State
 from robotiq_async.link.frames import expected_reply
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
+from robotiq_async.simulator.troubles.corruption import unchanged
 from robotiq_async.values.errors import ProtocolError
 from tests.adversity.world import HABITS
 
@@ -230,7 +231,7 @@ async def live(
     await asyncio.gather(commanding, return_exceptions=True)
     if commanding.done() and not commanding.cancelled():
         commanding.result()
-    server.replies.normal()
+    server.policy = unchanged
     await hand.stop()
     return {
         "replies": line.replies,

@@ -57,7 +57,7 @@ def test_one_warning_a_second_at_most(caplog: pytest.LogCaptureFixture) -> None:
 def test_slow_replies_are_not_blamed_on_the_loop_alone(caplog: pytest.LogCaptureFixture) -> None:
     async def main() -> None:
         async with world() as here:
-            here.server.replies.delay(0.1)
+            here.server.policy = lambda frame: [(0.1, frame)]
             await here.activate_beforehand()
             await here.hand.start()
             await asyncio.sleep(1.0)

@@ -103,7 +103,7 @@ async def test_the_habits_of_real_grippers_unless_it_is_plain(
 
 
 @pytest.mark.parametrize(
-    ("device", "why"), [("/dev/ttyNOWHERE", "no such device"), ("/dev/null", "it is no serial port")]
+    ("device", "why"), [("/dev/ttyNOWHERE", "no such device"), ("/dev/null", "it is not a serial port")]
 )
 def test_a_line_that_cannot_be_opened(call: Call, device: str, why: str) -> None:
     call("simulate", "--serial", device).assert_failed(1, f"cannot listen on {device}: ", why)

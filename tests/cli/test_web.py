@@ -19,7 +19,7 @@ import pytest
 
 from robotiq_async import Finger, NotStartedError, RobotiqHand, State
 from robotiq_async.cli.browser import opened
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.tools.actions import Operator
 
 pytest.importorskip("nicegui", reason="the page needs the extra web")
@@ -185,7 +185,7 @@ async def test_all_hands_are_stopped_at_once(server: SimulatorServer, gripper: S
         moving = asyncio.create_task(operators[1].move(255, Finger.A, speed=0))
         await operators[1].hand.wait_for_state(State.RUNNING_CC)
         await operators[1].hand.wait_for_state(State.RUNNING_IDLE)
-        dead.replies.drop()
+        await dead.fault_injector.begin(Trouble("drop"))
         page = PageServer([each.hand for each in operators], SETTINGS, operators=operators)
         leaving = asyncio.create_task(_leave_all(operators, page))
         await operators[1].hand.wait_for_state(State.SHUTDOWN)
@@ -209,7 +209,7 @@ async def test_a_hand_that_can_be_reached_again_is_not_started_once_the_page_end
         page.news[1].problem = "nobody was there"
         trying = asyncio.create_task(_try_again(page, 1, operators[1]))
         await asyncio.sleep(AGAIN_S - 0.5)
-        dead.replies.silence()
+        dead.policy = lambda _: []
         leaving = asyncio.create_task(_leave_all(operators, page))
         await trying
         assert not leaving.done()

@@ -29,7 +29,7 @@ A = Finger.A
 async def test_a_write_fails_within_a_second_on_a_silent_gripper(
     hand: RobotiqHand, server: SimulatorServer
 ) -> None:
-    server.replies.silence()
+    server.policy = lambda _: []
     began = time.monotonic()
     with pytest.raises(ConnectionLostError):
         await hand.set_position(200)
@@ -37,7 +37,7 @@ async def test_a_write_fails_within_a_second_on_a_silent_gripper(
 
 
 async def test_start_on_a_silent_gripper_ends_within_five_seconds(server: SimulatorServer) -> None:
-    server.replies.silence()
+    server.policy = lambda _: []
     began = time.monotonic()
     with pytest.raises(ConnectFailedError):
         await RobotiqHand(server.address).start()
@@ -62,7 +62,7 @@ async def test_stop_ends_within_two_seconds_on_a_dead_link(
     hand: RobotiqHand, server: SimulatorServer, what: str
 ) -> None:
     if what == "silence":
-        server.replies.silence()
+        server.policy = lambda _: []
     else:
         server.refuse()
         server.cut()

@@ -52,7 +52,7 @@ async def test_an_emergency_ends_every_sequence(
     if releasing:
         gripper.inject_fault(Fault.SCISSOR_BLOCKED)
         await hand.wait_for_state(State.FAULT)
-    server.replies.delay(delay)
+    server.policy = lambda frame: [(delay, frame)]
     asking = await reach(hand, state)
     await getattr(hand, emergency)()
     assert hand.state is State.RESET

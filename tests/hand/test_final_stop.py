@@ -62,7 +62,7 @@ def images_since(gripper: SimulatedGripper, count: int) -> list[Request]:
 
 async def slow(server: SimulatorServer, turn: float) -> None:
     """Answer late from now on, and wait for a moment of a cycle."""
-    server.replies.delay(LATENCY_S)
+    server.policy = lambda frame: [(LATENCY_S, frame)]
     await asyncio.sleep(4 * LATENCY_S + turn)
 
 
@@ -172,7 +172,7 @@ async def test_a_gripper_is_not_activated_after_the_end_was_asked_for(turn: floa
     loop = asyncio.get_running_loop()
     gripper = SimulatedGripper(loop.time, speedup=20)
     async with SimulatorServer(gripper) as server:
-        server.replies.delay(LATENCY_S)
+        server.policy = lambda frame: [(LATENCY_S, frame)]
         hand = RobotiqHand(server.address)
         starting = asyncio.create_task(hand.start())
         await asyncio.sleep(turn)
@@ -211,7 +211,7 @@ async def test_the_end_by_an_exception_is_final_too(
 
     async def fail() -> None:
         async with hand:
-            server.replies.delay(LATENCY_S)
+            server.policy = lambda frame: [(LATENCY_S, frame)]
             await asyncio.sleep(1)
             tasks.append(asyncio.create_task(control()))
             raise ZeroDivisionError

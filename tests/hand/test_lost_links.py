@@ -16,6 +16,7 @@ from robotiq_async import (
     State,
 )
 from robotiq_async.simulator import SimulatorServer
+from robotiq_async.simulator.troubles.corruption import unchanged
 from robotiq_async.values.request import Request
 from tests.hand.watching import settled, travels, until_moving
 
@@ -25,14 +26,14 @@ A = Finger.A
 async def test_a_command_that_was_not_acknowledged_is_never_sent_again(
     hand: RobotiqHand, server: SimulatorServer
 ) -> None:
-    server.replies.drop(1_000_000)
+    server.policy = lambda _: []
     with pytest.raises(ConnectionLostError):
         await hand.set_position(200, A)
     sent = [
         write for write in server.gripper.writes if Request.from_registers(write.registers).position(A) == 200
     ]
     assert len(sent) <= 1
-    server.replies.normal()
+    server.policy = unchanged
     await hand.wait_for_state(State.RUNNING_IDLE)
     writes = len(server.gripper.writes)
     await settled(hand)
@@ -92,7 +93,7 @@ async def test_while_the_link_is_down_no_sequence_can_be_asked_for(
 
 
 async def test_nothing_can_be_asked_for_while_it_connects(server: SimulatorServer) -> None:
-    server.replies.delay(0.1)
+    server.policy = lambda frame: [(0.1, frame)]
     hand = RobotiqHand(server.address)
     starting = asyncio.create_task(hand.start(activate=False))
     await asyncio.sleep(0)

@@ -448,7 +448,7 @@ def test_a_transport_that_cannot_tell_whether_it_is_open_is_opened_again(
         assert len(wire.opened_at) == 2
 
     run(main)
-    assert "cannot tell whether it is open" in caplog.text
+    assert "is_open of the transport raised" in caplog.text
     assert "failed" not in caplog.text
 
 

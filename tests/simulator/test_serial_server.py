@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
+from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, Trouble
 from robotiq_async.simulator.server.framing import Frame, take_rtu
 from robotiq_async.values.status import RobotiqStatus
 
@@ -208,7 +208,7 @@ async def test_only_the_own_unit_is_answered(line: Line) -> None:
 
 
 async def test_misbehaviour(server: AttentiveServer, line: Line) -> None:
-    server.replies.drop()
+    await server.fault_injector.begin(Trouble("drop"))
     line.send(with_crc(bytes.fromhex("09 06 03e9 1234")))
     assert await line.ask(bytes.fromhex("03 03e9 0001"), 4) == bytes.fromhex("03 02 1234")
 

@@ -12,6 +12,7 @@ from pymodbus.client import AsyncModbusTcpClient
 
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.simulator.server.endpoint import connections
+from robotiq_async.simulator.troubles.corruption import unchanged
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
@@ -334,56 +335,30 @@ def test_bad_options(option: str, value: int) -> None:
 # Misbehaviour.
 
 
-async def test_dropped_replies(server: SimulatorServer, client: RawClient) -> None:
-    server.replies.drop(2)
-    client.writer.write(client.frame(b"\x06\x00\x01\x12\x34") + client.frame(b"\x04\x00\x00\x00\x01"))
-    assert (await client.ask(b"\x03\x00\x01\x00\x01")) == bytes.fromhex("03 02 1234"), "it was carried out"
-
-
 async def test_silence_and_back_to_normal(server: SimulatorServer, client: RawClient) -> None:
-    server.replies.silence()
+    server.policy = lambda _: []
     client.writer.write(client.frame(b"\x06\x00\x01\x00\x01"))
     await until_written(server)
-    server.replies.normal()
+    server.policy = unchanged
     assert (await client.ask(b"\x04\x00\x00\x00\x01"))[0] == 4
 
 
 async def test_late_replies(server: SimulatorServer, client: RawClient) -> None:
     loop = asyncio.get_running_loop()
-    server.replies.delay(0.05)
+    server.policy = lambda frame: [(0.05, frame)]
     began = loop.time()
     await client.ask(b"\x04\x00\x00\x00\x01")
     assert loop.time() - began >= 0.045
     client.writer.write(client.frame(b"\x06\x00\x01\x00\x01"))
     await until_written(server)
-    server.replies.normal()
+    server.policy = unchanged
     client.writer.write(client.frame(b"\x04\x00\x00\x00\x01"))
     assert [(await client.reply())[2][0] for _ in range(2)] == [6, 4], "no reply overtakes an older one"
 
 
 async def test_mangled_replies(server: SimulatorServer, client: RawClient) -> None:
-    server.replies.mangle(lambda frame: frame[:7] + b"\x03" + frame[8:])
+    server.policy = lambda frame: [(0.0, frame[:7] + b"\x03" + frame[8:])]
     assert (await client.ask(b"\x04\x00\x00\x00\x01"))[0] == 3
-
-
-async def test_each_word_about_replies_replaces_the_one_before(
-    server: SimulatorServer, client: RawClient
-) -> None:
-    server.policy = lambda _: None
-    server.replies.silence()
-    server.replies.drop()
-    client.writer.write(client.frame(b"\x06\x00\x01\x12\x34"))
-    await until_written(server)
-    assert (await client.ask(b"\x03\x00\x01\x00\x01")) == bytes.fromhex("03 02 1234"), "one was lost"
-    server.replies.mangle(lambda frame: frame[:7] + b"\x03" + frame[8:])
-    server.replies.drop(0)
-    assert (await client.ask(b"\x04\x00\x00\x00\x01"))[0] == 4
-
-
-async def test_a_refusal_is_lost_like_any_reply(server: SimulatorServer, client: RawClient) -> None:
-    server.replies.drop()
-    client.writer.write(client.frame(b"\x04\x00\x00\x00\x09"))
-    assert (await client.ask(b"\x04\x00\x00\x00\x01"))[0] == 4
 
 
 async def test_a_policy_decides_on_every_reply(server: SimulatorServer, client: RawClient) -> None:

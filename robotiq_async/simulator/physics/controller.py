@@ -53,7 +53,6 @@ class Controller:
     """
 
     def __init__(self, scissor_limit: tuple[int, int], seed: int | None, habits: Habits) -> None:
-        """An open gripper in the basic mode's shape, reset; without a seed one that is exact."""
         *fingers, scissor = (Spread(seed, axis) for axis in AXES)
         self.axes = (
             *(_finger(motor, spread) for motor, spread in zip(MOTORS[:3], fingers, strict=True)),

@@ -10,7 +10,6 @@ class EmergencyStop:
     """
 
     def __init__(self) -> None:
-        """None."""
         self._is_pressed = False
         self._resets_needed = 0
 

@@ -17,7 +17,6 @@ class PresentFaults:
     """A set of faults with end times. Times are simulated seconds."""
 
     def __init__(self) -> None:
-        """No fault."""
         self._ends: dict[Fault, float] = {}
         self._escalates_at = math.inf
 

@@ -40,7 +40,6 @@ class Inbox:
     """
 
     def __init__(self) -> None:
-        """Nothing was written."""
         self.image: reg.Registers = REST.registers
         self.pending: deque[tuple[float, Request]] = deque()
         self.writes: deque[Write] = deque(maxlen=_HISTORY)

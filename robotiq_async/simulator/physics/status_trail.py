@@ -23,7 +23,6 @@ class StatusTrail:
     """The object status of the four axes over time. Times are simulated seconds and never decrease."""
 
     def __init__(self) -> None:
-        """Nothing has been noted."""
         self._entries = deque([_Entry(-math.inf, NOTHING)])
 
     def note(self, time: float, statuses: Statuses, lag: float) -> None:

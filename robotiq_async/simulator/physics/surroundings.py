@@ -20,7 +20,6 @@ class Surroundings(ABC):
     """The part of a gripper that the world acts on. It catches up with its clock before anything happens."""
 
     def __init__(self, controller: Controller) -> None:
-        """Around the axes of a controller there is nothing."""
         self._controller = controller
         self._time = 0.0
 

@@ -64,7 +64,6 @@ class Connection(ServerRequestHandler):
     """
 
     def __init__(self, owner: ModbusBaseServer, endpoint: Endpoint) -> None:
-        """A connection that was just accepted."""
         super().__init__(owner, None, None, None)  # type: ignore[no-untyped-call]
         self._endpoint = endpoint
         self._inbox = bytearray()

@@ -12,7 +12,6 @@ from ..physics.gripper import SimulatedGripper
 from ..troubles.corruption import ReplyPolicy, unchanged
 from ..troubles.fault_injector import FaultInjector
 from ..troubles.like_hardware import OWN_HABITS
-from ..troubles.replies import Replies
 from .connection import Connection
 
 if TYPE_CHECKING:
@@ -37,7 +36,6 @@ class SimulatorEndpoint(ABC):
             not given takes 12 s for an activation.
         policy: decides what becomes of each reply that no trouble is about.
         fault_injector: makes troubles happen, and decides on requests and replies.
-        replies: gives it a policy, in a word.
     """
 
     link: ClassVar[Link]
@@ -45,11 +43,9 @@ class SimulatorEndpoint(ABC):
     """The Modbus functions that are served without any trouble."""
 
     def __init__(self, gripper: SimulatedGripper | None) -> None:
-        """A server that is not started."""
         self.gripper = SimulatedGripper(habits=OWN_HABITS) if gripper is None else gripper
         self.policy: ReplyPolicy = unchanged
         self.fault_injector = FaultInjector(self)
-        self.replies = Replies(self)
         self._server: ModbusBaseServer | None = None
         self._left_over: deque[bytes] = deque(maxlen=_MOST_LEFT_OVER)
 

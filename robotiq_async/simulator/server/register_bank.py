@@ -39,7 +39,6 @@ class RegisterBank:
     """
 
     def __init__(self, gripper: SimulatedGripper, troubles: FaultInjector) -> None:
-        """The registers of one gripper, and what goes wrong with it."""
         self._gripper = gripper
         self._troubles = troubles
 

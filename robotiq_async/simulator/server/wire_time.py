@@ -23,7 +23,6 @@ class WireTime:
     """
 
     def __init__(self) -> None:
-        """Begin with a silent line."""
         self._heard_until = 0.0
         self._answers_from = 0.0
         self._sent_until = 0.0

@@ -42,7 +42,6 @@ class FaultInjector:
     """
 
     def __init__(self, target: Target) -> None:
-        """No trouble."""
         self._target = target
         self._ongoing: list[Ongoing] = []
         self._device_cycle = target.gripper.device_cycle

@@ -230,7 +230,6 @@ class Trouble:
         return kind.corruption(reply, self.amount)
 
     def __str__(self) -> str:
-        """The trouble in words; :func:`parse_troubles` reads them."""
         words = [self.kind]
         words += [] if self.value is None else [_digits(self.value)]
         words += [] if self.on == "any" else [f"on {self.on}"]

@@ -60,7 +60,6 @@ class Axis:
     """
 
     def __init__(self, position: int, low: int, high: int, motor: Motor, spread: Spread) -> None:
-        """An axis at rest between its mechanical stops."""
         self.low = low
         self.high = high
         self.status = ObjectStatus.IN_MOTION

@@ -25,7 +25,6 @@ class Spread:
     """The figures of one axis. Without a seed there is no spread: the axis is exact."""
 
     def __init__(self, seed: int | None, axis: Finger) -> None:
-        """The spread of an axis of the gripper with this seed."""
         self._seed = seed
         self._axis = axis
 
