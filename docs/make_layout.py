@@ -1,4 +1,4 @@
-"""The layout for Foxglove and Lichtblick: what ``robotiq-async view`` shows, and buttons for its services.
+"""The layout for Foxglove and Lichtblick: what ``robotiq-async view`` shows.
 
 The file lies in the package, so that an installed command can hand it out; make_pages.py writes it.
 """
@@ -9,7 +9,6 @@ import json
 from pathlib import Path
 from typing import Any, Final
 
-from robotiq_async.tools.actions import ACTIONS
 from robotiq_async.tools.description import hand_model
 from robotiq_async.values.enums import AXES, Fault, Severity, State
 
@@ -27,8 +26,6 @@ STATES: Final = {
     State.DISCONNECTED: RED,
     State.FAULT: RED,
 }
-TIMEOUT_S: Final = 100
-"""Longer than any command takes."""
 
 Panel = dict[str, Any]
 
@@ -47,15 +44,7 @@ def draw() -> str:
                 _stacked("3D!hand", curves, 40),
                 12,
             ),
-            _stacked(
-                _buttons("halt", "open", "close", "wide", "normal", "pinch"),
-                _stacked(
-                    "CallService!move",
-                    _stacked(_buttons("recover", "activate", "reset", "release"), "RawMessages!state", 65),
-                    25,
-                ),
-                35,
-            ),
+            "RawMessages!state",
             65,
         ),
     }
@@ -81,11 +70,6 @@ def panels() -> dict[str, Panel]:
             "paths": [{"label": label, "value": v, "timestampMethod": "receiveTime"} for label, v in series],
         },
         "RawMessages!state": {"topicPath": "/gripper/state", "diffEnabled": False, "expansion": "all"},
-        "CallService!move": _button("move", {"position": 100, "fingers": "ABC", "speed": 128, "force": 64}),
-        **{
-            f"CallService!{name}": _button(name, {"confirm": False} if action.warning else {})
-            for name, action in ACTIONS.items()
-        },
     }
 
 
@@ -149,28 +133,6 @@ def _plot(title: str, fields: list[tuple[str, str]]) -> Panel:
         "xAxisVal": "timestamp",
         "followingViewWidth": 30,
     }
-
-
-def _button(name: str, request: dict[str, object]) -> Panel:
-    """A button; what takes arguments, or has to be confirmed, shows them for editing."""
-    return {
-        "serviceName": f"/gripper/{name}",
-        "requestPayload": json.dumps(request, indent=1),
-        "layout": "vertical",
-        "buttonText": name,
-        "buttonTooltip": ACTIONS[name].what if name in ACTIONS else name,
-        "buttonColor": RED if request.get("confirm") is False else GREEN,
-        "editingMode": bool(request),
-        "timeoutSeconds": TIMEOUT_S,
-    }
-
-
-def _buttons(*names: str) -> object:
-    """Buttons side by side, of equal width."""
-    first, *others = (f"CallService!{name}" for name in names)
-    if not others:
-        return first
-    return _side_by_side(first, _buttons(*names[1:]), 100 / len(names))
 
 
 def _side_by_side(first: object, second: object, percent: float = 50) -> object:

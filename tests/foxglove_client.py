@@ -12,10 +12,10 @@ from typing import Any
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
-from robotiq_async.tools.viewer.viewer import Viewer
+from robotiq_async.tools.viewer import Viewer
 
-MESSAGE_DATA, CALL, ANSWER = 1, 2, 3
-"""Binary operations of the protocol foxglove.sdk.v1."""
+MESSAGE_DATA = 1
+"""The binary operation of the protocol foxglove.sdk.v1."""
 
 
 class Client:
@@ -28,7 +28,6 @@ class Client:
         self.services: dict[str, dict[str, Any]] = {}
         self._topics: dict[int, str] = {}
         self.received: list[tuple[str, int, bytes]] = []
-        self.answers: dict[int, Any] = {}
         self._objects: dict[str, list[dict[str, Any]]] = {}
 
     async def read(self) -> None:
@@ -42,20 +41,15 @@ class Client:
                 self.channels |= {channel["topic"]: channel for channel in said["channels"]}
             elif said["op"] == "advertiseServices":
                 self.services |= {service["name"]: service for service in said["services"]}
-            elif said["op"] == "serviceCallFailure":
-                self.answers[said["callId"]] = ValueError(said["message"])
         elif frame[0] == MESSAGE_DATA:
             number, nanoseconds = struct.unpack_from("<IQ", frame, 1)
             topic = self._topics[number]
             self.received.append((topic, nanoseconds, frame[13:]))
             if topic not in ("/joint_states", "/robot_description"):
                 self._objects.setdefault(topic, []).append(json.loads(frame[13:]))
-        elif frame[0] == ANSWER:
-            _, call, length = struct.unpack_from("<III", frame, 1)
-            self.answers[call] = json.loads(frame[13 + length :])["outcome"]
 
-    async def meet(self, *, services: bool) -> None:
-        while len(self.channels) < 7 or (services and not self.services):
+    async def meet(self) -> None:
+        while len(self.channels) < 7:
             await self.read()
 
     async def subscribe(self, *topics: str) -> None:
@@ -68,31 +62,15 @@ class Client:
         # A subscription is not acknowledged. What is read after it is: what comes from here on is not missed.
         await (await self.socket.ping())
 
-    async def ask(self, number: int, name: str, arguments: object) -> None:
-        service, payload = self.services[f"/gripper/{name}"]["id"], json.dumps(arguments).encode()
-        await self.socket.send(struct.pack("<BIII", CALL, service, number, 4) + b"json" + payload)
-
-    async def answer(self, number: int) -> str:
-        while number not in self.answers:
-            await self.read()
-        answer = self.answers.pop(number)
-        if isinstance(answer, Exception):
-            raise answer
-        return str(answer)
-
-    async def call(self, name: str, **arguments: object) -> str:
-        await self.ask(99, name, arguments)
-        return await self.answer(99)
-
     def objects(self, topic: str) -> list[dict[str, Any]]:
         return self._objects.get(topic, [])
 
 
 @contextlib.asynccontextmanager
-async def client(viewer: Viewer, *, services: bool = True) -> AsyncIterator[Client]:
+async def client(viewer: Viewer) -> AsyncIterator[Client]:
     subprotocols = [Subprotocol("foxglove.sdk.v1")]
     # A queue that is full would keep the client from hearing that the connection closes.
     async with connect(viewer.url, subprotocols=subprotocols, max_queue=None) as socket:
         client = Client(socket)
-        await client.meet(services=services)
+        await client.meet()
         yield client

@@ -151,12 +151,12 @@ async def test_a_recording(tmp_path: Path) -> None:
 
 async def test_a_viewer(hand: FakeHand) -> None:
     pytest.importorskip("foxglove")
-    from robotiq_async.tools.viewer.viewer import Viewer  # noqa: PLC0415
+    from robotiq_async.tools.viewer import Viewer  # noqa: PLC0415
     from tests.foxglove_client import client  # noqa: PLC0415
 
-    async with Viewer(hand, port=0, operator=Operator(hand)) as viewer, client(viewer) as one:
+    async with Viewer(hand, port=0) as viewer, client(viewer) as one:
         await one.subscribe("/gripper/status", "/gripper/state")
-        assert (await one.call("move", position=77, fingers="B")) == "B at 77; 0.00 s"
+        await hand.move(77, Finger.B)
         while not any(status["B"]["position"] == 77 for status in one.objects("/gripper/status")):
             await one.read()
         while not one.objects("/gripper/state"):

@@ -121,7 +121,7 @@ def parts() -> dict[str, Part]:
                 f"{PACKAGE}.tools.recording.recorder.Recorder",
                 f"{PACKAGE}.tools.recording.recordings.read_recording",
                 f"{PACKAGE}.tools.recording.recordings.recover",
-                f"{PACKAGE}.tools.viewer.viewer.Viewer",
+                f"{PACKAGE}.tools.viewer.Viewer",
                 f"{PACKAGE}.tools.metrics.serve_metrics",
                 f"{PACKAGE}.tools.web.server.PageServer",
             ),

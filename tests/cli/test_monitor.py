@@ -28,7 +28,7 @@ from robotiq_async.cli.tui.words import HINTS
 from robotiq_async.control.state_machine import refusal
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import Operator
-from robotiq_async.tools.viewer.refusal_words import refusal_words
+from robotiq_async.tools.wording import refusal_words
 from robotiq_async.values.enums import AXES
 from robotiq_async.values.trigger import Trigger
 from tests.grippers import active_gripper

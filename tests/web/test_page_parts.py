@@ -15,7 +15,6 @@ from robotiq_async import CLOSED, Fault, Finger, RobotiqHand, State
 from robotiq_async.control.state_machine import TABLE, Verdict, refusal
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import Operator
-from robotiq_async.tools.viewer.refusal_words import refusal_words
 from robotiq_async.tools.web.commands import BUTTONS, FRESH_S, MAX_COMMANDS, PageCommands
 from robotiq_async.tools.web.news import HandNews
 from robotiq_async.tools.web.page.heartbeat import LOST_S, Heartbeat
@@ -23,6 +22,7 @@ from robotiq_async.tools.web.page.mirror import HISTORY_S, Mirror
 from robotiq_async.tools.web.page.widgets.words import event_words, fault_words, state_words
 from robotiq_async.tools.web.server import PageServer
 from robotiq_async.tools.web.settings import PageSettings
+from robotiq_async.tools.wording import refusal_words
 from robotiq_async.values.trigger import Trigger
 from tests.fake_hand import FakeHand
 from tests.grippers import active_gripper

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ...link.serial_ports import why_no_port
-from ...tools.viewer.gate import is_loopback
+from ...runtime.sockets import is_loopback
 from ...values.enums import Finger
 from ...values.errors import RobotiqError
 from ...values.registers import RTU_REGISTERS

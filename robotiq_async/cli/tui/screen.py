@@ -19,7 +19,7 @@ from textual.worker import Worker
 from ...runtime.clock import now
 from ...tools.actions import ACTIONS, Operator
 from ...tools.recording.payloads import fault_fields, title
-from ...tools.viewer.refusal_words import refusal_words
+from ...tools.wording import refusal_words
 from ...values.enums import AXES, Fault, Finger, State
 from ...values.errors import RobotiqError
 from ...values.status import RobotiqStatus

@@ -10,7 +10,7 @@ from rich.text import Text
 from textual.widget import Widget
 from textual.widgets import Static
 
-from ...tools.viewer.state_words import STATE_WORDS
+from ...tools.wording import STATE_WORDS
 from ...values.enums import AXES, Fault, Finger, ObjectStatus, Severity, State
 from ...values.statistics import Statistics
 from ...values.status import NO_REQUEST, RobotiqStatus

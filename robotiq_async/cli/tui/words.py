@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from ...tools.viewer.refusal_words import without_methods
-from ...tools.viewer.state_words import STATE_WORDS
+from ...tools.wording import STATE_WORDS, without_methods
 from ...values.enums import State
 from ...values.events import Transition
 

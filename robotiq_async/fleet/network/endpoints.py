@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from ipaddress import ip_address
 from typing import Final
+
+from ...runtime.sockets import is_loopback
 
 FORMS: Final = "tcp/HOST:PORT, tls/HOST:PORT or quic/HOST:PORT"
 _ENDPOINT: Final = re.compile(r"(tcp|tls|quic)/(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9_.-]+):([0-9]{1,5})")
@@ -35,10 +36,7 @@ class Endpoint:
     @property
     def is_loopback(self) -> bool:
         """Whether only programs on this machine can be on the other side."""
-        try:
-            return ip_address(self.host).is_loopback
-        except ValueError:
-            return self.host.lower() == "localhost"
+        return is_loopback(self.host)
 
 
 def parse_endpoint(what: str, text: object) -> Endpoint:

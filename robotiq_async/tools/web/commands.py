@@ -12,8 +12,8 @@ from ...values.enums import State
 from ...values.errors import RobotiqError
 from ..actions import Operator
 from ..recording.payloads import Fields
-from ..viewer.refusal_words import refusal_words
-from ..viewer.services import SERVICES
+from ..wording import refusal_words
+from .services import SERVICES
 
 MAX_COMMANDS: Final = 16
 """Of one page at a time; a halt is never refused."""

@@ -9,7 +9,7 @@ import sys
 from contextlib import suppress
 from tempfile import mkdtemp
 
-from ...viewer.gate import listen
+from ....runtime.sockets import listen
 from ..settings import PageSettings
 from .pipes import Pipes
 

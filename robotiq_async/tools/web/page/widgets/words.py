@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from .....values.enums import AXES, Fault, Finger, ObjectStatus, Severity, State
 from .....values.status import NO_REQUEST
-from ....viewer.state_words import STATE_WORDS
+from ....wording import STATE_WORDS
 from ..mirror import HandMirror
 
 NAMES: Final = tuple("scissor" if axis is Finger.SCISSOR else str(axis.name) for axis in AXES)

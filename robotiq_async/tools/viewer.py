@@ -1,0 +1,188 @@
+"""Shows a hand in Foxglove and Lichtblick while it works. Needs the extra ``view`` (foxglove-sdk).
+
+    hand = RobotiqHand(address)
+    async with Viewer(hand), hand:
+        ...
+
+In this order nothing that concerns viewers delays the stop of the hand.
+
+The topics are those of a recording (:mod:`.recording.feed`); ``/gripper/state`` with state, fault and
+statistics, once a second and at every event; ``/robot_description`` and ``/tf`` for 3-D panels. Viewers only
+look: there is no password, and nothing here moves the gripper.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Callable
+from types import TracebackType
+from typing import Final, Self
+
+try:
+    import foxglove
+    from foxglove import Channel, Context, Schema
+    from foxglove.websocket import ChannelView, Client, ServerListener, WebSocketServer
+except ModuleNotFoundError as error:
+    from ..runtime.extras import install
+
+    raise ImportError(f"viewers need foxglove-sdk: {install('view')}") from error
+
+from ..protocol import Hand
+from ..runtime.clock import now
+from ..runtime.concurrency import in_a_thread, wait_shielded
+from ..values.checks import check_int
+from ..values.enums import State
+from ..values.errors import ViewerError
+from .description.robot_description import (
+    SCHEMA,
+    SCHEMA_NAME,
+    TRANSFORMS_NAME,
+    TRANSFORMS_SCHEMA,
+    description_message,
+    transforms,
+)
+from .recording.feed import EVENT, JOINTS, TOPICS, Feed, Message, Topic, compact, json_topic
+from .recording.payloads import SCHEMAS, state_fields, title
+
+LOOPBACK: Final = "127.0.0.1"
+PORT: Final = 8765
+"""The default of Foxglove's own dialog."""
+STATE: Final = json_topic("state", SCHEMAS["state"])
+DESCRIPTION: Final = Topic("/robot_description", "cdr", SCHEMA_NAME, "ros2msg", SCHEMA.encode())
+_TRANSFORMS_SCHEMA: Final = json.dumps(TRANSFORMS_SCHEMA).encode()
+TRANSFORMS: Final = Topic("/tf", "json", TRANSFORMS_NAME, "jsonschema", _TRANSFORMS_SCHEMA)
+SHOWN: Final = (*TOPICS, STATE, DESCRIPTION, TRANSFORMS)
+TRANSFORMS_S: Final = 0.05
+"""Between two messages on ``/tf``: smooth to the eye, a tenth of the polls."""
+STATE_S: Final = 1.0
+"""Between two messages on ``/gripper/state`` when nothing happens."""
+STOP_S: Final = 1.0
+"""Time for the server to close its connections; a client that does not read could delay it for ever."""
+
+
+class Viewer:
+    """Serves a hand to viewers while a block runs.
+
+    Attributes:
+        host: the interface to listen on.
+        port: the TCP port; 0 takes a free one, which ``port`` names once the viewer serves.
+
+    Raises:
+        TypeError: port is not an int.
+        ValueError: port is outside 0..65535.
+    """
+
+    def __init__(self, hand: Hand, *, host: str = LOOPBACK, port: int = PORT) -> None:
+        self.host = host
+        self.port = check_int("port", port, 0, 65535)
+        self._hand = hand
+        self._feed = Feed(hand, self._publish)
+        self._server: WebSocketServer
+        self._context: Context
+        """Its channels close when the last reference to it is gone."""
+        self._channels: dict[Topic, Channel] = {}
+        self._publisher: asyncio.Task[None]
+        self._transformed_at = 0
+        """Time of the last message on ``/tf``, in nanoseconds."""
+        self._published_state: State | None = None
+
+    @property
+    def url(self) -> str:
+        """The address to open in a viewer."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"ws://{host}:{self.port}"
+
+    async def __aenter__(self) -> Self:
+        """Listen and start publishing.
+
+        Raises:
+            ViewerError: the port is taken, or the interface does not exist.
+        """
+        self._context = Context()
+        self._channels = {topic: _channel(topic, self._context) for topic in SHOWN}
+        starting = in_a_thread(self._start_server)
+        try:
+            await wait_shielded(starting)
+        except asyncio.CancelledError:
+            if starting.exception() is None:
+                self._server = starting.result()
+                await wait_shielded(asyncio.ensure_future(self._stop_server()))
+            raise
+        try:
+            self._server = starting.result()
+        except (RuntimeError, OSError, ValueError) as error:
+            raise ViewerError(f"{self.url}: {error}") from error
+        self.port = self._server.port
+        self._feed.start()
+        loop = asyncio.get_running_loop()
+        self._publisher = loop.create_task(self._publish_periodically(), name="robotiq_async viewer")
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop publishing and close the port. Takes a second at most; completed even when cancelled."""
+        await wait_shielded(asyncio.ensure_future(self._close()))
+
+    async def _close(self) -> None:
+        self._publisher.cancel()
+        await asyncio.gather(self._publisher, return_exceptions=True)
+        await self._feed.stop()
+        await self._stop_server()
+
+    def _start_server(self) -> WebSocketServer:
+        return foxglove.start_server(
+            name=f"robotiq_async: {title(self._hand)}",
+            host=self.host,
+            port=self.port,
+            server_listener=_Listener(self._describe),
+            context=self._context,
+        )
+
+    async def _stop_server(self) -> None:
+        await asyncio.wait({in_a_thread(self._server.stop)}, timeout=STOP_S)
+
+    # -- publishing ------------------------------------------------------------------------------------
+
+    def _publish(self, message: Message) -> None:
+        self._channels[message.topic].log(message.data, log_time=message.nanoseconds)
+        # Every command goes to RUNNING_CC and back; publishing that would double the work.
+        if message.topic is EVENT and self._hand.state not in (self._published_state, State.RUNNING_CC):
+            self._publish_state()
+
+        if message.topic is JOINTS and message.nanoseconds - self._transformed_at >= TRANSFORMS_S * 1e9:
+            self._transformed_at = message.nanoseconds
+            data = compact(transforms(self._hand.status, message.nanoseconds))
+            self._channels[TRANSFORMS].log(data, log_time=message.nanoseconds)
+
+    def _describe(self) -> None:
+        """Publish the description to a new subscriber; it never changes."""
+        self._channels[DESCRIPTION].log(description_message())
+
+    def _publish_state(self) -> None:
+        self._published_state = self._hand.state
+        at = now()
+        data = compact(state_fields(self._hand, at))
+        self._channels[STATE].log(data, log_time=self._feed.nanoseconds(at))
+
+    async def _publish_periodically(self) -> None:
+        while True:
+            self._publish_state()
+            await asyncio.sleep(STATE_S)
+
+
+class _Listener(ServerListener):
+    """Reports subscriptions to the description, in a thread of the server."""
+
+    def __init__(self, describe: Callable[[], None]) -> None:
+        self._describe = describe
+
+    def on_subscribe(self, client: Client, channel: ChannelView) -> None:  # noqa: ARG002
+        if channel.topic == DESCRIPTION.name:
+            self._describe()
+
+
+def _channel(topic: Topic, context: Context) -> Channel:
+    schema = Schema(name=topic.schema_name, encoding=topic.schema_encoding, data=topic.schema)
+    return Channel(topic.name, schema=schema, message_encoding=topic.encoding, context=context)

@@ -1,0 +1,60 @@
+"""States and refusals in words for a person at the monitor or the page, who does not know the API."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Final
+
+from ..values.enums import State
+from ..values.errors import GripperFaultError, InvalidStateError, NotActivatedError, RobotiqError
+
+STATE_WORDS: Final = {
+    State.DISCONNECTED: "lost",
+    State.DO_ACTIVATION: "activating: the fingers move",
+    State.WF_ACTIVATION: "activating: the fingers move",
+    State.RUNNING_IDLE: "ready",
+    State.RUNNING_CC: "ready",
+    State.FAULT: "fault",
+    State.DO_ATR: "releasing: the fingers open",
+    State.WF_ATR: "releasing: the fingers open",
+    State.ATR_DONE: "released: reset it",
+    State.DO_RESET: "resetting",
+    State.WF_RESET: "resetting",
+    State.RESET: "reset: not active",
+    State.DO_SHUTDOWN: "stopping",
+    State.SHUTDOWN: "stopped",
+}
+"""What a state means to a person."""
+
+_METHOD: Final = re.compile(r"\b([a-z_]+)\(\)")
+_ADVICE: Final = re.compile(r": [^:]*(?:\b[a-z_]+\(\)|'async with').*")
+_ACTIONS: Final = {"atr": "release", "start": "the start", "stop": "the end"}
+
+
+def refusal_words(error: RobotiqError, hints: Mapping[State, str]) -> str:
+    """Why a command was refused, and what helps.
+
+    Args:
+        error: the error of the command.
+        hints: for each state, the key or the button that helps.
+    """
+    if isinstance(error, NotActivatedError):
+        return f"{_message(error)}; {hints[State.RESET]}"
+    if isinstance(error, GripperFaultError):
+        return f"{error.message}; {hints[State.FAULT]}"
+    if isinstance(error, InvalidStateError) and error.allowed:
+        now = STATE_WORDS[error.state]
+        allowed = sorted({STATE_WORDS[state] for state in error.allowed if state is not State.RUNNING_CC})
+        return f"not now, as it is {now!r}; only when {' or '.join(map(repr, allowed))}"
+    return _message(error)
+
+
+def _message(error: RobotiqError) -> str:
+    """The message without its advice for programs."""
+    return without_methods(_ADVICE.sub("", error.message))
+
+
+def without_methods(words: str) -> str:
+    """The text with methods replaced by the names of their actions, without parentheses."""
+    return _METHOD.sub(lambda found: _ACTIONS.get(found[1], found[1]), words)
