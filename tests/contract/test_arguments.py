@@ -39,6 +39,29 @@ CALLS: dict[str, tuple[Call, str]] = {
     "command speed": (lambda bad: lambda hand: hand.command(speed=bad), "speed"),
     "command force": (lambda bad: lambda hand: hand.command(force=bad), "force"),
 }
+ORDERS: dict[str, tuple[Call, tuple[str, ...]]] = {
+    "move": (
+        lambda bad: lambda hand: hand.move(bad.pop("position", 3), bad.pop("fingers", Finger.A), **bad),
+        ("fingers", "position", "speed", "force", "timeout"),
+    ),
+    "close": (
+        lambda bad: lambda hand: hand.close(bad.pop("fingers", Finger.A), **bad),
+        ("fingers", "speed", "force", "timeout"),
+    ),
+    "grasp": (
+        lambda bad: lambda hand: hand.grasp(bad.pop("fingers", Finger.A), **bad),
+        ("fingers", "at_least", "speed", "force", "timeout"),
+    ),
+    "command": (
+        lambda bad: lambda hand: hand.command(bad.pop("fingers", Finger.A), **bad),
+        ("fingers", "position", "speed", "force"),
+    ),
+    "set_position": (
+        lambda bad: lambda hand: hand.set_position(bad.pop("value", 3), bad.pop("fingers", Finger.A)),
+        ("fingers", "value"),
+    ),
+}
+"""The arguments of a call in the order in which they are checked."""
 TIMEOUTS: dict[str, Call] = {
     "move": lambda bad: lambda hand: hand.move(3, timeout=bad),
     "grasp": lambda bad: lambda hand: hand.grasp(timeout=bad),
@@ -84,6 +107,17 @@ async def test_outside_the_range(where: str, what: str) -> None:
     make, name = CALLS[what]
     for bad in [*WRONG_VALUES, *((0, 16) if name == "fingers" else ())]:
         await refused(where, make, name, bad, ValueError)
+
+
+@contract
+@pytest.mark.parametrize("what", ORDERS)
+async def test_of_several_wrong_arguments_the_first_is_named(where: str, what: str) -> None:
+    make, order = ORDERS[what]
+    async with bench(where) as here:
+        hand: Any = here.make()
+        for first in range(len(order)):
+            with pytest.raises(ValueError, match=f"^{order[first]} must be"):
+                await called(make(dict.fromkeys(order[first:], -1)), hand)
 
 
 @contract

@@ -124,13 +124,12 @@ class RemoteCommands(RemoteObservation):
             ControlLostError: this hand does not hold the lease, or lost it on the way.
             RobotiqError: as for a hand of this process, or the agent fell silent.
         """
-        limit = check_timeout("timeout", timeout)
         arguments: Fields = {
-            "position": check_byte("position", position),
             "fingers": int(check_mask(fingers)),
+            "position": check_byte("position", position),
             "speed": check_optional_byte("speed", speed),
             "force": check_optional_byte("force", force),
-            "timeout": limit,
+            "timeout": (limit := check_timeout("timeout", timeout)),
         }
         value = await self._ask("move", arguments, MOVE_S if limit is None else limit + SLACK_S)
         session = self._session
