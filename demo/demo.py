@@ -39,7 +39,7 @@ from robotiq_async.cli.failures import CommandError, UsageError
 from robotiq_async.cli.output.log_capture import forget
 from robotiq_async.fleet.network.route import is_remote
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
-from robotiq_async.protocol import Hand
+from robotiq_async.hand import Hand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
 WARNING = """ALL its fingers MOVE. It is activated (they open and close to their stops), then

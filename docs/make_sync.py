@@ -139,7 +139,7 @@ class _Module:
 
     def _constructor(self, node: _Function, kind: type) -> ast.stmt:
         self._import(".caller", "Caller")
-        self._import(f"{PACKAGE}.hand", f"{kind.__name__} as Async{kind.__name__}")
+        self._import(f"{PACKAGE}.hand.robotiq_hand", f"{kind.__name__} as Async{kind.__name__}")
         made = f"hand = Async{kind.__name__}({_arguments(node)})"
         return self._function(node, f"{made}\nsuper().__init__(hand, Caller(hand))")
 

@@ -18,7 +18,7 @@ What a program needs is imported from here. Where it comes from, and what stands
 Nothing of this has run on real hardware yet.
 """
 
-from .hand import RobotiqHand
+from .hand.robotiq_hand import RobotiqHand
 from .link.transport import Transport
 from .runtime.version import __version__ as __version__
 from .session.reconnecting import ReconnectPolicy

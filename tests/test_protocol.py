@@ -26,7 +26,7 @@ from robotiq_async import (
 from robotiq_async.cli.output.stream_output import print_objects
 from robotiq_async.cli.output.tables import print_outcomes, print_status
 from robotiq_async.cli.tui.screen import Monitor
-from robotiq_async.protocol import Hand, HandStream
+from robotiq_async.hand import Hand, HandStream
 from robotiq_async.tools.actions import ACTIONS, Operator
 from robotiq_async.tools.measure.campaigns import grasp, time_closing
 from robotiq_async.tools.metrics import serve_metrics

@@ -71,7 +71,7 @@ def parts() -> dict[str, Part]:
     fleet = origins(f"{PACKAGE}.fleet")
     return {
         "hand.md": Part(
-            "The hand", "One gripper, for the program that moves it.", (*hand, f"{PACKAGE}.protocol.Hand")
+            "The hand", "One gripper, for the program that moves it.", (*hand, f"{PACKAGE}.hand.Hand")
         ),
         "sync.md": Part(
             "The hand without await",

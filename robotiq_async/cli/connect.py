@@ -7,8 +7,8 @@ from contextlib import asynccontextmanager
 
 from ..fleet.network.route import is_remote
 from ..fleet.remote.remote_hand import RemoteHand
-from ..hand import RobotiqHand
-from ..protocol import Hand
+from ..hand import Hand
+from ..hand.robotiq_hand import RobotiqHand
 from ..session.options import POLL_INTERVAL_S
 from ..tools.actions import Operator
 from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED

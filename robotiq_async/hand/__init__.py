@@ -1,7 +1,8 @@
-"""RobotiqHand: one gripper, for the program that moves it.
+"""Hand: what every hand can do. RobotiqHand: the hand that owns the link to one gripper.
 
-Four files, each adding to the class of the one before:
+Five files, four of them each adding to the class of the one before:
 
+* ``base.py``: :class:`Hand`, the promises;
 * ``observation.py``: what the hand shows: state, statuses, streams, statistics, waiting for any of it;
 * ``recovery.py``: activation, reset, automatic release, and the way out of a fault;
 * ``commands.py``: positions, speeds, forces, moves, grasps, hold and halt;
@@ -10,6 +11,6 @@ Four files, each adding to the class of the one before:
 ``naming.py`` lets their errors tell the name of the hand.
 """
 
-from .robotiq_hand import RobotiqHand
+from .base import Hand, HandStream
 
-__all__ = ["RobotiqHand"]
+__all__ = ["Hand", "HandStream"]

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from types import TracebackType
 from typing import Generic, Self, TypeVar
 
-from ..hand import RobotiqHand as AsyncRobotiqHand
+from ..hand.robotiq_hand import RobotiqHand as AsyncRobotiqHand
 from .caller import Caller
 
 T = TypeVar("T")

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Coroutine
 from typing import Any, Final, TypeVar
 
-from ..hand import RobotiqHand as AsyncRobotiqHand
+from ..hand.robotiq_hand import RobotiqHand as AsyncRobotiqHand
 from ..runtime.concurrency import LateError
 from ..runtime.log import Log, log
 from ..values.enums import State

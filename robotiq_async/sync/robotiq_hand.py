@@ -5,7 +5,7 @@ Made from robotiq_async.hand.robotiq_hand by docs/make_sync.py.
 
 from __future__ import annotations
 
-from ..hand import RobotiqHand as AsyncRobotiqHand
+from ..hand.robotiq_hand import RobotiqHand as AsyncRobotiqHand
 from ..link.transport import Transport
 from ..session.options import (
     ACTIVATION_TIMEOUT_S,

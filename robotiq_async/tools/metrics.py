@@ -24,7 +24,7 @@ except ModuleNotFoundError as error:
 
     raise ImportError(f"metrics need prometheus-client: {install('metrics')}") from error
 
-from ..protocol import Hand
+from ..hand import Hand
 from ..values.checks import check_int
 from ..values.enums import State
 from ..values.statistics import Statistics

@@ -26,7 +26,7 @@ from robotiq_async.fleet.network.zenoh_bus import ZenohBus, open_bus
 from robotiq_async.fleet.wire.envelope import Answer, unpack_call
 from robotiq_async.fleet.wire.status_message import StatusMessage
 from robotiq_async.fleet.wire.values import statistics_fields
-from robotiq_async.protocol import Hand
+from robotiq_async.hand import Hand
 from robotiq_async.session.counters import Counters
 from robotiq_async.values.statistics import percentile
 

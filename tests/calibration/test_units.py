@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from robotiq_async import RobotiqHand, Units
 from robotiq_async.fleet import RemoteHand
-from robotiq_async.protocol import Hand
+from robotiq_async.hand import Hand
 from robotiq_async.values.calibration import ForceCalibration, SpeedCalibration
 from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, write_table
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from robotiq_async import Finger, RobotiqHand, State
-from robotiq_async.protocol import Hand
+from robotiq_async.hand import Hand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.enums import AXES
 from robotiq_async.values.request import Request

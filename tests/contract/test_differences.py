@@ -11,7 +11,7 @@ import pytest
 
 from robotiq_async import RobotiqError, RobotiqHand, State
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
-from robotiq_async.protocol import Hand
+from robotiq_async.hand import Hand
 from tests.contract.bench import LOCAL, REMOTE, A, Bench, bench, contract, ended, until
 
 PAGE = Path(__file__).parents[2] / "docs" / "on-another-host.md"

@@ -21,7 +21,7 @@ from robotiq_async import (
     NotStartedError,
     State,
 )
-from robotiq_async.protocol import Hand, HandStream
+from robotiq_async.hand import Hand, HandStream
 from tests.contract.bench import A, B, Bench, C, at_rest, bench, contract, ended
 
 GAINED, SLIPPED, LOST, RELEASED = GripChange

@@ -19,7 +19,7 @@ from robotiq_async import (
 )
 from robotiq_async.fleet.network.bus import Bus
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
-from robotiq_async.protocol import Hand
+from robotiq_async.hand import Hand
 from tests.contract.bench import LOCAL, REMOTE, A, B, Bench, C, bench, contract, ended, statuses, until
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from robotiq_async import NotStartedError, RobotiqStatus, State
-from robotiq_async.protocol import Hand, HandStream
+from robotiq_async.hand import Hand, HandStream
 from tests.contract.bench import LOCAL, REMOTE, A, Bench, bench, contract
 from tests.virtual import VirtualLoop
 

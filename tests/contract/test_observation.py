@@ -9,7 +9,7 @@ import logging
 import pytest
 
 from robotiq_async import ConnectionLostError, NotStartedError, RobotiqStatus, State
-from robotiq_async.protocol import Hand
+from robotiq_async.hand import Hand
 from tests.contract.bench import LOCAL, A, Bench, at_rest, bench, contract, ended, statuses
 
 PROPERTIES = ("is_moving", "is_activated", "is_reset")

@@ -10,7 +10,7 @@ import weakref
 import pytest
 
 from robotiq_async import Fault, RobotiqStatus, SentRequest, State, Transition
-from robotiq_async.protocol import HandStream
+from robotiq_async.hand import HandStream
 from tests.contract.bench import A, at_rest, bench, contract
 
 

@@ -19,7 +19,7 @@ from robotiq_async.fleet.keys.certificates import issue, make_authority
 from robotiq_async.fleet.network.bus import Query, Urgency
 from robotiq_async.fleet.wire.envelope import Answer
 from robotiq_async.fleet.wire.names import GripperName
-from robotiq_async.hand import RobotiqHand
+from robotiq_async.hand.robotiq_hand import RobotiqHand
 from robotiq_async.simulator import SimulatorServer
 from robotiq_async.tools.doctor import Finding, Level, examine_remote
 from robotiq_async.tools.doctor.certificates import examine_keys

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from robotiq_async import ConnectionLostError, Finger, MoveResult, RobotiqHand, State
-from robotiq_async.protocol import Hand
+from robotiq_async.hand import Hand
 from robotiq_async.ros2.gripper.goals import Ending, GoalRunner, Outcome
 from robotiq_async.ros2.gripper.hands import make_hand
 from robotiq_async.ros2.translation.joints import Targets

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import AsyncIterator
 
-from robotiq_async.protocol import Hand
+from robotiq_async.hand import Hand
 from robotiq_async.tools.actions import Operator
 from robotiq_async.tools.web.server import PageServer
 from robotiq_async.tools.web.settings import PageSettings

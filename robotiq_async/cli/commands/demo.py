@@ -10,7 +10,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Final
 
-from ...protocol import Hand
+from ...hand import Hand
 from ..arguments import Address, Flag, Yes, need
 from ..browser import opened
 from ..consent import consent

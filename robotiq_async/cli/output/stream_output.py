@@ -21,7 +21,7 @@ from .log_capture import forwarded_warnings
 from .text import clock, event_line, status_line
 
 if TYPE_CHECKING:
-    from ...protocol import Hand
+    from ...hand import Hand
 
 BUFFER: Final = 4000
 """Statuses kept for a slow reader: twenty seconds."""

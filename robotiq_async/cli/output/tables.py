@@ -14,7 +14,7 @@ from .text import axis_words
 
 if TYPE_CHECKING:
     from ... import MoveResult, RobotiqStatus
-    from ...protocol import Hand
+    from ...hand import Hand
 
 
 def print_status(hand: Hand) -> None:

@@ -10,7 +10,7 @@ from typing import Final
 
 from ...control.grip_keeper import KEEP_S
 from ...control.state_machine import RUNNING
-from ...hand import RobotiqHand
+from ...hand.robotiq_hand import RobotiqHand
 from ...runtime.clock import now
 from ...runtime.log import Log
 from ...runtime.version import __version__

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ...hand import RobotiqHand
+from ...hand.robotiq_hand import RobotiqHand
 from ...values.enums import AXES
 from ...values.errors import RobotiqError
 from ...values.events import SentRequest

@@ -25,7 +25,7 @@ from .session import CONNECT_S, RemoteSession
 class RemoteHand(RemoteCommands):
     """A Robotiq 3-Finger gripper on another host, served by ``robotiq-async agent`` there.
 
-    A :class:`~robotiq_async.protocol.Hand`: the names, errors and promises are those of
+    A :class:`~robotiq_async.hand.Hand`: the names, errors and promises are those of
     :class:`~robotiq_async.RobotiqHand`, and docs/how-to/fleet.md lists what differs. Commanding
     takes a lease, which this hand acquires when it starts and renews from its own event loop; a program that
     hangs loses it, and what it had set going is then held. Reading is free, and so is :meth:`halt`.

@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable
 from typing import Final
 
-from ...protocol import Hand
+from ...hand import Hand
 from ...runtime.log import Log
 from ...tools.actions import ACTIONS, Operator
 from ...values.errors import NotStartedError, RobotiqConnectionError, RobotiqError

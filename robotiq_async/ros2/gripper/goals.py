@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
-from ...protocol import Hand
+from ...hand import Hand
 from ...runtime.log import Log
 from ...values.enums import Finger
 from ...values.errors import RobotiqConnectionError, RobotiqError

@@ -6,8 +6,8 @@ from importlib.util import find_spec
 
 from ...fleet.network.route import is_remote
 from ...fleet.remote.remote_hand import RemoteHand
-from ...hand import RobotiqHand
-from ...protocol import Hand
+from ...hand import Hand
+from ...hand.robotiq_hand import RobotiqHand
 from ...runtime.extras import install
 from ...session.options import POLL_INTERVAL_S
 from ...values.errors import RobotiqError

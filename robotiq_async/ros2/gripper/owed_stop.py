@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Final
 
-from ...protocol import Hand
+from ...hand import Hand
 from ...runtime.clock import now
 from ...runtime.log import Log
 from ...values.enums import State

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-from ...protocol import Hand
+from ...hand import Hand
 from ...values.enums import AXES, Severity
 from ...values.errors import NotStartedError
 from ...values.status import RobotiqStatus

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...control.state_machine import RUNNING
-from ...protocol import Hand
+from ...hand import Hand
 from ...values.enums import State
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from ...protocol import Hand
+from ...hand import Hand
 from ...runtime.clock import now
 from ...values.calibration.closing_time import closing_time
 from ...values.calibration.csv_tables import (

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
-from ...protocol import Hand, HandStream
+from ...hand import Hand, HandStream
 from ...runtime.clock import now
 from ...runtime.log import Log
 from ...values.enums import Fault

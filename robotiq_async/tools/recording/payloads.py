@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from ...protocol import Hand
+from ...hand import Hand
 from ...values.enums import AXES, Fault, Finger, State
 from ...values.errors import NotStartedError
 from ...values.events import Transition

@@ -25,7 +25,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final, Protocol, Self
 
-from ...protocol import Hand
+from ...hand import Hand
 from ...runtime.concurrency import in_a_thread, wait_shielded
 from ...values.errors import RecordingError
 from .csv_file import CsvFile

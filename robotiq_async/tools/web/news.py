@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Iterator
 from typing import Final
 
-from ...protocol import Hand, HandStream
+from ...hand import Hand, HandStream
 from ...runtime.clock import now
 from ...values.enums import AXES, Fault, State
 from ...values.errors import NotStartedError

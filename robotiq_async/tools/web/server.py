@@ -19,7 +19,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
 
-from ...protocol import Hand
+from ...hand import Hand
 from ...runtime.clock import now
 from ...runtime.concurrency import wait_shielded
 from ...runtime.log import log

@@ -19,7 +19,7 @@ from ...consent import read_line
 from ...failures import CommandError, UsageError
 
 if TYPE_CHECKING:
-    from ....protocol import Hand
+    from ....hand import Hand
     from ....simulator import SimulatedGripper
     from ....tools.measure.campaigns import Campaign
 

@@ -15,7 +15,7 @@ from ...arguments import USUAL, Address, Flag, Link, need
 from ...failures import UsageError
 
 if TYPE_CHECKING:
-    from ....protocol import Hand
+    from ....hand import Hand
     from ....tools.recording.recorder import Recorder
 
 WHOLE = "robotiq-async recover makes a whole file of it"

@@ -11,15 +11,15 @@ from collections.abc import Iterator
 from types import TracebackType
 from typing import Protocol, Self, TypeVar
 
-from .control.grip_watch import SLIP_COUNTS
-from .values.calibration import Units
-from .values.enums import Finger, State
-from .values.events import SentRequest, Transition
-from .values.grasp_result import GraspResult
-from .values.grip_event import GripEvent
-from .values.move_result import MoveResult
-from .values.statistics import Statistics
-from .values.status import RobotiqStatus
+from ..control.grip_watch import SLIP_COUNTS
+from ..values.calibration import Units
+from ..values.enums import Finger, State
+from ..values.events import SentRequest, Transition
+from ..values.grasp_result import GraspResult
+from ..values.grip_event import GripEvent
+from ..values.move_result import MoveResult
+from ..values.statistics import Statistics
+from ..values.status import RobotiqStatus
 
 T_co = TypeVar("T_co", covariant=True)
 
