@@ -4,8 +4,7 @@
     python docs/make_pages.py --check
 
 The pictures come from make_architecture.py and make_diagram.py, the layout for viewers from make_layout.py
-and the tables from make_tables.py. The blocking hand, robotiq_async/sync/, is made of the async one by
-make_sync.py in the same turn. With ``--check`` nothing is written: the stale files are named, and the
+and the tables from make_tables.py. With ``--check`` nothing is written: the stale files are named, and the
 exit code is 1 when there are any.
 """
 
@@ -21,7 +20,7 @@ ROOT: Final = Path(__file__).parents[1]
 if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
 
-from docs import make_architecture, make_diagram, make_layout, make_sync, make_tables  # noqa: E402
+from docs import make_architecture, make_diagram, make_layout, make_tables  # noqa: E402
 
 
 def generated() -> dict[Path, str]:
@@ -33,7 +32,6 @@ def generated() -> dict[Path, str]:
     """
     files = {each.PICTURE: each.draw() for each in (make_architecture, make_diagram)}
     files[make_layout.FILE] = make_layout.draw()
-    files |= make_sync.generated()
     for page in make_tables.PAGES:
         path = make_tables.DOCS / page
         files[path] = make_tables.filled(page, path.read_text(encoding="utf-8"))

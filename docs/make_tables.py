@@ -186,8 +186,8 @@ def faults() -> str:
 
 
 def options() -> str:
-    """The constructor's options, from its signature and its docstring."""
-    return _arguments(RobotiqHand.__init__, "Args")
+    """The constructor's options, from its signature and the docstring of the class."""
+    return _arguments(RobotiqHand, "Args")
 
 
 def reconnect_policy() -> str:

@@ -19,14 +19,13 @@ from robotiq_async import (
     GripChange,
     InvalidStateError,
     RobotiqHand,
-    RobotiqStatus,
     State,
-    Stream,
 )
 from robotiq_async.cli.output.stream_output import print_objects
 from robotiq_async.cli.output.tables import print_outcomes, print_status
 from robotiq_async.cli.tui.screen import Monitor
-from robotiq_async.hand import Hand, HandStream
+from robotiq_async.fleet import RemoteHand
+from robotiq_async.hand import Hand
 from robotiq_async.tools.actions import ACTIONS, Operator
 from robotiq_async.tools.measure.campaigns import grasp, time_closing
 from robotiq_async.tools.metrics import serve_metrics
@@ -34,7 +33,7 @@ from robotiq_async.tools.recording.payloads import reading_fields
 from robotiq_async.tools.recording.recorder import Recorder
 from robotiq_async.tools.recording.recordings import read_recording
 from robotiq_async.values.errors import MeasuringError
-from tests.fake_hand import FakeHand, FakeStream
+from tests.fake_hand import FakeHand
 
 ROOT = Path(robotiq_async.__file__).parent
 AROUND = [path for room in ("tools", "cli") for path in sorted((ROOT / room).rglob("*.py"))]
@@ -44,39 +43,29 @@ AROUND = [path for room in ("tools", "cli") for path in sorted((ROOT / room).rgl
 # -- who satisfies it --------------------------------------------------------------------------------------
 
 
-async def test_both_are_hands() -> None:
-    """The assignments are what mypy checks."""
-    real: Hand = RobotiqHand()
-    fake: Hand = FakeHand()
-    streams: list[HandStream[RobotiqStatus]] = [real.statuses(), fake.statuses()]
-    assert [type(stream) for stream in streams] == [Stream, FakeStream]
-
-
 def members(kind: type) -> dict[str, object]:
-    names = {"__aenter__", "__aexit__"}
     own = {
         name for base in kind.__mro__ if base.__module__.startswith("robotiq_async") for name in vars(base)
     }
-    return {name: getattr(kind, name) for name in own if name in names or not name.startswith("_")}
+    return {name: getattr(kind, name) for name in own if not name.startswith("_")}
 
 
-def test_what_is_public_at_a_hand_is_in_the_protocol() -> None:
-    """But for what belongs to the process that owns the link."""
-    assert members(RobotiqHand).keys() - {"add_listener"} == members(Hand).keys()
+def test_what_is_public_at_a_hand_every_hand_has() -> None:
+    """But for what belongs to the process that owns the link, and what takes a lease."""
+    shared = members(Hand).keys()
+    assert members(RobotiqHand).keys() - shared == {"add_listener"}
+    assert members(RemoteHand).keys() - shared == {"acquire", "take", "release", "is_in_control"}
 
 
-@pytest.mark.parametrize("name", sorted(name for name, each in members(Hand).items() if callable(each)))
-def test_parameters_and_defaults_are_those_of_the_protocol(name: str) -> None:
-    """Of defaults mypy compares only whether there is one."""
-    promised, given = (inspect.signature(getattr(kind, name)) for kind in (Hand, RobotiqHand))
-    assert [(each.name, each.kind, each.default) for each in promised.parameters.values()] == [
-        (each.name, each.kind, each.default) for each in given.parameters.values()
-    ]
+@pytest.mark.parametrize("kind", [RobotiqHand, RemoteHand])
+def test_a_kind_of_hand_leaves_checks_and_promises_to_hand(kind: type) -> None:
+    supplied = {"state", "statistics"}
+    assert members(Hand).keys() & vars(kind).keys() == supplied
+    assert inspect.isabstract(Hand)
 
 
-@pytest.mark.parametrize("kind", [Hand, HandStream], ids=lambda kind: kind.__name__)
-def test_every_promise_is_described(kind: type) -> None:
-    for name, each in members(kind).items():
+def test_every_promise_is_described() -> None:
+    for name, each in members(Hand).items():
         assert inspect.getdoc(each), name
 
 
@@ -186,9 +175,8 @@ async def test_the_monitor(hand: FakeHand) -> None:
         assert f"  {hand.address}" in str(pilot.app.query_one("#state", Static).render())
 
 
-async def test_the_monitor_of_a_hand_with_a_name(hand: FakeHand) -> None:
-    hand.name = "left"
-    async with Monitor(Operator(hand)).run_test(size=(100, 30)) as pilot:
+async def test_the_monitor_of_a_hand_with_a_name() -> None:
+    async with FakeHand("left") as hand, Monitor(Operator(hand)).run_test(size=(100, 30)) as pilot:
         await pilot.pause()
         assert "  left (fake://hand)" in str(pilot.app.query_one("#state", Static).render())
 

@@ -1,128 +1,203 @@
-"""Hand: what every hand can do, in this process or on another host.
-
-What stands around a hand (actions, telemetry, measurements, the command line) is typed against this, and
-uses nothing else. :class:`~robotiq_async.RobotiqHand` is the hand that owns the link to a gripper. The
-docstrings here are what every implementation promises.
-"""
+"""Hand: what every hand can do, what it promises, and what it refuses."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from abc import ABC, abstractmethod
+from collections.abc import Collection
 from types import TracebackType
-from typing import Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Final, Literal, Self, TypeVar
 
-from ..control.grip_watch import SLIP_COUNTS
+from ..control.grip_watch import SLIP_COUNTS, GripWatch
+from ..runtime.event_loop import running_loop
+from ..runtime.log import Log
+from ..session.options import LONGEST_WAIT_S
+from ..session.state_waiters import check_states
+from ..session.streams import Channel, Channels, Stream
 from ..values.calibration import Units
-from ..values.enums import Finger, State
+from ..values.checks import (
+    check_byte,
+    check_flag,
+    check_int,
+    check_mask,
+    check_optional_byte,
+    check_seconds,
+    check_timeout,
+)
+from ..values.enums import CLOSED, OPEN, Finger, State
+from ..values.errors import ConnectionLostError, NotStartedError
 from ..values.events import SentRequest, Transition
-from ..values.grasp_result import GraspResult
+from ..values.grasp_result import GraspResult, check_at_least
 from ..values.grip_event import GripEvent
 from ..values.move_result import MoveResult
 from ..values.statistics import Statistics
 from ..values.status import RobotiqStatus
+from .run import NamesErrors, Run
 
-T_co = TypeVar("T_co", covariant=True)
-
-
-class HandStream(Protocol[T_co]):
-    """What happens to a hand, for one reader. Dropping it ends it: nothing has to be closed."""
-
-    @property
-    def missed(self) -> int:
-        """Items that were dropped, the oldest first, because the reader was slow."""
-
-    def __aiter__(self) -> Self:
-        """The stream itself."""
-
-    async def __anext__(self) -> T_co:
-        """The next item. A cancelled wait loses nothing.
-
-        Raises:
-            StopAsyncIteration: the hand was stopped, or the stream was closed.
-            RobotiqConnectionError: the hand gave up on its link.
-        """
-
-    def take_nowait(self) -> T_co | None:
-        """The next item if it is there already."""
-
-    def drain(self) -> Iterator[T_co]:
-        """The items that are there already, also those that came before the end."""
-
-    async def aclose(self) -> None:
-        """End the stream; a waiting reader ends too. Idempotent."""
+T = TypeVar("T")
+LONGEST_BUFFER: Final = 1_000_000  # items: over an hour of statuses at 200 Hz
 
 
-class Hand(Protocol):
+class Hand(ABC):
     """A gripper, as a program sees it.
 
-    Calls belong to one event loop, never block it, and end in bounded time; any number of tasks may make
-    them. Masks are :class:`Finger` or the same integers; values are integers in 0..255, whatever has an
-    ``__index__`` being one. Anything else is a TypeError or a ValueError, and nothing has been asked of the
-    gripper then. Timestamps are monotonic seconds by the clock of this process, wherever the gripper is. No
-    command is ever sent twice.
+    Use a hand with ``async with``, or call :meth:`start` and :meth:`stop`. A hand belongs to the event loop
+    in which it was started: any number of tasks of that loop may call it. No call blocks the loop, and each
+    ends in bounded time unless you ask it to wait for longer. From another thread or another loop every call
+    raises RuntimeError and asks nothing of the gripper; the properties can be read from anywhere.
+
+    Many calls take the same arguments. Any other value raises TypeError or ValueError, and nothing is sent:
+
+    * ``fingers``: the axes, a :class:`Finger` mask or the same integer, 1..15. The others stay as they are.
+    * ``position``: the target in counts, 0 (open) .. 255 (closed). Integers are whatever has ``__index__``,
+      bool aside.
+    * ``speed``: 0 (22 mm/s nominal) .. 255 (110 mm/s nominal); None leaves the speed of these axes.
+    * ``force``: 0 (15 N nominal) .. 255 (60 N nominal), not linear; None leaves the force of these axes.
+    * ``timeout``: seconds above 0; None for twice the expected time plus 2 s.
+
+    Timestamps are monotonic seconds of this process, wherever the gripper is. No motion is ever sent twice.
+
+    Every public call is in this class, which documents it and checks its arguments. To add a kind of hand,
+    supply the methods below "for subclasses".
+
+    Args:
+        address: which gripper; no two hands of a process have the same one.
+        name: what the log, errors and metrics call the hand; empty for its address.
+        units: what positions, speeds and forces mean.
+        keep_grip: whether :meth:`stop` keeps a grip unless told otherwise.
     """
+
+    _session: Run | None = None
+    """The present run, or the last one; None before the first start."""
+
+    def __init__(self, address: str, *, units: Units, name: str = "", keep_grip: bool = False) -> None:
+        self._address = address
+        self._given_name = name
+        self._units = units
+        self._keep_grip = keep_grip
+        self._channels = Channels(Log(name or address))
+        self._naming = NamesErrors(name)
+
+    def __repr__(self) -> str:
+        """Kind, name if one was given, address and state."""
+        name = f"{self._given_name} " if self._given_name else ""
+        return f"<{type(self).__name__} {name}{self._address} {self.state.name}>"
 
     # -- lifetime --------------------------------------------------------------------------------------
 
     async def __aenter__(self) -> Self:
-        """Start, with activation."""
+        """Start, with activation. Raises what :meth:`start` raises."""
+        await self.start()
+        return self
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Stop, also when the block failed or was cancelled."""
+        await self.stop()
+
+    if not TYPE_CHECKING:  # type checkers report the mistake themselves
+
+        def __enter__(self) -> None:
+            """Refuse ``with``."""
+            kind = type(self).__name__
+            raise TypeError(
+                f"a {kind} is used with 'async with'; for 'with' use robotiq_async.sync.RobotiqHand"
+            )
+
+        __exit__ = __enter__  # Python looks for both before it calls the first
 
     async def start(self, activate: bool = True, *, wait: float = 0.0) -> None:
-        """Connect, read the status, and activate a gripper that is reset: its fingers MOVE then.
+        """Connect, read the status, activate a gripper that is reset, and poll from then on.
 
-        An active gripper is adopted, and one in fault is left there. A failed or cancelled start leaves
-        nothing running. A hand may be started again after it was stopped.
+        An activation MOVES the fingers: they open and close to their stops. An active gripper is adopted:
+        nothing is written. (A gripper that has to be woken on a new connection follows its second motion: the
+        first ends with MoveIgnoredError.) A gripper in fault is left there, so that :meth:`atr` and
+        :meth:`recover` can run. Fault 0x09, which some grippers show once after a second without a poll, is
+        passed over first.
+
+        A failed or cancelled start leaves nothing running and takes back an activation that it began. A hand
+        that was stopped can be started again.
 
         Args:
-            activate: False writes nothing to the gripper.
-            wait: seconds, 0..86400, for which there may be no gripper yet: it is tried until it answers, and
-                activated only then.
+            activate: False writes nothing: a gripper that is reset stays in RESET.
+            wait: seconds to keep trying while nothing answers, 0..86400, for a gripper that is switched on
+                later than the program starts. Its fingers may MOVE long after the call then.
 
         Raises:
-            InvalidStateError: started already, or another hand owns the gripper.
-            RobotiqError: no gripper there, a link that failed, or an activation that failed.
+            InvalidStateError: this hand is started already, or another one owns the gripper.
+            NotStartedError: stop() was called meanwhile.
+            ConnectFailedError: nothing answers within the connect timeout, or within ``wait``.
+            RobotiqConnectionError: something answers, but not a gripper; or the link went down again.
+            GripperFaultError: the activation ended in a fault.
+            NotActivatedError: the gripper was reset during the activation.
+            ActivationTimeoutError: the activation was not finished in time, or showed nothing but fault 0x05
+                for 5 s, as with a pressed emergency stop.
         """
+        check_flag("activate", activate)
+        wait = check_seconds("wait", wait, 0.0, LONGEST_WAIT_S)
+        running_loop()
+        self._abandon_if_loop_closed()
+        with self._naming:
+            await self._start(activate, wait)
 
     async def stop(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:
-        """Stop the fingers and disconnect, within 2 s and also when cancelled meanwhile. Idempotent.
+        """Stop the fingers (rGTO = 0), keep the activation, disconnect. Idempotent.
 
-        Final from the call on: every request is refused, what was not sent is dropped, and what others wait
-        for ends with NotStartedError. The strongest of several calls under way counts. The state is SHUTDOWN
-        afterwards.
+        The stop is final from the call on: every request is refused with NotStartedError, requests that were
+        not sent are dropped, and whatever else is being waited for ends with NotStartedError. Nothing that
+        starts or continues a motion is sent after the call. The state is SHUTDOWN when it returns.
+
+        It ends within 2 s, even on a dead link and when cancelled meanwhile: the cancellation is raised once
+        the hand has stopped. A link that is down is tried once more. Of several calls under way the strongest
+        counts, whichever comes first: without ``keep_grip``, then with it, then ``halt=False``. A call
+        stronger than those before it has 2 s of its own. A halt or a hold that was not delivered turns
+        ``halt=False`` into a stop with ``keep_grip``.
+
+        With ``keep_grip`` axes that move are held where they are, and rGTO stays set, so that a grip goes on
+        while nothing is connected. This needs every axis seen at rest. In any doubt rGTO is cleared after
+        all, and the log says why: an axis is not at rest within 0.5 s, the link is or goes down, a fault, a
+        sequence, another client that commands, or a ``halt()``. A client that starts a motion after the last
+        status and before the disconnection is not seen. What a real gripper does with a part, either way, is
+        not known. A gripper that is not polled may lose its activation, and the part: the next program then
+        finds it in RESET.
+
+        If the event loop was closed, the hand counts as stopped, and the fingers go on.
 
         Args:
-            halt: False leaves the fingers to what they do.
-            keep_grip: True holds what moves and lets a grip stay in force; on any doubt the fingers are
-                stopped as ever. None for what the hand was made with.
+            halt: False disconnects and leaves the fingers to what they do; for programs that only look.
+            keep_grip: whether a grip stays in force; None for what the hand was made with.
         """
+        check_flag("halt", halt)
+        keeps = self._keeps_grip(keep_grip)
+        self._abandon_if_loop_closed()
+        await self._stop(halt, keeps)
 
     # -- commands --------------------------------------------------------------------------------------
 
     async def set_position(self, value: int, fingers: Finger | int = Finger.ABC) -> None:
-        """Ask axes to go somewhere; returns when the gripper has acknowledged it.
+        """Send axes somewhere; returns when the gripper has acknowledged it, not when they are there.
+
+        When cancelled, the request may still be sent: :meth:`halt` stops it.
 
         Raises:
-            RobotiqError: the hand takes no commands now, or the acknowledgement did not come.
+            RobotiqError: the hand takes no commands now, or the link went down before the acknowledgement.
+                The request is not sent again, and may have been carried out.
         """
+        axes = check_mask(fingers)
+        with self._naming:
+            await self._set("position", check_byte("value", value), axes)
 
     async def set_speed(self, value: int, fingers: Finger | int = Finger.ALL) -> None:
-        """Set the speed of axes, also of a motion under way; never starts one.
-
-        Raises:
-            RobotiqError: as :meth:`set_position`.
-        """
+        """Set the speed of axes, as :meth:`set_position`, also of a motion under way; never starts one."""
+        axes = check_mask(fingers)
+        with self._naming:
+            await self._set("speed", check_byte("value", value), axes)
 
     async def set_force(self, value: int, fingers: Finger | int = Finger.ALL) -> None:
-        """Set the force of axes; never starts a motion. More force tightens a grip.
-
-        Raises:
-            RobotiqError: as :meth:`set_position`.
-        """
+        """Set the force of axes, as :meth:`set_position`; never starts a motion. More tightens a grip."""
+        axes = check_mask(fingers)
+        with self._naming:
+            await self._set("force", check_byte("value", value), axes)
 
     def command(
         self,
@@ -132,12 +207,22 @@ class Hand(Protocol):
         speed: int | None = None,
         force: int | None = None,
     ) -> None:
-        """Ask axes for something, without waiting: the last value wins, nothing queues.
+        """Ask something of axes and return at once, for control loops. The last value wins; nothing queues.
+
+        What you ask between two polls goes out as one write. If the link goes down first, it is dropped: the
+        state and the log show that.
 
         Raises:
-            ValueError: none of position, speed and force.
+            ValueError: also if position, speed and force are all None.
             RobotiqError: the hand takes no commands now.
         """
+        axes = check_mask(fingers)
+        if position is None and speed is None and force is None:
+            raise ValueError("command() needs at least one of position, speed and force in 0..255, got none")
+        position = check_optional_byte("position", position)
+        speed, force = check_optional_byte("speed", speed), check_optional_byte("force", force)
+        with self._naming:
+            self._command(axes, position, speed, force)
 
     async def move(
         self,
@@ -148,25 +233,29 @@ class Hand(Protocol):
         force: int | None = None,
         timeout: float | None = None,
     ) -> MoveResult:
-        """Move axes and return when every one of them has stopped: there, or against something.
+        """Move axes and return when every one of them has stopped: at the target, or against something.
 
-        The other axes stay as they are. Cancelled or timed out, those that still move are held, and a grip
-        stays.
+        When the call is cancelled (by a task, ``asyncio.timeout`` or an anyio scope) or times out, those of
+        its axes that still move are held where they are; an axis in contact keeps its request and its grip.
 
-        Args:
-            position: target in counts.
-            fingers: the axes.
-            speed: new speed of these axes; None leaves it.
-            force: new force of these axes; None leaves it.
-            timeout: seconds; None for twice the expected time plus 2 s.
+        Returns:
+            How each axis ended. A contact is a result, not an error.
 
         Raises:
-            MoveTimeoutError: an axis still moved when the time was over; as MoveIgnoredError: the first
-                motion on a connection was echoed, and nothing has moved for a second.
+            MoveTimeoutError: an axis still moved when the time was over; as MoveIgnoredError, the first
+                motion on a connection was echoed and nothing moved for a second.
             MoveSupersededError: another command, halt(), reset() or another client took over an axis.
             GripperFaultError: the gripper reports a minor or a major fault.
-            RobotiqError: the hand takes no commands now, the link went down, or the hand was stopped.
+            NotActivatedError: the gripper is not activated, or lost its activation.
+            ConnectionLostError: the link went down; the gripper may still be moving.
+            RobotiqStateError: the hand takes no commands now, or was stopped.
         """
+        axes = check_mask(fingers)
+        target = check_byte("position", position)
+        speed, force = check_optional_byte("speed", speed), check_optional_byte("force", force)
+        limit = check_timeout("timeout", timeout)
+        with self._naming:
+            return await self._move(axes, target, speed, force, limit)
 
     async def open(
         self,
@@ -176,7 +265,8 @@ class Hand(Protocol):
         force: int | None = None,
         timeout: float | None = None,
     ) -> MoveResult:
-        """Open fingers: :meth:`move` to 0."""
+        """Open fingers: :meth:`move` to 0. Returns and raises what it does."""
+        return await self.move(OPEN, fingers, speed=speed, force=force, timeout=timeout)
 
     async def close(
         self,
@@ -186,7 +276,8 @@ class Hand(Protocol):
         force: int | None = None,
         timeout: float | None = None,
     ) -> MoveResult:
-        """Close the fingers, not the connection: :meth:`move` to 255."""
+        """Close the fingers, not the connection (that is :meth:`stop`): :meth:`move` to 255."""
+        return await self.move(CLOSED, fingers, speed=speed, force=force, timeout=timeout)
 
     async def grasp(
         self,
@@ -197,147 +288,192 @@ class Hand(Protocol):
         force: int | None = None,
         timeout: float | None = None,
     ) -> GraspResult:
-        """Close fingers until each of them has met something or is closed, and say which of them hold it.
+        """Close fingers until each has met something or is closed, and say which of them hold it.
 
-        Too few contacts are a result and not an error: the result is false, and the fingers stay as they are.
-        When cancelled or timed out, as :meth:`move`.
+        A grasp takes ``at_least`` contacts, 1 .. the number of axes; None for all of them. Too few are a
+        result and not an error: the result is false, and the fingers stay as they are. For the rest it is a
+        :meth:`move`: what it raises, and what it does when cancelled or timed out.
 
-        What holds is what the gripper calls a contact while closing. A thin object between fingertips may
-        never be called one; and a contact latches: a finger that stood in one before still counts, also when
+        An axis holds if the gripper reports a contact while closing. It may never report one for a thin
+        object between fingertips. A contact latches: a finger that was in contact before still counts when
         the part has been taken out meanwhile. Open first, or ask for more force.
-
-        Args:
-            fingers: the axes that close.
-            at_least: contacts that make a grasp, 1..as many as there are axes; None for all of them.
-            speed: new speed of these axes; None leaves it.
-            force: new force of these axes; None leaves it.
-            timeout: seconds; None for twice the expected time plus 2 s.
-
-        Raises:
-            TypeError, ValueError: an argument of the wrong type or outside its range; nothing is sent.
-            RobotiqError: as :meth:`move`.
         """
+        axes = check_mask(fingers)
+        needed = check_at_least(at_least, axes)
+        return GraspResult(await self.close(axes, speed=speed, force=force, timeout=timeout), needed)
 
     async def hold(self, fingers: Finger | int = Finger.ALL) -> None:
-        """Ask axes that move to stay where they are; returns when the gripper has acknowledged it.
+        """Hold axes that move where they are; returns when the gripper has acknowledged it.
 
-        An axis in contact keeps its grip, and one at rest is left alone. Moves of these axes end with
-        MoveSupersededError. In an activation, a release or a reset nothing is sent.
+        An axis in contact keeps its request and its grip, and one at rest is left alone. Awaited moves and
+        pending requests of these axes end with MoveSupersededError, and their other axes go on. When
+        cancelled, the hold is sent all the same. If a lost link prevents the acknowledgement, the hold is
+        repeated once the link is back, unless another client moves the axes then. In RESET and ATR_DONE, and
+        during an activation, a release or a reset, it sends nothing; :meth:`halt` ends those.
 
         Raises:
-            RobotiqError: not connected, or the acknowledgement did not come.
+            MoveSupersededError: reset() took over before it was sent.
+            NotActivatedError: the gripper lost its activation before it was sent.
+            RobotiqError: not connected, or the link went down before the acknowledgement.
         """
+        axes = check_mask(fingers)
+        with self._naming:
+            await self._hold(axes)
 
     async def halt(self) -> None:
-        """Stop every axis now; returns when the gripper shows it. The next command goes again.
+        """Stop every axis now (rGTO = 0). The next command goes again, and moves only the axes it names.
+
+        Returns when the gripper shows that it has stopped, at most 0.5 s after the acknowledgement. Awaited
+        moves end with MoveSupersededError. When cancelled, the halt is sent all the same. In RESET and
+        ATR_DONE nothing moves and nothing is sent. rGTO does not stop an activation or an automatic release:
+        during these, halt() clears rACT, as :meth:`reset` does, and returns in RESET.
 
         Raises:
-            RobotiqError: not connected, or the acknowledgement did not come.
+            MoveSupersededError: reset() took over before it was sent.
+            StateTimeoutError: an activation or a release was not seen to end within 5 s.
+            RobotiqError: not connected, or the link went down before the acknowledgement.
         """
+        with self._naming:
+            await self._halt()
 
     # -- activation, faults ----------------------------------------------------------------------------
 
     async def activate(self) -> None:
-        """Activate the gripper, if it is not active yet: its fingers MOVE. When cancelled, it goes on.
+        """Activate the gripper if it is not active. The fingers MOVE to their stops.
+
+        When cancelled, the activation goes on; :meth:`reset` ends it.
 
         Raises:
-            RobotiqError: a fault is latched, the activation failed, or it is not possible now.
+            GripperFaultError: a fault is latched (see :meth:`recover`), or the activation ended in one.
+            NotActivatedError: the gripper was reset meanwhile.
+            ActivationTimeoutError: not finished within the activation timeout, or nothing but fault 0x05 for
+                5 s, as with a pressed emergency stop. The activation goes on.
+            RobotiqError: not possible now, or the link went down.
         """
+        with self._naming:
+            await self._activate()
 
     async def reset(self) -> None:
-        """Reset the gripper, which lets go of what it holds; returns in RESET. When cancelled, it goes on.
+        """Reset the gripper (rACT = 0): this clears faults and lets go of the part. Returns in RESET.
+
+        It also ends an activation or a release under way. Awaited moves end with MoveSupersededError. When
+        cancelled, the reset goes on.
 
         Raises:
-            RobotiqError: not possible now, not in time, or the link went down.
+            StateTimeoutError: the gripper did not report the reset within 5 s.
+            RobotiqError: not possible now, or the link went down.
         """
+        with self._naming:
+            await self._reset()
 
     async def atr(self) -> None:
-        """Release automatically: all axes open slowly. Only in FAULT; returns in ATR_DONE.
+        """Release automatically: all axes open slowly, whatever the fault. Only in FAULT.
+
+        Returns in ATR_DONE. After that only :meth:`reset` and :meth:`activate`, or :meth:`recover`, help.
+        When cancelled, the release goes on.
 
         Raises:
             InvalidStateError: not in FAULT.
-            RobotiqError: not in time, or the link went down.
+            NotActivatedError: the gripper is reset, or was reset during the release.
+            StateTimeoutError: the release was not finished within 60 s.
+            RobotiqError: the link went down.
         """
+        with self._naming:
+            await self._atr()
 
     async def recover(self, timeout: float | None = None) -> None:
-        """Do whatever the present fault needs: after a major one the part DROPS and the fingers MOVE.
+        """Do what the present fault needs, until the gripper is active again.
 
-        Args:
-            timeout: seconds for all of it; None for 90 s.
+        A minor fault, and an activation, reset or release under way, are waited for. After a major fault the
+        gripper is reset and activated. So is a gripper that makes no progress for 5 s while it waits for its
+        activation (0x05, as after an emergency stop) or releases, at most twice. A reset DROPS the part, and
+        an activation MOVES the fingers. The ``timeout`` is for all of it; None for 90 s.
 
         Raises:
-            RobotiqError: not active in time, the activation failed, or the link went down.
+            StateTimeoutError: not active in time, or not after two resets: a person has to look at it.
+            ActivationTimeoutError: the new activation took longer than the activation timeout.
+            GripperFaultError: the new activation ended in a fault.
+            NotActivatedError: the gripper was reset during the new activation.
+            RobotiqError: the link went down, or the hand was stopped.
         """
+        limit = check_timeout("timeout", timeout)
+        with self._naming:
+            await self._recover(limit)
 
-    # -- what is going on ------------------------------------------------------------------------------
+    # -- what the hand shows ---------------------------------------------------------------------------
 
     @property
     def name(self) -> str:
-        """What the hand is called, in the log and in metrics: by its address, unless it was given a name."""
+        """What the log, errors and metrics call the hand: the name it was given, or else its address."""
+        return self._given_name or self._address
 
     @property
     def address(self) -> str:
-        """Which gripper, for people and labels: no two hands of a process have the same one."""
+        """The gripper's address in its full form; for a transport object, what messages call it."""
+        return self._address
 
     @property
     def units(self) -> Units:
-        """Converts mm, mm/s, seconds and newton labels to what commands take, and back.
-
-        There before the start, and the same as long as the hand lives.
-        """
+        """Converts mm, mm/s, seconds and newton labels to values and back, by the hand's calibrations."""
+        return self._units
 
     @property
+    @abstractmethod
     def state(self) -> State:
-        """Where the hand is."""
+        """The state of the hand."""
 
     @property
     def status(self) -> RobotiqStatus:
-        """The newest status, also after the link went down: its timestamp tells how old it is.
-
-        Raises:
-            NotStartedError: there is none yet.
-        """
+        """The newest status, however old its timestamp says it is; NotStartedError before the first."""
+        status = self._newest_status
+        if status is None:
+            with self._naming:
+                raise NotStartedError("no status has been read yet: start the hand first")
+        return status
 
     @property
     def is_activated(self) -> bool:
-        """Whether the gripper is active.
-
-        Raises:
-            RobotiqError: not known: not started, or the link is down.
-        """
+        """Whether the gripper is active (gIMC = 3); raises as :attr:`is_moving`."""
+        return self._current_status().is_activated
 
     @property
     def is_reset(self) -> bool:
-        """Whether the gripper is reset.
-
-        Raises:
-            RobotiqError: not known: not started, or the link is down.
-        """
+        """Whether the gripper is reset (gACT = 0 and gIMC = 0); raises as :attr:`is_moving`."""
+        status = self._current_status()
+        return status.is_reset and not status.activation_echo
 
     @property
     def is_moving(self) -> bool:
         """Whether an axis moves, or will because of a command that does not act yet.
 
-        Raises:
-            RobotiqError: not known: not started, or the link is down.
+        Raises RobotiqError while that is not known: before the start, and when the link is down.
         """
+        self._current_status()
+        return self._is_moving()
 
     @property
+    @abstractmethod
     def statistics(self) -> Statistics:
-        """How the polling went since the last start."""
+        """Figures of the polling since the last start."""
 
-    def statuses(self, buffer: int = 1) -> HandStream[RobotiqStatus]:
-        """Every status from now on, in its order; the newest ``buffer`` of them are kept for the reader.
+    def statuses(self, buffer: int = 1) -> Stream[RobotiqStatus]:
+        """Every status from now on, in order, for one reader.
 
-        Like the other two it may be opened before the start, waits out a lost link, and ends after
-        :meth:`stop`.
+        A slow reader costs only itself: the stream keeps the newest ``buffer`` statuses, and its ``missed``
+        counts the others; ``buffer`` is 1..1000000. A stream opened before the start waits for it, and it
+        waits while the link is down. It ends after :meth:`stop`, and raises RobotiqConnectionError when the
+        hand gives up on its link.
         """
+        return self._opened(self._channels.statuses, check_int("buffer", buffer, 1, LONGEST_BUFFER))
 
-    def transitions(self) -> HandStream[Transition]:
-        """Every change of state from now on, none lost."""
+    def transitions(self) -> Stream[Transition]:
+        """Every change of state from now on, none lost, for one reader. Ends as :meth:`statuses` does."""
+        return self._opened(self._channels.transitions, None)
 
-    def requests(self, buffer: int | None = None) -> HandStream[SentRequest]:
-        """Every request written from now on, by whomever it was asked for; None loses none."""
+    def requests(self, buffer: int | None = None) -> Stream[SentRequest]:
+        """Every request written from now on, as :meth:`statuses`; a ``buffer`` of None loses none."""
+        kept = None if buffer is None else check_int("buffer", buffer, 1, LONGEST_BUFFER)
+        return self._opened(self._channels.requests, kept)
 
     def grip_events(
         self,
@@ -345,33 +481,119 @@ class Hand(Protocol):
         *,
         since: RobotiqStatus | None = None,
         slip: int = SLIP_COUNTS,
-    ) -> HandStream[GripEvent]:
-        """What becomes of the grips from now on: contacts gained and lost, parts that slip.
+    ) -> Stream[GripEvent]:
+        """What happens to grips from now on: contacts gained and lost, parts that slip. None lost.
 
-        For one reader, none lost. Nothing is told while the link is down; what has become of a grip meanwhile
-        is told when it is back.
-
-        It tells what the gripper reports. A contact latches: a part that is pulled out is noticed when its
-        finger closes on, which it does when more force is asked for, and by the manual not before.
+        For one reader; ends as :meth:`statuses` does. What happens while the link is down is reported when it
+        is back. The events follow what the gripper reports, and a contact latches: when a part is pulled out,
+        that shows once its finger closes further, by the manual only when you ask for more force.
 
         Args:
             fingers: the axes that are watched.
-            since: the status to begin with, ``result.status`` of a grasp or a move: what has changed between
-                that and the next status is told, too. None for the newest one.
-            slip: counts that an axis in contact may move without being told, 1..255.
-
-        Raises:
-            TypeError, ValueError: an argument of the wrong type or outside its range.
+            since: the status to begin with, ``result.status`` of a grasp or a move; None for the newest one.
+            slip: counts that an axis in contact may move without an event, 1..255.
         """
+        watch = GripWatch(fingers, since=since, slip=slip)
+        self._check_may_listen()
+        if since is None and self._newest_status is not None:
+            watch.see(self._newest_status)
+        return self._channels.statuses.derive(watch.see)
 
     async def wait_for_state(self, *states: State, timeout: float | None = None) -> State:
-        """Wait until the hand is, if only for a moment, in one of these states, and return it.
+        """Wait until the hand is in one of these states, if only for a moment, and return that state.
 
-        Args:
-            states: at least one.
-            timeout: seconds; None waits for as long as the hand runs.
+        None as ``timeout`` waits for as long as the hand runs.
 
         Raises:
             StateTimeoutError: not reached in time.
-            RobotiqError: not started, stopped meanwhile, or the hand gave up on its link.
+            NotStartedError: the hand is not started, or was stopped meanwhile.
+            RobotiqConnectionError: the hand gave up on its link.
         """
+        check_states(states)
+        limit = check_timeout("timeout", timeout)
+        if self.state in states:
+            return self.state
+        with self._naming:
+            self._check_running()
+            return await self._wait_for_state(states, limit)
+
+    # -- for subclasses: what each kind of hand supplies, with checked arguments -------------------------
+
+    @property
+    @abstractmethod
+    def _newest_status(self) -> RobotiqStatus | None:
+        """The newest status; None before the first."""
+
+    @abstractmethod
+    def _is_moving(self) -> bool:
+        """Whether an axis moves or will move; only asked while that is known."""
+
+    @abstractmethod
+    async def _start(self, activate: bool, wait: float) -> None: ...
+
+    @abstractmethod
+    async def _stop(self, halt: bool, keep_grip: bool) -> None: ...
+
+    @abstractmethod
+    async def _set(self, what: Literal["position", "speed", "force"], value: int, axes: Finger) -> None: ...
+
+    @abstractmethod
+    def _command(self, axes: Finger, position: int | None, speed: int | None, force: int | None) -> None: ...
+
+    @abstractmethod
+    async def _move(
+        self, axes: Finger, target: int, speed: int | None, force: int | None, timeout: float | None
+    ) -> MoveResult: ...
+
+    @abstractmethod
+    async def _hold(self, axes: Finger) -> None: ...
+
+    @abstractmethod
+    async def _halt(self) -> None: ...
+
+    @abstractmethod
+    async def _activate(self) -> None: ...
+
+    @abstractmethod
+    async def _reset(self) -> None: ...
+
+    @abstractmethod
+    async def _atr(self) -> None: ...
+
+    @abstractmethod
+    async def _recover(self, timeout: float | None) -> None: ...
+
+    @abstractmethod
+    async def _wait_for_state(self, states: Collection[State], timeout: float | None) -> State: ...
+
+    # -- what the calls above share ----------------------------------------------------------------------
+
+    def _keeps_grip(self, keep_grip: bool | None) -> bool:
+        return self._keep_grip if keep_grip is None else check_flag("keep_grip", keep_grip)
+
+    def _check_running(self) -> None:
+        if self._session is None:
+            raise NotStartedError("the hand is not started: use 'async with' or start()")
+        self._session.check_running()
+
+    def _check_may_listen(self) -> None:
+        """Refuse another thread or loop while the hand runs: neither streams nor listeners are locked."""
+        session = self._session
+        if session is not None and not session.is_over and not session.lost_its_loop:
+            session.check_loop("a stream or a listener of the hand")
+
+    def _current_status(self) -> RobotiqStatus:
+        with self._naming:
+            self._check_running()
+            status = self.status
+            if self.state is State.DISCONNECTED:
+                raise ConnectionLostError("the link to the gripper is down: what it does is not known")
+            return status
+
+    def _opened(self, channel: Channel[T], buffer: int | None) -> Stream[T]:
+        self._check_may_listen()
+        return channel.open(buffer)
+
+    def _abandon_if_loop_closed(self) -> None:
+        if self._session is not None and self._session.lost_its_loop:
+            self._session.abandon()

@@ -1,17 +1,23 @@
-"""RobotiqHand: its options, its start and its end."""
+"""RobotiqHand: the hand that owns the link to its gripper."""
 
 from __future__ import annotations
 
-from types import TracebackType
-from typing import TYPE_CHECKING, Self
+import asyncio
+import inspect
+from collections.abc import Callable, Collection
+from typing import Final, Literal
 
-from ..control.state_machine import StateMachine
+import anyio
+
+from ..control.motion import Move
+from ..control.requests.pending import Command
+from ..control.state_machine import RUNNING, SEQUENCES, StateMachine
 from ..link.transport import Transport
-from ..runtime.event_loop import running_loop
+from ..runtime.clock import now
+from ..session.counters import Counters
 from ..session.options import (
     ACTIVATION_TIMEOUT_S,
     CONNECT_TIMEOUT_S,
-    LONGEST_WAIT_S,
     POLL_INTERVAL_S,
     RESPONSE_TIMEOUT_S,
     WRITE_SPACING_S,
@@ -19,25 +25,89 @@ from ..session.options import (
 )
 from ..session.reconnecting import ReconnectPolicy
 from ..session.session import Session
-from ..session.streams import Channels
+from ..session.stall_watch import STALLED_S, StallWatch
 from ..values.calibration import ForceCalibration, SpeedCalibration
-from ..values.checks import check_flag, check_seconds
-from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED
-from ..values.errors import NotStartedError
-from .commands import Commands
-from .naming import tells_its_hand
+from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED, Finger, Severity, State
+from ..values.errors import (
+    InvalidStateError,
+    MoveSupersededError,
+    MoveTimeoutError,
+    NotActivatedError,
+    NotStartedError,
+    StateTimeoutError,
+)
+from ..values.events import SentRequest, Transition
+from ..values.move_result import MoveResult
+from ..values.statistics import Statistics
+from ..values.status import RobotiqStatus
+from ..values.trigger import Trigger
+from .base import Hand
+
+RESET_TIMEOUT_S: Final = 5.0
+"""A reset takes a device cycle or two; this leaves room for a slow one."""
+RELEASE_TIMEOUT_S: Final = 60.0
+"""A release opens slowly; no figure is published. A full stroke at the slowest speed takes 10 s."""
+RECOVER_TIMEOUT_S: Final = 90.0
+"""Interference counts as minor for 20 s, a release may take a minute, a reset and an activation follow."""
+RESETS: Final = 2
+"""After an emergency stop one reset has been seen to help, and sometimes a second."""
 
 
-class RobotiqHand(Commands):
+class RobotiqHand(Hand):
     """A Robotiq 3-Finger gripper behind Modbus TCP, a serial line, or simulated.
 
-    Use it as ``async with RobotiqHand(address) as hand:``, or call :meth:`start` and :meth:`stop`. One
-    task polls the gripper; every call here hands its request to that task and never blocks the loop.
-    Calls may come from any task of the loop the hand was started in. From another thread, or another
-    loop, every call is a RuntimeError that says what to do, and nothing has been asked then.
+    Use it as ``async with RobotiqHand(address) as hand:``, or call :meth:`start` and :meth:`stop`. One task
+    polls the gripper; every call hands its request to that task and never blocks the loop. The calls may come
+    from any task of the loop in which the hand was started. From another thread or another loop every call
+    raises RuntimeError, which says what to do instead, and asks nothing of the gripper. See
+    :class:`~robotiq_async.hand.Hand` for what all hands promise.
+
+    Making a hand checks every option; it opens nothing and needs no running loop.
+
+    Speed and force have no echo. After adopting an active gripper, ``speed`` and ``force`` are therefore also
+    what the axes get that a first command does not address: pass what the gripper was used with if that
+    matters to the part it holds.
 
     Nothing of this has run on real hardware yet.
+
+    Args:
+        address: ``tcp://HOST[:502]`` (or HOST, HOST:PORT), ``rtu:///dev/ttyUSB0``, ``rtu+tcp://HOST:PORT``
+            (a serial line behind a socket), ``sim://`` (or ``sim://?speedup=10&object=150``), or a
+            transport object.
+        name: what to call this hand, in 1..64 printable characters: errors and the log begin with it, and
+            metrics and recordings carry it. None calls it by its address.
+        device_id: Modbus unit id, 0..255 over TCP and 1..247 over RTU; by default 2 over TCP and 9 over
+            RTU. Two hands on one TCP address need one each: that of their gripper behind the gateway.
+        read_function: Modbus function that reads the status, 3 or 4; by default 4 over TCP and 3 over
+            RTU.
+        poll_interval: seconds between polls, 0.001..0.1; over RTU 0.015 unless given.
+        write_spacing: seconds from the acknowledgement of a write to the next one, 0..0.1; requests made
+            meanwhile are merged. The manual of 2014 says that a gripper may lose writes less than 10 ms
+            apart; pass 0 for one that does not. A stop and a halt do not wait.
+        connect_timeout: seconds for opening the link, 0.01..5.
+        response_timeout: seconds for one answer, 0.005..5. A write fails within twice that, and over RTU,
+            where a read may be asked again, within 0.15 s more (three times that if it is above 0.4).
+            :meth:`stop` ends within 2 s whatever it is; but a gripper that takes longer than 0.4 s to
+            answer may not have confirmed by then that the fingers were stopped, and the log says so.
+        activation_timeout: seconds for an activation, 0.01..120.
+        reconnect: whether a lost link is opened again, or a :class:`ReconnectPolicy`.
+        speed: what the axes get until set otherwise, 0..255.
+        force: what the axes get until set otherwise, 0..255.
+        request_address: first request register; by default 0 over TCP and 0x03E8 over RTU.
+        status_address: first status register; by default 0 over TCP and 0x07D0 over RTU.
+        calibration: how fast this gripper is: default timeouts of moves come from it, and the speeds of
+            :attr:`units`. None for the thesis's gripper.
+        force_calibration: what :attr:`units` labels force values with. None for the manual's figures.
+        keep_grip: what :meth:`stop` does by default, and leaving the block does always: False stops the
+            fingers for certain (rGTO = 0), True holds what moves and keeps a grip in force. A gripper that is
+            not polled afterwards may lose its activation, and with it the grip.
+
+    Raises:
+        TypeError: an option of the wrong type.
+        ValueError: an option outside its range, or a malformed address.
     """
+
+    _session: Session | None = None
 
     def __init__(
         self,
@@ -60,49 +130,7 @@ class RobotiqHand(Commands):
         force_calibration: ForceCalibration | None = None,
         keep_grip: bool = False,
     ) -> None:
-        """Check every option. Opens nothing and needs no running loop.
-
-        Speed and force have no echo. So after adopting an active gripper, ``speed`` and ``force`` are also
-        what the axes get that a first command does not address: pass what the gripper was used with if
-        that matters to what it holds.
-
-        Args:
-            address: ``tcp://HOST[:502]`` (or HOST, HOST:PORT), ``rtu:///dev/ttyUSB0``, ``rtu+tcp://HOST:PORT``
-                (a serial line behind a socket), ``sim://`` (or ``sim://?speedup=10&object=150``), or a
-                transport object.
-            name: what to call this hand, in 1..64 printable characters: errors and the log begin with it,
-                metrics and recordings have it. None calls it by its address.
-            device_id: Modbus unit id, 0..255 over TCP and 1..247 over RTU; by default 2 over TCP and 9 over
-                RTU. Two hands on one TCP address need one each: that of their gripper behind the gateway.
-            read_function: Modbus function that reads the status, 3 or 4; by default 4 over TCP and 3 over
-                RTU.
-            poll_interval: seconds between polls, 0.001..0.1; over RTU 0.015 unless given.
-            write_spacing: seconds from the acknowledgement of a write to the next one, 0..0.1: what is asked
-                meanwhile is merged. The manual of 2014 says that a gripper may lose what comes sooner than
-                10 ms; pass 0 for one that does not. A stop and a halt do not wait.
-            connect_timeout: seconds for opening the link, 0.01..5.
-            response_timeout: seconds for one answer, 0.005..5. A write fails within twice that, and over RTU,
-                where a read may be asked again, within 0.15 s more (three times that if it is above 0.4).
-                :meth:`stop` ends within 2 s whatever it is; but a gripper that takes longer than 0.4 s to
-                answer may not have confirmed by then that the fingers were stopped, and the log says so.
-            activation_timeout: seconds for an activation, 0.01..120.
-            reconnect: whether a lost link is opened again, or a :class:`ReconnectPolicy`.
-            speed: what the axes get until set otherwise, 0..255.
-            force: what the axes get until set otherwise, 0..255.
-            request_address: first request register; by default 0 over TCP and 0x03E8 over RTU.
-            status_address: first status register; by default 0 over TCP and 0x07D0 over RTU.
-            calibration: how fast this gripper is: default timeouts of moves come from it, and the speeds of
-                :attr:`units`. None for the thesis's gripper.
-            force_calibration: what :attr:`units` labels force values with. None for the manual's figures.
-            keep_grip: what :meth:`stop` does unless told: False stops the fingers for certain (rGTO = 0),
-                True holds what moves and lets a grip stay in force. It is also what leaving the block does.
-                A gripper that is not polled afterwards may lose its activation, and with it the grip.
-
-        Raises:
-            TypeError: an option of the wrong type.
-            ValueError: an option outside its range, or a malformed address.
-        """
-        self._options = check_options(
+        self._options = options = check_options(
             address,
             name=name,
             device_id=device_id,
@@ -121,74 +149,14 @@ class RobotiqHand(Commands):
             force_calibration=force_calibration,
             keep_grip=keep_grip,
         )
-        self._machine = StateMachine(log=self._options.log)
-        self._channels = Channels(self._options.log)
-        self._session: Session | None = None
-        """The run under way, or the last one."""
+        super().__init__(
+            options.address, units=options.units, name=options.given_name, keep_grip=options.keep_grip
+        )
+        self._machine = StateMachine(log=options.log)
 
-    async def __aenter__(self) -> Self:
-        """Start, with activation. See :meth:`start` for what it raises."""
-        await self.start()
-        return self
+    # -- lifetime --------------------------------------------------------------------------------------
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Stop, also when the block failed or was cancelled."""
-        await self.stop()
-
-    if not TYPE_CHECKING:  # type checkers tell the mistake themselves
-
-        def __enter__(self) -> None:
-            """Refuse ``with``.
-
-            Raises:
-                TypeError: always.
-            """
-            raise TypeError(
-                "a RobotiqHand is used with 'async with', in a coroutine; for 'with' there is the hand that "
-                "blocks: robotiq_async.sync.RobotiqHand"
-            )
-
-        def __exit__(self, *_: object) -> None:
-            """Never called; without it Python would not call the other one."""
-
-    @tells_its_hand
-    async def start(self, activate: bool = True, *, wait: float = 0.0) -> None:
-        """Connect, read the status, activate if the gripper is reset, and poll from then on.
-
-        An activation MOVES the fingers: they open and close to their stops. A gripper that is active
-        already is adopted: nothing is written. (A gripper that has to be woken on a new connection follows
-        its second motion: the first ends with MoveIgnoredError.) One that is in fault already is left there,
-        so that :meth:`atr` and :meth:`recover` can run.
-
-        With ``wait`` there may be no gripper yet, for a program that starts before its gripper is switched
-        on: it is tried until it answers. It is activated only then, and its fingers MOVE long after the call.
-
-        Fault 0x09, which some grippers show once after a second without a poll, is looked past first.
-
-        A failed or cancelled start leaves nothing running; an activation that it began is taken back.
-
-        Args:
-            activate: False leaves a reset gripper in RESET.
-            wait: seconds for which nobody may answer, 0..86400. After that the error of the last try is
-                raised; with 0 that of the only one.
-
-        Raises:
-            RuntimeError: not in a running asyncio event loop.
-            InvalidStateError: this hand is started already, or another one runs on the same gripper.
-            NotStartedError: stop() was called meanwhile.
-            ConnectFailedError: nobody answers within the connect timeout, or for as long as was waited.
-            RobotiqConnectionError: somebody answers, but not a gripper; or the link went down again.
-            GripperFaultError: the activation that was begun ended in a fault.
-            NotActivatedError: the gripper was reset during the activation that was begun.
-            ActivationTimeoutError: the activation was not finished in time, or got nowhere for 5 s (0x05 and
-                nothing new, as with a pressed emergency stop).
-        """
-        check_flag("activate", activate)
-        wait = check_seconds("wait", wait, 0.0, LONGEST_WAIT_S)
-        running_loop()
-        self._abandon_if_loop_closed()
+    async def _start(self, activate: bool, wait: float) -> None:
         self._session = session = Session(
             self._options, self._machine, self._channels, activate=activate, wait=wait
         )
@@ -197,55 +165,214 @@ class RobotiqHand(Commands):
             if activate:
                 await session.activated()
         except NotStartedError:
-            await session.ended()  # stop() was called meanwhile: what it asked for counts
+            await session.ended()  # stop() was called meanwhile, and with its own arguments
             raise
         except BaseException:
             await self.stop()
             raise
 
-    async def stop(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:
-        """Stop the fingers (rGTO = 0), keep the activation, disconnect. Idempotent.
-
-        It is final from the call on: every request is refused with NotStartedError, what was asked before
-        and not sent yet is dropped, and what other tasks wait for ends with NotStartedError. No request that
-        starts or continues a motion is sent any more.
-
-        Ends within 2 s even on a dead link, and also when cancelled meanwhile: the cancellation is
-        raised once the hand has stopped. If the link is down, it is tried once more.
-
-        Of several calls under way the strongest counts, whichever comes first: without ``keep_grip``, then
-        with it, then ``halt=False``; one that is stronger than those before it has 2 s of its own. A halt or
-        a hold that was not delivered makes of ``halt=False`` a stop with ``keep_grip``. A hand that has
-        stopped is left as it is.
-
-        With ``keep_grip`` axes that move are held where they are, and rGTO stays set, so that what grips
-        goes on gripping while nobody is connected. But only when every axis has been seen at rest: on any
-        doubt (within half a second one has not come to rest; the link is or goes down; a fault; a sequence;
-        another client commands the gripper; ``halt()`` was asked) rGTO is cleared as ever, and the log says
-        why. Who sets the fingers going between the last look at them and the end of the connection is not
-        seen. What a real gripper does with a part, either way, is not known; and one that is not polled may
-        lose its activation, and the part: the next program finds it in RESET then.
-
-        Args:
-            halt: False disconnects and leaves the fingers to what they do; for programs that only look.
-            keep_grip: whether a grip stays in force; None for what the hand was made with.
-
-        Raises:
-            RuntimeError: called in another event loop than the hand runs in; it goes on. (When that loop
-                has been closed, nothing can reach the gripper any more: the hand counts as stopped, and
-                the fingers go on with what they do.)
-        """
-        check_flag("halt", halt)
-        keep_grip = self._options.keep_grip if keep_grip is None else check_flag("keep_grip", keep_grip)
-        self._abandon_if_loop_closed()
+    async def _stop(self, halt: bool, keep_grip: bool) -> None:
         if self._session is not None and not self._session.is_over:
             await self._session.stop(halt=halt, keep_grip=keep_grip)
 
-    def __repr__(self) -> str:
-        """Name, if it was given one, address and state."""
-        name = f"{self._options.given_name} " if self._options.given_name else ""
-        return f"<RobotiqHand {name}{self._options.address} {self.state.name}>"
+    # -- commands --------------------------------------------------------------------------------------
 
-    def _abandon_if_loop_closed(self) -> None:
-        if self._session is not None and self._session.lost_its_loop:
-            self._session.abandon()
+    async def _set(self, what: Literal["position", "speed", "force"], value: int, axes: Finger) -> None:
+        session, command = self._asked(), Command(axes, **{what: value})
+        await session.answered(lambda waiter: session.controller.command(command, waiter))
+
+    def _command(self, axes: Finger, position: int | None, speed: int | None, force: int | None) -> None:
+        session = self._asked()
+        session.ask(session.controller.command, Command(axes, position, speed, force))
+
+    async def _move(
+        self, axes: Finger, target: int, speed: int | None, force: int | None, timeout: float | None
+    ) -> MoveResult:
+        session = self._asked()
+        controller = session.controller
+        ended: asyncio.Future[MoveResult] = session.waiter()
+        move = Move(target, axes, now(), ended)
+        usual = session.ask(controller.move, move, speed, force)
+        limit = usual if timeout is None else timeout
+        with session.counters.move() as note:
+            try:
+                with anyio.move_on_after(limit):
+                    result = await ended
+                    note(result)
+                    return result
+            except asyncio.CancelledError:
+                session.ask(controller.abandon, move, unseen=True)
+                if ended.done() and not ended.cancelled():
+                    ended.exception()  # retrieved: asyncio would log it as never looked at
+                raise
+            finally:
+                # Also after a timeout: the axes that still move are held.
+                session.ask(controller.abandon, move)
+            raise MoveTimeoutError(
+                f"{axes} still moved after {limit:.2f} s on the way to {target}", self.status
+            )
+
+    async def _hold(self, axes: Finger) -> None:
+        session = self._asked()
+        await session.answered(lambda waiter: session.controller.hold(axes, waiter))
+
+    async def _halt(self) -> None:
+        session = self._asked()
+        if self.state in SEQUENCES:
+            await self._reset_for(Trigger.ASK_HALT)  # rGTO does not stop these
+        else:
+            await session.answered(session.controller.halt)
+
+    def _drop_requests(self, why: str) -> None:
+        """Drop what was asked and not sent, holds and halts aside: who asked commands no longer."""
+        if self._session is not None and not self._session.is_over:
+            self._session.ask(self._session.controller.drop_requests, MoveSupersededError(why))
+
+    # -- activation, faults ----------------------------------------------------------------------------
+
+    async def _activate(self) -> None:
+        session = self._asked()
+        if self.state in RUNNING:
+            return
+        under_way = self.state in (State.DO_ACTIVATION, State.WF_ACTIVATION)
+        await session.activated(None if under_way else session.controller.activate)
+
+    async def _reset(self) -> None:
+        await self._reset_for(Trigger.ASK_RESET)
+
+    async def _reset_for(self, trigger: Trigger) -> None:
+        session = self._asked()
+        await session.reach(
+            {State.RESET},
+            RESET_TIMEOUT_S,
+            ask=lambda: session.controller.reset(trigger),
+            failing={},
+            what="the gripper did not report the reset",
+        )
+
+    async def _atr(self) -> None:
+        session = self._asked()
+        # Only a reset ends a release; another client may then have activated the gripper.
+        ended = (State.RESET, State.WF_ACTIVATION, State.RUNNING_IDLE, State.FAULT)
+        await session.reach(
+            {State.ATR_DONE},
+            RELEASE_TIMEOUT_S,
+            ask=session.controller.release,
+            failing={
+                **dict.fromkeys(ended, lambda: NotActivatedError("the gripper was reset during the release")),
+                State.DO_RESET: lambda: InvalidStateError("reset() or halt() took over", State.DO_RESET),
+            },
+            what="the automatic release was not finished",
+        )
+
+    async def _recover(self, timeout: float | None) -> None:
+        limit = timeout or RECOVER_TIMEOUT_S
+        self._asked()
+        watch, resets = StallWatch(self._channels.listeners, self._machine), 0
+        with anyio.move_on_after(limit), watch as stall:
+            while self.state not in RUNNING:
+                with stall.ends_early() as step:
+                    await self._recover_step()
+                if step.cancelled_caught:
+                    self._check_worth_a_reset(resets)
+                    resets += 1
+                    await self.reset()
+            return
+        raise StateTimeoutError(f"the gripper is not active after {limit:g} s: {self.state.name}")
+
+    def _check_worth_a_reset(self, resets: int) -> None:
+        fault = self.status.fault
+        what = f"the gripper gets nowhere: {fault.description} (gFLT 0x{int(fault):02X})"
+        if resets == RESETS:
+            raise StateTimeoutError(
+                f"{what}, also after {resets} resets. Is its emergency stop released, and is it powered? "
+                "Switch its power off and on, look at its LED, then call recover() again"
+            )
+        self._options.log.warning("%s for %g s; it is reset and activated", what, STALLED_S)
+
+    async def _recover_step(self) -> None:
+        session, state = self._asked(), self.state
+        if state is State.RESET:
+            await self.activate()
+        elif state is State.ATR_DONE or (
+            state is State.FAULT and self.status.fault.severity is Severity.MAJOR
+        ):
+            await self.reset()
+        elif state is State.DISCONNECTED:
+            raise session.link_lost()
+        else:
+            # A minor fault, or a sequence under way: the next status may tell more.
+            await session.next_status()
+
+    # -- what the hand shows ---------------------------------------------------------------------------
+
+    @property
+    def state(self) -> State:
+        """The state of the hand."""
+        return self._machine.state
+
+    @property
+    def statistics(self) -> Statistics:
+        """Figures of the polling since the last start."""
+        if self._session is None:
+            return Counters().snapshot(0)
+        controller = self._session.controller
+        return self._session.counters.snapshot(controller.foreign_commands, controller.passing_faults)
+
+    @property
+    def _newest_status(self) -> RobotiqStatus | None:
+        return None if self._session is None else self._session.controller.status
+
+    def _is_moving(self) -> bool:
+        assert self._session is not None, "only asked of a hand that runs"
+        return self._session.controller.is_moving
+
+    def add_listener(
+        self, callback: Callable[[RobotiqStatus | Transition | SentRequest], None]
+    ) -> Callable[[], None]:
+        """Call a plain function with every status, change of state and request written, as it happens.
+
+        It is called in the hand's event loop, in the turn in which it happens: before any reader of a stream
+        and any awaiting caller goes on. Every poll waits for it, so it must be quick and must not block.
+        Calls come in order: a change of state before the status or the request that leads to it, and what the
+        callback itself brings about after the present item.
+
+        A callback that raises is logged with its traceback and not called again; the hand goes on. One that
+        is added before the start waits for it, and it outlasts :meth:`stop`, until you remove it.
+
+        Args:
+            callback: takes a RobotiqStatus, a Transition or a SentRequest.
+
+        Returns:
+            A function that removes it. Calling that twice does no harm.
+
+        Raises:
+            TypeError: callback cannot be called, or is a coroutine function.
+        """
+        if inspect.iscoroutinefunction(callback) or not callable(callback):
+            raise TypeError(f"callback must be a plain function, got {callback!r}")
+        self._check_may_listen()
+        return self._channels.listeners.add(callback)
+
+    async def _wait_for_state(self, states: Collection[State], timeout: float | None) -> State:
+        assert self._session is not None, "only asked of a hand that runs"
+        self._session.check_loop("the hand")
+        names = " or ".join(state.name for state in states)
+        return await self._session.reach(states, timeout, what=f"{names} was not reached")
+
+    # -- inside ----------------------------------------------------------------------------------------
+
+    @property
+    def _has_commanded(self) -> bool:
+        """Whether a request was written since the last start, or is pending; a refused one does not count."""
+        session = self._session
+        return session is not None and (session.counters.has_begun_to_write or session.controller.has_request)
+
+    def _asked(self) -> Session:
+        """The present run, for a request: refused before the start, after stop(), and from another loop."""
+        self._check_running()
+        session = self._session
+        assert session is not None, "it runs"
+        session.check_loop("the hand")
+        session.check_takes_requests()
+        return session

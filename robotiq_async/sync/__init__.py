@@ -3,10 +3,10 @@
 ======================  ===================================================================
 module                  what it holds
 ======================  ===================================================================
-``loop_thread``         the event loop of all of them, in a thread that is there while it is needed
-``caller``              how a call gets there, and what Ctrl-C, a fork and the end of the program do
-``blocking``            what the hand is made of; it and ``streams`` are written by hand
-``robotiq_hand``        and the others: made from :mod:`robotiq_async.hand` by docs/make_sync.py
+``robotiq_hand``        the hand: one line for each call of the async one
+``streams``             iterators over its statuses, transitions, requests and grip events
+``caller``              how a call gets to the event loop; Ctrl-C, a fork, the end of the program
+``loop_thread``         the event loop of all blocking hands, in a thread that lives while it is needed
 ======================  ===================================================================
 """
 

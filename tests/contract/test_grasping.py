@@ -20,20 +20,21 @@ from robotiq_async import (
     NotActivatedError,
     NotStartedError,
     State,
+    Stream,
 )
-from robotiq_async.hand import Hand, HandStream
+from robotiq_async.hand import Hand
 from tests.contract.bench import A, B, Bench, C, at_rest, bench, contract, ended
 
 GAINED, SLIPPED, LOST, RELEASED = GripChange
 
 
-async def heard(events: HandStream[GripEvent], count: int) -> list[GripEvent]:
+async def heard(events: Stream[GripEvent], count: int) -> list[GripEvent]:
     """The next events; they come soon, or not at all."""
     async with asyncio.timeout(20):
         return [await anext(events) for _ in range(count)]
 
 
-async def told(events: HandStream[GripEvent], count: int) -> list[tuple[GripChange, Finger]]:
+async def told(events: Stream[GripEvent], count: int) -> list[tuple[GripChange, Finger]]:
     """What the next events tell."""
     return [(event.change, event.finger) for event in await heard(events, count)]
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from robotiq_async import NotStartedError, RobotiqStatus, State
-from robotiq_async.hand import Hand, HandStream
+from robotiq_async import NotStartedError, RobotiqStatus, State, Stream
+from robotiq_async.hand import Hand
 from tests.contract.bench import LOCAL, REMOTE, A, Bench, bench, contract
 from tests.virtual import VirtualLoop
 
@@ -115,7 +115,7 @@ def test_a_loop_that_was_closed_under_it(where: str) -> None:
     loop = VirtualLoop()
     context = bench(where)
 
-    async def begin() -> tuple[Bench, Hand, HandStream[RobotiqStatus]]:
+    async def begin() -> tuple[Bench, Hand, Stream[RobotiqStatus]]:
         here = await context.__aenter__()
         hand = here.make()
         await hand.start()

@@ -9,20 +9,19 @@ import weakref
 
 import pytest
 
-from robotiq_async import Fault, RobotiqStatus, SentRequest, State, Transition
-from robotiq_async.hand import HandStream
+from robotiq_async import Fault, RobotiqStatus, SentRequest, State, Stream, Transition
 from tests.contract.bench import A, at_rest, bench, contract
 
 
-async def all_of(stream: HandStream[RobotiqStatus]) -> list[int]:
+async def all_of(stream: Stream[RobotiqStatus]) -> list[int]:
     return [status.sequence async for status in stream]
 
 
-async def changes(stream: HandStream[Transition]) -> list[Transition]:
+async def changes(stream: Stream[Transition]) -> list[Transition]:
     return [transition async for transition in stream]
 
 
-async def sent(stream: HandStream[SentRequest]) -> list[SentRequest]:
+async def sent(stream: Stream[SentRequest]) -> list[SentRequest]:
     return [request async for request in stream]
 
 

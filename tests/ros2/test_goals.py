@@ -94,12 +94,12 @@ async def test_a_canceled_goal_does_not_hold_what_the_next_one_moves(slow: Robot
 class DeafHand(FakeHand):
     """Its gripper moves for ever, and takes no hold."""
 
-    async def move(self, position: int, *_: Any, **__: Any) -> MoveResult:
-        self.command(position=position)
+    async def _move(self, axes: Finger, target: int, *_: Any) -> MoveResult:
+        self.command(axes, position=target)
         await asyncio.Event().wait()
         raise AssertionError
 
-    async def hold(self, fingers: Finger | int = Finger.ALL) -> None:  # noqa: ARG002
+    async def _hold(self, axes: Finger) -> None:  # noqa: ARG002
         raise ConnectionLostError("the link went down")
 
 

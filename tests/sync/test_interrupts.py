@@ -71,8 +71,9 @@ def test_what_was_asked_and_not_sent_yet_begins_no_more(
     def strike() -> None:
         until(lambda: bool(hand._caller._calls))
         interrupt()
-        controller = hand._inner._started().controller
-        until(lambda: is_caught.is_set() or controller.has_undelivered_stop)
+        session = hand._inner._session
+        assert session is not None
+        until(lambda: is_caught.is_set() or session.controller.has_undelivered_stop)
         wire.is_slow = False
 
     before = wire.targets()

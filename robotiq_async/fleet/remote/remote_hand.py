@@ -1,38 +1,92 @@
-"""RemoteHand: a hand that an agent on another host serves. Its options, its start, its end and its lease."""
+"""RemoteHand: a hand that an agent on another host serves."""
 
 from __future__ import annotations
 
-from types import TracebackType
-from typing import TYPE_CHECKING, Self
+import asyncio
+from collections.abc import Collection
+from contextlib import nullcontext
+from dataclasses import replace
+from typing import Final, Literal
 
-from ...runtime.event_loop import running_loop
-from ...runtime.log import Log
+from ...control.state_machine import RUNNING, refusal
+from ...hand import Hand
+from ...session.counters import Counters
 from ...session.ending import Ending
-from ...session.options import LONGEST_WAIT_S, check_units
-from ...session.streams import Channels
+from ...session.options import check_units
 from ...values.calibration import ForceCalibration, SpeedCalibration
 from ...values.checks import check_flag, check_seconds
-from ...values.enums import State
-from ...values.errors import InvalidStateError, NotStartedError
-from ..network.bus import Bus
+from ...values.enums import Finger, State
+from ...values.errors import (
+    InvalidStateError,
+    NotAllowedError,
+    NotStartedError,
+    RobotiqConnectionError,
+    StateTimeoutError,
+)
+from ...values.move_result import MoveResult
+from ...values.statistics import Statistics
+from ...values.status import RobotiqStatus
+from ...values.trigger import Trigger
+from ..network.bus import Bus, Urgency
 from ..network.route import parse_remote_address
-from .commands import RemoteCommands
+from ..wire.values import Fields, read_result, reading
 from .outbox import Outbox
 from .requests import no_answer_as_lost_connection
 from .session import CONNECT_S, RemoteSession
 
+COMMAND_S: Final = 5.0
+"""Seconds for what ends when the gripper acknowledges it."""
+SEQUENCE_S: Final = 130.0
+"""Seconds for an activation, a reset or a release; the agent has limits of its own, and they are shorter."""
+MOVE_S: Final = 100.0
+"""Seconds for a move without a timeout; the agent ends it by its own, which is shorter."""
+SLACK_S: Final = 5.0
+"""Seconds beyond a timeout that the agent watches over."""
+MOTIONS: Final = ("move", "set_position")
 
-class RemoteHand(RemoteCommands):
+
+class RemoteHand(Hand):
     """A Robotiq 3-Finger gripper on another host, served by ``robotiq-async agent`` there.
 
-    A :class:`~robotiq_async.hand.Hand`: the names, errors and promises are those of
-    :class:`~robotiq_async.RobotiqHand`, and docs/how-to/fleet.md lists what differs. Commanding
-    takes a lease, which this hand acquires when it starts and renews from its own event loop; a program that
-    hangs loses it, and what it had set going is then held. Reading is free, and so is :meth:`halt`.
+    What all hands promise is in :class:`~robotiq_async.hand.Hand`. Commanding takes a lease, which this
+    hand acquires when it starts and renews from its own event loop. A program that hangs loses the lease, and
+    what it had set going is then held. What differs from a hand of this process:
 
-    The safety of people is none of its business: a network can be cut at any moment. Nothing of this has run
-    on real hardware yet.
+    * :meth:`start` looks for the agent (ConnectFailedError, NotAllowedError) and acquires the lease
+      (ControlLostError: another client commands). Without the extra ``fleet`` it raises ImportError. A hand
+      that only reads activates nothing.
+    * :meth:`stop` gives the lease back; the agent's hand goes on. A hand without the lease stops no fingers.
+      If the event loop was closed, the agent holds what moves.
+    * Commands raise ControlLostError without the lease, and ConnectionLostError when the agent falls silent:
+      it may have carried them out, and holds what moves within its window. A command that the agent refuses
+      later than :meth:`command` returns is logged.
+    * :meth:`halt` takes no lease and asks again until it is answered. If another client commands the gripper,
+      that client loses the lease. ConnectionLostError means no answer within 2 s: the fingers MAY STILL MOVE.
+    * :attr:`state` is DISCONNECTED also while the agent is silent; that is a transition, too. Some statuses
+      may be missing, and :meth:`grip_events` follows those that arrived.
+
+    The safety of people must not depend on it: a network can be cut at any moment. Nothing of this has run on
+    real hardware yet. Making a hand checks every option; it opens nothing and needs no running loop.
+
+    Args:
+        address: ``zenoh://SITE/HOST/GRIPPER``; ``?connect=tls/HOST:7447&keys=FOLDER`` says how to get there.
+            What the address leaves out comes from the environment (``ROBOTIQ_ASYNC_CONNECT``,
+            ``ROBOTIQ_ASYNC_KEYS``); without that it is an agent on this machine.
+        control: True acquires the lease when the hand starts, None with the first command that is awaited,
+            False not at all: it only reads (and halts) unless :meth:`acquire` is called.
+        connect_timeout: seconds for finding the agent, 0.1..60.
+        bus: an open session to share; it stays open. None opens one.
+        calibration: the speeds of :attr:`units`; default timeouts are the agent's. None for the thesis's
+            gripper.
+        force_calibration: what :attr:`units` labels force values with. None for the manual's figures.
+        keep_grip: what :meth:`stop` and :meth:`release` do by default, and leaving the block does always.
+
+    Raises:
+        TypeError: an option of the wrong type.
+        ValueError: an option outside its range, or a malformed address.
     """
+
+    _session: RemoteSession | None = None
 
     def __init__(
         self,
@@ -45,90 +99,24 @@ class RemoteHand(RemoteCommands):
         force_calibration: ForceCalibration | None = None,
         keep_grip: bool = False,
     ) -> None:
-        """Check every option. Opens nothing and needs no running loop.
-
-        Args:
-            address: ``zenoh://SITE/HOST/GRIPPER``; ``?connect=tls/HOST:7447&keys=FOLDER`` says how to get
-                there. What the address does not say the environment does (``ROBOTIQ_ASYNC_CONNECT``,
-                ``ROBOTIQ_ASYNC_KEYS``), and without that it is an agent on this machine.
-            control: True acquires the lease when the hand starts, None with the first command that is
-                awaited, False not at all: it only reads (and halts) unless :meth:`acquire` is called.
-            connect_timeout: seconds for finding the agent, 0.1..60.
-            bus: an open session to share; it stays open. None opens one.
-            calibration: the speeds of :attr:`units`; default timeouts are the agent's. None for the thesis's
-                gripper.
-            force_calibration: what :attr:`units` labels force values with. None for the manual's figures.
-            keep_grip: what :meth:`stop` and :meth:`release` do unless told, and what leaving the block does.
-
-        Raises:
-            TypeError: an option of the wrong type.
-            ValueError: an option outside its range, or a malformed address.
-        """
         if control is not None and not isinstance(control, bool):
             raise TypeError(f"control must be True, False or None, got {control!r}")
-        self._name, self._route = parse_remote_address(address)
+        self._gripper, self._route = parse_remote_address(address)
         self._connect_timeout = check_seconds("connect_timeout", connect_timeout, 0.1, 60.0)
         self._control = control
-        self._units = check_units(calibration, force_calibration)
-        self._keep_grip = check_flag("keep_grip", keep_grip)
+        units = check_units(calibration, force_calibration)
+        super().__init__(str(self._gripper), units=units, keep_grip=check_flag("keep_grip", keep_grip))
         if bus is None:
-            self._route.configuration()  # malformed or unprotected: said here, and not when it starts
-        self._shared = bus
+            self._route.configuration()  # a malformed or unprotected route fails here, not at the start
+        self._shared_bus = bus
         self._opening: object = None
-        """Stands for the start that opens a session; None if there is none, or if it is to end."""
-        self._channels = Channels(Log(str(self._name)))
-        self._session: RemoteSession | None = None
+        """Identifies the start that opens a bus; None if there is none, or if stop() was called."""
         self._outbox: Outbox | None = None
+        """Of the present run, or the last one."""
 
     # -- lifetime --------------------------------------------------------------------------------------
 
-    async def __aenter__(self) -> Self:
-        """Start, with activation. See :meth:`start` for what it raises."""
-        await self.start()
-        return self
-
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Stop, also when the block failed or was cancelled."""
-        await self.stop()
-
-    if not TYPE_CHECKING:  # type checkers tell the mistake themselves
-
-        def __enter__(self) -> None:
-            """Refuse ``with``.
-
-            Raises:
-                TypeError: always.
-            """
-            raise TypeError("a RemoteHand is used with 'async with', in a coroutine")
-
-        def __exit__(self, *_: object) -> None:
-            """Never called; without it Python would not call the other one."""
-
-    async def start(self, activate: bool = True, *, wait: float = 0.0) -> None:
-        """Find the agent, acquire the lease, and activate a gripper that is reset: its fingers MOVE then.
-
-        A hand that only reads activates nothing. A failed or cancelled start leaves nothing running.
-
-        Args:
-            activate: False writes nothing to the gripper.
-            wait: seconds, 0..86400, for which there may be no agent or no gripper yet. It may be activated
-                long after the call, and its fingers MOVE only then.
-
-        Raises:
-            RuntimeError: not in a running asyncio event loop.
-            InvalidStateError: this hand is started already.
-            ConnectFailedError: no agent that serves this gripper.
-            ImportError: the extra fleet is not installed.
-            NotAllowedError: the agent's access rules say no.
-            ControlLostError: another client commands the gripper.
-            RobotiqError: as for a hand of this process, where the gripper is.
-        """
-        check_flag("activate", activate)
-        wait = check_seconds("wait", wait, 0.0, LONGEST_WAIT_S)
-        running_loop()
-        self._abandon_if_loop_closed()
+    async def _start(self, activate: bool, wait: float) -> None:
         before = self._session
         if self._opening is not None or (before is not None and not before.has_ended):
             raise InvalidStateError(
@@ -136,66 +124,43 @@ class RemoteHand(RemoteCommands):
                 self.state,
                 {State.DISCONNECTED, State.SHUTDOWN},
             )
-        bus = await self._open()
+        bus = await self._open_bus()
         self._session = session = RemoteSession(
-            self._name,
+            self._gripper,
             bus,
             self._channels,
             wants_control=self._control is True,
-            owns_bus=bus is not self._shared,
+            owns_bus=bus is not self._shared_bus,
             before=None if before is None else before.mirror,
         )
         self._outbox = Outbox(session)
         try:
             with no_answer_as_lost_connection():
                 await session.connect(max(self._connect_timeout, wait))
-            if activate and self._control:
-                await self._activate_if_reset()
+            activates = activate and self._control
+            if activates and self.state in (State.RESET, State.DO_ACTIVATION, State.WF_ACTIVATION):
+                await self.activate()
         except BaseException:
             await self.stop()
             raise
 
-    async def stop(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:
-        """Stop the fingers, give the lease back, and disconnect; the agent's hand goes on.
-
-        Ends within 2 s also when the agent is silent, or when cancelled meanwhile. A hand that does not hold
-        the lease stops no fingers. Idempotent.
-
-        Args:
-            halt: False leaves the fingers to what they do.
-            keep_grip: True lets the agent hold what moves, so that a grip stays in force; it halts when an
-                axis does not come to rest, and in a fault or a sequence. None for what the hand was made
-                with.
-
-        Raises:
-            RuntimeError: called in another event loop than the hand runs in; it goes on. (When that loop
-                has been closed, the hand counts as stopped, and its agent holds what moves.)
-        """
-        check_flag("halt", halt)
-        keep_grip = self._keep_grip if keep_grip is None else check_flag("keep_grip", keep_grip)
-        self._abandon_if_loop_closed()
+    async def _stop(self, halt: bool, keep_grip: bool) -> None:
         self._opening = None
         session = self._session
         if session is not None and not session.has_ended:
             session.check_loop()
-            assert self._outbox is not None
+            assert self._outbox is not None, "made with the session"
             self._outbox.drop()
             await session.close(Ending.of(halt=halt, keep_grip=keep_grip))
 
-    async def _open(self) -> Bus:
-        """The session to use.
-
-        Raises:
-            NotStartedError: stop() was called meanwhile.
-            RobotiqError: none could be opened.
-        """
-        if self._shared is not None:
-            return self._shared
+    async def _open_bus(self) -> Bus:
+        if self._shared_bus is not None:
+            return self._shared_bus
         from ..network.zenoh_bus import open_bus  # noqa: PLC0415  # needs the extra
 
         self._opening = opening = object()
         try:
-            bus = await open_bus(self._route.configuration(), str(self._name))
+            bus = await open_bus(self._route.configuration(), self._address)
             if self._opening is not opening:
                 await bus.close()
                 raise NotStartedError("stop() was called meanwhile")
@@ -203,14 +168,6 @@ class RemoteHand(RemoteCommands):
             if self._opening is opening:
                 self._opening = None
         return bus
-
-    def _abandon_if_loop_closed(self) -> None:
-        if self._session is not None and self._session.lost_its_loop:
-            self._session.abandon()
-
-    async def _activate_if_reset(self) -> None:
-        if self.state in (State.RESET, State.DO_ACTIVATION, State.WF_ACTIVATION):
-            await self.activate()
 
     # -- the lease -------------------------------------------------------------------------------------
 
@@ -220,7 +177,7 @@ class RemoteHand(RemoteCommands):
         return self._session is not None and not self._session.is_over and self._session.keeper.is_in_control
 
     async def acquire(self) -> None:
-        """Get the lease, if nobody else has it.
+        """Get the lease, unless another client has it.
 
         Raises:
             ControlLostError: another client commands the gripper.
@@ -230,7 +187,7 @@ class RemoteHand(RemoteCommands):
             await self._asked().keeper.acquire()
 
     async def take(self) -> None:
-        """Get the lease, whoever has it: what that one commanded and still moves is held.
+        """Get the lease, also from another client: what that client commanded and still moves is held.
 
         Raises:
             RobotiqError: not started, or the agent does not answer.
@@ -239,7 +196,7 @@ class RemoteHand(RemoteCommands):
             await self._asked().keeper.acquire(take=True)
 
     async def release(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:
-        """Give the lease back, and read on.
+        """Give the lease back, and go on reading.
 
         Args:
             halt: False leaves the fingers to what they do.
@@ -249,12 +206,134 @@ class RemoteHand(RemoteCommands):
             RobotiqError: not started, the agent does not answer, or the fingers were not seen to stop.
         """
         check_flag("halt", halt)
-        keep_grip = self._keep_grip if keep_grip is None else check_flag("keep_grip", keep_grip)
+        ending = Ending.of(halt=halt, keep_grip=self._keeps_grip(keep_grip))
         keeper = self._asked().keeper
-        keeper.give_back(Ending.of(halt=halt, keep_grip=keep_grip))
+        keeper.give_back(ending)
         with no_answer_as_lost_connection():
             await keeper.given_back()
 
-    def __repr__(self) -> str:
-        """Address and state."""
-        return f"<RemoteHand {self.address} {self.state.name}>"
+    # -- commands --------------------------------------------------------------------------------------
+
+    async def _set(self, what: Literal["position", "speed", "force"], value: int, axes: Finger) -> None:
+        await self._ask(f"set_{what}", {"value": value, "fingers": int(axes)}, COMMAND_S)
+
+    def _command(self, axes: Finger, position: int | None, speed: int | None, force: int | None) -> None:
+        session = self._asked()
+        session.check_control()
+        if self.state not in RUNNING:
+            raise refusal(Trigger.ASK_COMMAND, self.state, session.mirror.status)
+        changes = {"position": position, "speed": speed, "force": force}
+        assert self._outbox is not None, "made with the session"
+        self._outbox.put(axes, {name: value for name, value in changes.items() if value is not None})
+
+    async def _move(
+        self, axes: Finger, target: int, speed: int | None, force: int | None, timeout: float | None
+    ) -> MoveResult:
+        arguments: Fields = {
+            "position": target,
+            "fingers": int(axes),
+            "speed": speed,
+            "force": force,
+            "timeout": timeout,
+        }
+        value = await self._ask("move", arguments, MOVE_S if timeout is None else timeout + SLACK_S)
+        assert self._session is not None, "it has answered"
+        mirror = self._session.mirror
+        with reading("a result"):
+            result = read_result(value, mirror.clock)
+            return replace(result, status=mirror.renumbered(result.status))
+
+    async def _hold(self, axes: Finger) -> None:
+        await self._ask("hold", {"fingers": int(axes)}, COMMAND_S)
+
+    async def _halt(self) -> None:
+        session = self._asked()
+        assert self._outbox is not None, "made with the session"
+        self._outbox.clear()
+        halting = session.stops.halt()
+        try:
+            with no_answer_as_lost_connection():
+                await asyncio.shield(halting)
+        except asyncio.CancelledError:
+            if not halting.cancelled():
+                # It goes on; retrieving its error keeps asyncio from logging that it was never looked at.
+                halting.add_done_callback(lambda task: task.cancelled() or task.exception())
+            elif session.is_over:
+                raise NotStartedError("the hand was stopped") from None
+            raise
+
+    async def _activate(self) -> None:
+        await self._ask("activate", {}, SEQUENCE_S)
+
+    async def _reset(self) -> None:
+        await self._ask("reset", {}, SEQUENCE_S)
+
+    async def _atr(self) -> None:
+        await self._ask("atr", {}, SEQUENCE_S)
+
+    async def _recover(self, timeout: float | None) -> None:
+        await self._ask("recover", {"timeout": timeout}, SEQUENCE_S if timeout is None else timeout + SLACK_S)
+
+    async def _ask(self, name: str, arguments: Fields, timeout: float) -> Fields:
+        """Have the agent's hand do something. If the call is cancelled, the agent calls it off."""
+        session, outbox = self._asked(), self._outbox
+        assert outbox is not None, "made with the session"
+        if self._control is None and not session.keeper.is_in_control and session.keeper.lost is None:
+            with no_answer_as_lost_connection():
+                await session.keeper.acquire()
+        session.check_control()
+        # What command() asked before goes first.
+        outbox.flush()
+        call = session.call(arguments)
+        try:
+            with no_answer_as_lost_connection(), outbox.motion() if name in MOTIONS else nullcontext():
+                value: Fields = await session.send(
+                    call, f"cmd/{name}", timeout=timeout, urgency=Urgency.COMMAND
+                )
+        except (asyncio.CancelledError, RobotiqConnectionError, NotAllowedError):
+            # Also after an answer that leaves open whether the request was carried out.
+            cancelling = session.stops.call_off(name, call)
+            if cancelling is not None and name in MOTIONS:
+                outbox.count_motion(cancelling)
+            raise
+        return value
+
+    # -- what the hand shows ---------------------------------------------------------------------------
+
+    @property
+    def state(self) -> State:
+        """The state of the agent's hand; DISCONNECTED also while the agent is silent."""
+        return State.DISCONNECTED if self._session is None else self._session.mirror.state
+
+    @property
+    def statistics(self) -> Statistics:
+        """Figures of the agent's polling, at most a second old."""
+        return Counters().snapshot(0) if self._session is None else self._session.statistics
+
+    @property
+    def _newest_status(self) -> RobotiqStatus | None:
+        return None if self._session is None else self._session.mirror.status
+
+    def _is_moving(self) -> bool:
+        assert self._session is not None, "only asked of a hand that runs"
+        assert self._outbox is not None, "made with the session"
+        newest = self._session.mirror.newest
+        return self._outbox.is_moving or (newest is not None and newest.is_moving)
+
+    async def _wait_for_state(self, states: Collection[State], timeout: float | None) -> State:
+        with self._asked().waiters.watching(states, {}) as reached:
+            try:
+                async with asyncio.timeout(timeout):
+                    return await reached
+            except TimeoutError:
+                names = " or ".join(state.name for state in states)
+                raise StateTimeoutError(
+                    f"{names} was not reached within {timeout:g} s (now {self.state.name})"
+                ) from None
+
+    def _asked(self) -> RemoteSession:
+        """The present run, for a request: refused before the start, after stop(), and from another loop."""
+        self._check_running()
+        assert self._session is not None, "it runs"
+        self._session.check_loop()
+        return self._session

@@ -240,13 +240,13 @@ class RemoteSession:
         if self.loop.is_closed():
             raise NotStartedError("the event loop that the hand ran in was closed: start() it again")
 
-    def check_loop(self) -> None:
+    def check_loop(self, what: str = "the hand") -> None:
         """Refuse a call from another thread or event loop.
 
         Raises:
             RuntimeError: it is one.
         """
-        check_loop(self.loop, "the hand")
+        check_loop(self.loop, what)
 
     # -- what is heard ---------------------------------------------------------------------------------
 

@@ -13,9 +13,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
-from ...hand import Hand, HandStream
+from ...hand import Hand
 from ...runtime.clock import now
 from ...runtime.log import Log
+from ...session.streams import Stream
 from ...values.enums import Fault
 from ...values.errors import RobotiqConnectionError
 from ...values.events import SentRequest, Transition
@@ -95,10 +96,10 @@ class Message:
 class _Source:
     """A stream of a hand that is opened again when it ends."""
 
-    def __init__(self, open_stream: Callable[[], HandStream[Any]], publish: Callable[[Any], None]) -> None:
+    def __init__(self, open_stream: Callable[[], Stream[Any]], publish: Callable[[Any], None]) -> None:
         self._open_stream = open_stream
         self._publish = publish
-        self._stream: HandStream[Any]
+        self._stream: Stream[Any]
         self._missed_before = 0
 
     @property

@@ -7,8 +7,9 @@ from collections import deque
 from collections.abc import Iterator
 from typing import Final
 
-from ...hand import Hand, HandStream
+from ...hand import Hand
 from ...runtime.clock import now
+from ...session.streams import Stream
 from ...values.enums import AXES, Fault, State
 from ...values.errors import NotStartedError
 from ...values.events import Transition
@@ -33,8 +34,8 @@ class HandNews:
     def __init__(self, hand: Hand) -> None:
         self.hand = hand
         self.problem = ""
-        self._statuses: HandStream[RobotiqStatus]
-        self._transitions: HandStream[Transition]
+        self._statuses: Stream[RobotiqStatus]
+        self._transitions: Stream[Transition]
         self._events: deque[Fields] = deque(maxlen=EVENTS)
         self._peaks = [0] * len(AXES)
         self._fault = Fault.NONE

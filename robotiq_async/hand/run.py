@@ -1,0 +1,44 @@
+"""What hands of any kind use: a run, from a start to the next stop, and a name for the errors of calls."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from ..values.errors import RobotiqError
+
+
+class Run(Protocol):
+    """What the hand needs of its present run, from a start to the next stop."""
+
+    is_over: bool
+
+    @property
+    def lost_its_loop(self) -> bool:
+        """Whether the event loop was closed before the stop."""
+
+    def check_running(self) -> None:
+        """Raise NotStartedError, or why the link was given up, if the run has ended."""
+
+    def check_loop(self, what: str) -> None:
+        """Raise RuntimeError if called outside the event loop of the run."""
+
+    def abandon(self) -> None:
+        """End a run whose event loop was closed."""
+
+
+class NamesErrors:
+    """Puts the name of a hand into every RobotiqError that leaves a block, if it was given one.
+
+    The errors are made in many places, most of which know no names.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __enter__(self) -> None:
+        """Nothing to prepare: one object serves any number of calls at a time."""
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        """Name the error."""
+        if self._name and isinstance(error, RobotiqError):
+            error.hand = self._name
