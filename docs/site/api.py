@@ -75,7 +75,7 @@ def parts() -> dict[str, Part]:
         ),
         "sync.md": Part(
             "The hand without await",
-            "For scripts and notebooks: made from the async one, with the same names.",
+            "For scripts and notebooks: the calls of the async one, which describes them.",
             tuple(exports(f"{PACKAGE}.sync")),
         ),
         "values.md": Part(
