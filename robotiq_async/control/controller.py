@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from ..values.enums import NO_AXES, Finger, Severity, State
+from ..values.enums import AXES, NO_AXES, Finger, Severity, State
 from ..values.errors import (
     ConnectionLostError,
     GripperFaultError,
@@ -32,7 +32,7 @@ from .motion import Move
 from .passing_fault import PassingFault
 from .requests.merging import merged
 from .requests.pending import Command
-from .requests.shadow import NEVER, RequestShadow
+from .requests.shadow import NEVER, RequestShadow, Whose
 from .sequences import Sequence, activation, automatic_release, reset, shutdown
 from .state_machine import RUNNING, StateMachine
 from .triggers import classify
@@ -122,7 +122,8 @@ class Controller:
         self.command(Command(move.axes, move.position, speed, force))
         self._callers.moves.add(move)
         assert self.status is not None, "the hand takes commands, so a status has been read"
-        speeds = self._shadow.speeds | self._callers.pending.speeds
+        written = {axis: asked.speed for axis, asked in zip(AXES, self._shadow.base.axes, strict=True)}
+        speeds = written | self._callers.pending.speeds
         return move.default_timeout(self.status, speeds, self._closing_time)
 
     def abandon(self, move: Move, *, unseen: bool = False) -> None:
@@ -238,7 +239,14 @@ class Controller:
         if self._activating:
             self._begin(reset(self._shadow.at_rest))
         elif self.status is not None:
-            self._begin(self._grip_keeper.sequence() if keep_grip else shutdown(self._shadow.last_image))
+            stop = self._image_to_stop
+            self._begin(self._grip_keeper.sequence(stop) if keep_grip else shutdown(stop))
+
+    def _image_to_stop(self, status: RobotiqStatus) -> Request | None:
+        """The image that stops the fingers whoever moves them; None when there is nothing to stop."""
+        if classify(status) is Trigger.SEEN_READY:
+            self._shadow.follow(self._shadow.identify(), status)
+        return self._shadow.stop_image(status)
 
     # -- what is known ---------------------------------------------------------------------------------
 
@@ -283,13 +291,12 @@ class Controller:
         if self._callers.halting and self._early_stop is None:
             self._callers.see_halt(status, self._shadow.acts)
         if after in RUNNING:
-            self._shadow.see_arrivals(status)
-            self._shadow.see_contacts(status)
-            arrived = self._shadow.arrived
+            self._shadow.see_axes(status)
+            arrived = self._shadow.arrivals.axes
             if self._first_motion.is_watched:
                 arrived &= ~self._see_first_motion(status)
             if self._callers.moves:
-                self._callers.moves.see(status, self._shadow.acts, arrived, self._shadow.limited)
+                self._callers.moves.see(status, self._shadow.acts, arrived, self._shadow.arrivals.limited)
 
     @property
     def is_undecided(self) -> bool:
@@ -307,11 +314,13 @@ class Controller:
         """Whether a stop is to be written. It does not wait for a status that may never come."""
         if self.machine.sequence is None or self._judged is None:
             return self._callers.pending.halting is not None
-        state, may_move = self.machine.state, self._activating or self._shadow.may_go(self._judged)
+        if self._step or self.machine.state not in (State.DO_RESET, State.DO_SHUTDOWN):
+            return False
+        if self.machine.state is State.DO_RESET:
+            return True
         if self._keeps_grip and self._grip_keeper.rests(self._judged):
-            may_move = False  # whether to leave it so is decided on what is read next
-        stops = state is State.DO_RESET or (state is State.DO_SHUTDOWN and may_move)
-        return stops and not self._step
+            return False  # the next status decides whether rGTO stays set
+        return self._activating or self._shadow.stop_image(self._judged) is not None
 
     def wait(self, now: float) -> float:
         """Seconds until the next write may leave; 0 for one that stops, unless it is a repetition."""
@@ -343,24 +352,25 @@ class Controller:
         shadow = self._shadow
         if self._passing_fault.is_open and pending.halting is None and not pending.holds_at_most:
             return None  # if it lasts, what would move is not sent at all
-        if pending.halting is None and not shadow.is_ready(status, moves=bool(pending.positions)):
+        base = shadow.base
+        if pending.halting is None and not shadow.is_ready(status, base, moves=bool(pending.positions)):
             return None  # for a halt it is never too early
         image = merged(
-            shadow.base,
+            base,
             pending,
             status,
-            gripping=shadow.gripping(status),
-            arrived=shadow.arrived,
+            gripping=shadow.grips.held(status, base),
+            arrived=shadow.arrivals.axes,
             doubtful=shadow.doubtful(status) if pending.hold else NO_AXES,
         )
-        if pending.holds_at_most and image == shadow.base:
+        if pending.holds_at_most and image == base:
             # Nothing drifts; but what was written before may not act yet, and then something might.
             if shadow.is_settled:
                 self._callers.nothing_to_send()
                 self.machine.delivered()
             return None
         sent = self._callers.take()
-        if image.go and not shadow.base.go:
+        if image.go and not base.go:
             self._grip_keeper.tell_of_lost_grips(status, sent.moved)
         self._note_early_stop(image, now, stops=sent.halting is not None)
         number = shadow.writing(image, sent.moved, now)
@@ -414,7 +424,7 @@ class Controller:
         self.machine.begin(sequence)
         self._step, self._early_stop = 0, None
         self._hold_on_return = NO_AXES
-        self._shadow.forget_contacts()
+        self._shadow.grips.forget()
 
     def _next_step(self, status: RobotiqStatus, now: float) -> Request | None:
         """What the sequence under way wants written; at its end, see where that leaves the hand."""
@@ -437,7 +447,10 @@ class Controller:
             is_ours = self._shadow.restart(status)
             self._first_motion.over()
         else:  # what it was to begin from was gone: nothing was sent
-            self._activating, is_ours = False, self._shadow.is_ours(status)
+            self._activating, whose = False, self._shadow.identify()
+            is_ours = whose is not Whose.FOREIGN
+            if is_ours:
+                self._shadow.follow(whose, status)
         if self.machine.state in _COMMANDED and not is_ours:
             self._take_over(status)
         if self._activating:
@@ -475,8 +488,10 @@ class Controller:
             self._return(status)
         elif before not in _COMMANDED:
             self._shadow.adopt(status)
-        elif not self._shadow.is_ours(status):
+        elif (whose := self._shadow.identify()) is Whose.FOREIGN:
             self._take_over(status)
+        elif whose is not Whose.OURS:
+            self._shadow.follow(whose, status)
 
     def _return(self, status: RobotiqStatus) -> None:
         """The link is back: go on from the image that the gripper shows, or adopt it."""
@@ -490,7 +505,7 @@ class Controller:
     def _see_first_motion(self, status: RobotiqStatus) -> Finger:
         """See whether the gripper follows the first motion on a new link; return the axes that do not."""
         still, is_ignored = self._first_motion.see(
-            status, self._shadow.base, self._shadow.acts, self._shadow.moment
+            status, self._shadow.base, self._shadow.acts, self._shadow.now
         )
         if is_ignored:
             error = MoveIgnoredError(
@@ -516,7 +531,7 @@ class Controller:
     def _take_over(self, status: RobotiqStatus) -> None:
         """Another client commands the gripper: take over its requests, or our next write undoes them."""
         self.foreign_commands += 1
-        limited = self._shadow.limited
+        limited = self._shadow.arrivals.limited
         self._shadow.see_others()
         if status.timestamp - self._warned >= WARNING_S:
             self._warned = status.timestamp

@@ -9,6 +9,7 @@ docs/decisions/keeping-a-grip.md has the reasons.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Final
 
 from ..runtime.log import Log, log
@@ -18,7 +19,7 @@ from ..values.status import RobotiqStatus
 from ..values.trigger import Trigger
 from .requests.merging import merged
 from .requests.pending import PendingCommand
-from .requests.shadow import RequestShadow
+from .requests.shadow import RequestShadow, Whose
 from .sequences import Sequence, stop_fingers
 from .state_machine import RUNNING
 from .triggers import classify
@@ -50,43 +51,51 @@ class GripKeeper:
         """Whether every axis is known to rest under what it was asked last, and there is no fault."""
         shadow = self._shadow
         ready = classify(status) is Trigger.SEEN_READY and status.fault is Fault.NONE and not self.doubt
-        rests = not status.moving and shadow.arrived is Finger.ALL and shadow.is_certain
+        rests = not status.moving and shadow.arrivals.axes is Finger.ALL and shadow.is_certain
         return ready and status.go_echo and shadow.is_settled and rests
 
-    def sequence(self) -> Sequence:
-        """Hold what moves and leave rGTO set once everything rests; on any doubt, clear it and see it."""
+    def sequence(self, image_to_stop: Callable[[RobotiqStatus], Request | None]) -> Sequence:
+        """Hold what moves and leave rGTO set once everything rests.
+
+        On any doubt it writes ``image_to_stop`` of the newest status, and sees that it acts.
+        """
         status = yield None
         # How long an axis has stood still is counted by when that was asked: replies may be looked at late.
         until, since, may_hold = status.timestamp + KEEP_S, math.inf, True
         while True:
-            self._shadow.see_arrivals(status)
-            if doubt := self._doubt(status, until):
+            self._shadow.see_axes(status)
+            if doubt := self.doubt or self._trouble(status):
+                break
+            self._shadow.follow(self._shadow.identify(), status)
+            if doubt := self._unrest(status, until):
                 break
             image = self._held(status) if may_hold and self._shadow.is_certain else None
             if image is not None:
                 may_hold, since = False, math.inf
                 status = yield image
                 continue
-            since = min(since, self._shadow.asked) if self.rests(status) else math.inf
-            if self._shadow.asked - since >= REST_S:
+            since = min(since, self._shadow.now.time) if self.rests(status) else math.inf
+            if self._shadow.now.time - since >= REST_S:
                 self._log.info("stopped with rGTO set; in contact: %s", status.contacts or "nothing")
                 return
             status = yield None
-        last = self._shadow.last_image(status)
+        last = image_to_stop(status)
         if last is not None:
             self._log.warning("rGTO is cleared, and no grip is kept: %s", doubt)
             yield from stop_fingers(last)
 
-    def _doubt(self, status: RobotiqStatus, until: float) -> str:
-        """Why the fingers cannot be left as they are; empty for no reason."""
-        if self.doubt:
-            return self.doubt
+    def _trouble(self, status: RobotiqStatus) -> str:
+        """Why a gripper in this condition cannot keep its grip; empty for no reason."""
         condition = classify(status)
         if condition is not Trigger.SEEN_READY or status.fault is not Fault.NONE:
             return f"the {condition.value} ({status.fault.description})"
-        if not self._shadow.is_ours(status):
+        if self._shadow.identify() is Whose.FOREIGN:
             return "another client commands the gripper"
-        if status.timestamp - self._shadow.asked > KEEP_S:
+        return ""
+
+    def _unrest(self, status: RobotiqStatus, until: float) -> str:
+        """Why the axes cannot be left as they are; empty for no reason."""
+        if status.timestamp - self._shadow.now.time > KEEP_S:
             return "the newest status is old: something holds up the event loop"
         # An object status that may be late is worth a wait; what may come of a lost link is not.
         is_late = self._shadow.is_adoption_late and not status.moving and status.timestamp < until
@@ -107,7 +116,7 @@ class GripKeeper:
             held,
             status,
             gripping=NO_AXES,
-            arrived=shadow.arrived,
+            arrived=shadow.arrivals.axes,
             doubtful=shadow.doubtful(status),
         )
         return None if image == shadow.base else image
@@ -119,7 +128,7 @@ class GripKeeper:
             status: the newest one.
             moved: the axes that get a position.
         """
-        axes = status.contacts & ~self._shadow.gripping(status) & ~moved
+        axes = status.contacts & ~self._shadow.grips.held(status, self._shadow.base) & ~moved
         if axes:
             self._log.warning(
                 "%s in contact while rGTO was clear: held in place, and gripping no longer", axes

@@ -25,5 +25,5 @@ def shadow() -> Shadow:
 def ours(shadow: Shadow) -> Shadow:
     """Of a gripper that we have sent from 100 to 200."""
     shadow.write(image(200))
-    assert shadow.is_ours(shadow.shown(shows(200, 1.1), 1.1))
+    assert shadow.follows(shadow.shown(shows(200, 1.1), 1.1))
     return shadow

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robotiq_async.control.requests.shadow import RequestShadow
+from robotiq_async.control.requests.shadow import RequestShadow, Whose
 from robotiq_async.control.requests.writes import WriteHistory
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.request import AxisRequest, Request
@@ -46,17 +46,24 @@ class Shadow(RequestShadow):
 
     def __init__(self) -> None:
         super().__init__(128, 64)
-        self.now = 0.0
+        self.at = 0.0
 
     def shown(self, status: RobotiqStatus, at: float) -> RobotiqStatus:
-        self.now = at
+        self.at = at
         self.see(status, at)
         return status
 
+    def follows(self, status: RobotiqStatus) -> bool:
+        """Whether it goes on from a status that shows requests of ours, or those that were adopted."""
+        whose = self.identify()
+        if whose is not Whose.FOREIGN:
+            self.follow(whose, status)
+        return whose is not Whose.FOREIGN
+
     def write(self, request: Request, moved: Finger = Finger.ALL, *, answered: bool = True) -> int:
-        number = self.writing(request, moved, self.now)
+        number = self.writing(request, moved, self.at)
         if answered:
-            self.acknowledged(self.now)
+            self.acknowledged(self.at)
         else:
             self.lost()
         return number

@@ -22,7 +22,6 @@ def positions(request: Request) -> list[int]:
 
 def test_before_anything_is_known_every_axis_has_the_settings_of_the_hand() -> None:
     shadow = RequestShadow(128, 64)
-    assert shadow.speeds == dict.fromkeys(AXES, 128)
     assert shadow.base == Request(axes=(AxisRequest(0, 128, 64),) * 4)
 
 
@@ -45,7 +44,7 @@ def test_a_moving_gripper_that_is_found_is_not_certain_before_it_has_shown_its_d
     shadow, moving = Shadow(), status_of(0x39, 0x00, echo=100, position=50)
     shadow.returned(shadow.shown(moving, 1.0))
     assert not shadow.is_certain
-    assert shadow.is_ours(shadow.shown(moving, 1.0 + DIRECTION_WAIT_S))
+    assert shadow.follows(shadow.shown(moving, 1.0 + DIRECTION_WAIT_S))
     assert shadow.is_certain
 
 
@@ -63,21 +62,20 @@ def test_at_rest_nothing_could_be_woken(ours: Shadow) -> None:
 def test_the_last_image_written_is_what_the_next_is_made_from(shadow: Shadow) -> None:
     shadow.write(image(200))
     assert shadow.base == image(200)
-    assert list(shadow.speeds.values()) == [axis.speed for axis in image(200).axes]
     assert shadow.ours == Finger.ALL
 
 
 def test_a_write_acts_once_it_shows(shadow: Shadow) -> None:
     number = shadow.write(image(200))
-    assert shadow.is_ours(shadow.shown(shows(100, 1.01), 1.01))
+    assert shadow.follows(shadow.shown(shows(100, 1.01), 1.01))
     assert not shadow.acts(number)
     assert not shadow.is_settled
     assert shadow.may_begin_to_move
-    assert shadow.is_ours(shadow.shown(shows(200, 1.02), 1.02))
+    assert shadow.follows(shadow.shown(shows(200, 1.02), 1.02))
     assert shadow.acts(number)
     assert shadow.is_settled
     assert shadow.may_begin_to_move, "until gDT can be believed"
-    shadow.see_arrivals(shows(200, 1.02))
+    shadow.see_axes(shows(200, 1.02))
     assert not shadow.may_begin_to_move
 
 
@@ -105,14 +103,14 @@ def test_a_speed_that_does_not_act_yet_sets_nothing_in_motion_while_rgto_is_clea
 
 
 def test_what_we_never_wrote_is_anothers(ours: Shadow) -> None:
-    assert not ours.is_ours(ours.shown(shows(77, 1.2), 1.2))
+    assert not ours.follows(ours.shown(shows(77, 1.2), 1.2))
 
 
 def test_the_requests_of_another_client_are_what_the_next_image_is_made_from(ours: Shadow) -> None:
     status = ours.shown(shows(77, 1.2), 1.2)
     ours.adopt(status)
     assert ours.base == image(77), "speed and force stay as we last wrote them: they have no echo"
-    assert ours.is_ours(ours.shown(shows(77, 1.3), 1.3))
+    assert ours.follows(ours.shown(shows(77, 1.3), 1.3))
 
 
 def test_an_axis_that_another_client_leaves_alone_stays_ours(shadow: Shadow) -> None:
@@ -128,7 +126,7 @@ def test_our_write_that_shows_after_another_clients_is_gone_on_from(ours: Shadow
     ours.write(image(30))
     ours.adopt(ours.shown(shows(77, 1.2), 1.2))
     assert not ours.is_certain, "our write may still act"
-    assert ours.is_ours(ours.shown(shows(30, 1.3), 1.3))
+    assert ours.follows(ours.shown(shows(30, 1.3), 1.3))
     assert ours.base == image(30)
     assert ours.ours == Finger.ALL
     assert ours.is_certain
@@ -139,7 +137,7 @@ def test_who_writes_again_and_again_does_not_make_us_wait_again_and_again(shadow
     for n in range(10):
         at = 2.0 + n * DIRECTION_WAIT_S / 5
         moving = status_of(0x39, 0x00, echo=150 + n, position=50)
-        assert not shadow.is_ours(shadow.shown(moving, at))
+        assert not shadow.follows(shadow.shown(moving, at))
         shadow.adopt(moving)
     assert shadow.is_certain
 
@@ -174,14 +172,14 @@ def test_a_write_that_may_have_arrived_is_waited_for(ours: Shadow) -> None:
     ours.returned(ours.shown(shows(200, 1.2), 1.2))
     assert ours.base == image(200)
     assert not ours.is_certain
-    assert ours.is_ours(ours.shown(shows(200, 1.15 + SILENT_S), 1.15 + SILENT_S))
+    assert ours.follows(ours.shown(shows(200, 1.15 + SILENT_S), 1.15 + SILENT_S))
     assert ours.is_certain, "what has not shown by now has not arrived"
 
 
 def test_a_write_that_has_arrived_all_the_same_is_gone_on_from(ours: Shadow) -> None:
     ours.write(image(30), answered=False)
     ours.returned(ours.shown(shows(200, 1.2), 1.2))
-    assert ours.is_ours(ours.shown(shows(30, 1.3), 1.3))
+    assert ours.follows(ours.shown(shows(30, 1.3), 1.3))
     assert ours.base == image(30)
     assert ours.is_certain
 

@@ -8,23 +8,34 @@ written, and an adopted gripper's requests are only known from its status. No I/
 from __future__ import annotations
 
 from dataclasses import replace
+from enum import Enum
 from functools import reduce
 from operator import or_
 from typing import Final
 
 from ...runtime.log import Log, log
-from ...values.enums import AXES, NO_AXES, Finger, ObjectStatus
+from ...values.enums import AXES, NO_AXES, Finger
 from ...values.request import AxisRequest, Request
 from ...values.status import RobotiqStatus
-from ...values.trigger import Trigger
-from ..contact import TOLERANCE, agrees
-from ..triggers import classify
 from .adoption import Adoption
+from .arrivals import Arrivals
+from .grips import Grips
 from .limits import ALONE_S
-from .standstill import Moment, Standstill
+from .standstill import Moment
 from .writes import SILENT_S, WINDOW_S, WriteHistory
 
 NEVER: Final = float("-inf")
+
+
+class Whose(Enum):
+    """Whose requests a status shows."""
+
+    __hash__ = object.__hash__  # see State
+
+    OURS = "the last write of ours that showed, or one after it"
+    ADOPTED = "the requests that were adopted from another client"
+    OLDER = "an older write of ours: the link came back, or another client wrote meanwhile"
+    FOREIGN = "another client's"
 
 
 class RequestShadow:
@@ -50,19 +61,13 @@ class RequestShadow:
         """The image of ours that the newest status shows, if it shows one."""
         self._moved = NO_AXES
         """Axes that we have given a position since the gripper was found."""
-        self._contacts: dict[Finger, tuple[ObjectStatus, int]] = {}
-        """The contacts, and where, when the go bit was last seen set: gDT is not worth reading without it."""
-        self.arrived = Finger.ALL
-        """Axes that are known to rest under the position that they were asked last; the others move, or are
-        about to, or what is shown of them may be from before."""
-        self._standstill = {axis: Standstill() for axis in AXES}
-        self._reads = 0
-        self.limited: dict[Finger, int] = {}
-        """What the gripper shows in place of requests of ours that lie beyond a software limit."""
-        self._others_at = NEVER
-        self.asked = 0.0
+        self.grips: Final = Grips()
+        self.arrivals: Final = Arrivals(self._writes, log)
+        self.now = Moment(0.0, 0)
         """When the newest status was asked for. What it shows may be as old as that, however late its reply
-        was looked at; so this is the time that the age of a write is measured by."""
+        was looked at; so the age of a write is measured by it."""
+        self._others_at = NEVER
+        """When another client was last seen."""
         self._sure_at = 0.0
         """When no write was in doubt, the last time."""
         self._unsure_until = NEVER
@@ -79,25 +84,15 @@ class RequestShadow:
         """The base with rGTO clear and every axis asked to be where it is: nothing to wake."""
         return replace(self.base, go=False).with_positions({axis: status.position(axis) for axis in AXES})
 
-    def may_go(self, status: RobotiqStatus) -> bool:
-        """Whether rGTO is set, or an image that does not act yet may set it."""
-        return status.go_echo or not self.is_settled
-
-    def last_image(self, status: RobotiqStatus) -> Request | None:
-        """The image to leave the gripper with; None when there is nothing to stop."""
-        if classify(status) is Trigger.SEEN_READY and not self.is_ours(status):
-            self.adopt(status)
-        if not self.may_go(status):
+    def stop_image(self, status: RobotiqStatus) -> Request | None:
+        """The image that leaves the gripper stopped; None when rGTO is clear, and no write may set it."""
+        if self.is_settled and not status.go_echo:
             return None
-        # A gripper that lost its activation unnoticed must not be activated by our shutdown, nor one
-        # that a reset of ours is just about to reach; and one that others have activated not be reset.
-        active = status.activation_echo and (self.base.activate or self.is_settled)
-        return replace(self.base, activate=active, go=False)
-
-    @property
-    def speeds(self) -> dict[Finger, int]:
-        """The speed of each axis, as last written."""
-        return {axis: request.speed for axis, request in zip(AXES, self._image.axes, strict=True)}
+        # The shutdown must not activate a gripper that lost its activation unnoticed, or that a reset of ours
+        # is about to reach. Nor must it reset one that another client has activated.
+        base = self.base
+        active = status.activation_echo and (base.activate or self.is_settled)
+        return replace(base, activate=active, go=False)
 
     @property
     def is_certain(self) -> bool:
@@ -116,17 +111,18 @@ class RequestShadow:
 
     @property
     def _is_in_doubt(self) -> bool:
-        return self._writes.is_in_doubt and self.asked - self._sure_at < SILENT_S
+        return self._writes.is_in_doubt and self.now.time - self._sure_at < SILENT_S
 
-    def is_ready(self, status: RobotiqStatus, *, moves: bool) -> bool:
-        """Whether the next image can be made from the base now.
+    def is_ready(self, status: RobotiqStatus, base: Request, *, moves: bool) -> bool:
+        """Whether the next image can be made now.
 
         Args:
             status: the newest status.
-            moves: whether it is to set an axis going: after a halt that waits until it has acted, for only
-                then it is known where the fingers stopped.
+            base: what it is made from.
+            moves: whether it sets an axis going. After a halt that waits until the halt acts: only then is it
+                known where the fingers stopped.
         """
-        stopping = not self.base.go and status.go_echo and not self.is_settled
+        stopping = not base.go and status.go_echo and not self.is_settled
         return self.is_certain and not (moves and stopping)
 
     @property
@@ -142,7 +138,7 @@ class RequestShadow:
         """
         if not self.is_settled:
             return self._image.go or not self._writes.all_look_alike
-        return self.arrived is not Finger.ALL and self._image.go and self._adoption is None
+        return self.arrivals.axes is not Finger.ALL and self._image.go and self._adoption is None
 
     @property
     def ours(self) -> Finger:
@@ -155,7 +151,7 @@ class RequestShadow:
 
     def acts(self, number: int) -> bool:
         """Whether the image of this number acts."""
-        return self._writes.acts(number, self.asked)
+        return self._writes.acts(number, self.now.time)
 
     # -- what is written -------------------------------------------------------------------------------
 
@@ -164,29 +160,10 @@ class RequestShadow:
         before, self._image, self._adoption = self.base, image, None
         self._unsure_until = NEVER
         self._moved |= moved
-        self._contacts = {axis: at for axis, at in self._contacts.items() if axis not in moved}
-        self.limited = {axis: at for axis, at in self.limited.items() if axis not in moved}
+        self.grips.forget(moved)
         number = self._writes.writing(image, now)
-        self._ask(number, before, image)
+        self.arrivals.ask(number, before, image, moved)
         return number
-
-    def _ask(self, number: int, before: Request, image: Request) -> None:
-        """Note which axes are asked for something else than before; what gDT says of them may be late."""
-        raised = image.go and not before.go
-        for axis, old, new in zip(AXES, before.axes, image.axes, strict=True):
-            # More force lets an axis in contact try again; one that moves goes on as it did.
-            pressed = new.force > old.force
-            is_new = image.go is not before.go or new.position != old.position
-            if is_new or (pressed and axis in self.arrived):
-                self._standstill[axis].ask(
-                    number,
-                    new.position if image.go else None,
-                    before=old.position if before.go else None,
-                    again=raised or pressed,
-                    rested=axis in self.arrived and before.go,
-                )
-                if image.go:
-                    self.arrived &= ~axis
 
     def acknowledged(self, now: float) -> int:
         """The last image was acknowledged; returns its number."""
@@ -202,8 +179,7 @@ class RequestShadow:
 
     def see(self, status: RobotiqStatus, asked: float) -> None:
         """Take in a status and when it was asked for; what follows is about it."""
-        self.asked = asked
-        self._reads += 1
+        self.now = Moment(asked, self.now.reads + 1)
         if self._writes.last_number:
             self._shown = self._writes.see(status, asked)
             if self._shown is None and self._suspects_limits(status):
@@ -218,7 +194,7 @@ class RequestShadow:
 
     def _suspects_limits(self, status: RobotiqStatus) -> bool:
         """Whether what is not ours may be limits in place of our last requests."""
-        is_alone = self.asked - self._others_at > ALONE_S and self._adoption is None
+        is_alone = self.now.time - self._others_at > ALONE_S and self._adoption is None
         return is_alone and self._writes.suspect_limits(status)
 
     def _take_limits(self) -> None:
@@ -227,47 +203,49 @@ class RequestShadow:
         for axis, (request, limit) in replaced.items():
             if self._image.position(axis) == request:
                 self._image = self._image.with_positions({axis: limit})
-                self._standstill[axis].limit(limit)
-                self.limited[axis] = limit
+                self.arrivals.limit(axis, limit)
 
     def see_others(self) -> None:
         """Another client was seen."""
-        self._others_at = self.asked
+        self._others_at = self.now.time
         self._writes.limits.doubt()
 
     def returned(self, status: RobotiqStatus) -> None:
         """The link was lost and is back, and the gripper follows requests: ours, or it is adopted."""
-        self._unsure_until = self.asked + WINDOW_S
+        self._unsure_until = self.now.time + WINDOW_S
         if self._shown is None or self._shown is self._adopted:
             self._moved = NO_AXES
             self.adopt(status)
         else:
             self._image = self._writes.newest_that_shows_like(self._shown)
-            self._writes.adopt(self._image, status.echo, self.asked)
+            self._writes.adopt(self._image, status.echo, self.now.time)
 
     def adopt(self, status: RobotiqStatus) -> None:
         """Take the gripper as it is, without writing."""
-        self._contacts.clear()
-        # Who writes again and again must not make us wait again and again.
-        since = self.moment if self._adoption is None else self._adoption.since
-        self._adoption = Adoption(status, self.moment, since)
+        self.grips.forget()
+        # A client that writes again and again must not make us wait again and again.
+        since = self.now if self._adoption is None else self._adoption.since
+        self._adoption = Adoption(status, self.now, since)
         self._adopted = self.base
-        self._writes.adopt(self._adopted, status.echo, self.asked)
+        self._writes.adopt(self._adopted, status.echo, self.now.time)
 
-    def is_ours(self, status: RobotiqStatus) -> bool:
-        """Whether a gripper that follows requests follows ours, and not those of somebody else."""
-        shown = self._shown
-        if shown is None:
-            return False
-        if self._adoption is not None and shown is self._adopted:
-            self._adoption.see(status, self.moment)
-        elif self.asked < self._unsure_until and shown is self._adopted:
+    def identify(self) -> Whose:
+        """Whose requests the newest status shows, of a gripper that follows requests. Changes nothing."""
+        if self._shown is None:
+            return Whose.FOREIGN
+        if self._adoption is None and self.now.time >= self._unsure_until:
+            return Whose.OURS
+        # Nothing was written since the link came back, or since another client wrote.
+        return Whose.ADOPTED if self._shown is self._adopted else Whose.OLDER
+
+    def follow(self, whose: Whose, status: RobotiqStatus) -> None:
+        """Make the next image from what the status shows; ``whose`` is what :meth:`identify` says of it."""
+        if whose is Whose.FOREIGN or (whose is Whose.ADOPTED and self._adoption is None):
             self.adopt(status)
-        elif self._adoption is not None or self.asked < self._unsure_until:
-            # Nothing was written since the link came back, or since another client wrote, and now an older
-            # write of ours shows: go on from it.
-            self._image, self._adoption = self._writes.newest_that_shows_like(shown), None
-        return True
+        elif whose is Whose.ADOPTED and self._adoption is not None:
+            self._adoption.see(status, self.now)
+        elif whose is Whose.OLDER and self._shown is not None:
+            self._image, self._adoption = self._writes.newest_that_shows_like(self._shown), None
 
     def restart(self, status: RobotiqStatus) -> bool:
         """A sequence is over: what it wrote last is what the gripper has, and nothing else is on its way.
@@ -276,76 +254,24 @@ class RequestShadow:
             Whether the status shows that. If not, another client has written meanwhile. rATR has no echo; a
             gripper that follows requests does not follow that one.
         """
-        self._writes.restart(self._image, status.echo, self.asked)
-        self.arrived = Finger.ALL
-        for standstill in self._standstill.values():
-            standstill.clear()
+        self._writes.restart(self._image, status.echo, self.now.time)
+        self.arrivals.clear()
         return status.echo == self._image.echo and not self._image.release
 
-    def see_arrivals(self, status: RobotiqStatus) -> None:
-        """Remember which axes have come to rest, from a status of a gripper that has no fault.
+    def see_axes(self, status: RobotiqStatus) -> None:
+        """Note which axes have come to rest, and which grip, in a status of a gripper that has no fault.
 
-        In a fault an axis that has not begun yet is at rest, too.
+        In a fault an axis that has not begun to move is at rest, too.
         """
-        if self.arrived is Finger.ALL or not status.go_echo:
-            return  # quickly: this runs at every poll
-        now = self.moment
-        for axis in AXES:
-            if axis not in self.arrived:
-                standstill = self._standstill[axis]
-                what = status.finger_status(axis)
-                standstill.see(what, self.acts, self._is_old, now)
-                if standstill.is_known(what, status.position(axis)):
-                    self.arrived |= axis
-                    self._prove_limit(axis, what, status.position(axis))
-
-    def _prove_limit(self, axis: Finger, what: ObjectStatus, position: int) -> None:
-        if axis in self.limited and what is ObjectStatus.AT_POSITION:
-            limit = self._writes.limits.prove(axis, position)
-            if limit is not None:
-                self._log.info("the gripper replaces requests of %s by its limit %d", axis, limit)
+        if not status.go_echo:
+            return  # gDT says nothing then
+        self.arrivals.see(status, self.now)
+        if self.grips or status.contacts:
+            contacts = status.contacts
+            if contacts & ~self.arrivals.axes:
+                contacts &= ~self.doubtful(status)
+            self.grips.see(status, contacts)
 
     def doubtful(self, status: RobotiqStatus) -> Finger:
-        """The axes that may move, or be about to, although they are shown at rest."""
-        doubtful, now = NO_AXES, self.moment
-        for axis, standstill in self._standstill.items():
-            what = status.finger_status(axis)
-            standstill.see(what, self.acts, self._is_old, now)
-            if standstill.is_doubtful(what, status.position(axis)):
-                doubtful |= axis
-        return doubtful
-
-    def _is_old(self, number: int) -> bool:
-        return self._writes.is_old(number, self.asked)
-
-    @property
-    def moment(self) -> Moment:
-        """When the newest status was asked for, and how many have been read."""
-        return Moment(self.asked, self._reads)
-
-    # -- grips -----------------------------------------------------------------------------------------
-
-    def see_contacts(self, status: RobotiqStatus) -> None:
-        """Remember which axes grip, as long as that can be seen."""
-        if status.go_echo and (self._contacts or status.contacts):
-            contacts = status.contacts
-            if self.arrived is not Finger.ALL and contacts & ~self.arrived:
-                contacts &= ~self.doubtful(status)
-            self._contacts = {
-                axis: (status.finger_status(axis), status.position(axis)) for axis in AXES if axis in contacts
-            }
-
-    def gripping(self, status: RobotiqStatus) -> Finger:
-        """The axes that gripped when rGTO was last set, are there still, and by the request they have."""
-        base = self.base
-        gripping = (
-            axis
-            for axis, (what, at) in self._contacts.items()
-            if abs(status.position(axis) - at) <= TOLERANCE
-            and agrees(base.position(axis), what, at, direction=0)
-        )
-        return reduce(or_, gripping, NO_AXES)
-
-    def forget_contacts(self) -> None:
-        """A sequence begins: it lets go."""
-        self._contacts.clear()
+        """The axes that may move, or be about to, although the status shows them at rest."""
+        return self.arrivals.doubtful(status, self.now)
