@@ -1,4 +1,4 @@
-"""What a position, a contact and a motion tell about the request that an axis follows."""
+"""Which request an axis may be following, by its position, contact and motion."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from ..values.status import RobotiqStatus
 TOLERANCE: Final = 2
 """Counts between a request and the position reached (manual: within 1-2)."""
 OPEN_READING_MAX: Final = 7
-"""An open finger reads 6-7 although 0 was asked."""
+"""An open finger reads 6-7 after a request of 0."""
 CLOSED_READING_MIN: Final = 240
-"""A closed finger reads 240 or more although 255 was asked."""
+"""A closed finger reads 240 or more after a request of 255."""
 
 
 def agrees(request: int, what: ObjectStatus, position: int, direction: int) -> bool:
-    """Whether an axis could be doing what it does because of this request.
+    """Whether what an axis shows can result from this request.
 
     Args:
         request: position request in counts.
-        what: what the axis does.
+        what: the object status of the axis.
         position: where it is, in counts.
         direction: above 0 closing, below 0 opening, 0 unknown; used only while it moves.
     """
@@ -42,18 +42,18 @@ def agrees(request: int, what: ObjectStatus, position: int, direction: int) -> b
 def drifts(
     axis: Finger, base: Request, status: RobotiqStatus, arrived: Finger, doubtful: Finger = NO_AXES
 ) -> bool:
-    """Whether an axis moves or is about to: then holding it means asking for where it is.
+    """Whether an axis moves or is about to, so that a hold must ask for its present position.
 
-    An axis in contact keeps its request, and with it its grip; so does one that stands where it was asked
-    to. What an axis does may still come from the request before this one: then the two disagree.
+    An axis in contact keeps its request, and with it its grip; so does one at rest where it was asked to be.
+    An axis may still show what the request before this one made it do: then the two disagree.
 
     Args:
         axis: the axis.
-        base: the image that acts, or will in a moment.
+        base: the image that acts, or is about to.
         status: the newest status.
-        arrived: the axes that have come to rest under their requests. Another one that is at rest close by
-            may not have begun yet.
-        doubtful: the axes that are shown at rest, and by what was asked a moment ago may move all the same.
+        arrived: the axes that have come to rest under their requests. Another axis at rest close to its
+            request may not have begun to move.
+        doubtful: the axes that show rest, and may move because of an earlier request.
     """
     if not base.go:
         return False

@@ -1,10 +1,10 @@
-"""The hand without its link: learns from what is read, and decides what to write.
+"""The hand without its link: takes in statuses and decides what to write.
 
-No I/O, no clock and no event loop. Whoever owns the link calls, once per cycle and in this order:
+No I/O, no clock and no event loop. The task that owns the link calls, once per poll and in this order:
 
 * :meth:`Controller.see` with the status just read;
-* :meth:`Controller.decide` for the image to write now, if there is one; then :meth:`Controller.acknowledged`;
-* :meth:`Controller.lost` when the link went down at any point of it.
+* :meth:`Controller.decide` for the image to write now, if any; then :meth:`Controller.acknowledged`;
+* :meth:`Controller.lost` if the link goes down at any point.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from ..values.errors import (
 from ..values.request import Request
 from ..values.status import RobotiqStatus
 from ..values.trigger import Trigger
-from .callers import Callers
 from .first_motion import IGNORED_S, FirstMotion
 from .grip_keeper import GripKeeper
 from .motion import Move
+from .open_requests import OpenRequests
 from .passing_fault import PassingFault
 from .requests.merging import merged
 from .requests.pending import Command
@@ -41,13 +41,28 @@ from .waiters import Waiter
 _COMMANDED: Final = RUNNING | {State.FAULT}
 """The states in which the gripper follows requests, ours or another client's."""
 WARNING_S: Final = 1.0
-"""At most one warning about another client in this time."""
+"""Seconds between two warnings about another client."""
 _STOPPING: Final = frozenset({State.DO_RESET, State.WF_RESET, State.DO_SHUTDOWN})
-"""The states in which what is written ends motion: it waits for nothing."""
+"""The states whose writes end motion: these do not wait for write_spacing."""
 
 
 class Controller:
-    """State, requests and moves of one hand."""
+    """State, requests and moves of one hand.
+
+    Args:
+        machine: the state of the hand, in DISCONNECTED.
+        speed: what every axis gets until set otherwise, 0..255.
+        force: what every axis gets until set otherwise, 0..255.
+        closing_time: gives the seconds of a full closing at a speed; default timeouts of moves come from it.
+        write_spacing: seconds from the acknowledgement of a write to the next one: a gripper may acknowledge
+            one that comes sooner and forget it. A stop does not wait; it is repeated.
+
+    Attributes:
+        status: the newest status; None before the first.
+        activates: whether a gripper that is found reset is activated.
+        foreign_commands: how often another client was seen to command the gripper.
+        passing_faults: how often 0x09 was shown in passing.
+    """
 
     def __init__(
         self,
@@ -57,105 +72,89 @@ class Controller:
         closing_time: Callable[[int], float],
         write_spacing: float = 0.0,
     ) -> None:
-        """Start without a status.
-
-        Args:
-            machine: the state of the hand, in DISCONNECTED.
-            speed: what every axis gets until set otherwise, 0..255.
-            force: what every axis gets until set otherwise, 0..255.
-            closing_time: seconds of a full closing at a speed; default timeouts of moves come from it.
-            write_spacing: seconds from the acknowledgement of a write to the next one: a gripper may
-                acknowledge one that comes sooner and forget it. A stop does not wait; it is repeated.
-        """
         self.machine = machine
         self.status: RobotiqStatus | None = None
         self.activates = False
-        """Whether a gripper that is found reset is activated."""
         self.foreign_commands = 0
-        """How often another client was seen to command the gripper."""
         self.passing_faults = 0
-        """How often 0x09 was shown in passing."""
-        self._passing_fault = PassingFault(self._tell_of_passing_fault)
+        self._passing_fault = PassingFault(self._count_passing_fault)
         self._judged: RobotiqStatus | None = None
-        """The newest status, without a fault that has not lasted: what is decided on."""
+        """The newest status, without 0x09 until that has lasted: decisions use this one."""
         self._warned = NEVER
         self._closing_time = closing_time
         self._shadow = RequestShadow(speed, force, log=machine.log)
-        self._callers = Callers()
+        self._requests = OpenRequests()
         self._first_motion = FirstMotion()
         self._step = 0
-        """The write that carried the last step of a sequence: it sees only what came of it."""
+        """The number of the last write of a sequence: its next status must show the effect. 0 for none."""
         self._activating = False
-        """Whether an activation of ours may still be under way: to be taken back if the hand is stopped."""
+        """Whether an activation of ours may be under way: stopping the hand takes it back."""
         self._write_spacing = write_spacing
         self._written_at = NEVER
-        """When a write was acknowledged last."""
+        """When a write was last acknowledged."""
         self._early_stop: Request | None = None
-        """A stop that came sooner after another write than a gripper may bear. It is written again, after the
-        next status, also if that shows it: what it shows may be from before the write that it followed."""
+        """A stop written sooner than write_spacing after another write. It is written again after the next
+        status, even if that shows it: the gripper may forget it and go on with the write before."""
         self._hold_on_return = NO_AXES
-        """Axes whose hold was not delivered before the link went down."""
+        """The axes whose hold was not delivered before the link went down."""
         self._grip_keeper = GripKeeper(self._shadow, log=machine.log)
-        """Whether rGTO may be left set when the hand is stopped."""
         self._keeps_grip = False
-        """Whether that is asked for."""
+        """Whether the stop under way is to leave rGTO set."""
 
     # -- what is asked ---------------------------------------------------------------------------------
 
     def command(self, command: Command, waiter: Waiter[None] | None = None) -> None:
-        """Ask axes for something; it goes out with the next write.
+        """Add a command to the next write.
 
         Raises:
             RobotiqError: the hand takes no command now.
         """
         self.machine.fire(Trigger.ASK_COMMAND, self.status)
-        self._callers.command(command, waiter)
+        self._requests.command(command, waiter)
 
     def move(self, move: Move, speed: int | None, force: int | None) -> float:
-        """Ask for a move; its end is told to its waiter.
-
-        Returns its default timeout in seconds, from where its axes are.
+        """Add a move to the next write; return its default timeout in seconds.
 
         Raises:
             RobotiqError: the hand takes no command now.
         """
         self.command(Command(move.axes, move.position, speed, force))
-        self._callers.moves.add(move)
+        self._requests.moves.add(move)
         assert self.status is not None, "the hand takes commands, so a status has been read"
         written = {axis: asked.speed for axis, asked in zip(AXES, self._shadow.base.axes, strict=True)}
-        speeds = written | self._callers.pending.speeds
+        speeds = written | self._requests.pending.speeds
         return move.default_timeout(self.status, speeds, self._closing_time)
 
     def abandon(self, move: Move, *, unseen: bool = False) -> None:
-        """Nobody waits for this move any more: hold those of its axes that still move.
+        """The caller has given up on a move: hold those of its axes that still move.
 
-        ``unseen``: it was cancelled, and if it has ended meanwhile, nobody knows of that.
+        ``unseen`` if the call was cancelled: then the caller does not learn that the link went down, either.
         """
-        if self._callers.moves.remove(move):
-            self._callers.hold(move.axes, "a move took over and was given up")
+        if self._requests.moves.remove(move):
+            self._requests.hold(move.axes, "a move took over and was given up")
         elif unseen and move.was_lost:
             self._hold_on_return |= move.axes
             self._hold_what_was_lost()
 
     def hold(self, axes: Finger, waiter: Waiter[None]) -> None:
-        """Hold those of some axes that move, whoever moves them; in a sequence there is nothing to do.
+        """Hold those axes that move, whichever client moves them. In a sequence there is nothing to do.
 
         Raises:
             RobotiqError: the gripper cannot be reached.
         """
         if self.machine.fire(Trigger.ASK_HOLD, self.status):
-            self._callers.hold(axes, "hold() took over", waiter)
+            self._requests.hold(axes, "hold() took over", waiter)
         else:
             waiter.set_result(None)
 
     def halt(self, waiter: Waiter[None]) -> None:
-        """Clear rGTO; where nothing moves, there is nothing to do. A sequence is ended by :meth:`reset`.
+        """Clear rGTO, unless no axis can move. A sequence needs :meth:`reset`.
 
         Raises:
             RobotiqError: the hand cannot halt now.
         """
         if self.machine.fire(Trigger.ASK_HALT, self.status):
-            self._callers.halt(waiter)
+            self._requests.halt(waiter)
         else:
             waiter.set_result(None)
 
@@ -171,7 +170,7 @@ class Controller:
         self._begin_activation(Trigger.ASK_ACTIVATE)
 
     def reset(self, trigger: Trigger = Trigger.ASK_RESET) -> None:
-        """Begin a reset; one that is about to be sent already will do.
+        """Begin a reset, unless one is about to be sent.
 
         Args:
             trigger: ASK_HALT for a halt that ends a sequence.
@@ -180,7 +179,7 @@ class Controller:
             RobotiqError: not possible now.
         """
         if self.machine.fire(trigger, self.status):
-            self._callers.fail(MoveSupersededError(f"{trigger.value} took over"))
+            self._requests.fail(MoveSupersededError(f"{trigger.value} took over"))
             self._begin(reset(self._shadow.at_rest))
 
     def release(self) -> None:
@@ -192,48 +191,46 @@ class Controller:
         if self.machine.state is State.FAULT and self.status is not None and not self.status.activation_echo:
             raise NotActivatedError("the gripper is reset: there is nothing to release")
         self.machine.fire(Trigger.ASK_RELEASE, self.status)
-        self._callers.fail(MoveSupersededError("atr() took over"))
+        self._requests.fail(MoveSupersededError("atr() took over"))
         self._begin(automatic_release(self._shadow.at_rest))
 
     def drop_requests(self, error: RobotiqError) -> None:
-        """Drop what was asked and not sent, but for holds and halts, and tell its callers."""
-        self._callers.fail_but_stops(error)
+        """Fail the requests that are not sent, except holds and halts."""
+        self._requests.fail_but_stops(error)
 
     def stop(self) -> None:
-        """The hand is being stopped: take no more requests, drop those not sent, and tell their callers."""
-        self._grip_keeper.begin(self.machine.state, halts=self._callers.pending.halting is not None)
+        """Begin to stop the hand: refuse new requests, and fail those that are not sent."""
+        self._grip_keeper.begin(self.machine.state, halts=self._requests.pending.halting is not None)
         if self._activating and not self._step:
-            self._activating = False  # it was not sent: there is nothing to take back
-        if not self._callers.pending.is_empty:
-            self.machine.log.info("stopped: what was asked for and not sent yet is dropped")
+            self._activating = False  # it was not sent, so it need not be taken back
+        if not self._requests.pending.is_empty:
+            self.machine.log.info("stopped: requests that were not sent are dropped")
         self.machine.fire(Trigger.ASK_STOP)
-        self._callers.fail(NotStartedError("the hand was stopped"))
+        self._requests.fail(NotStartedError("the hand was stopped"))
         self.machine.drop_sequence()
 
     def stopped(self) -> None:
-        """The shutdown is over, whether it came to its end or its time did."""
+        """The shutdown has ended or has run out of time."""
         self.machine.drop_sequence()
         self.machine.fire(Trigger.STOPPED)
 
     @property
     def has_undelivered_stop(self) -> bool:
-        """Whether a halt, a hold or a reset was asked for that the gripper has not acknowledged."""
+        """Whether a halt, a hold or a reset waits for its acknowledgement."""
         resets = self.machine.state is State.DO_RESET
         waits = self._early_stop is not None or bool(self._hold_on_return)
-        return resets or self._callers.has_undelivered_stop or waits
+        return resets or self._requests.has_undelivered_stop or waits
 
     def keep_no_grip(self, why: str) -> None:
-        """Clear rGTO in the shutdown under way after all."""
+        """Make the shutdown under way clear rGTO after all."""
         self._keeps_grip = False
         self._grip_keeper.doubt = why
 
     def shut_down(self, *, keep_grip: bool = False) -> None:
-        """Begin to stop the fingers, if there is anything to stop.
+        """Begin to stop the fingers, if any may move.
 
-        An activation that this hand began is taken back (rACT = 0): clearing rGTO would not stop it.
-
-        Args:
-            keep_grip: leave rGTO set if everything is at rest, and known to be.
+        An activation that this hand began is taken back with rACT = 0: clearing rGTO would not stop it. With
+        ``keep_grip`` rGTO stays set if every axis is known to rest.
         """
         self._keeps_grip = keep_grip
         if self._activating:
@@ -243,7 +240,7 @@ class Controller:
             self._begin(self._grip_keeper.sequence(stop) if keep_grip else shutdown(stop))
 
     def _image_to_stop(self, status: RobotiqStatus) -> Request | None:
-        """The image that stops the fingers whoever moves them; None when there is nothing to stop."""
+        """The image that stops the fingers, whichever client moves them; None if there is nothing to stop."""
         if classify(status) is Trigger.SEEN_READY:
             self._shadow.follow(self._shadow.identify(), status)
         return self._shadow.stop_image(status)
@@ -255,12 +252,12 @@ class Controller:
         """Whether an axis moves, or will because of a command that does not act yet."""
         if self.status is None or self.status.is_moving or self.machine.state not in RUNNING:
             return self.status is not None and self.status.is_moving
-        return bool(self._callers.pending.positions) or self._shadow.may_begin_to_move
+        return bool(self._requests.pending.positions) or self._shadow.may_begin_to_move
 
     # -- the cycle -------------------------------------------------------------------------------------
 
     def see(self, status: RobotiqStatus, asked: float | None = None) -> None:
-        """Take in a status, read after everything that was acknowledged so far.
+        """Take in a status that was read after every acknowledgement so far.
 
         ``asked`` is when it was asked for, in monotonic seconds; None for the time of the reply.
         """
@@ -271,9 +268,9 @@ class Controller:
         if condition is Trigger.SEEN_FAULT or self._passing_fault.reads:
             condition = self._look_past_fault(status, asked)
         if self.machine.sequence is not None:
-            return  # the sequence decides what it means
+            return  # the sequence takes it in decide()
         if before is State.DISCONNECTED and self.is_undecided:
-            return  # the next status does
+            return  # the next status decides
         if before is State.DISCONNECTED and condition is Trigger.SEEN_RESET and self.activates:
             self._begin_activation(Trigger.ACTIVATES)
             return
@@ -285,35 +282,35 @@ class Controller:
             self._go_on(before, status)
         else:
             self._hold_on_return = NO_AXES
-        # What nobody waits for is not worked out: this runs at every poll.
+        # This runs at every poll, so it works out only what is waited for.
         if self._activating:
             self._see_activation(status)
-        if self._callers.halting and self._early_stop is None:
-            self._callers.see_halt(status, self._shadow.acts)
+        if self._requests.halting and self._early_stop is None:
+            self._requests.see_halt(status, self._shadow.acts)
         if after in RUNNING:
             self._shadow.see_axes(status)
             arrived = self._shadow.arrivals.axes
             if self._first_motion.is_watched:
                 arrived &= ~self._see_first_motion(status)
-            if self._callers.moves:
-                self._callers.moves.see(status, self._shadow.acts, arrived, self._shadow.arrivals.limited)
+            if self._requests.moves:
+                self._requests.moves.see(status, self._shadow.acts, arrived, self._shadow.arrivals.limited)
 
     @property
     def is_undecided(self) -> bool:
-        """Whether the first status on a new link shows 0x09, which may be for the silence before."""
+        """Whether the first status on a new link shows 0x09, perhaps because of the silence before it."""
         return self._passing_fault.is_open and self.machine.state is State.DISCONNECTED
 
     @property
     def has_request(self) -> bool:
-        """Whether there may be something to write."""
-        asked = self.machine.sequence is not None or not self._callers.pending.is_empty
+        """Whether there may be a request to write."""
+        asked = self.machine.sequence is not None or not self._requests.pending.is_empty
         return asked or self._early_stop is not None
 
     @property
     def is_urgent(self) -> bool:
-        """Whether a stop is to be written. It does not wait for a status that may never come."""
+        """Whether to write a stop now, without waiting for a status that may never come."""
         if self.machine.sequence is None or self._judged is None:
-            return self._callers.pending.halting is not None
+            return self._requests.pending.halting is not None
         if self._step or self.machine.state not in (State.DO_RESET, State.DO_SHUTDOWN):
             return False
         if self.machine.state is State.DO_RESET:
@@ -323,25 +320,25 @@ class Controller:
         return self._activating or self._shadow.stop_image(self._judged) is not None
 
     def wait(self, now: float) -> float:
-        """Seconds until the next write may leave; 0 for one that stops, unless it is a repetition."""
+        """Seconds until the next write may leave; 0 for a stop that is not a repetition."""
         if self._stops and self._early_stop is None:
             return 0.0
         return max(0.0, self._written_at + self._write_spacing - now)
 
     @property
     def _stops(self) -> bool:
-        """Whether what is written next ends motion."""
+        """Whether the next write ends motion."""
         if self.machine.sequence is None:
-            return self._callers.pending.halting is not None
+            return self._requests.pending.halting is not None
         return self.machine.state in _STOPPING and not self._keeps_grip
 
     def decide(self, now: float) -> Request | None:
-        """The image to write now, after the status just seen, or None. It counts as sent from here on."""
-        status, pending = self._judged, self._callers.pending
+        """Return the image to write now, or None. It counts as sent from here on."""
+        status, pending = self._judged, self._requests.pending
         if status is None:
             return None
         if self._early_stop is not None and self._early_stop.activate and not status.activation_echo:
-            self._early_stop = None  # the gripper was reset meanwhile, and stands: this would activate it
+            self._early_stop = None  # the gripper was reset meanwhile: the image would activate it
         if self._early_stop is not None:
             return self._repeat_stop(self._early_stop, now)
         if self.machine.sequence is not None:
@@ -351,10 +348,10 @@ class Controller:
             return None
         shadow = self._shadow
         if self._passing_fault.is_open and pending.halting is None and not pending.holds_at_most:
-            return None  # if it lasts, what would move is not sent at all
+            return None  # if the fault lasts, no motion is sent at all
         base = shadow.base
         if pending.halting is None and not shadow.is_ready(status, base, moves=bool(pending.positions)):
-            return None  # for a halt it is never too early
+            return None  # only a halt does not wait
         image = merged(
             base,
             pending,
@@ -364,19 +361,19 @@ class Controller:
             doubtful=shadow.doubtful(status) if pending.hold else NO_AXES,
         )
         if pending.holds_at_most and image == base:
-            # Nothing drifts; but what was written before may not act yet, and then something might.
+            # No axis moves. If an earlier write does not act yet, one may begin to: ask again then.
             if shadow.is_settled:
-                self._callers.nothing_to_send()
+                self._requests.nothing_to_send()
                 self.machine.delivered()
             return None
-        sent = self._callers.take()
+        sent = self._requests.take()
         if image.go and not base.go:
-            self._grip_keeper.tell_of_lost_grips(status, sent.moved)
+            self._grip_keeper.warn_of_lost_grips(status, sent.moved)
         self._note_early_stop(image, now, stops=sent.halting is not None)
         number = shadow.writing(image, sent.moved, now)
         self._first_motion.written(number, sent.moved, status)
         if sent.positions:
-            self._callers.moves.written(number)
+            self._requests.moves.written(number)
         return image
 
     def _note_early_stop(self, image: Request, now: float, *, stops: bool) -> None:
@@ -389,27 +386,26 @@ class Controller:
         self._early_stop = None
         number = self._shadow.writing(image, NO_AXES, now)
         if self.machine.sequence is None:
-            self._callers.halt_again()
+            self._requests.halt_again()
         else:
             self._step = number
         return image
 
     def acknowledged(self, now: float) -> None:
-        """The image was acknowledged."""
         self._written_at = now
         number = self._shadow.acknowledged(now)
-        self._callers.acknowledged(number)
-        if number == self._step or (self.machine.sequence is None and self._callers.pending.is_empty):
+        self._requests.acknowledged(number)
+        if number == self._step or (self.machine.sequence is None and self._requests.pending.is_empty):
             self.machine.delivered()
 
     def lost(self, why: RobotiqError | None = None) -> None:
-        """The link is down: what was not acknowledged is dropped, never to be sent again."""
+        """The link is down: drop every request that was not acknowledged, and never send it again."""
         self.machine.fire(Trigger.LINK_LOST)
         self._grip_keeper.doubt = "the link went down"
         error = ConnectionLostError(f"the link went down before this was done: {why}")
         error.__cause__ = why
         self._early_stop = None
-        self._hold_on_return |= self._callers.lost(error)
+        self._hold_on_return |= self._requests.lost(error)
         self.machine.drop_sequence()
         self._shadow.lost()
 
@@ -427,7 +423,7 @@ class Controller:
         self._shadow.grips.forget()
 
     def _next_step(self, status: RobotiqStatus, now: float) -> Request | None:
-        """What the sequence under way wants written; at its end, see where that leaves the hand."""
+        """Advance the sequence under way; return the image that it wants written."""
         if self._step and not self._shadow.acts(self._step):
             return None
         if self.machine.state is State.DO_ACTIVATION and self._passing_fault.is_open:
@@ -446,7 +442,7 @@ class Controller:
         if self._step:
             is_ours = self._shadow.restart(status)
             self._first_motion.over()
-        else:  # what it was to begin from was gone: nothing was sent
+        else:  # the sequence had nothing to do and has written nothing
             self._activating, whose = False, self._shadow.identify()
             is_ours = whose is not Whose.FOREIGN
             if is_ours:
@@ -457,7 +453,6 @@ class Controller:
             self._see_activation(status)
 
     def _see_activation(self, status: RobotiqStatus) -> None:
-        """See whether an activation of ours has come to its end."""
         condition = classify(status)
         self._activating = not (
             condition is Trigger.SEEN_READY
@@ -466,24 +461,24 @@ class Controller:
         )
 
     def _look_past_fault(self, status: RobotiqStatus, asked: float) -> Trigger:
-        """The condition that a status shows without 0x09, as long as that has not lasted."""
+        """The condition that a status shows, without 0x09 until that has lasted."""
         judged = self._passing_fault.see(status, asked)
-        if self.machine.state is not State.FAULT:  # that one fault has passed says nothing of the next
+        if self.machine.state is not State.FAULT:  # in FAULT 0x09 is no news, and counts at once
             self._judged = judged
         return classify(self._judged or status)
 
-    def _tell_of_passing_fault(self) -> None:
+    def _count_passing_fault(self) -> None:
         self.passing_faults += 1
         if self.passing_faults == 1:
             self.machine.log.info(
                 "the gripper showed fault 0x09 for a moment, as some do after a second without a poll: "
-                "passed over, and only counted from here on"
+                "ignored, and from here on only counted"
             )
 
-    # -- what others do, and what was lost -------------------------------------------------------------
+    # -- other clients, and a link that is back --------------------------------------------------------
 
     def _go_on(self, before: State, status: RobotiqStatus) -> None:
-        """The gripper follows requests: see whose."""
+        """The gripper follows requests: find out whose."""
         if before is State.DISCONNECTED:
             self._return(status)
         elif before not in _COMMANDED:
@@ -498,12 +493,12 @@ class Controller:
         self._shadow.returned(status)
         self._first_motion.connected()
         if self.machine.state is State.FAULT and status.activation_echo:
-            # As when a fault is seen to begin: nothing resumes by itself when it clears.
+            # As when a fault begins: no motion may resume when it clears.
             self._hold_on_return = Finger.ALL
         self._hold_what_was_lost()
 
     def _see_first_motion(self, status: RobotiqStatus) -> Finger:
-        """See whether the gripper follows the first motion on a new link; return the axes that do not."""
+        """Return the axes that do not follow the first motion on a new link, and fail their moves in time."""
         still, is_ignored = self._first_motion.see(
             status, self._shadow.base, self._shadow.acts, self._shadow.now
         )
@@ -511,25 +506,25 @@ class Controller:
             error = MoveIgnoredError(
                 f"the gripper acknowledged and echoed a motion of {still}, and nothing has moved for "
                 f"{IGNORED_S:g} s: it may not follow on a new connection. Try it again; if that is ignored, "
-                "too: reset() and activate()",
+                "too, call reset() and activate()",
                 status,
             )
             self.machine.log.warning("%s", error)
-            self._callers.moves.fail(error, lambda move: bool(move.axes & still))
-            # Nothing may begin to move because the gripper wakes up later.
-            self._callers.hold(still, "the fingers are held")
+            self._requests.moves.fail(error, lambda move: bool(move.axes & still))
+            # These axes must not start if the gripper wakes up later.
+            self._requests.hold(still, "the fingers are held")
         return still
 
     def _hold_what_was_lost(self) -> None:
-        """Hold what a lost link kept from being held, unless somebody else moves it by now."""
+        """Hold the axes whose hold was not delivered, unless another client moves them now."""
         if self.machine.state not in _COMMANDED:
             return  # the link is still down
         axes, self._hold_on_return = self._hold_on_return & self._shadow.ours, NO_AXES
         if axes:
-            self._callers.hold(axes, "the fingers are held")
+            self._requests.hold(axes, "the fingers are held")
 
     def _take_over(self, status: RobotiqStatus) -> None:
-        """Another client commands the gripper: take over its requests, or our next write undoes them."""
+        """Another client commands the gripper: adopt its requests, or our next write would undo them."""
         self.foreign_commands += 1
         limited = self._shadow.arrivals.limited
         self._shadow.see_others()
@@ -537,21 +532,21 @@ class Controller:
             self._warned = status.timestamp
             self.machine.log.warning("another client commands the gripper: %r", status)
         self._shadow.adopt(status)
-        self._callers.pending.hold &= self._shadow.ours | self._callers.pending.asked_to_hold
-        self._callers.moves.fail(
+        self._requests.pending.hold &= self._shadow.ours | self._requests.pending.asked_to_hold
+        self._requests.moves.fail(
             MoveSupersededError("another client commands the gripper"),
             lambda move: move.write is not None and not move.is_under(status, limited),
         )
 
     def _leave(self, after: State, status: RobotiqStatus) -> None:
-        """The gripper is not active any more, or reports a fault: nothing asked before may resume."""
+        """The gripper reports a fault or is no longer active: no earlier request may resume."""
         if after not in (State.FAULT, State.ATR_DONE):
-            self._callers.fail(NotActivatedError("the gripper lost its activation"))
+            self._requests.fail(NotActivatedError("the gripper lost its activation"))
         elif after is State.ATR_DONE:
-            self._callers.fail(GripperFaultError(status.fault))
+            self._requests.fail(GripperFaultError(status.fault))
         else:
-            self._callers.fail_but_stops(GripperFaultError(status.fault))
+            self._requests.fail_but_stops(GripperFaultError(status.fault))
         if after is State.FAULT and status.activation_echo:
-            # Which axes drift is decided when the hold is written: a command that was sent just before
-            # may not act yet, and its motion would begin when the fault clears.
-            self._callers.hold(self._shadow.ours, "the fingers are held")
+            # Hold every axis of ours: a command sent just before may not act yet, and its motion would begin
+            # when the fault clears. Which axes need it is decided when the hold is written.
+            self._requests.hold(self._shadow.ours, "the fingers are held")

@@ -1,8 +1,8 @@
-"""The first motion on a new connection: whether the gripper follows it, or only says so.
+"""The first motion on a new connection: does the gripper follow it, or only acknowledge it?
 
-After a reconnect or an adoption a gripper may acknowledge a motion, echo it and move nothing: one driver
-that ran on a 3-Finger writes rACT anew on each connection because of that. Without a word the move would end
-far from its request, or when its time is over.
+After a reconnect or an adoption a gripper may acknowledge and echo a motion without moving. One driver that
+ran on a 3-Finger writes rACT on each new connection for this reason. The caller must get an error then: the
+move would otherwise end far from its target, or at its timeout.
 """
 
 from __future__ import annotations
@@ -18,22 +18,24 @@ from .requests.limits import NEAR_PINCH
 from .requests.standstill import LAG_READS, Moment
 
 IGNORED_S: Final = 1.0
-"""What has moved no finger for so long is ignored: at the slowest speed it takes 23 counts (thesis, table
-A1.1), and an object status has come by then."""
+"""A motion that moves no finger for this long is ignored. At the slowest speed a finger moves 23 counts in
+this time (thesis, table A1.1), and no object status is this late."""
 
 NEAR_AN_END: Final = 20, 225
-"""Scissor readings beyond which a software limit may be (drivers keep within 15..232)."""
+"""Scissor positions beyond which a software limit may lie (drivers keep within 15..232)."""
 LIMITED_FINGER: Final = 100
-"""A limited finger is not further open than this: in pinch they stop at about 113 (manual)."""
+"""A limited finger is at least this far closed: in pinch mode fingers stop at about 113 (manual)."""
 
 
 class FirstMotion:
-    """Watches it from its write until something has moved, or nothing has for long enough."""
+    """Watches the first motion from its write until an axis moves, or for IGNORED_S.
+
+    Attributes:
+        is_watched: whether the motion was written, and no axis has moved.
+    """
 
     def __init__(self) -> None:
-        """There is no connection."""
         self.is_watched = False
-        """Whether it was written, and nothing has moved."""
         self._is_due = False
         self._number = 0
         self._moved = NO_AXES
@@ -41,11 +43,11 @@ class FirstMotion:
         self._since: Moment | None = None
 
     def connected(self) -> None:
-        """A gripper that is active was found on a new connection."""
+        """An active gripper was found on a new connection."""
         self._is_due, self.is_watched = True, False
 
     def over(self) -> None:
-        """It follows what we ask; or it was asked something else."""
+        """Stop watching: the gripper follows, or a sequence has run."""
         self._is_due = self.is_watched = False
 
     def written(self, number: int, moved: Finger, status: RobotiqStatus) -> None:
@@ -61,13 +63,9 @@ class FirstMotion:
     def see(
         self, status: RobotiqStatus, base: Request, acts: Callable[[int], bool], now: Moment
     ) -> tuple[Finger, bool]:
-        """The axes that do not follow, and whether that has lasted.
+        """Return the axes that do not follow, and whether this has lasted for IGNORED_S.
 
-        Args:
-            status: the newest.
-            base: what the gripper has been asked.
-            acts: whether the write of a number acts.
-            now: when the status was asked for.
+        ``base`` is the request in force; ``acts`` tells whether the write of a number acts.
         """
         if not base.go or any(abs(status.position(axis) - at) > TOLERANCE for axis, at in self._from.items()):
             self.over()
@@ -77,7 +75,7 @@ class FirstMotion:
             return self._moved, False
         still = Finger(sum(axis for axis in AXES if axis in self._moved and _should_move(axis, status, base)))
         if not still:
-            self.is_watched = False  # it was asked for nothing: the next one is the first
+            self.is_watched = False  # this one asked for no motion: the next one is the first
             return NO_AXES, False
         is_long = now.time - self._since.time >= IGNORED_S and now.reads - self._since.reads >= LAG_READS
         if is_long:
@@ -86,7 +84,7 @@ class FirstMotion:
 
 
 def _should_move(axis: Finger, status: RobotiqStatus, base: Request) -> bool:
-    """Whether an axis is asked to be somewhere else, and nothing that is known keeps it from that."""
+    """Whether an axis is asked to be elsewhere, and no known contact or limit keeps it where it is."""
     what, position, request = status.finger_status(axis), status.position(axis), base.position(axis)
     if what.is_contact and agrees(request, what, position, direction=0):
         return False
@@ -96,7 +94,7 @@ def _should_move(axis: Finger, status: RobotiqStatus, base: Request) -> bool:
 
 
 def _may_be_limited(axis: Finger, request: int, status: RobotiqStatus) -> bool:
-    """Whether a software limit may keep an axis where it is, which the gripper reports as reached."""
+    """Whether a software limit may keep an axis where it is. The gripper reports that as arrived."""
     position = status.position(axis)
     low, high = NEAR_AN_END
     if axis is Finger.SCISSOR:

@@ -1,8 +1,8 @@
-"""The end of a hand that keeps its grip: rGTO stays set, if nothing moves.
+"""stop(keep_grip=True): leaves rGTO set if no axis moves.
 
-Clearing rGTO is what stops the fingers for certain; no public source says what then becomes of a grip. So a
-hand may leave rGTO set when it is stopped, but only if every axis has been seen at rest under requests that
-are known. What moves is held first, once, as a cancelled move is. On any doubt rGTO is cleared, as ever.
+Clearing rGTO is what stops the fingers for certain, but no public source says what then becomes of a grip. A
+hand may therefore leave rGTO set when it is stopped, if every axis is seen at rest under a known request.
+Axes that move are held first, once, as after a cancelled move. In any doubt rGTO is cleared.
 docs/decisions/keeping-a-grip.md has the reasons.
 """
 
@@ -25,30 +25,32 @@ from .state_machine import RUNNING
 from .triggers import classify
 
 KEEP_S: Final = 0.5
-"""How long axes have to come to rest. What is left of the time of a stop is enough to clear rGTO also on the
-slowest gripper that is reckoned with (a device cycle of 0.2 s)."""
+"""Time for the axes to come to rest. The rest of the 2 s of a stop is enough to clear rGTO even on the
+slowest gripper considered (a device cycle of 0.2 s)."""
 REST_S: Final = 0.05
-"""How long every axis must have stood still: ten polls. What was asked a moment ago, and gDT may not show
-yet, is waited for besides (see requests/standstill.py)."""
+"""Time for which every axis must rest: ten polls. requests/standstill.py waits, besides, for recent requests
+that gDT may not show yet."""
 
 
 class GripKeeper:
-    """Judges the statuses of a hand that is being stopped and is to keep its grip."""
+    """Decides whether a hand that is being stopped may leave rGTO set.
+
+    Attributes:
+        doubt: why rGTO must be cleared whatever the statuses show; empty for no reason.
+    """
 
     def __init__(self, shadow: RequestShadow, *, log: Log = log) -> None:
-        """Judge by what the gripper was asked; ``log`` is that of the hand."""
         self._shadow = shadow
         self._log = log
         self.doubt = ""
-        """Why rGTO is to be cleared, whatever the statuses show."""
 
     def begin(self, state: State, *, halts: bool) -> None:
-        """The hand is being stopped in a state, perhaps with a halt that has not been sent."""
+        """Begin in the state in which the hand is stopped; ``halts`` if a halt has not been sent."""
         running = "" if state in RUNNING else f"the hand was in {state.name}"
         self.doubt = "halt() was asked for" if halts else running
 
     def rests(self, status: RobotiqStatus) -> bool:
-        """Whether every axis is known to rest under what it was asked last, and there is no fault."""
+        """Whether every axis is known to rest under its last request, and there is no fault."""
         shadow = self._shadow
         ready = classify(status) is Trigger.SEEN_READY and status.fault is Fault.NONE and not self.doubt
         rests = not status.moving and shadow.arrivals.axes is Finger.ALL and shadow.is_certain
@@ -60,7 +62,7 @@ class GripKeeper:
         On any doubt it writes ``image_to_stop`` of the newest status, and sees that it acts.
         """
         status = yield None
-        # How long an axis has stood still is counted by when that was asked: replies may be looked at late.
+        # Rest is timed by when a status was asked for, because a busy loop may read the reply late.
         until, since, may_hold = status.timestamp + KEEP_S, math.inf, True
         while True:
             self._shadow.see_axes(status)
@@ -85,7 +87,7 @@ class GripKeeper:
             yield from stop_fingers(last)
 
     def _trouble(self, status: RobotiqStatus) -> str:
-        """Why a gripper in this condition cannot keep its grip; empty for no reason."""
+        """Why the condition of the gripper forbids it; empty for no reason."""
         condition = classify(status)
         if condition is not Trigger.SEEN_READY or status.fault is not Fault.NONE:
             return f"the {condition.value} ({status.fault.description})"
@@ -94,10 +96,10 @@ class GripKeeper:
         return ""
 
     def _unrest(self, status: RobotiqStatus, until: float) -> str:
-        """Why the axes cannot be left as they are; empty for no reason."""
+        """Why the axes do not allow it; empty for no reason."""
         if status.timestamp - self._shadow.now.time > KEEP_S:
             return "the newest status is old: something holds up the event loop"
-        # An object status that may be late is worth a wait; what may come of a lost link is not.
+        # A late object status is worth a wait. A write that was lost with the link is not.
         is_late = self._shadow.is_adoption_late and not status.moving and status.timestamp < until
         if not self._shadow.is_certain and not is_late:
             return "what the gripper was asked is not known for certain"
@@ -108,7 +110,7 @@ class GripKeeper:
         return ""
 
     def _held(self, status: RobotiqStatus) -> Request | None:
-        """The image in which everything that moves, or is about to, is held; None if nothing does."""
+        """The image that holds every axis that moves or is about to; None if no axis does."""
         shadow = self._shadow
         held = PendingCommand(hold=Finger.ALL)
         image = merged(
@@ -121,12 +123,10 @@ class GripKeeper:
         )
         return None if image == shadow.base else image
 
-    def tell_of_lost_grips(self, status: RobotiqStatus, moved: Finger) -> None:
-        """The next image sets rGTO, which drives every axis; one adopted without it has but its place.
+    def warn_of_lost_grips(self, status: RobotiqStatus, moved: Finger) -> None:
+        """Warn before an image sets rGTO: an axis whose request is unknown is only held where it is then.
 
-        Args:
-            status: the newest one.
-            moved: the axes that get a position.
+        ``moved`` are the axes that get a position.
         """
         axes = status.contacts & ~self._shadow.grips.held(status, self._shadow.base) & ~moved
         if axes:

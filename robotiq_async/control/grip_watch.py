@@ -1,4 +1,4 @@
-"""GripWatch: sees from statuses what becomes of grips."""
+"""GripWatch: derives grip events from statuses."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from .contact import agrees
 from .passing_fault import PassingFault
 
 SLIP_COUNTS: Final = 3
-"""Counts that an axis in contact may move without being told: more than the 2 by which readings and requests
-differ (manual). What a slip is on real hardware has not been seen."""
+"""Counts that an axis in contact may move without an event: more than the 2 by which positions and requests
+differ (manual). No slip has been measured on real hardware."""
 
 LATE_S: Final = 1.0
-"""No status of a hand comes later than that after a newer one."""
+"""A status that is older than the last one by more than this is from another clock."""
 
 
 @dataclass(slots=True)
@@ -25,11 +25,11 @@ class _Grip:
     """The contact of one axis.
 
     Attributes:
-        contact: which one: while closing, or while opening.
-        touched: where it was made.
+        contact: while closing, or while opening.
+        touched: the position at which it was made.
         position: the same, or where the axis has slipped to since.
-        was_pressed: whether a request beyond it was ever echoed. The echo of an axis under simple control may
-            tell nothing, and then its contact cannot be seen to be released.
+        was_pressed: whether a request beyond it was ever echoed. Under simple control the echo of an axis may
+            say nothing, and then its contact cannot be seen to be released.
         is_slipping: whether the axis has moved on and reports no contact yet.
     """
 
@@ -40,20 +40,27 @@ class _Grip:
     is_slipping: bool = False
 
     def is_pressed(self, request: int) -> bool:
-        """Whether a request lies beyond the contact: it is what keeps an axis there."""
+        """Whether a request lies beyond the contact, so that the axis presses."""
         return agrees(request, self.contact, self.touched, direction=0)
 
     def is_left(self, moved: int) -> bool:
-        """Whether an axis that has moved so far has gone away from what it touched."""
+        """Whether an axis that has moved by this many counts has left the part."""
         return moved < 0 if self.contact is ObjectStatus.CONTACT_CLOSING else moved > 0
 
 
 class GripWatch:
-    """Is fed statuses in their order, and says what has become of the grips of some axes.
+    """Follows the grips of some axes from status to status.
 
     A contact lasts until the gripper reports something else. An axis that tries again under the same request,
-    as it does when more force is asked for, moves for a moment: that ends its contact only if it gets further
-    than a slip.
+    as it does for more force, moves for a moment: its contact ends only if it moves further than a slip.
+
+    Args:
+        fingers: the axes.
+        since: the status to begin with; its contacts give no events. None for the first status seen.
+        slip: counts that an axis in contact may move without an event, 1..255.
+
+    Raises:
+        TypeError, ValueError: an argument of the wrong type or outside its range.
     """
 
     def __init__(
@@ -63,17 +70,6 @@ class GripWatch:
         since: RobotiqStatus | None = None,
         slip: int = SLIP_COUNTS,
     ) -> None:
-        """Watch some axes.
-
-        Args:
-            fingers: the axes.
-            since: the status to begin with: its contacts are there already, and no events. None for the first
-                one that is seen.
-            slip: counts that an axis in contact may move without being told, 1..255.
-
-        Raises:
-            TypeError, ValueError: an argument of the wrong type or outside its range.
-        """
         self._axes = tuple(check_mask(fingers))
         self._slip = check_int("slip", slip, 1, 255)
         if since is not None and not isinstance(since, RobotiqStatus):
@@ -86,14 +82,14 @@ class GripWatch:
 
     @property
     def holds(self) -> Finger:
-        """The axes in contact, as far as has been seen; one that is slipping is not among them."""
+        """The axes in contact, without those that are slipping."""
         return Finger(sum(axis for axis, grip in self._grips.items() if not grip.is_slipping))
 
     def see(self, status: RobotiqStatus) -> list[GripEvent]:
-        """Take in a status; returns what it tells.
+        """Return the events that a status brings.
 
-        One that is older than the last is late, and passed over. One that is older by a second or more is of
-        another clock, and believed: a watch that waits for the time to come back hears nothing.
+        A status older than the last one is late and ignored. If it is older by LATE_S or more, the clock has
+        changed: it counts, or the watch would report nothing until the old time is reached again.
         """
         last = self._last
         if last is not None and 0 < last.timestamp - status.timestamp < LATE_S:
@@ -108,7 +104,7 @@ class GripWatch:
         return [GripEvent(change, axis, moved, self.holds, status) for axis, change, moved in changes]
 
     def _changes(self, axis: Finger, status: RobotiqStatus) -> list[tuple[GripChange, int]]:
-        """What has become of one axis, in its order, each with the counts it has moved."""
+        """The changes of one axis in their order, each with the counts that it has moved."""
         grip = self._grips.get(axis)
         if grip is None:
             return self._gain(axis, status)
@@ -120,7 +116,7 @@ class GripWatch:
         lets_go = not is_pressed and _follows_requests(status)
         moved = status.position(axis) - grip.position
         if is_touching or (is_pressed and _moves(axis, status)):
-            # gDT may trail the echo: an axis that was asked to let go does so before its contact ends.
+            # gDT may trail the echo: an axis that was asked to let go moves before its contact ends.
             is_leaving = lets_go and grip.was_pressed
             if grip.is_slipping or is_leaving or abs(moved) <= self._slip:
                 return []
@@ -132,7 +128,6 @@ class GripWatch:
         return [(change, moved), *self._gain(axis, status)]
 
     def _gain(self, axis: Finger, status: RobotiqStatus) -> list[tuple[GripChange, int]]:
-        """Begin with a contact, if there is one."""
         contact, position = _contact(axis, status), status.position(axis)
         if contact is None:
             return []
@@ -142,16 +137,15 @@ class GripWatch:
 
 
 def _contact(axis: Finger, status: RobotiqStatus) -> ObjectStatus | None:
-    """The contact that an axis reports, if any; of a gripper that is not active nothing counts."""
+    """The contact that an axis reports; None also while the gripper is not active."""
     what = status.finger_status(axis)
     return what if what.is_contact and status.is_activated else None
 
 
 def _moves(axis: Finger, status: RobotiqStatus) -> bool:
-    """Whether an axis moves: in a fault it reads so, and stands."""
+    """Whether an axis moves. In a fault it shows motion and is at rest."""
     return axis in status.moving and not status.fault.is_serious
 
 
 def _follows_requests(status: RobotiqStatus) -> bool:
-    """Whether the axes do what is asked of them."""
     return status.is_activated and status.go_echo and not status.fault.is_serious

@@ -1,14 +1,14 @@
-"""How the hand gets from one state to another, as suspended code.
+"""Activation, reset, automatic release and shutdown, each as a generator.
 
-Each sequence is a generator. It is sent a status and yields the image to write at once, or None; after an
-image, the next status it is sent is one that shows what came of it. The first status it is sent decides
-whether there is anything to begin at all: between being asked for and being carried out, somebody else
-may have done something to the gripper. There is no I/O, no clock and no event loop here; whoever waits
-for a sequence bounds it in time.
+A sequence is sent a status and yields the image to write now, or None. After an image, the next status it is
+sent shows the effect of that image. The first status decides whether the sequence begins at all: another
+client may have changed the gripper since the call. A sequence does no I/O and has no clock; its caller limits
+its time.
 
 A gripper may acknowledge a write that comes soon after another one and forget it (manual of 2014: space
-them by 10 ms). A stop or a reset that does not show when it should act is therefore yielded again. An
-activation and a release are not, for they move the fingers: they keep their distance from the write before.
+them by 10 ms). A sequence therefore yields a stop or a reset again if it does not show when it should act. It
+never yields an activation or a release again, because they move the fingers; these keep their distance from
+the write before them.
 """
 
 from __future__ import annotations
@@ -25,19 +25,18 @@ from .requests.writes import WINDOW_S
 from .triggers import classify
 
 Sequence = Generator[Request | None, RobotiqStatus, None]
-"""Yields what to write now, is sent the next status that counts."""
 Image = Callable[[RobotiqStatus], Request]
-"""The image to begin from, given the newest status."""
+"""Makes the image to begin from out of the newest status."""
 
 
 def activation(at_rest: Image) -> Sequence:
     """Raise rACT and wait for gIMC = 3. The fingers open and close to their stops.
 
-    Does nothing when the gripper is not reset any more.
+    Does nothing if the gripper is no longer reset.
 
     Raises:
         GripperFaultError: the activation ended in a major fault.
-        NotActivatedError: the gripper fell back to reset after it had begun.
+        NotActivatedError: the gripper was reset after the activation had begun.
     """
     status = yield None
     if classify(status) is not Trigger.SEEN_RESET:
@@ -47,7 +46,7 @@ def activation(at_rest: Image) -> Sequence:
     while classify(status) is not Trigger.SEEN_READY:
         if status.fault.severity is Severity.MAJOR:
             raise GripperFaultError(status.fault)
-        # The first statuses may still be from before the request: a reset means a loss only afterwards.
+        # The first statuses may be from before the write: a reset counts only after the activation showed.
         if begun and classify(status) is Trigger.SEEN_RESET:
             raise NotActivatedError(
                 "the gripper was reset while it activated (power cycle, or another client)"
@@ -57,7 +56,7 @@ def activation(at_rest: Image) -> Sequence:
 
 
 def reset(at_rest: Image) -> Sequence:
-    """Clear rACT and wait for gACT = 0 and gIMC = 0. Clears faults; the gripper lets go."""
+    """Clear rACT and wait for gACT = 0 and gIMC = 0. This clears faults and releases the part."""
     status = yield None
     image = replace(at_rest(status), activate=False, release=False)
     status = yield image
@@ -66,12 +65,12 @@ def reset(at_rest: Image) -> Sequence:
 
 
 def automatic_release(at_rest: Image) -> Sequence:
-    """Raise rATR and wait for fault 0x0F. All axes open slowly; only a reset helps afterwards.
+    """Raise rATR and wait for fault 0x0F. All axes open slowly; afterwards the gripper needs a reset.
 
-    Does nothing when the gripper has been reset: the raised rACT would activate it.
+    Does nothing if the gripper was reset: the image has rACT set and would activate it.
 
     Raises:
-        NotActivatedError: the gripper was reset meanwhile; perhaps it was activated again at once.
+        NotActivatedError: the gripper was reset meanwhile; it may have been activated again since.
     """
     status = yield None
     if not status.activation_echo:
@@ -80,7 +79,7 @@ def automatic_release(at_rest: Image) -> Sequence:
     status = yield replace(at_rest(status), activate=True, release=True)
     while status.fault is not Fault.AUTOMATIC_RELEASE_DONE:
         begun = begun or status.fault is Fault.AUTOMATIC_RELEASE
-        # gIMC is 0 during a release. Until it has been seen, a status may be from before the request, and the
+        # gIMC is 0 during a release. Until the release shows, a status may be from before the write, and its
         # fault from before the release.
         goes_on = status.is_reset or status.fault is Fault.AUTOMATIC_RELEASE
         is_sure = begun or (status.timestamp - asked > WINDOW_S and not status.fault.is_serious)
@@ -90,13 +89,13 @@ def automatic_release(at_rest: Image) -> Sequence:
 
 
 def shutdown(last_image: Callable[[RobotiqStatus], Request | None]) -> Sequence:
-    """Clear rGTO, if anything may move, and wait until the echo of the complete last image is back.
+    """Clear rGTO, if an axis may move, and wait until the gripper echoes the whole image.
 
-    A write acts one device cycle after its acknowledgement. Waiting for gGTO = 0 alone could match the
-    state before the previous write, and whoever connects next would adopt an echo about to change.
+    A write acts one device cycle after its acknowledgement. gGTO = 0 alone may be from before the previous
+    write, and the next client would adopt an echo that is about to change.
 
     Args:
-        last_image: the image to leave the gripper with, given the newest status; None for nothing to stop.
+        last_image: makes the image to leave the gripper with; None if there is nothing to stop.
     """
     status = yield None
     last = last_image(status)
@@ -105,10 +104,10 @@ def shutdown(last_image: Callable[[RobotiqStatus], Request | None]) -> Sequence:
 
 
 def stop_fingers(last: Request) -> Sequence:
-    """Write the last image, again if need be, until its echo is back: the end of a shutdown."""
+    """Write the last image, repeatedly if need be, until the gripper echoes it."""
     status = yield last
     while status.echo != last.echo:
-        # If it was reset meanwhile, it is at rest, and this image would activate it.
+        # A gripper that was reset meanwhile is at rest, and this image would activate it.
         is_being_reset = last.activate and not status.activation_echo
         if is_being_reset and classify(status) is Trigger.SEEN_RESET:
             return

@@ -1,15 +1,12 @@
-"""The legal life of a hand: one table of state and trigger, and the one object that follows it.
+"""The state machine of a hand: one table of states and triggers, and the object that follows it.
 
-Theory of operation
--------------------
-Every state has an entry for every trigger: the state that follows, IGNORED where there is nothing to do or
-nothing new, or the error that a caller gets. A refusal changes nothing.
+Every state has an entry for every trigger: the next state, IGNORED where there is nothing to do, or the
+error that the caller gets. A refusal changes nothing. What a status shows is never refused.
 
-What a status shows is never refused: the gripper does what it does. DO_ states and RUNNING_CC last from the
-decision to send until the gripper has acknowledged, so that a lost link finds the hand in the state that
-tells what was under way. How an activation, a release, a reset or a shutdown goes on is a generator (see
-sequences.py) that :class:`StateMachine` runs; no register, clock or task is known here. The diagram and the
-tables in docs/ are made from the table below.
+DO_ states and RUNNING_CC last from the decision to write until the acknowledgement, so the state tells what
+was under way when the link went down. The steps of an activation, a release, a reset or a shutdown are a
+generator (see sequences.py) that :class:`StateMachine` runs. This module knows no register, clock or task.
+The diagram and the tables in docs/ are made from the table below.
 """
 
 from __future__ import annotations
@@ -37,7 +34,7 @@ from .triggers import classify
 
 
 class Verdict(Enum):
-    """What a trigger comes to where it leads to no state."""
+    """The result of a trigger that leads to no state."""
 
     IGNORED = "nothing to do"
     LINK_DOWN = "ConnectionLostError"
@@ -73,10 +70,10 @@ _FAULTY: Final[Row] = _SEEN | _all(_MOTIONS, Verdict.IN_FAULT)
 
 
 def _row(entries: Row) -> Row:
-    """What is usual in a sequence, and wherever the hand has its link, with entries of its own."""
+    """The entries that are usual while the link is up, replaced by those given."""
     return {
         **{trigger: Verdict.IGNORED if trigger.is_seen else Verdict.NOT_NOW for trigger in Trigger},
-        # No motion of a command is under way; and rACT = 0 is the only request that ends a sequence.
+        # In a sequence no commanded motion is under way, and only rACT = 0 ends it.
         Trigger.ASK_HOLD: Verdict.IGNORED,
         Trigger.ASK_HALT: State.DO_RESET,
         Trigger.ASK_RESET: State.DO_RESET,
@@ -111,7 +108,7 @@ TABLE: Final[dict[State, Row]] = {
     State.DO_RESET: _row(
         _all((Trigger.ASK_HALT, Trigger.ASK_RESET), Verdict.IGNORED) | {Trigger.DELIVERED: State.WF_RESET}
     ),
-    # A fault may outlast the request that clears it by a device cycle: only the reset itself counts.
+    # A fault may show for a device cycle after the reset was written: only the reset itself counts.
     State.WF_RESET: _row({Trigger.SEEN_RESET: State.RESET}),
     State.RESET: _row(
         _SEEN
@@ -124,18 +121,17 @@ TABLE: Final[dict[State, Row]] = {
     State.DO_SHUTDOWN: _OFF | {Trigger.STOPPED: State.SHUTDOWN},
     State.SHUTDOWN: _OFF | {Trigger.ASK_START: State.DISCONNECTED, Trigger.STOPPED: Verdict.IGNORED},
 }
-"""For every state and trigger the state that follows, IGNORED, or the error."""
+"""The next state, IGNORED or the error, for every state and trigger."""
 
 RUNNING: Final = frozenset({State.RUNNING_IDLE, State.RUNNING_CC})
 """The states in which the gripper is active and takes commands."""
 SEQUENCES: Final = frozenset(
     {State.DO_ACTIVATION, State.WF_ACTIVATION, State.DO_ATR, State.WF_ATR, State.DO_RESET, State.WF_RESET}
 )
-"""Activation, release and reset: they lead somewhere by themselves, and clearing rGTO ends none of them."""
+"""The states of an activation, a release and a reset. Clearing rGTO ends none of these."""
 
 
 def states_allowing(trigger: Trigger) -> frozenset[State]:
-    """The states in which a trigger is not refused."""
     return frozenset(
         state
         for state, row in TABLE.items()
@@ -144,70 +140,66 @@ def states_allowing(trigger: Trigger) -> frozenset[State]:
 
 
 class StateMachine:
-    """The state of one hand, and the sequence under way. :meth:`fire` alone changes the state."""
+    """The state of one hand, and the sequence under way. Only :meth:`fire` changes the state.
+
+    Attributes:
+        changed: called with source, target and trigger after each change of state.
+        sequence: the one under way; changed by :meth:`begin`, :meth:`advance` and :meth:`drop_sequence`.
+        why_down: why the link is down, for the error of what is refused then.
+    """
 
     def __init__(
         self, changed: Callable[[State, State, Trigger], None] = lambda *_: None, *, log: Log = log
     ) -> None:
-        """Start in DISCONNECTED; ``log`` is that of the hand."""
         self.log = log
         self.changed = changed
-        """Called with source, target and trigger after each change of state."""
-        self._state = State.DISCONNECTED
         self.sequence: Sequence | None = None
-        """The one under way, for :meth:`begin`, :meth:`advance` and :meth:`drop_sequence` to change."""
         self.why_down: object = None
-        """Why the link is down, for the error of what is refused then."""
+        self._state = State.DISCONNECTED
 
     @property
     def state(self) -> State:
-        """The present state."""
         return self._state
 
     def fire(self, trigger: Trigger, status: RobotiqStatus | None = None) -> bool:
-        """Let something happen.
+        """Follow a trigger; return whether there is anything to do (False where the table says IGNORED).
 
-        Args:
-            trigger: what happens.
-            status: the newest one, for the error of what a fault refuses.
-
-        Returns:
-            Whether there is anything to do: False where the table says IGNORED.
+        ``status`` is the newest one, for the error of what a fault refuses.
 
         Raises:
-            RobotiqError: the table refuses it; the state stays.
+            RobotiqError: the table refuses the trigger; the state stays.
         """
         source = self._state
         target = TABLE[source][trigger]
         if target is source:
-            return True  # quickly: most statuses show nothing new
+            return True  # the usual case: a status that shows nothing new
         if target is Verdict.IGNORED:
             return False
         if isinstance(target, Verdict):
             raise refusal(trigger, source, status, self.why_down)
         self._state = target
-        # A control loop goes to RUNNING_CC and back with every command: that is for the curious.
+        # A control loop goes to RUNNING_CC and back with every command.
         level = logging.DEBUG if {source, target} <= RUNNING else logging.INFO
         self.log.log(level, "%s -> %s (%s)", source.name, target.name, trigger.value)
         self.changed(source, target, trigger)
         return True
 
     def delivered(self) -> None:
-        """What was about to be sent has been acknowledged, or is not sent after all."""
+        """What the state was about to send was acknowledged, or need not be sent."""
         if isinstance(TABLE[self._state][Trigger.DELIVERED], State):
             self.fire(Trigger.DELIVERED)
 
     # -- the sequence under way ------------------------------------------------------------------------
 
     def begin(self, sequence: Sequence) -> None:
-        """Run a sequence, in place of the one under way."""
+        """Run a sequence in place of the one under way."""
         self.sequence = sequence
         next(sequence)
 
     def advance(self, status: RobotiqStatus) -> Request | None:
-        """Hand a status to the sequence under way, and return what it wants written now.
+        """Send a status to the sequence under way; return the image that it wants written now.
 
-        When that was its end, the state follows what the status shows.
+        At the end of the sequence the state follows what the status shows.
         """
         assert self.sequence is not None, "a sequence is under way"
         try:
@@ -222,14 +214,13 @@ class StateMachine:
         return None
 
     def drop_sequence(self) -> None:
-        """Nothing more comes of the sequence under way."""
         self.sequence = None
 
 
 def refusal(
     trigger: Trigger, state: State, status: RobotiqStatus | None = None, why_down: object = None
 ) -> RobotiqError:
-    """The error for what the table refuses; ``why_down`` is why the link is, if that is known."""
+    """Make the error for a trigger that the table refuses."""
     match TABLE[state][trigger]:
         case Verdict.LINK_DOWN:
             why = "" if why_down is None else f": {why_down}"

@@ -1,4 +1,4 @@
-"""What a status shows of the gripper's condition."""
+"""The trigger that a status gives the state machine."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from ..values.trigger import Trigger
 def classify(status: RobotiqStatus) -> Trigger:
     """The condition that a status shows, one of five.
 
-    A serious fault comes first, because gIMC = 0 with a fault is an automatic release and not a reset.
+    A serious fault comes first: gIMC = 0 with a fault is an automatic release and not a reset.
     """
-    # gACT, gIMC and gFLT decide; they rarely change, and this runs at every poll.
+    # Only gACT, gIMC and gFLT decide. They rarely change and this runs at every poll, so it is cached.
     first, second = status.registers[:2]
     return _classify(first >> 8, second >> 8 & 0x0F)
 
 
 @cache
 def _classify(activation: int, fault: int) -> Trigger:
-    """The condition, from the byte that holds gACT and gIMC, and from gFLT."""
+    """``activation`` is the byte with gACT and gIMC, ``fault`` is gFLT."""
     status = RobotiqStatus((activation << 8, fault << 8, 0, 0, 0, 0, 0, 0))
     if status.fault is Fault.AUTOMATIC_RELEASE_DONE:
         return Trigger.SEEN_RELEASED

@@ -1,4 +1,4 @@
-"""Callers that wait for something, in the shape of futures: ``asyncio.Future`` is one."""
+"""How a caller gets its answer: a protocol that ``asyncio.Future`` satisfies."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ def resolve(waiters: Iterable[Waiter[None]]) -> None:
 
 
 def fail(waiters: Iterable[Waiter[Any]], error: RobotiqError) -> None:
-    """Tell callers why it never will be; each raises an error of its own, with a traceback of its own."""
+    """Give each caller an error of its own: a raised error collects the traceback of its caller."""
     for waiter in waiters:
         if not waiter.done():
-            waiter.set_exception(another(error))
+            waiter.set_exception(copy_of(error))
 
 
-def another(error: RobotiqError) -> RobotiqError:
-    """A copy of an error, with its cause."""
-    again = copy.copy(error)
-    again.__cause__ = error.__cause__
-    return again
+def copy_of(error: RobotiqError) -> RobotiqError:
+    """Copy an error with its cause, which ``copy`` leaves out."""
+    copied = copy.copy(error)
+    copied.__cause__ = error.__cause__
+    return copied

@@ -122,7 +122,7 @@ def test_an_abandoned_move_is_held_where_it_is(scan: Scan) -> None:
     scan.run(1.0)
     scan.controller.abandon(move)
     at = scan.gripper.position(A)
-    assert not scan.controller._callers.moves, "nobody waits for it any more"
+    assert not scan.controller._requests.moves, "nobody waits for it any more"
     scan.run(2.0)
     assert not scan.gripper.is_moving
     assert scan.gripper.position(A) == pytest.approx(at, abs=3)

@@ -142,7 +142,7 @@ async def test_what_was_not_sent_yet_is_dropped_and_its_callers_hear_of_it_at_on
         await asyncio.wait(asked)
     assert loop.time() - called < 0.001
     assert all(isinstance(each.exception(), NotStartedError) for each in asked)
-    assert "what was asked for and not sent yet is dropped" in caplog.text
+    assert "requests that were not sent are dropped" in caplog.text
     await stopping
     assert before == 0
     assert not any(image.go for image in images_since(gripper, writes))

@@ -1,9 +1,9 @@
-"""What an axis is asked to do, when somebody else asked it.
+"""What another client has asked of each axis, as far as the status tells.
 
-The hand adopts an active gripper without writing. Its first write then carries a request for every axis,
-and the axes it does not address must neither move nor let go. What they were asked can only be read off
-the status, and the echoes can mislead: under simple control B, C and the scissor follow other registers
-than the ones that are echoed as theirs. The rules are those of docs/decisions/adoption.md.
+The hand adopts an active gripper without writing. Its first write carries a request for every axis, and the
+axes that it does not address must neither move nor let go. Their requests are known only from the status, and
+the echo can mislead: under simple control B, C and the scissor follow other registers than those echoed as
+theirs. docs/decisions/adoption.md has the rules.
 """
 
 from __future__ import annotations
@@ -18,22 +18,21 @@ from ..contact import agrees
 from .standstill import Moment
 
 DIRECTION_WAIT_S: Final = 0.1
-"""How long a moving axis is watched for its direction: at the slowest speed a count takes 43 ms
+"""Time in which a moving axis shows its direction: at the slowest speed a count takes 43 ms
 (234 counts in 10.0 s; thesis, table A1.1)."""
 
 
 class Adoption:
-    """Watches an adopted gripper until the hand writes its own first image."""
+    """Follows an adopted gripper until the hand writes its own first image.
+
+    Args:
+        first: the first status after the adoption.
+        now: when it was asked for; None for the time of the reply.
+        since: when the time begins that a moving axis has to show its direction, and a late object status to
+            come; None for the same time.
+    """
 
     def __init__(self, first: RobotiqStatus, now: Moment | None = None, since: Moment | None = None) -> None:
-        """Begin with the first status after the adoption.
-
-        Args:
-            first: the status.
-            now: when it was asked for; None for the time of the reply.
-            since: from when the time counts that a moving axis is given to show its direction, and a late
-                object status to come; None for the same time.
-        """
         self._first = first
         self._latest = first
         self._now = Moment(first.timestamp, 0) if now is None else now
@@ -46,10 +45,10 @@ class Adoption:
 
     @property
     def is_certain(self) -> bool:
-        """Whether what the axes do can be relied on.
+        """Whether the request made from the status can be relied on.
 
-        A moving one has shown its direction, or has had the time to. One at rest agrees with a request that
-        it may have; or else its gDT may be from before that, and is given the time to come.
+        A moving axis must have shown its direction, or have had the time to. An axis at rest must agree with
+        its echo; if it does not, its gDT may be from before that request, and gets time to come.
         """
         has_time = self._now.time - self.since.time < DIRECTION_WAIT_S
         if has_time and not all(self._direction(axis) for axis in AXES if axis in self._latest.moving):
@@ -58,18 +57,14 @@ class Adoption:
 
     @property
     def _is_late(self) -> bool:
-        """Whether an axis at rest contradicts its echo; under simple control some do for good."""
+        """Whether an axis at rest contradicts its echo. Under simple control some always do."""
         status = self._latest
         return status.go_echo and not all(
             self._agrees(axis, status.requested_position(axis)) for axis in AXES if axis not in status.moving
         )
 
     def request(self, settings: Sequence[AxisRequest]) -> Request:
-        """The image that changes nothing about the gripper.
-
-        Args:
-            settings: where speed and force of each axis come from; they have no echo.
-        """
+        """The image that changes nothing, with speed and force from ``settings``: they have no echo."""
         status = self._latest
         return Request(
             activate=status.activation_echo,
@@ -82,7 +77,6 @@ class Adoption:
         )
 
     def _position(self, axis: Finger) -> int:
-        """The request an axis has."""
         status = self._latest
         position = status.position(axis)
         if not status.go_echo:
@@ -98,7 +92,7 @@ class Adoption:
         return position
 
     def _requested(self, axis: Finger) -> int | None:
-        """The echo that agrees with what an axis does, if one does."""
+        """The echo that agrees with what an axis shows, if one does."""
         status = self._latest
         candidates = [status.requested_position(axis)]
         if axis in Finger.B | Finger.C:

@@ -1,17 +1,17 @@
 """Software limits that a gripper echoes in place of the request.
 
-The manual says that a request beyond a limit is replaced by the limit, and not which of the two is echoed.
-Where it is the limit, the first status that shows our write looks as if another client had written just after
-us. It is taken for a limit only where everything else speaks for that:
+The manual says that a limit replaces a request beyond it, and not which of the two the gripper echoes. If it
+echoes the limit, the status looks as if another client had written just after us. It counts as a limit only
+if
 
-* nothing but positions that this write has changed shows otherwise than written;
-* each shows a value on the way from the axis to its request, so that it may be where the way is barred;
-* the axis may have a limit: the scissor, or a finger that closes while the scissor stands near pinch;
-* our own request was never shown, and no other client was seen for some time.
+* the only differences are positions that this write has changed;
+* each echoed value lies between the axis and its request;
+* the axis can have a limit: the scissor, or a finger that closes while the scissor is near pinch;
+* our own request never showed, and no other client was seen for ALONE_S.
 
-Another client that writes within the same device cycle as we do, and just that, is taken for a limit by
-mistake. Nothing is moved by that: what shows becomes the request that our next image repeats, in either case.
-Lost is that the move ends with where its axis came to rest, in place of MoveSupersededError.
+If another client writes exactly such a request within the same device cycle, it is mistaken for a limit. This
+moves nothing: in both cases our next image repeats what the status echoes. But the move then ends with the
+position at which the axis came to rest, and not with MoveSupersededError.
 """
 
 from __future__ import annotations
@@ -26,31 +26,30 @@ from ...values.status import RobotiqStatus
 from ..contact import TOLERANCE
 
 ALONE_S: Final = 10.0
-"""No other client was seen for so long: one that was is the better explanation."""
+"""If another client was seen within this time, it explains the echo better than a limit."""
 NEAR_PINCH: Final = 160
-"""A scissor reading from which on the fingers may be limited: 137 is basic, 219 pinch."""
+"""From this scissor position on the fingers may be limited: 137 is basic mode, 219 is pinch mode."""
 FIRST_POSITION: Final = 2
 """Index of the first position in an echo."""
 
 
 class Limits:
-    """What has been echoed in place of requests, so far."""
+    """The limits that have been echoed in place of requests."""
 
     def __init__(self) -> None:
-        """None is known."""
         self._known: dict[tuple[Finger, bool], int] = {}
-        """By axis, and whether it limits closing."""
+        """The limit by axis and whether it limits closing."""
         self._proven: set[tuple[Finger, bool]] = set()
 
     def alias(self, image: Request) -> Echo | None:
-        """How an image would be echoed under the limits that are known, if otherwise than written."""
+        """The echo of an image under the known limits; None if it is that of the image itself."""
         if not self._known:
             return None
         limited = image.with_positions(self.apply(image)).echo
         return limited if limited != image.echo else None
 
     def apply(self, image: Request) -> dict[Finger, int]:
-        """What stands in place of the requests of an image that lie beyond a limit."""
+        """The limits that replace requests of an image, by axis."""
         return {
             axis: limit
             for (axis, closing), limit in self._known.items()
@@ -58,12 +57,12 @@ class Limits:
         }
 
     def suspect(self, before: Request, image: Request, status: RobotiqStatus) -> bool:
-        """Take what a status shows in place of a write for limits, if it can be that.
+        """Add the differences between a write and a status to the limits, if they can be limits.
 
         Args:
-            before: the image that was in force before the write.
-            image: the one written.
-            status: the first that shows something else than either.
+            before: the image in force before the write.
+            image: the image written.
+            status: the first status that shows neither.
         """
         echo = status.echo
         if echo[:FIRST_POSITION] != image.echo[:FIRST_POSITION] or not image.go:
@@ -81,7 +80,7 @@ class Limits:
         return bool(found)
 
     def prove(self, axis: Finger, position: int) -> int | None:
-        """An axis has come to rest: the limit that it has proven by that, if it is news."""
+        """The limit that an axis newly proves by coming to rest there, if any."""
         for key, limit in self._known.items():
             if key[0] is axis and key not in self._proven and abs(limit - position) <= TOLERANCE:
                 self._proven.add(key)
@@ -89,17 +88,17 @@ class Limits:
         return None
 
     def doubt(self) -> None:
-        """Another client was seen: what was not proven may have been its doing."""
+        """Another client was seen: drop the limits that no axis has proven, they may be its requests."""
         self._known = {key: limit for key, limit in self._known.items() if key in self._proven}
 
     def forget(self, image: Request, echo: Echo) -> None:
-        """A status shows an image as it was written: what would limit it does not."""
+        """Drop the limits that a status refutes by showing the image as it was written."""
         beyond: Mapping[Finger, int] = self.apply(image) if echo == image.echo else {}
         self._known = {key: limit for key, limit in self._known.items() if key[0] not in beyond}
 
 
 def _may_be_limit(axis: Finger, request: int, shown: int, status: RobotiqStatus) -> bool:
-    """Whether a value lies on the way of an axis that may have a limit there."""
+    """Whether the axis can have a limit at this value, and has it between itself and its request."""
     position = status.position(axis)
     closing = request > shown
     is_on_the_way = shown >= position - TOLERANCE if closing else shown <= position + TOLERANCE

@@ -1,4 +1,4 @@
-"""The next image: what the gripper has been asked so far, with the pending command put in."""
+"""The next image: the request in force with the pending command merged into it."""
 
 from __future__ import annotations
 
@@ -20,23 +20,24 @@ def merged(
     arrived: Finger,
     doubtful: Finger = NO_AXES,
 ) -> Request:
-    """The image with everything that callers ask for; axes that nobody addresses stay as they are.
+    """Merge a pending command into ``base``. Axes that it does not address keep their requests.
 
     Args:
-        base: the image that acts now.
-        pending: what is asked for. A halt goes alone: the rest follows once the gripper has stopped.
+        base: the image in force.
+        pending: what callers ask for. A halt goes alone: the rest follows once the gripper has stopped.
         status: the newest status.
         gripping: the axes that were in contact when rGTO was last set.
         arrived: the axes that have come to rest under their requests.
-        doubtful: the axes that may move although they are shown at rest.
+        doubtful: the axes that show rest and may move all the same.
     """
-    # rACT is for the sequences: raised here it would activate a gripper that has lost its activation. And
-    # rATR would let go.
+    # Only sequences raise rACT: here it would activate a gripper that has lost its activation. rATR would
+    # release the part.
     base = replace(base, activate=base.activate and status.activation_echo, release=False)
     if pending.halting is not None:
         return replace(base, go=False)
     if pending.positions and not base.go:
-        # Raising rGTO wakes every axis. One that gripped keeps its request, or the grip would be gone.
+        # rGTO starts every axis: ask each for where it is. An axis that gripped keeps its request, or it
+        # would lose its grip.
         base = base.with_positions({axis: status.position(axis) for axis in AXES if axis not in gripping})
     held = {
         axis: status.position(axis)

@@ -1,6 +1,6 @@
-"""What callers have asked for and the gripper has not been told yet.
+"""What callers have asked for and is not written yet.
 
-Between two polls everything asked is merged, the last value wins, and it leaves as one write.
+All requests between two polls are merged into one write; the last value wins.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ..waiters import Waiter, fail
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """What is asked of some axes: a position, a speed, a force; None leaves what there is."""
+    """A position, a speed and a force for some axes; None changes nothing."""
 
     axes: Finger
     position: int | None = None
@@ -26,17 +26,17 @@ class Command:
 
 @dataclass(slots=True)
 class PendingCommand:
-    """Changes that wait for the next write, and who waits for that.
+    """The changes for the next write, and the callers that wait for it.
 
     Attributes:
         positions: new position request by axis.
         speeds: new speed by axis.
         forces: new force by axis.
-        hold: axes to be held where they are, if they move. A position goes before it; but if that is lost
-            with the link, the hold is not.
-        asking: callers that wait for the acknowledgement, each with the axes that are to move for it.
-        holding: callers of hold(), with their axes. The axes are held whoever moves them.
-        halting: callers of halt(); None when nobody asked to halt.
+        hold: axes to hold if they move. A position of the same axis replaces the hold; but if the link goes
+            down before the write, the hold remains.
+        asking: callers that wait for the acknowledgement, each with the axes that it moves.
+        holding: callers of hold(), with their axes. These are held whichever client moves them.
+        halting: callers of halt(); None without a halt.
     """
 
     positions: dict[Finger, int] = field(default_factory=dict)
@@ -49,13 +49,12 @@ class PendingCommand:
 
     @property
     def is_empty(self) -> bool:
-        """Whether there is nothing to write."""
-        # In full, and not by the next one: this runs at every poll.
+        # Written out, and not by holds_at_most, because this runs at every poll.
         return not (self.positions or self.speeds or self.forces or self.hold or self.halting is not None)
 
     @property
     def holds_at_most(self) -> bool:
-        """Whether axes to be held are all there is, if anything."""
+        """Whether there is nothing but axes to hold."""
         return not (self.positions or self.speeds or self.forces or self.halting is not None)
 
     @property
@@ -65,16 +64,15 @@ class PendingCommand:
 
     @property
     def asked_to_hold(self) -> Finger:
-        """The axes that callers of hold() have named."""
+        """The axes named by callers of hold()."""
         return reduce(or_, (axes for axes, _ in self.holding), NO_AXES)
 
     @property
     def waiters(self) -> list[Waiter[None]]:
-        """Callers that wait for nothing but the acknowledgement."""
+        """The callers that have their answer with the acknowledgement."""
         return [waiter for _, waiter in (*self.asking, *self.holding)]
 
     def merge(self, new: Command, waiter: Waiter[None] | None = None) -> None:
-        """Merge a command; the last value wins."""
         values = (new.position, new.speed, new.force)
         for changes, value in zip((self.positions, self.speeds, self.forces), values, strict=True):
             if value is not None:
@@ -83,19 +81,19 @@ class PendingCommand:
             self.asking.append((NO_AXES if new.position is None else new.axes, waiter))
 
     def merge_hold(self, axes: Finger, superseded: RobotiqError, waiter: Waiter[None] | None = None) -> None:
-        """Hold axes; a position that was not sent yet is dropped, and who waits for it is told."""
+        """Hold axes. This drops their pending positions, whose callers get the error ``superseded``."""
         self._drop_positions(axes, superseded)
         self.hold |= axes
         if waiter is not None:
             self.holding.append((axes, waiter))
 
     def merge_halt(self, waiter: Waiter[None], superseded: RobotiqError) -> None:
-        """Stop everything; a position that was asked before and not sent yet is dropped."""
+        """Stop every axis. This drops all pending positions, whose callers get the error ``superseded``."""
         self._drop_positions(Finger.ALL, superseded)
         self.halting = [*(self.halting or ()), waiter]
 
     def fail(self, error: RobotiqError) -> None:
-        """Tell everybody who waits that it will not happen."""
+        """Fail every caller that waits."""
         fail((*self.waiters, *(self.halting or ())), error)
 
     def _drop_positions(self, axes: Finger, superseded: RobotiqError) -> None:

@@ -1,8 +1,9 @@
-"""What the gripper has been asked, as far as is known: by us, or by others before and beside us.
+"""The request that the gripper has, as far as it is known.
 
-The next image is made from the one that the gripper has. That is the last one written, unless a status
-shows otherwise: after a reconnect an older one may turn out to be in force, another client may have
-written, and an adopted gripper's requests are only known from its status. No I/O and no clock.
+The gripper's requests cannot be read back whole: speed and force have no echo, a write shows a device cycle
+late, and another client may write at any time. So the hand keeps a shadow of the request block. The next
+image is made from it: the last image written, unless a status shows otherwise. After a reconnect an older
+image may be in force; an adopted gripper's requests are known only from its status. No I/O and no clock.
 """
 
 from __future__ import annotations
@@ -28,50 +29,52 @@ NEVER: Final = float("-inf")
 
 
 class Whose(Enum):
-    """Whose requests a status shows."""
+    """Whose request a status shows."""
 
     __hash__ = object.__hash__  # see State
 
-    OURS = "the last write of ours that showed, or one after it"
-    ADOPTED = "the requests that were adopted from another client"
-    OLDER = "an older write of ours: the link came back, or another client wrote meanwhile"
+    OURS = "ours: the write that showed last, or one after it"
+    ADOPTED = "that of another client, as it was adopted"
+    OLDER = "an older one of ours: the link came back, or another client wrote meanwhile"
     FOREIGN = "another client's"
 
 
 class RequestShadow:
-    """The image that is in force, and what is known of it."""
+    """The image in force.
+
+    Args:
+        speed: what every axis gets until set otherwise, 0..255.
+        force: what every axis gets until set otherwise, 0..255.
+        log: of the hand.
+
+    Attributes:
+        grips: which axes grip.
+        arrivals: which axes have come to rest.
+        now: when the newest status was asked for. It may show the state of that time, however late a busy
+            loop reads the reply; so the age of a write is measured by this.
+    """
 
     def __init__(self, speed: int, force: int, *, log: Log = log) -> None:
-        """Know nothing yet.
-
-        Args:
-            speed: what every axis gets until set otherwise, 0..255.
-            force: what every axis gets until set otherwise, 0..255.
-            log: of the hand.
-        """
-        self._log = log
         self._image = Request(axes=(AxisRequest(0, speed, force),) * len(AXES))
-        """The last image written, or the one the gripper shows after a reconnect."""
+        """The last image written, or the one that the gripper shows after a reconnect."""
         self._adoption: Adoption | None = None
-        """From an adoption until the first write: what the base of that write is made from."""
+        """From an adoption to the next write: makes the base of that write."""
         self._adopted = self._image
-        """What others had asked at the last adoption."""
+        """The request of another client at the last adoption."""
         self._writes = WriteHistory()
         self._shown: Request | None = None
-        """The image of ours that the newest status shows, if it shows one."""
+        """The image of ours that the newest status shows, if any."""
         self._moved = NO_AXES
-        """Axes that we have given a position since the gripper was found."""
+        """The axes that we have given a position since the gripper was found."""
         self.grips: Final = Grips()
         self.arrivals: Final = Arrivals(self._writes, log)
         self.now = Moment(0.0, 0)
-        """When the newest status was asked for. What it shows may be as old as that, however late its reply
-        was looked at; so the age of a write is measured by it."""
         self._others_at = NEVER
         """When another client was last seen."""
         self._sure_at = 0.0
         """When no write was in doubt, the last time."""
         self._unsure_until = NEVER
-        """Until then a write that was not acknowledged before a reconnect may still show."""
+        """Until then a write that was not acknowledged before a reconnect may show."""
 
     # -- what is known ---------------------------------------------------------------------------------
 
@@ -81,7 +84,7 @@ class RequestShadow:
         return self._image if self._adoption is None else self._adoption.request(self._image.axes)
 
     def at_rest(self, status: RobotiqStatus) -> Request:
-        """The base with rGTO clear and every axis asked to be where it is: nothing to wake."""
+        """The base with rGTO clear and every axis asked to be where it is, so that no axis starts."""
         return replace(self.base, go=False).with_positions({axis: status.position(axis) for axis in AXES})
 
     def stop_image(self, status: RobotiqStatus) -> Request | None:
@@ -98,15 +101,15 @@ class RequestShadow:
     def is_certain(self) -> bool:
         """Whether the base can be relied on.
 
-        An adopted axis takes a moment to show its direction, or that it is at rest. A write that was not
-        acknowledged before the link went down may have arrived, and shows within a device cycle: what is
-        written before that would take the axes back to what they were asked before it.
+        An adopted axis takes some time to show its direction, or that it is at rest. A write that was not
+        acknowledged before the link went down may have arrived, and shows within a device cycle: an image
+        written before that would undo it.
         """
         return not self._is_in_doubt and (self._adoption is None or self._adoption.is_certain)
 
     @property
     def is_adoption_late(self) -> bool:
-        """Whether nothing but an adopted axis keeps the base from being certain."""
+        """Whether only an adopted axis keeps the base from being certain."""
         return not self._is_in_doubt and self._adoption is not None and not self._adoption.is_certain
 
     @property
@@ -132,9 +135,9 @@ class RequestShadow:
 
     @property
     def may_begin_to_move(self) -> bool:
-        """Whether an image that does not act yet, or does not show in gDT, may set something in motion.
+        """Whether an image that does not act yet, or does not show in gDT yet, may start an axis.
 
-        While rGTO is clear a speed or a force does not: they have no echo, so all that waits looks alike.
+        While rGTO is clear a speed or a force does not: then all writes that wait have the same echo.
         """
         if not self.is_settled:
             return self._image.go or not self._writes.all_look_alike
@@ -142,7 +145,7 @@ class RequestShadow:
 
     @property
     def ours(self) -> Finger:
-        """The axes that may move because we said so: all, unless somebody else's requests were adopted."""
+        """The axes that may move because of our requests: all, unless another client's were adopted."""
         if self._adoption is None:
             return Finger.ALL
         adopted, image = self._adopted, self._image
@@ -150,13 +153,12 @@ class RequestShadow:
         return self._moved & reduce(or_, unchanged, NO_AXES)
 
     def acts(self, number: int) -> bool:
-        """Whether the image of this number acts."""
         return self._writes.acts(number, self.now.time)
 
     # -- what is written -------------------------------------------------------------------------------
 
     def writing(self, image: Request, moved: Finger, now: float) -> int:
-        """An image is about to be sent, with new positions for some axes; returns the number it goes by."""
+        """Add an image that is about to be sent, with new positions for ``moved``; return its number."""
         before, self._image, self._adoption = self.base, image, None
         self._unsure_until = NEVER
         self._moved |= moved
@@ -171,14 +173,13 @@ class RequestShadow:
         return self._writes.last_number
 
     def lost(self) -> None:
-        """The link is down: what others do meanwhile is not seen."""
         self._image, self._adoption = self.base, None
         self._writes.lost()
 
     # -- what is read ----------------------------------------------------------------------------------
 
     def see(self, status: RobotiqStatus, asked: float) -> None:
-        """Take in a status and when it was asked for; what follows is about it."""
+        """Take in a status. The other methods then speak of it."""
         self.now = Moment(asked, self.now.reads + 1)
         if self._writes.last_number:
             self._shown = self._writes.see(status, asked)
@@ -187,18 +188,18 @@ class RequestShadow:
             if self._writes.replaced:
                 self._take_limits()
         else:
-            # The very first: not ours, but what any write of ours comes after.
+            # The very first status: every write of ours comes after it.
             self._writes.restart(self._image, status.echo, asked)
         if not self._writes.is_in_doubt:
             self._sure_at = asked
 
     def _suspects_limits(self, status: RobotiqStatus) -> bool:
-        """Whether what is not ours may be limits in place of our last requests."""
+        """Whether a foreign echo may be software limits in place of our last requests."""
         is_alone = self.now.time - self._others_at > ALONE_S and self._adoption is None
         return is_alone and self._writes.suspect_limits(status)
 
     def _take_limits(self) -> None:
-        """What is shown in place of our requests is what the axes are asked from here on."""
+        """Make the limits that show in place of our requests part of the base."""
         replaced, self._writes.replaced = self._writes.replaced, {}
         for axis, (request, limit) in replaced.items():
             if self._image.position(axis) == request:
@@ -206,12 +207,11 @@ class RequestShadow:
                 self.arrivals.limit(axis, limit)
 
     def see_others(self) -> None:
-        """Another client was seen."""
         self._others_at = self.now.time
         self._writes.limits.doubt()
 
     def returned(self, status: RobotiqStatus) -> None:
-        """The link was lost and is back, and the gripper follows requests: ours, or it is adopted."""
+        """The link is back: go on from the image of ours that shows, or adopt the gripper."""
         self._unsure_until = self.now.time + WINDOW_S
         if self._shown is None or self._shown is self._adopted:
             self._moved = NO_AXES
@@ -221,16 +221,16 @@ class RequestShadow:
             self._writes.adopt(self._image, status.echo, self.now.time)
 
     def adopt(self, status: RobotiqStatus) -> None:
-        """Take the gripper as it is, without writing."""
+        """Take the gripper's request from its status; write nothing."""
         self.grips.forget()
-        # A client that writes again and again must not make us wait again and again.
+        # A client that keeps writing must not make us wait anew each time.
         since = self.now if self._adoption is None else self._adoption.since
         self._adoption = Adoption(status, self.now, since)
         self._adopted = self.base
         self._writes.adopt(self._adopted, status.echo, self.now.time)
 
     def identify(self) -> Whose:
-        """Whose requests the newest status shows, of a gripper that follows requests. Changes nothing."""
+        """Whose request the newest status shows; asked only of a gripper that follows requests."""
         if self._shown is None:
             return Whose.FOREIGN
         if self._adoption is None and self.now.time >= self._unsure_until:
@@ -239,7 +239,7 @@ class RequestShadow:
         return Whose.ADOPTED if self._shown is self._adopted else Whose.OLDER
 
     def follow(self, whose: Whose, status: RobotiqStatus) -> None:
-        """Make the next image from what the status shows; ``whose`` is what :meth:`identify` says of it."""
+        """Take over the request that the status shows; ``whose`` is the result of :meth:`identify`."""
         if whose is Whose.FOREIGN or (whose is Whose.ADOPTED and self._adoption is None):
             self.adopt(status)
         elif whose is Whose.ADOPTED and self._adoption is not None:
@@ -248,23 +248,20 @@ class RequestShadow:
             self._image, self._adoption = self._writes.newest_that_shows_like(self._shown), None
 
     def restart(self, status: RobotiqStatus) -> bool:
-        """A sequence is over: what it wrote last is what the gripper has, and nothing else is on its way.
+        """A sequence has ended: the gripper has its last image, and no other write is under way.
 
         Returns:
-            Whether the status shows that. If not, another client has written meanwhile. rATR has no echo; a
-            gripper that follows requests does not follow that one.
+            Whether the status shows that image. If not, another client has written meanwhile. rATR has no
+            echo, so an image with rATR counts as not shown by a gripper that follows requests.
         """
         self._writes.restart(self._image, status.echo, self.now.time)
         self.arrivals.clear()
         return status.echo == self._image.echo and not self._image.release
 
     def see_axes(self, status: RobotiqStatus) -> None:
-        """Note which axes have come to rest, and which grip, in a status of a gripper that has no fault.
-
-        In a fault an axis that has not begun to move is at rest, too.
-        """
+        """Note which axes have come to rest and which grip. Not in a fault: it keeps axes from starting."""
         if not status.go_echo:
-            return  # gDT says nothing then
+            return  # gDT says nothing without rGTO
         self.arrivals.see(status, self.now)
         if self.grips or status.contacts:
             contacts = status.contacts

@@ -1,8 +1,8 @@
-"""What was written, and what the gripper shows of it.
+"""The recent writes, and which of them a status shows.
 
-A write acts one device cycle after it is acknowledged, and a slow device may show the one before last or
-skip one. So a status is compared with every image of the last half second and the one before those: if
-it shows one of them it is ours; if it shows something else, another client commands the gripper.
+A write acts one device cycle after it is acknowledged, and a slow device may show the write before the last,
+or skip one. So a status is compared with every image of the last half second and the one before those. If it
+shows one of them, the gripper follows us; if it shows anything else, another client commands it.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ from ...values.status import RobotiqStatus
 from .limits import Limits
 
 WINDOW_S: Final = 0.5
-"""How long after its acknowledgement a write may still be about to show; the slowest device cycle that is
-reckoned with is 0.2 s."""
+"""How long after its acknowledgement a write may take to show. The slowest device cycle considered is 0.2
+s."""
 SILENT_S: Final = 0.25
-"""How long a change without an echo (speed, force) is given to act: the slowest device cycle and more."""
+"""How long a change without an echo (speed, force) may take to act: the slowest device cycle and 0.05 s."""
 
 
 class Phase(Enum):
-    """How far a write has come."""
+    """The phases of a write."""
 
     __hash__ = object.__hash__
 
     SENT = "on the line"
-    ACKNOWLEDGED = "it has arrived, and acts within a device cycle"
+    ACKNOWLEDGED = "acknowledged: it acts within a device cycle"
     SHOWN = "a status has shown it"
-    IN_DOUBT = "the link went down under it: it may have arrived, and may still act"
+    IN_DOUBT = "the link went down before the acknowledgement: it may still act"
     OVERTAKEN = "acknowledged, but another client's request showed first: it may still act"
 
 
 _WAITING: Final = frozenset({Phase.IN_DOUBT, Phase.OVERTAKEN})
-"""It counts while it may still act, and not as what the gripper has."""
+"""The write may still act, but is not what the gripper has."""
 _SETTLED: Final = frozenset({Phase.ACKNOWLEDGED, Phase.SHOWN})
 _ARRIVED: Final = frozenset({Phase.ACKNOWLEDGED, Phase.SHOWN, Phase.OVERTAKEN})
 
@@ -51,29 +51,31 @@ class _Write:
     time: float
     phase: Phase = Phase.SENT
     alias: Echo | None = None
-    """How it is echoed where a limit takes the place of a request."""
+    """Its echo if software limits replace requests."""
 
 
 class WriteHistory:
-    """Compares echoes with what was written. Fed with writes and statuses; keeps no clock."""
+    """Compares the echo of each status with the recent writes. Has no clock.
+
+    Attributes:
+        last_number: the number of the last write.
+        limits: the software limits that the gripper echoes in place of requests.
+        replaced: the requests that the newest status is the first to show limited, each with its limit.
+    """
 
     def __init__(self) -> None:
-        """Know nothing yet: :meth:`restart` tells what the gripper shows."""
-        self._writes: deque[_Write] = deque()
         self.last_number = 0
-        """The number of the last image."""
-        self._shown: _Write | None = None
         self.limits = Limits()
         self.replaced: dict[Finger, tuple[int, int]] = {}
-        """The requests that the newest status is the first to show limited, each with its limit."""
+        self._writes: deque[_Write] = deque()
+        self._shown: _Write | None = None
+        # Both flags keep the common case fast: usually no write waits, and none has an alias.
         self._has_alias = False
-        """Whether a write may show as limits in place of its requests."""
         self._has_waiting = False
-        """Whether a write may be in a phase that waits; the usual case is none of many."""
 
     @property
     def is_in_doubt(self) -> bool:
-        """Whether a write may or may not act, and has not shown so far."""
+        """Whether it is unknown if a write acts."""
         return self._has_waiting and len(self._writes) > 1 and self._any_waits()
 
     def _any_waits(self) -> bool:
@@ -81,21 +83,20 @@ class WriteHistory:
 
     @property
     def all_look_alike(self) -> bool:
-        """Whether what is shown and what waits cannot be told apart by the echo."""
+        """Whether the writes have the same echo, so that no status can tell which of them acts."""
         return len({each.echo for each in self._writes}) <= 1
 
     def restart(self, image: Request, echo: Echo, now: float) -> None:
-        """Take an image for what the gripper has now, and an echo for how it shows; forget the rest."""
+        """Forget all writes: the gripper has ``image`` now and shows it as ``echo``."""
         self.last_number += 1
         self._shown = _Write(self.last_number, image, echo, now, Phase.SHOWN)
         self._writes = deque([self._shown])
         self._has_waiting = False
 
     def adopt(self, image: Request, echo: Echo, now: float) -> None:
-        """Restart, but what has not shown yet may still come.
+        """Restart, but keep the writes that may still show.
 
-        That is a write that was on its way when another client wrote, or one that was not acknowledged
-        before the link went down: it may have arrived all the same.
+        These are writes under way when another client wrote, or not acknowledged before the link went down.
         """
         shown = self._shown.number if self._shown is not None else self.last_number
         waiting = [each for each in self._writes if each.number > shown]
@@ -107,7 +108,7 @@ class WriteHistory:
             self._has_waiting = True
 
     def writing(self, image: Request, now: float) -> int:
-        """An image is about to be sent; returns the number it goes by."""
+        """Add a write that is about to be sent; return its number."""
         self.last_number += 1
         alias = self.limits.alias(image)
         self._has_alias = self._has_alias or alias is not None
@@ -115,35 +116,34 @@ class WriteHistory:
         return self.last_number
 
     def acknowledged(self, now: float) -> None:
-        """The last image was acknowledged."""
         last = self._writes[-1]
         last.phase, last.time = Phase.ACKNOWLEDGED, now
 
     def lost(self) -> None:
-        """The link is down: what was not acknowledged may have arrived, or not."""
+        """The link is down: a write without acknowledgement may or may not have arrived."""
         if self._writes and self._writes[-1].phase is Phase.SENT:
             self._writes[-1].phase = Phase.IN_DOUBT
             self._has_waiting = True
 
     def see(self, status: RobotiqStatus, asked: float) -> Request | None:
-        """The image that a status shows, or None if it shows none of ours.
+        """Return the image of ours that a status shows, or None.
 
-        The gripper takes images in order, so the first one that fits, counted from the one shown last,
-        is the one shown. An older one may come back for as long as it is remembered.
+        The gripper takes images in order, so a status shows the first one after the last shown that fits its
+        echo. While an older image is in the window, a slow device may show it again.
 
         Args:
             status: the status.
-            asked: when it was asked for. What it shows may be as old as that.
+            asked: when it was asked for. It may show the state of that time.
         """
         self._forget(asked)
         echo = status.echo
-        # The usual case first: nothing has changed since the last poll.
+        # The common case first: nothing has changed since the last poll.
         shown = self._shown
         is_shown = shown is not None and shown.echo == echo and shown.number >= self._writes[0].number
         if is_shown and not self._has_alias:
             assert shown is not None
             return shown.image
-        # A stream of commands leaves a hundred writes in the window: what is usual costs one look at each.
+        # A control loop leaves a hundred writes in the window: look at each once.
         fitting = [
             each
             for each in self._writes
@@ -162,7 +162,7 @@ class WriteHistory:
         return (newer or fitting)[0].image
 
     def suspect_limits(self, status: RobotiqStatus) -> bool:
-        """Whether what a status shows can be limits in place of what was written last."""
+        """Whether a status may show limits in place of the last writes; if so, note how they would show."""
         shown = self._shown
         waiting = [each for each in self._writes if shown is not None and each.number > shown.number]
         if shown is None or not waiting or any(each.phase is not Phase.ACKNOWLEDGED for each in waiting):
@@ -175,17 +175,17 @@ class WriteHistory:
         return True
 
     def _is_limited(self, write: _Write, echo: Echo, now: float) -> bool:
-        """Whether a write shows as limits in place of its requests.
+        """Whether an echo shows a write with limits in place of its requests.
 
-        What the gripper shows already may be that, or that the write does not act yet: that takes its time.
+        If the gripper showed the same echo before, the write may not act yet: then wait for SILENT_S.
         """
         if write.alias != echo:
             return False
-        tells = self._shown is None or self._shown.echo != echo
-        return tells or (write.phase is Phase.ACKNOWLEDGED and now - write.time >= SILENT_S)
+        is_new = self._shown is None or self._shown.echo != echo
+        return is_new or (write.phase is Phase.ACKNOWLEDGED and now - write.time >= SILENT_S)
 
     def _settle(self, write: _Write, echo: Echo) -> None:
-        """From here on a write is what is shown of it, if that is limits in place of requests."""
+        """If a write shows as limits in place of requests, make it a write of these limits."""
         if echo == write.echo:
             self.limits.forget(write.image, echo)
         else:
@@ -195,18 +195,18 @@ class WriteHistory:
         write.alias = None
 
     def newest_that_shows_like(self, image: Request) -> Request:
-        """The newest image that has arrived for certain and cannot be told from this one by its echo.
+        """The newest image that has arrived for certain and has the same echo as this one.
 
-        That is what the gripper has, or will have in a moment: speed and force have no echo.
+        The gripper has that image, or is about to: speed and force have no echo.
         """
         alike = {each.echo for each in self._writes if each.image is image}
         newest = [each.image for each in self._writes if each.phase in _ARRIVED and each.echo in alike]
         return newest[-1] if newest else image
 
     def acts(self, number: int, now: float) -> bool:
-        """Whether the image of this number, or a later one, acts by now.
+        """Whether the write of this number, or a later one, acts by now.
 
-        That is when its echo has been seen, or when enough time has passed since its acknowledgement.
+        It does when its echo has shown, or a long enough time after its acknowledgement.
         """
         if self._shown is None or self._shown.number >= number:
             return True
@@ -222,11 +222,11 @@ class WriteHistory:
         waiting = [self._shown, *(each for each in waiting if each.number > self._shown.number)]
         if any(each.echo != last.echo for each in waiting):
             return False
-        # The echo cannot tell the waiting images apart. Equal ones change nothing; a speed or a force does.
+        # All these have the same echo. Equal images act at once; a speed or a force may take SILENT_S.
         return age >= SILENT_S or all(each.image == last.image for each in waiting)
 
     def is_old(self, number: int, now: float) -> bool:
-        """Whether the image of this number has not shown, and was acknowledged so long ago that it acts."""
+        """Whether the write of this number never showed, and was acknowledged so long ago that it acts."""
         if self._shown is None or self._shown.number >= number:
             return False
         return any(
@@ -235,14 +235,14 @@ class WriteHistory:
         )
 
     def _forget(self, now: float) -> None:
-        """Drop what is older than the window, but for the newest of that: the gripper has it, or ought to."""
+        """Drop the writes that are older than the window, except the newest of them: the gripper has that."""
         writes = self._writes
         if len(writes) == 1:
             return
         old: list[_Write] = []
-        while writes and now - writes[0].time > WINDOW_S:  # times only rise: what is old stands first
+        while writes and now - writes[0].time > WINDOW_S:  # the oldest write is the first
             old.append(writes.popleft())
         settled = [each for each in old if each.phase in _SETTLED]
-        on_the_line = [each for each in old if each.phase is Phase.SENT]  # no other comes after it
+        on_the_line = [each for each in old if each.phase is Phase.SENT]  # the last write at most
         writes.extendleft(reversed([*settled[-1:], *on_the_line]))
         self._has_waiting = self._has_waiting and self._any_waits()

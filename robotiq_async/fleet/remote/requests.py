@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
-from ...control.waiters import another
+from ...control.waiters import copy_of
 from ...runtime.clock import now
 from ...values.errors import AgentError, ConnectionLostError, NotAllowedError, NotStartedError, RobotiqError
 from ..network.bus import Bus, Reply, Urgency
@@ -96,7 +96,7 @@ class Requests:
         for posted in self._commands.values():
             if posted.call.lease == lease:
                 posted.rest()
-                self._loop.call_later(LAST_ANSWER_S, posted.fail, another(error))
+                self._loop.call_later(LAST_ANSWER_S, posted.fail, copy_of(error))
 
     def end(self) -> None:
         """The hand was stopped: nothing is asked from now on but for what ends motion."""

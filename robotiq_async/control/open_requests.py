@@ -1,4 +1,4 @@
-"""Everything that callers have asked for, from the call until they have been told what became of it."""
+"""What callers have asked for and have no answer to yet."""
 
 from __future__ import annotations
 
@@ -15,57 +15,50 @@ from .waiters import Waiter, resolve
 
 @dataclass(slots=True, eq=False)
 class _Halt:
-    """One halt that waits until it shows.
+    """A halt that was acknowledged and does not act yet."""
 
-    Attributes:
-        number: of its write.
-        waiter: who asked.
-        is_second: whether it has been sent twice.
-    """
-
-    number: int
+    write: int
     waiter: Waiter[None]
-    is_second: bool = False
+    is_repeated: bool = False
 
 
-class Callers:
+class OpenRequests:
     """Commands, moves and halts: pending, on the line, or acknowledged and not seen to act.
 
     Attributes:
-        pending: what the gripper has not been told yet.
-        moves: the moves that somebody waits for.
-        halting: halts that were acknowledged and not seen to act.
+        pending: what is to be written.
+        moves: the moves that callers wait for.
+        halting: the halts that were acknowledged and do not act yet.
     """
 
     def __init__(self) -> None:
-        """Begin with nobody."""
         self.pending = PendingCommand()
         self.moves = LiveMoves()
+        self.halting: list[_Halt] = []
         self._sent = PendingCommand()
         """What is on the line."""
-        self.halting: list[_Halt] = []
 
     @property
     def has_undelivered_stop(self) -> bool:
         """Whether a halt or a hold waits to be sent, or for its acknowledgement."""
         return any(each.hold or each.halting is not None for each in (self.pending, self._sent))
 
-    # -- what they ask ---------------------------------------------------------------------------------
+    # -- what is asked ---------------------------------------------------------------------------------
 
     def command(self, command: Command, waiter: Waiter[None] | None = None) -> None:
-        """Ask axes for something; moves of axes that get a position are superseded."""
+        """Ask something of axes. A position supersedes the moves of these axes."""
         if command.position is not None:
             self._supersede(command.axes, MoveSupersededError(f"another command moves {command.axes}"))
         self.pending.merge(command, waiter)
 
     def hold(self, axes: Finger, why: str, waiter: Waiter[None] | None = None) -> None:
-        """Hold axes where they are, if they move; moves of them are superseded."""
+        """Hold those axes that move. It supersedes their moves."""
         superseded = MoveSupersededError(why)
         self._supersede(axes, superseded)
         self.pending.merge_hold(axes, superseded, waiter)
 
     def halt(self, waiter: Waiter[None]) -> None:
-        """Stop everything."""
+        """Stop every axis."""
         superseded = MoveSupersededError("halt() stopped the fingers")
         self.moves.fail(superseded)
         self.pending.merge_halt(waiter, superseded)
@@ -77,56 +70,56 @@ class Callers:
     # -- what becomes of it ----------------------------------------------------------------------------
 
     def take(self) -> PendingCommand:
-        """What goes out now. A halt goes before the rest, which follows once the gripper has stopped."""
+        """Take what is written now. A halt goes alone: the rest follows once the gripper has stopped."""
         sent, self.pending = self.pending, PendingCommand()
         if sent.halting is not None:
             self.pending = replace(sent, hold=NO_AXES, holding=[], halting=None)
-            # It stops what was to be held.
+            # The halt also stops the axes to be held, so the callers of hold() have their answer with it.
             sent = PendingCommand(hold=sent.hold, holding=sent.holding, halting=sent.halting)
         self._sent = sent
         return sent
 
     def nothing_to_send(self) -> None:
-        """What is pending holds already."""
+        """Everything pending is in force already."""
         resolve(self.pending.waiters)
         self.pending = PendingCommand()
 
     def acknowledged(self, number: int) -> None:
-        """What is on the line was acknowledged under this number."""
+        """The write on the line, ``number``, was acknowledged."""
         sent, self._sent = self._sent, PendingCommand()
         resolve(sent.waiters)
         if sent.halting is not None:
             for halt in self.halting:
-                halt.number = number  # this write is the second one of those before it, or as good
+                halt.write = number  # this write also repeats the halts before it
             self.halting += [_Halt(number, waiter) for waiter in sent.halting]
 
     def halt_again(self) -> None:
-        """The last halt is on the line once more."""
+        """The last halt is on the line again."""
         self._sent = PendingCommand(halting=[])
 
     def see_halt(self, status: RobotiqStatus, acts: Callable[[int], bool]) -> None:
-        """Tell those whose halt a status shows. One that should act and does not show is sent once more.
+        """Answer the callers whose halt the status shows, and repeat a halt that it should show and does not.
 
-        A gripper may acknowledge a write and forget it. Unlike a motion, a halt may be sent again; that it
-        shows only then is not told twice.
+        A gripper may acknowledge a write and forget it. A halt may be sent twice, unlike a motion. After the
+        repetition the caller gets its answer even if the status still shows rGTO set.
         """
         for halt in self.halting[:]:
-            if not status.go_echo or (halt.is_second and acts(halt.number)):
+            if not status.go_echo or (halt.is_repeated and acts(halt.write)):
                 self.halting.remove(halt)
                 resolve([halt.waiter])
-            elif acts(halt.number) and self.pending.halting is None:
-                halt.is_second, self.pending.halting = True, []
+            elif acts(halt.write) and self.pending.halting is None:
+                halt.is_repeated, self.pending.halting = True, []
 
     def fail(self, error: RobotiqError) -> None:
-        """Nothing asked so far will happen: tell everybody. The write may be on the line all the same."""
-        told = (self.pending, self._sent, PendingCommand(halting=[halt.waiter for halt in self.halting]))
+        """Fail everything asked so far. A write may be on the line all the same."""
+        failing = (self.pending, self._sent, PendingCommand(halting=[halt.waiter for halt in self.halting]))
         self.pending, self._sent, self.halting = PendingCommand(), PendingCommand(), []
-        for command in told:
+        for command in failing:
             command.fail(error)
         self.moves.fail(error)
 
     def fail_but_stops(self, error: RobotiqError) -> None:
-        """Nothing will move that was asked to; a halt and a hold are good all the same."""
+        """Fail everything that would move an axis; halts and holds remain."""
         asked, halting, self.halting = self.pending, self.halting, []
         self.pending = replace(asked, holding=[], halting=None)
         self.fail(error)
@@ -134,9 +127,9 @@ class Callers:
         self.pending = PendingCommand(hold=asked.asked_to_hold, holding=asked.holding, halting=asked.halting)
 
     def lost(self, error: RobotiqError) -> Finger:
-        """The link is down: tell everybody, and return the axes whose hold was not acknowledged.
+        """The link is down: fail everything, and return the axes whose hold was not acknowledged.
 
-        A hold is a stop and not a motion: it is not dropped.
+        A hold stops motion, so it is sent once the link is back.
         """
         axes = self.pending.hold | self._sent.hold
         self.fail(error)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robotiq_async.control.callers import Callers
+from robotiq_async.control.open_requests import OpenRequests
 from robotiq_async.control.requests.pending import Command
 from robotiq_async.values.enums import AXES, Fault, Finger
 from robotiq_async.values.errors import ConnectionLostError, GripperFaultError
@@ -13,7 +13,7 @@ NONE = Finger(0)
 
 
 def test_a_halt_goes_before_what_was_asked_with_it() -> None:
-    callers, halter, setter = Callers(), Outcome(), Outcome()
+    callers, halter, setter = OpenRequests(), Outcome(), Outcome()
     callers.command(Command(A, None, 50), setter)
     callers.halt(halter)
     callers.command(Command(B, 100))
@@ -27,7 +27,7 @@ def test_a_halt_goes_before_what_was_asked_with_it() -> None:
 
 def test_a_halt_does_for_every_hold_and_is_told_to_who_waits_for_one() -> None:
     """The hold alone would leave nothing to write, and nobody would be told."""
-    callers, before, after = Callers(), Outcome(), Outcome()
+    callers, before, after = OpenRequests(), Outcome(), Outcome()
     callers.hold(A, "", before)
     callers.halt(Outcome())
     callers.hold(B, "", after)
@@ -39,7 +39,7 @@ def test_a_halt_does_for_every_hold_and_is_told_to_who_waits_for_one() -> None:
 
 def test_what_was_to_be_held_when_the_link_was_lost_is_given_back() -> None:
     """Also where a position or a halt went before it: that is dropped, and a stop is not."""
-    callers, holder = Callers(), Outcome()
+    callers, holder = OpenRequests(), Outcome()
     callers.hold(A, "", holder)
     callers.halt(Outcome())
     callers.take()
@@ -51,7 +51,7 @@ def test_what_was_to_be_held_when_the_link_was_lost_is_given_back() -> None:
 
 
 def test_what_fails_on_the_line_is_not_told_again_when_it_is_acknowledged() -> None:
-    callers, asking = Callers(), Outcome()
+    callers, asking = OpenRequests(), Outcome()
     callers.command(Command(A, 100), asking)
     callers.take()
     callers.fail(ConnectionLostError("gone"))
@@ -60,7 +60,7 @@ def test_what_fails_on_the_line_is_not_told_again_when_it_is_acknowledged() -> N
 
 
 def test_a_fault_ends_what_moves_and_not_what_stops() -> None:
-    callers, asking, holder, halter = Callers(), Outcome(), Outcome(), Outcome()
+    callers, asking, holder, halter = OpenRequests(), Outcome(), Outcome(), Outcome()
     callers.command(Command(A, 100), asking)
     callers.hold(B, "", holder)
     callers.halt(halter)
