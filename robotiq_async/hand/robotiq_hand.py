@@ -282,7 +282,7 @@ class RobotiqHand(Hand):
 
     def _check_worth_a_reset(self, resets: int) -> None:
         fault = self.status.fault
-        what = f"the gripper gets nowhere: {fault.description} (gFLT 0x{int(fault):02X})"
+        what = f"the gripper makes no progress: {fault.description} (gFLT 0x{int(fault):02X})"
         if resets == RESETS:
             raise StateTimeoutError(
                 f"{what}, also after {resets} resets. Is its emergency stop released, and is it powered? "

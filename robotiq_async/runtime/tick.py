@@ -1,12 +1,13 @@
-"""Wakes the poller tasks of a loop, each at absolute deadlines of its own.
+"""Wakes the poller tasks of a loop, each at its own absolute deadlines.
 
-A loop's own timers are no good for 200 Hz: epoll rounds their timeouts up to a millisecond, and uvloop's
-clock is one. On Linux the next deadline is therefore kept by the kernel, in a timerfd that the running loop
-watches like a socket; elsewhere, and in a loop that has a clock of its own, by the loop's timers. All
-hands of a loop share one: whoever is due is woken together, and a busy loop is not woken more often for it.
+A loop's own timers are too coarse for 200 Hz: epoll rounds their timeouts up to a millisecond, and uvloop's
+clock counts milliseconds. On Linux the kernel therefore keeps the next deadline, in a timerfd that the loop
+watches like a socket. Elsewhere, and in a loop with a clock of its own, the loop's timers keep it. All hands
+of a loop share one timer, so those that are due wake together, and many hands do not wake a busy loop more
+often.
 
-A tick that nobody waits for is counted and not caught up with. How late a tick came tells for how long the
-loop was held up, whatever the poller task was doing meanwhile.
+A missed tick is counted and not caught up with. The delay of a tick tells for how long the loop was held up,
+whatever the poller task was doing meanwhile.
 """
 
 from __future__ import annotations
@@ -28,60 +29,59 @@ _GOLDEN: Final = (math.sqrt(5) - 1) / 2
 
 
 class Tick:
-    """One steady beat, for one task. :meth:`close` it at the end."""
+    """A periodic tick for one task. :meth:`close` it at the end. Making one needs a running event loop.
+
+    Attributes:
+        interval: seconds between ticks.
+        time: the clock of the deadlines.
+        due: the next deadline.
+        late: the longest delay of a tick in seconds, since its reader last set this to 0.
+        longest_late: the longest delay so far.
+        stood_still: whether the loop was not running during ``late``, as between two prompts of IPython.
+    """
 
     def __init__(self, interval: float) -> None:
-        """Prepare; must be made inside a running event loop.
-
-        Args:
-            interval: seconds between ticks.
-        """
         self._loop = asyncio.get_running_loop()
-        self._bell: _Bell | None = None
+        self._timer: _LoopTimer | None = None
         self.interval: Final = interval
         self.time: Final = clock_of(self._loop)
-        """The clock that the deadlines are those of."""
         self.due = 0.0
-        """The next deadline."""
         self.late = 0.0
-        """How late a tick came, in seconds: the worst since somebody set this to 0."""
         self.longest_late = 0.0
-        """The worst of all."""
         self.stood_still = False
-        """Whether nobody ran the loop when it came so late, as IPython's terminal between two prompts."""
         self._passed = 0
         self._hurried = False
         self._waiter: asyncio.Future[None] | None = None
 
     def start(self) -> None:
-        """Begin to beat, or begin anew: the next tick comes within an interval."""
+        """Start or restart: the next tick comes within an interval."""
         self.close()
-        self._bell = bell = _Bell.of(self._loop)
-        phase = self.interval * bell.next_phase()
+        self._timer = timer = _LoopTimer.of(self._loop)
+        phase = self.interval * timer.next_phase()
         self.due = math.ceil((self.time() - phase) / self.interval) * self.interval + phase
         self._passed, self._hurried, self.late, self.stood_still = 0, False, 0.0, False
-        bell.add(self)
+        timer.add(self)
 
     def close(self) -> None:
-        """Beat no more. Idempotent."""
-        bell, self._bell = self._bell, None
-        if bell is not None:
-            bell.remove(self)
+        """Stop ticking. Idempotent."""
+        timer, self._timer = self._timer, None
+        if timer is not None:
+            timer.remove(self)
 
     @property
     def source(self) -> Source | Literal[""]:
-        """What it beats by."""
-        return "" if self._bell is None else self._bell.source
+        """What keeps the deadlines; empty before the start."""
+        return "" if self._timer is None else self._timer.source
 
     def hurry(self) -> None:
-        """Have the next wait end at once; the ticks come when they would have come."""
+        """End the next wait at once; the ticks keep their deadlines."""
         self._hurried = True
         self._wake()
 
     async def wait(self) -> int:
-        """Wait for the next tick, and return how many have passed since the last wait.
+        """Wait for the next tick; return how many have passed since the last wait.
 
-        That is 1, more if late, and 0 when :meth:`hurry` ended the wait.
+        That is 1, more if ticks were missed, and 0 if :meth:`hurry` ended the wait.
         """
         while not self._passed and not self._hurried:
             self._waiter = self._loop.create_future()
@@ -89,12 +89,10 @@ class Tick:
         passed, self._passed, self._hurried = self._passed, 0, False
         return passed
 
-    def strike(self, now: float, *, stood_still: bool) -> None:
-        """The deadline has passed, and perhaps some more have.
+    def expire(self, now: float, *, stood_still: bool) -> None:
+        """Count the deadline, and any further ones, that have passed; set the next.
 
-        Args:
-            now: the time.
-            stood_still: whether the loop was stopped and run again since the last tick.
+        ``stood_still`` if the loop was stopped and run again since the last tick.
         """
         late = now - self.due
         if late > self.late:
@@ -110,22 +108,22 @@ class Tick:
             self._waiter.set_result(None)
 
 
-class _Bell:
-    """Strikes all ticks of one loop, while there are any."""
+class _LoopTimer:
+    """The timer that all ticks of one loop share, while there are any."""
 
-    _bells: ClassVar[dict[asyncio.AbstractEventLoop, _Bell]] = {}
-    """Loops of several threads come and go at once: whoever takes one out gives it back."""
+    _timers: ClassVar[dict[asyncio.AbstractEventLoop, _LoopTimer]] = {}
+    """Threads start and end loops at any time: the thread that pops a timer from here releases it."""
 
     @classmethod
-    def of(cls, loop: asyncio.AbstractEventLoop) -> _Bell:
-        """The timer of a loop; frees those of loops that were closed without notice."""
-        for each in list(cls._bells):
-            if each.is_closed() and (left := cls._bells.pop(each, None)) is not None:
-                left.give_back()
-        bell = cls._bells.get(loop)
-        if bell is None:
-            bell = cls._bells[loop] = cls(loop)
-        return bell
+    def of(cls, loop: asyncio.AbstractEventLoop) -> _LoopTimer:
+        """The timer of a loop; releases those of loops that were closed under their ticks."""
+        for each in list(cls._timers):
+            if each.is_closed() and (left := cls._timers.pop(each, None)) is not None:
+                left.release()
+        timer = cls._timers.get(loop)
+        if timer is None:
+            timer = cls._timers[loop] = cls(loop)
+        return timer
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self._loop = loop
@@ -141,9 +139,9 @@ class _Bell:
         return "loop timer" if self._timerfd is None else "timerfd"
 
     def next_phase(self) -> float:
-        """Where in its interval the next tick beats, 0..1, so that the hands do not all send at once.
+        """The phase of the next tick in its interval, 0..1, so that the hands do not all send at once.
 
-        The fractional parts of the multiples of the golden ratio leave no large gap, however many there are.
+        The fractional parts of multiples of the golden ratio spread evenly for any number of hands.
         """
         return self._added * _GOLDEN % 1
 
@@ -158,34 +156,32 @@ class _Bell:
         if not self._heap:
             self._close()
 
-    def _ring(self) -> None:
-        """Strike whoever is due."""
+    def _expire_due(self) -> None:
         heap, now, run = self._heap, self._clock(), _this_run()
         stood_still, self._run = run is not self._run, run
         while heap and heap[0][0] <= now:
             _, number, tick = heap[0]
-            tick.strike(now, stood_still=stood_still)
+            tick.expire(now, stood_still=stood_still)
             heapq.heapreplace(heap, (tick.due, number, tick))
         self._arm()
 
     def _arm(self) -> None:
-        """Come back at the next deadline."""
         due = self._heap[0][0]
         if self._timerfd is not None:
             self._timerfd.arm(due)
             return
         if self._handle is not None:
             self._handle.cancel()
-        self._handle = self._loop.call_at(due, self._ring)
+        self._handle = self._loop.call_at(due, self._expire_due)
 
     def _watched_timerfd(self) -> TimerFd | None:
-        """A timerfd that the loop watches; None where there is none, or where it would tell another time."""
+        """A timerfd that the loop watches; None without timerfd, or if the loop has a clock of its own."""
         if self._clock is not time.monotonic:
             return None
         with contextlib.suppress(OSError, NotImplementedError):
             timer = TimerFd()
             try:
-                self._loop.add_reader(timer.descriptor, self._ring)
+                self._loop.add_reader(timer.descriptor, self._expire_due)
             except BaseException:
                 timer.close()
                 raise
@@ -193,24 +189,23 @@ class _Bell:
         return None
 
     def _close(self) -> None:
-        if self._bells.pop(self._loop, None) is None:
-            return  # given back by another thread
+        if self._timers.pop(self._loop, None) is None:
+            return  # another thread has released it
         if self._timerfd is not None and not self._loop.is_closed():
             self._loop.remove_reader(self._timerfd.descriptor)
         if self._handle is not None:
             self._handle.cancel()
-        self.give_back()
+        self.release()
 
-    def give_back(self) -> None:
-        """Close the descriptor; the loop does not watch it any more."""
+    def release(self) -> None:
+        """Close the descriptor; the loop no longer watches it."""
         if self._timerfd is not None:
             self._timerfd.close()
 
 
 def _this_run() -> object:
-    """Something that stands for the present ``run_forever()`` of the loop that runs here.
+    """An object that identifies the present ``run_forever()`` of the running loop.
 
-    Each of them sets hooks for async generators that are bound to the loop anew: another one, another object.
-    Both asyncio and uvloop do.
+    In asyncio and in uvloop each run sets new hooks for async generators.
     """
     return sys.get_asyncgen_hooks().firstiter

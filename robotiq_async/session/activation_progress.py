@@ -1,4 +1,4 @@
-"""A word in the log while a gripper activates: on real ones that may take half a minute."""
+"""Logs the progress of an activation, which may take half a minute on a real gripper."""
 
 from __future__ import annotations
 
@@ -13,17 +13,15 @@ ACTIVATING: Final = frozenset({State.DO_ACTIVATION, State.WF_ACTIVATION})
 
 
 class ActivationProgress:
-    """Tells how long an activation has taken so far, whoever began it."""
+    """Logs how long an activation has taken so far, whichever client began it."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop, log: Log) -> None:
-        """Nothing activates yet."""
         self._loop = loop
         self._log = log
         self._since = 0.0
         self._timer: asyncio.TimerHandle | None = None
 
     def reached(self, state: State) -> None:
-        """The hand has come to a state."""
         if state in ACTIVATING:
             if self._timer is None:
                 self._since = self._loop.time()

@@ -1,4 +1,4 @@
-"""Who owns which gripper in this process."""
+"""Claims: no two hands of a process may own the same gripper."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Gripper:
-    """What is known of a gripper without asking it.
+    """What identifies a gripper before it is connected.
 
     Attributes:
-        place: the same for all ways to write its address.
-        unit: the unit id that was given; None where none was, or where there can be but one owner.
-        hint: for people who meant two grippers.
+        place: the same for all spellings of its address.
+        unit: the unit id that was given; None if none was, or if only one hand can own the place.
+        hint: for the error message, in case two grippers were meant.
     """
 
     place: str
@@ -26,10 +26,9 @@ class Gripper:
     hint: str = field(default="", compare=False)
 
     def may_be(self, other: Gripper) -> bool:
-        """Whether this may be the other one.
+        """Whether both may be the same gripper.
 
-        Grippers in the field answer any unit id, so the ids tell two apart only where both were given:
-        whoever does that says that there is a gateway.
+        Grippers answer any unit id, so ids count only if both were given: then there is a gateway.
         """
         units = {self.unit, other.unit}
         return self.place == other.place and (None in units or len(units) == 1)
@@ -43,20 +42,19 @@ class _Claim(Generic[T]):
 
 
 class Claims(Generic[T]):
-    """Grippers and their owners. Threads may claim at once."""
+    """Grippers and their owners. Thread-safe."""
 
     def __init__(self) -> None:
-        """Begin with nothing claimed."""
         self._claiming = threading.Lock()
         self._claims: dict[T, _Claim[T]] = {}
 
     def claim(self, gripper: Callable[[], Gripper], owner: T, is_over: Callable[[T], bool]) -> T | None:
-        """Take a gripper in the running loop; gives its owner instead if it has one.
+        """Claim a gripper for the running loop; return its present owner if it has one.
 
         Args:
-            gripper: tells which. Asked again when others claim: a serial port may be another by then.
-            owner: who wants it.
-            is_over: tells, of an owner in this loop, whether it has ended without a word.
+            gripper: identifies it; called anew for each later claim, because a serial port may be renamed.
+            owner: the new owner.
+            is_over: whether an owner in this loop has ended without a release.
         """
         here = asyncio.get_running_loop()
         with self._claiming:
@@ -70,5 +68,5 @@ class Claims(Generic[T]):
         return None
 
     def release(self, owner: T) -> None:
-        """Give back what somebody owns. Never waits: it may be called from anywhere."""
+        """Give up a claim. Takes no lock: any thread may call it."""
         self._claims.pop(owner, None)

@@ -1,4 +1,4 @@
-"""What is counted while a hand polls."""
+"""The counters behind :class:`Statistics`."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from ..values.move_result import MoveResult
 from ..values.statistics import Statistics, percentile
 
 SAMPLES: Final = 2000
-"""Periods and round trips that percentiles are taken from: 10 s at 200 Hz."""
+"""The periods and round trips that percentiles are made from: 10 s at 200 Hz."""
 
 
 @dataclass(slots=True)
 class Counters:
-    """What is counted from one start to the next."""
+    """Counts from one start to the next."""
 
     polls: int = 0
     writes: int = 0
@@ -35,7 +35,7 @@ class Counters:
 
     @contextmanager
     def move(self) -> Iterator[Callable[[MoveResult], None]]:
-        """Count how a move ends; gives what is to be called with its result."""
+        """Count how a move ends; call the function that this yields with its result."""
         outcome = "cancelled"
 
         def note(result: MoveResult) -> None:
@@ -51,7 +51,6 @@ class Counters:
             self.moves[outcome] += 1
 
     def snapshot(self, foreign_commands: int, passing_faults: int = 0) -> Statistics:
-        """The figures so far, with those that the controller counts."""
         periods, round_trips = sorted(self.periods), sorted(self.round_trips)
         return Statistics(
             polls=self.polls,

@@ -1,4 +1,4 @@
-"""What becomes of the fingers when a hand is stopped."""
+"""How a stop leaves the fingers."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ from typing import Self
 
 
 class Ending(IntEnum):
-    """The gentlest first: of several stops under way the strongest counts."""
+    """Ordered by strength: of several stops under way the strongest counts."""
 
     LEAVE = 0
-    """They go on with what they do."""
+    """The fingers go on."""
     KEEP = 1
-    """What moves is held, and rGTO stays set if everything is seen at rest."""
+    """Axes that move are held, and rGTO stays set if every axis is seen at rest."""
     HALT = 2
     """rGTO is cleared."""
 
     @classmethod
     def of(cls, *, halt: bool, keep_grip: bool) -> Self:
-        """What the arguments of ``stop()`` ask for."""
+        """The ending for the arguments of ``stop()``."""
         if not halt:
             return cls(cls.LEAVE)
         return cls(cls.KEEP if keep_grip else cls.HALT)
 
     @property
     def done(self) -> str:
-        """What the fingers are then."""
+        """The participle for messages: the fingers are ..."""
         return ("left as they are", "held", "stopped")[self]

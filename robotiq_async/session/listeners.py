@@ -1,4 +1,4 @@
-"""Callbacks that are told at once what happens to a hand, before anybody who waits wakes up."""
+"""Callbacks for everything that happens to a hand, called before any waiting task goes on."""
 
 from __future__ import annotations
 
@@ -13,26 +13,25 @@ Listener = Callable[[Any], None]
 
 
 class Listeners:
-    """Tells each of them everything, in its order."""
+    """Calls every listener with every item, in order. A listener that raises is logged and removed."""
 
     def __init__(self, log: Log = log) -> None:
-        """Begin with nobody; those that raise are logged."""
         self._log = log
         self._listeners: dict[object, Listener] = {}
-        """By what :meth:`add` has made for each: the same callback may be added twice."""
+        """By a key of their own: the same callback may be added twice."""
         self._items: deque[object] = deque()
         self._is_telling = False
 
     def add(self, listener: Listener) -> Callable[[], None]:
-        """Tell a listener from now on; returns what removes it again, which may be called twice."""
+        """Add a listener; return a function that removes it, and may be called twice."""
         key = object()
         self._listeners[key] = listener
         return lambda: self._remove(key)
 
     def tell(self, item: object) -> None:
-        """Tell everybody. What happens because of it is told after it."""
+        """Call every listener. What a listener itself brings about comes after the present item."""
         if not self._listeners:
-            return  # quickly: this runs at every poll
+            return  # the common case, at every poll
         self._items.append(item)
         if self._is_telling:
             return
@@ -49,7 +48,7 @@ class Listeners:
                 continue  # removed by another one, just now
             try:
                 listener(item)
-            except (Exception, asyncio.CancelledError):  # noqa: BLE001  # nothing may end the task that polls
+            except (Exception, asyncio.CancelledError):  # noqa: BLE001  # no listener may end the poller task
                 self._remove(key)
                 self._log.exception("a listener raised, and is not called any more: %r", listener)
 

@@ -1,4 +1,4 @@
-"""Opens the link of a hand, at its start and again when it was lost, until it is open or given up."""
+"""Opens the link of a hand, at its start and after a loss, until it is open or given up."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .reconnecting import Backoff, ReconnectPolicy
 
 
 class Opener:
-    """Tries until it works. :meth:`end` ends that at any moment, and for good."""
+    """Tries until the link is open. :meth:`end` ends that at any moment, and for good."""
 
     def __init__(self, connect: Callable[[], Awaitable[None]], options: Options) -> None:
         """Prepare; must be made inside a running event loop.

@@ -1,10 +1,9 @@
-"""The one task that owns the link: connects, polls, writes, reconnects and shuts down.
+"""The one task that owns the link: it connects, polls, writes, reconnects and shuts down.
 
-Every cycle reads the status, decides, and writes at once, as the scan of a PLC: what is decided is decided
-on what the gripper has just shown. Nobody else touches the transport; callers leave what they want with
-the controller and wait beside it. So no request is cancelled in flight (but one that a stop has waited for
-long enough, and the link with it), the link stays in step, and start() and stop() may be called from
-different tasks.
+Every cycle reads the status, decides and writes at once, like the scan of a PLC, so each decision is made on
+what the gripper has just shown. No other task touches the transport: callers leave their requests with the
+controller and wait. So no exchange is cancelled in flight, except when a stop has waited for it long enough;
+then the link is closed with it. start() and stop() may be called from different tasks.
 """
 
 from __future__ import annotations
@@ -37,37 +36,50 @@ from .opening import Opener
 from .options import LONGEST_SPACING_S, Options
 from .streams import Channels
 
-# anyio loads its backend when it is first used: some 20 ms that would hold up the loop in which a hand
-# starts. Where it keeps it is not documented; a name that has changed costs those 20 ms and nothing else.
+# anyio loads its backend at its first use, which would hold up the loop for some 20 ms when a hand starts.
+# The name of the backend is not documented; if it changes, it only costs those 20 ms.
 with contextlib.suppress(ImportError):
     importlib.import_module("anyio._backends._asyncio")
 
 STOP_S: Final = 1.4
-"""From stop() until disconnecting at the latest, whatever is in flight. Promised are 2 s; a transport object
-may take the last half second to close."""
+"""From stop() to the disconnection at the latest. stop() promises 2 s, and a transport object may take half a
+second to close."""
 IN_FLIGHT_S: Final = 0.9
-"""Of that, time for what is in flight at stop() to be answered, before the link is opened anew."""
+"""Of STOP_S: how long the exchange in flight may take before the link is closed and opened anew."""
 SHUTDOWN_S: Final = 1.2
-"""Of that, time to reach the gripper and to see the fingers stop."""
+"""Of STOP_S: time to reach the gripper and to see the fingers stop."""
 SHUTDOWN_PAUSE_S: Final = 0.05
 """Between two attempts at that."""
 READS: Final = 3
-"""At most this many reads in a cycle that has something to write, in a loop that is held up."""
+"""The most reads in a cycle that has a request to write, while the loop is held up."""
 SOON_S: Final = 0.0025
-"""A cycle waits so long for the distance between two writes: half of a usual period. What is decided on is no
-older than that then."""
+"""How long a cycle waits for write_spacing: half of a usual period, so that its status is still fresh."""
 LATE_S: Final = 0.05
-"""Later than this a poll is worth a warning; on a busy machine a few milliseconds are usual."""
+"""A poll that is later than this is worth a warning; on a busy machine a few milliseconds are usual."""
 LATE_WARNING_S: Final = 1.0
-"""At most one warning about late polls in this time."""
+"""Seconds between two warnings about late polls."""
 STOOD_STILL: Final = (
-    "nobody ran the event loop meanwhile, and nothing watched the fingers (as between the prompts of "
+    "the event loop was not running meanwhile, and nothing watched the fingers (as between the prompts of "
     "IPython's terminal: use robotiq_async.sync there)"
 )
 
 
 class Poller:
-    """Runs one hand's link from start to stop. :meth:`run` is the body of its task."""
+    """Runs the link of one hand from start to stop; :meth:`run` is the body of its task.
+
+    Args:
+        transport: the link; no other task may use it.
+        controller: decides what to write.
+        counters: for the statistics.
+        channels: get each status after the controller has seen it, and each write.
+        options: of the hand.
+        wait: seconds to keep trying while nothing answers.
+
+    Attributes:
+        connected: done after the first status; holds the error if there is none.
+        failure: why the link was given up, if it was.
+        why_lost: why the link is down, while it is being opened again.
+    """
 
     def __init__(
         self,
@@ -79,16 +91,6 @@ class Poller:
         *,
         wait: float = 0.0,
     ) -> None:
-        """Prepare; must be made inside a running event loop.
-
-        Args:
-            transport: the link; nobody else may use it.
-            controller: what decides.
-            counters: what is counted.
-            channels: are told of each status, after the controller has seen it, and of what is written.
-            options: of the hand.
-            wait: seconds for which there may be no gripper yet.
-        """
         self._wait = wait
         self._transport = transport
         self._controller = controller
@@ -98,33 +100,28 @@ class Poller:
         self._log = options.log
         self._loop = asyncio.get_running_loop()
         self.connected: asyncio.Future[None] = self._loop.create_future()
-        """Done when the first status has been taken in; holds the error when there was none."""
         self.failure: RobotiqConnectionError | None = None
-        """Why the hand gave up, if it did."""
         self.why_lost: RobotiqConnectionError | None = None
-        """Why the link is down, if it went down and is being opened again."""
         self._stopping = False
         self._end_by = math.inf
         self._ending = Ending.HALT
-        """The strongest that was asked for; a task that ends by itself stops the fingers."""
+        """The strongest requested so far; a task that ends by itself stops the fingers."""
         self._opener = Opener(self._connect, options)
         self._polling: anyio.CancelScope | None = None
         self._tick = Tick(options.poll_interval)
         self._last_poll = 0.0
         self._warned = -math.inf
         self._decided: tuple[Request, float] | None = None
-        """What the last cycle decided to write, and when."""
+        """The last image decided on, and when."""
 
     def request_stop(self, *, halt: bool, keep_grip: bool = False) -> None:
-        """End the task; with ``halt`` it stops the fingers first. Never blocks.
+        """End the task as :class:`Ending` says; the strongest of several requests counts. Never blocks.
 
-        With ``keep_grip`` as well it holds what moves, and leaves rGTO set if it sees everything at rest.
-        From here on the controller refuses every request and has dropped what was not sent. Of several
-        requests to stop the strongest counts, whichever comes first.
+        From here on the controller refuses every request and has dropped those that were not sent.
         """
         ending = Ending.of(halt=halt, keep_grip=keep_grip)
         if not self._stopping:
-            # A hold or a halt that is not delivered yet is dropped with the rest: this one makes up for it.
+            # A hold or a halt that was not delivered is dropped with the rest: this stop must replace it.
             self._ending = max(ending, Ending.KEEP) if self._controller.has_undelivered_stop else ending
             self._end_by = self._loop.time() + STOP_S
             if self._polling is not None:
@@ -143,20 +140,20 @@ class Poller:
     def _refuse_requests(self) -> None:
         """Take no more requests, and drop those that were not sent.
 
-        At once, and not when the task gets to its end: between a read and a write of this cycle a request
-        would still be taken, and a motion begin.
+        This cannot wait for the end of the task: between the read and the write of this cycle it would still
+        take a request and begin a motion.
         """
         self._stopping = True
         self._controller.stop()
         self._channels.publish_changes()
 
     def hurry(self) -> None:
-        """Begin the next cycle at once if there is a stop to write; it does not wait for the tick."""
+        """Begin the next cycle at once, and not with the tick, if there is a stop to write."""
         if self._controller.is_urgent:
             self._tick.hurry()
 
     def abandon(self) -> None:
-        """The loop was closed: give back what is not its own."""
+        """The loop was closed: release the shared timer."""
         self._tick.close()
 
     async def run(self) -> None:
@@ -185,14 +182,14 @@ class Poller:
         if connected:
             resolve([self.connected])
             policy = self._options.policy
-            # Only the start may activate unasked; from here on the policy says.
+            # From here on the reconnect policy decides about activations.
             self._controller.activates = policy is not None and policy.activate
         return connected
 
     async def _connect(self) -> None:
         """Open the link and see the first status, or what it takes to decide about one."""
         await self._transport.open()
-        self._last_poll = 0.0  # no period counts that the link was lost in
+        self._last_poll = 0.0  # the time without a link counts as no period
         await self._poll_once()
         while self._controller.is_undecided:  # the silence before may show as a fault, once
             await asyncio.sleep(self._options.poll_interval)
@@ -231,13 +228,13 @@ class Poller:
             try:
                 await self._cycle()
                 if not passed:
-                    self._last_poll = 0.0  # nor does the rest of a period that a hurried cycle came into
+                    self._last_poll = 0.0  # a hurried cycle breaks the period
             except RobotiqConnectionError as error:
                 if not await self._reconnect(error):
                     return
 
     async def _cycle(self) -> None:
-        """Read, decide, write. A stop is written before that, too: the gripper may hear without answering."""
+        """Read, decide, write. Write a stop before reading, too: a gripper may obey and not answer."""
         controller = self._controller
         if controller.is_urgent and not self._is_held_up() and await self._may_write(LONGEST_SPACING_S):
             await self._write()
@@ -250,7 +247,7 @@ class Poller:
         await self._write()
 
     async def _may_write(self, soon: float = SOON_S) -> bool:
-        """Whether the gripper bears another write in this cycle; waits for that if it does soon."""
+        """Whether write_spacing allows a write in this cycle; waits for it for up to ``soon`` seconds."""
         wait = self._controller.wait(self._tick.time())
         if wait > soon:
             return False
@@ -259,9 +256,8 @@ class Poller:
         return True
 
     async def _write(self) -> None:
-        """Write what the controller decides on, if anything."""
         self._decided = None
-        # Listeners hear of it after the write: what they ask for would come too late for this one.
+        # Listeners hear of changes after the write: a request of theirs would come too late for this one.
         try:
             is_written = await self._transport.send(self._decide)
         except RobotiqConnectionError:
@@ -277,18 +273,17 @@ class Poller:
         self._channels.requests.push(SentRequest(*self._decided, acknowledged=True))
 
     def _decide(self) -> Registers | None:
-        """Called by the link in the turn of the loop in which it writes: no stop comes between."""
+        """The image to write, decided in the turn in which the link writes: no stop comes between."""
         now = self._tick.time()
         request = self._controller.decide(now)
         if request is None:
-            self._channels.publish_changes()  # it waits for no write
+            self._channels.publish_changes()  # no write follows to wait for
             return None
         self._counters.has_begun_to_write = True
         self._decided = request, now
         return request.registers
 
     async def _poll_once(self) -> None:
-        """Read, and tell everybody."""
         tick, counters = self._tick, self._counters
         tick.late = 0.0
         asked = tick.time()
@@ -307,9 +302,9 @@ class Poller:
     def _is_held_up(self) -> bool:
         """Whether the loop was held up since the newest status was asked for, or is at this moment.
 
-        Nothing is decided on it then: what another client has done, or where an axis is by now, must be
-        seen before the next write. While a slow gripper is waited for the ticks come in time; when the loop
-        is held up they do not.
+        Such a status is too old to decide on: it may lack a write of another client, or the motion of an
+        axis.
+        A slow gripper does not count: then the ticks come in time.
         """
         tick = self._tick
         return tick.late > HELD_S or tick.time() - tick.due > HELD_S
@@ -318,7 +313,7 @@ class Poller:
         """Wait for the next tick, and return how many have passed; a missed one is counted and skipped."""
         passed = await self._tick.wait()
         if not passed:
-            self._last_poll = 0.0  # a hurried cycle keeps to no period
+            self._last_poll = 0.0  # a hurried cycle breaks the period
             return passed
         missed = passed - 1
         self._counters.longest_stall = self._tick.longest_late
@@ -345,7 +340,7 @@ class Poller:
     # -- the end ---------------------------------------------------------------------------------------
 
     async def _finish(self) -> None:
-        """See to the fingers as far as that is possible in time, then disconnect."""
+        """Stop the fingers if there is time, then disconnect."""
         if not self._stopping:
             self._refuse_requests()
         try:
@@ -357,7 +352,7 @@ class Poller:
                 self._channels.publish_changes()
 
     async def _end_motion_and_close(self) -> None:
-        """A stronger stop may be asked for while a gentler one is carried out, or while the link closes."""
+        """Stop and close; again if a stronger stop is requested during this, or while the link closes."""
         done = Ending.LEAVE
         while True:
             try:
@@ -380,7 +375,7 @@ class Poller:
             self._log.warning("the gripper did not confirm in time that the fingers were stopped")
 
     async def _stop_fingers(self) -> None:
-        """Clear rGTO and see it; until the time is over. Unlike a motion, a stop may be sent again."""
+        """Clear rGTO and see it, trying until the time is over. Unlike a motion, a stop may be sent again."""
         failed = False
         while True:
             try:
@@ -388,7 +383,7 @@ class Poller:
                 return
             except RobotiqConnectionError as error:
                 if not failed:
-                    self._log.warning("the fingers could not be told to stop, trying again: %s", error)
+                    self._log.warning("the stop was not delivered, trying again: %s", error)
                 failed = True
                 self._controller.lost(error)
                 self._channels.publish_changes()
@@ -396,8 +391,8 @@ class Poller:
 
     async def _stop_fingers_once(self) -> None:
         if not self._transport.is_open:
-            # A gripper that lost its client goes on moving; one that lost its power meanwhile would be
-            # activated by what was known of it before.
+            # A gripper without a client goes on moving. Read first: if it lost its power meanwhile, an image
+            # with rACT would activate it.
             await self._transport.open()
             await self._poll_once()
         self._controller.shut_down(keep_grip=self._ending is Ending.KEEP)

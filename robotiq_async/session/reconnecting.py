@@ -1,4 +1,4 @@
-"""What becomes of a lost link."""
+"""How a lost link is opened again."""
 
 from __future__ import annotations
 
@@ -8,20 +8,19 @@ from typing import Final
 from ..values.checks import check_seconds
 
 SHORTEST_S: Final = 0.01
-"""Between two tries, at least."""
+"""The shortest time between two tries."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReconnectPolicy:
-    """What becomes of a lost link.
+    """How a lost link is opened again.
 
     Attributes:
         first_delay: seconds before the first try, 0..10.
         max_delay: the delay doubles up to this, in seconds, 0.01..60.
         give_up_after: seconds after which the hand gives up; None tries for ever.
-        activate: whether a gripper that comes back without its activation is activated. The fingers
-            MOVE then, without anybody having asked at that moment: leave it off unless nothing can be
-            in their way.
+        activate: whether a gripper that comes back without its activation is activated. The fingers MOVE
+            then, at a moment that you do not choose: leave it off unless nothing can be in their way.
     """
 
     first_delay: float = 0.05
@@ -56,15 +55,14 @@ class Backoff:
     """
 
     def __init__(self, policy: ReconnectPolicy, since: float) -> None:
-        """Begin with the first delay."""
         self._policy = policy
         self.since = since
         self.delay = policy.first_delay
 
     def gives_up(self, now: float) -> bool:
-        """A try has failed: whether that was the last one. If not, the next delay is longer.
+        """Whether the try that has just failed was the last one. If not, lengthen the delay.
 
-        The last try comes when it is time to give up, and no later.
+        The last try begins when ``give_up_after`` is over, and no later.
         """
         limit = self._policy.give_up_after
         self.delay = min(max(2 * self.delay, SHORTEST_S), self._policy.max_delay)

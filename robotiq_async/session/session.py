@@ -1,4 +1,4 @@
-"""One run of a hand, from start() to stop(): its controller, its task, and those who wait beside it."""
+"""One run of a hand, from start() to stop(): its controller, its poller task and the callers that wait."""
 
 from __future__ import annotations
 
@@ -41,14 +41,26 @@ from .streams import Channels
 P = ParamSpec("P")
 T = TypeVar("T")
 Failing = Mapping[State, Callable[[], RobotiqError]]
-"""States that mean that what is waited for will not come, each with the error that says so."""
+"""The states in which a wait is in vain, each with the error for the caller."""
 
 
 class Session:
-    """Runs a hand once: from start() to stop(), or until its link or its loop is gone for good."""
+    """A run: from start() to stop(), or until the link is given up or the event loop closed.
+
+    Making one claims the gripper and begins to connect. This needs a running event loop.
+
+    Args:
+        options: of the hand.
+        machine: the state of the hand; it outlives the session.
+        channels: the streams and listeners of the hand; they outlive the session.
+        activate: whether a gripper that is found reset is activated.
+        wait: seconds to keep trying while nothing answers.
+
+    Raises:
+        InvalidStateError: another hand of this process owns the gripper.
+    """
 
     _claims: ClassVar[Claims[Session]] = Claims()
-    """Who owns which gripper in this process."""
 
     def __init__(
         self,
@@ -59,21 +71,8 @@ class Session:
         activate: bool,
         wait: float = 0.0,
     ) -> None:
-        """Claim the address and begin to connect; must be made in a running event loop.
-
-        Args:
-            options: of the hand.
-            machine: of the hand: its state outlives the session.
-            channels: of the hand: they were opened before, perhaps, and are read afterwards.
-            activate: whether a gripper that is found reset is activated.
-            wait: seconds for which there may be no gripper yet.
-
-        Raises:
-            InvalidStateError: the address is owned already.
-        """
         self.options = options
-        self.is_over = True  # until its task runs
-        """Whether nothing runs any more."""
+        self.is_over = True  # until the poller task runs
         self._loop = asyncio.get_running_loop()
         self.machine = machine
         machine.why_down = None
@@ -101,33 +100,24 @@ class Session:
 
     @property
     def lost_its_loop(self) -> bool:
-        """Whether the loop was closed under it: its task can never end then."""
+        """Whether the event loop was closed before the stop, so that the task can never end."""
         return not self.is_over and self._loop.is_closed()
 
     async def stop(self, *, halt: bool, keep_grip: bool = False) -> None:
-        """Stop the fingers (with ``halt``) and disconnect; also when cancelled meanwhile.
-
-        With ``keep_grip`` they are held, and rGTO stays set if everything is seen at rest.
-
-        Raises:
-            RuntimeError: called in another event loop.
-        """
+        """Stop as :meth:`Hand.stop` says, also when cancelled meanwhile."""
         self.check_loop("hand.stop()")
         self._poller.request_stop(halt=halt, keep_grip=keep_grip)
         await self.ended()
 
     async def ended(self) -> None:
-        """Wait for the end that was asked for; a cancellation meanwhile is raised after it."""
+        """Wait for the end of the task; a cancellation meanwhile is raised after it."""
         try:
             await wait_shielded(self._task)
         finally:
             self._end(self._task)
 
     def abandon(self) -> None:
-        """Count as over when the loop was closed under it.
-
-        Nobody in that loop can be told. What they wait with belongs to it and is left to it.
-        """
+        """End a run whose event loop was closed. Its callers' futures belong to that loop: leave them."""
         self.options.log.warning("the event loop was closed before stop(); the fingers may still move")
         self._release()
         self._poller.abandon()
@@ -154,7 +144,7 @@ class Session:
         self._claims.release(self)
 
     def _end(self, task: asyncio.Task[None]) -> None:
-        """The task has ended: nobody may wait for it any longer. Called by whoever sees it first."""
+        """The task has ended: no caller may wait for it. Called by the task and by :meth:`ended`."""
         if self.is_over:
             return
         self._release()
@@ -167,23 +157,14 @@ class Session:
         self._waiters.fail(failure or self._stopped)
         self._channels.end(failure)
 
-    # -- whether it can be asked -----------------------------------------------------------------------
+    # -- whether it takes calls ------------------------------------------------------------------------
 
     def check_loop(self, what: str) -> None:
-        """Refuse a call from another thread or event loop.
-
-        Raises:
-            RuntimeError: it is one.
-        """
+        """Raise RuntimeError for a call from another thread or event loop."""
         check_loop(self._loop, what)
 
     def check_running(self) -> None:
-        """Refuse what needs a running hand.
-
-        Raises:
-            NotStartedError: it is over.
-            ConnectionLostError: the hand gave up on its link.
-        """
+        """Raise NotStartedError, or ConnectionLostError if the link was given up, unless the hand runs."""
         if self.is_over:
             if self._poller.failure is not None:
                 raise self.link_lost()
@@ -192,16 +173,12 @@ class Session:
             raise NotStartedError("the event loop that the hand ran in was closed: start() it again")
 
     def check_takes_requests(self) -> None:
-        """Refuse what a hand that is being stopped does not do.
-
-        Raises:
-            NotStartedError: stop() was called.
-        """
+        """Raise NotStartedError once stop() was called."""
         if self.machine.state is State.DO_SHUTDOWN:
             raise self._stopped()
 
     def link_lost(self) -> RobotiqConnectionError:
-        """The error that tells that the link is down, and why if that is known."""
+        """Make the error for a link that is down, with the reason if that is known."""
         failure = self._poller.failure or self._poller.why_lost
         error = ConnectionLostError(f"the link is down{'' if failure is None else f': {failure}'}")
         error.__cause__ = failure
@@ -211,19 +188,14 @@ class Session:
     # -- waiting ---------------------------------------------------------------------------------------
 
     async def connected(self) -> None:
-        """Wait for the first status.
-
-        Raises:
-            RobotiqError: there was none.
-        """
+        """Wait for the first status; raises RobotiqError if there is none."""
         await self._poller.connected
 
     def waiter(self) -> asyncio.Future[Any]:
-        """What a caller waits with."""
         return self._loop.create_future()
 
     def ask(self, request: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Make a request of the controller; what it changes is told after it.
+        """Make a request of the controller; listeners hear of its changes of state after it.
 
         Raises:
             RobotiqError: it is refused.
@@ -234,11 +206,7 @@ class Session:
             self._channels.publish_changes()
 
     async def answered(self, request: Callable[[Waiter[None]], None]) -> None:
-        """Make a request and wait until it was acknowledged.
-
-        Raises:
-            RobotiqError: why it was not.
-        """
+        """Make a request and wait for its acknowledgement; raises RobotiqError if there is none."""
         waiter = self.waiter()
         self.ask(request, waiter)
         self._poller.hurry()
@@ -253,18 +221,19 @@ class Session:
         ask: Callable[[], None] | None = None,
         failing: Failing | None = None,
     ) -> State:
-        """Ask for something and wait for a state.
+        """Make a request and wait for one of some states.
 
         Args:
-            states: what is waited for.
-            timeout: seconds; None for as long as it takes.
-            what: the sentence for a timeout.
-            ask: asks for it.
-            failing: states that mean it will not come, as a lost link does then; None waits that out.
+            states: what to wait for.
+            timeout: seconds; None for as long as the hand runs.
+            what: the message of a timeout.
+            ask: makes the request.
+            failing: states in which the wait is in vain, besides a lost link and a stop. None waits those
+                out, too.
 
         Raises:
             StateTimeoutError: not in time.
-            RobotiqError: refused, or it will not come.
+            RobotiqError: refused, or in vain.
         """
         ends: Failing = {State.DISCONNECTED: self.link_lost, State.DO_SHUTDOWN: self._stopped}
         ends = {} if failing is None else {**ends, **failing}
@@ -277,10 +246,10 @@ class Session:
         raise StateTimeoutError(f"{what} within {timeout:g} s (now {self.machine.state.name})")
 
     async def activated(self, ask: Callable[[], None] | None = None) -> None:
-        """Wait for the end of an activation; one that this hand began must not end in a fault.
+        """Wait for the end of an activation. One that this hand began must not end in a fault.
 
         Args:
-            ask: asks for it; None for what the start, or another caller, has begun.
+            ask: makes the request; None for an activation that the start, or another caller, has begun.
 
         Raises:
             GripperFaultError: it is refused because of a fault, or ended in one.
@@ -317,22 +286,22 @@ class Session:
             raise ActivationTimeoutError(f"{error}{why}") from None
 
     async def next_status(self) -> None:
-        """Wait for the next status, which may tell more.
+        """Wait for the next status.
 
         Raises:
             RobotiqConnectionError: the link went down meanwhile.
             NotStartedError: the hand was stopped.
         """
         ends: Failing = {State.DISCONNECTED: self.link_lost, State.DO_SHUTDOWN: self._stopped}
-        with self._waiters.watching((), ends) as told:
+        with self._waiters.watching((), ends) as seen:
 
-            def tell(item: object) -> None:
-                if isinstance(item, RobotiqStatus) and not told.done():
-                    told.set_result(self.machine.state)
+            def see(item: object) -> None:
+                if isinstance(item, RobotiqStatus) and not seen.done():
+                    seen.set_result(self.machine.state)
 
-            remove = self._channels.listeners.add(tell)
+            remove = self._channels.listeners.add(see)
             try:
-                await told
+                await seen
             finally:
                 remove()
 
@@ -344,7 +313,7 @@ class Session:
         assert self.controller.status is not None, "the stall was seen in one"
         fault = self.controller.status.fault
         return ActivationTimeoutError(
-            f"the activation gets nowhere: for {STALLED_S:g} s nothing but {fault.description} (gFLT "
+            f"the activation makes no progress: for {STALLED_S:g} s nothing but {fault.description} (gFLT "
             f"0x{int(fault):02X}). Is the emergency stop released, and the gripper powered? Release it; then "
             "start(activate=False) and recover(), which resets the gripper"
         )

@@ -1,4 +1,4 @@
-"""Notices an activation or a release that gets nowhere, as after an emergency stop."""
+"""Detects an activation or a release without progress, as after an emergency stop."""
 
 from __future__ import annotations
 
@@ -15,19 +15,18 @@ from ..values.status import RobotiqStatus
 from .listeners import Listeners
 
 STALLED_S: Final = 5.0
-"""A gripper that waits for its activation (gFLT 0x05 to 0x07) or releases, and shows nothing new for so long,
-gets nowhere. One that moves shows currents and positions; no figure is published."""
+"""A gripper that waits for its activation (gFLT 0x05 to 0x07) or releases, and shows nothing new for this
+time, makes no progress. While it moves, its currents and positions change. No figure is published."""
 
 
 class StallWatch:
-    """Listens to statuses while it is entered, and ends a wait when nothing new has shown for some time.
+    """A context manager that follows the statuses, and cancels a wait when they stop changing.
 
-    In an activation the fault must be a priority code: an action waits for what does not go on. Without one
-    a gripper may well activate, and show nothing of it. A release opens the fingers, which shows.
+    During an activation this needs a priority fault, which says that the gripper waits for the activation;
+    without one a gripper may activate and show nothing new. A release always shows: it opens the fingers.
     """
 
     def __init__(self, listeners: Listeners, machine: StateMachine) -> None:
-        """Listen beside others to a hand in the state of a machine."""
         self._listeners = listeners
         self._machine = machine
         self._shown: Registers | None = None
@@ -36,12 +35,10 @@ class StallWatch:
         self._remove: Callable[[], None] = lambda: None
 
     def __enter__(self) -> Self:
-        """Begin to listen."""
         self._remove = self._listeners.add(self._see)
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End it."""
         self._remove()
 
     @contextmanager
@@ -56,7 +53,7 @@ class StallWatch:
             return
         state, is_priority = self._machine.state, item.fault.severity is Severity.PRIORITY
         waits = state is State.WF_ATR or (state is State.WF_ACTIVATION and is_priority)
-        shown = (*item.registers[:-1], item.registers[-1] >> 8)  # its other byte is reserved
+        shown = (*item.registers[:-1], item.registers[-1] >> 8)  # the low byte of the last one is reserved
         if not waits or shown != self._shown:
             self._shown, self._since = shown, item.timestamp
         elif item.timestamp - self._since >= STALLED_S and self._scope is not None:

@@ -1,4 +1,4 @@
-"""Callers that wait for a state."""
+"""Futures for callers that wait for a state."""
 
 from __future__ import annotations
 
@@ -13,12 +13,7 @@ _Waiter = tuple[Collection[State], Mapping[State, Callable[[], RobotiqError]], a
 
 
 def check_states(states: Collection[object]) -> None:
-    """Refuse what cannot be waited for.
-
-    Raises:
-        TypeError: not a State.
-        ValueError: no state.
-    """
+    """Raise ValueError for no state, and TypeError for anything but a State."""
     if not states:
         raise ValueError("states must name at least one State, got none")
     for state in states:
@@ -27,21 +22,20 @@ def check_states(states: Collection[object]) -> None:
 
 
 class StateWaiters:
-    """Tells callers of the states they wait for, however short these last."""
+    """Wakes callers for the states that they wait for, however short these last."""
 
     def __init__(self) -> None:
-        """Begin with nobody waiting."""
         self._waiters: list[_Waiter] = []
 
     @contextmanager
     def watching(
         self, states: Collection[State], failing: Mapping[State, Callable[[], RobotiqError]]
     ) -> Iterator[asyncio.Future[State]]:
-        """Watch from here on: a future that is done with one of the states, or fails with an error.
+        """Yield a future for the first of some states from now on.
 
         Args:
-            states: what is waited for.
-            failing: states that mean it will not come, each with the error that says so.
+            states: what to wait for.
+            failing: states in which the wait is in vain, each with the error for the caller.
         """
         reached: asyncio.Future[State] = asyncio.get_running_loop().create_future()
         waiter = (states, failing, reached)
@@ -51,10 +45,9 @@ class StateWaiters:
         finally:
             self._waiters.remove(waiter)
             if reached.done() and not reached.cancelled():
-                reached.exception()  # it counts as seen, also when the caller was cancelled meanwhile
+                reached.exception()  # retrieved: the caller may have been cancelled, and asyncio would log it
 
     def reached(self, state: State) -> None:
-        """The hand is in a state."""
         for states, failing, future in self._waiters:
             if future.done():
                 continue
@@ -64,7 +57,6 @@ class StateWaiters:
                 future.set_exception(failing[state]())
 
     def fail(self, failure: Callable[[], RobotiqError]) -> None:
-        """Nothing more will happen."""
         for _, _, future in self._waiters:
             if not future.done():
                 future.set_exception(failure())

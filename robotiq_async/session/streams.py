@@ -1,7 +1,6 @@
-"""Async iterators over what happens to a hand.
+"""Async iterators over the statuses, transitions and requests of a hand.
 
-Plain classes and not async generators: an iterator that is dropped in the middle has nothing to clean up
-in another task.
+These are plain classes and not async generators: a reader that drops one leaves nothing to clean up.
 """
 
 from __future__ import annotations
@@ -33,13 +32,12 @@ class Stream(Generic[T]):
     """
 
     def __init__(self, buffer: int | None, kept: set[Stream[Any]]) -> None:
-        """Keep up to ``buffer`` items, the newest ones; None keeps all.
-
-        While somebody waits the stream is in ``kept``: the task of that reader may be held by nothing else.
-        """
+        """Keep the newest ``buffer`` items; None keeps all."""
         self._kept = kept
+        """Streams with a waiting reader: a strong reference, because nothing else may hold the task of the
+        reader."""
         self._loop: asyncio.AbstractEventLoop | None = None
-        """The loop of the hand, while it runs: only there an item can wake the reader."""
+        """The loop of the hand, while it runs: items come from there."""
         self.missed = 0
         self._items: deque[T] = deque(maxlen=buffer)
         self._waiting: asyncio.Future[None] | None = None
@@ -50,14 +48,9 @@ class Stream(Generic[T]):
         """The stream itself."""
         return self
 
-    if not TYPE_CHECKING:  # type checkers tell the mistake themselves
+    if not TYPE_CHECKING:  # type checkers report the mistake themselves
 
         def __iter__(self) -> None:
-            """Refuse ``for``.
-
-            Raises:
-                TypeError: always.
-            """
             raise TypeError("a stream of a hand is read with 'async for', in a coroutine")
 
     async def __anext__(self) -> T:
@@ -78,11 +71,11 @@ class Stream(Generic[T]):
             self._waiting = asyncio.get_running_loop().create_future()
             self._kept.add(self)
             try:
-                if not self._items and not self._ended:  # looked at again: the hand may run in another thread
+                if not self._items and not self._ended:  # once more: the hand may run in another thread
                     await self._waiting
             except BaseException:
                 self._wait_no_longer()
-                # Whoever keeps the traceback, as a cancelled task does, is not to keep the stream with it.
+                # A cancelled task keeps the traceback, which must not keep the stream alive.
                 del self
                 raise
             self._wait_no_longer()
@@ -93,11 +86,11 @@ class Stream(Generic[T]):
         raise StopAsyncIteration if failure is None else failure()
 
     def take_nowait(self) -> T | None:
-        """The next item if there is one already."""
+        """The next item if there is one now, or None."""
         return self._items.popleft() if self._items else None
 
     def drain(self) -> Iterator[T]:
-        """What is there already, one after the other."""
+        """Iterate over the items that are there now."""
         while self._items:
             yield self._items.popleft()
 
@@ -107,7 +100,7 @@ class Stream(Generic[T]):
         self.end(None)
 
     def push(self, item: T) -> None:
-        """Hand an item to the reader; the oldest one is dropped when the buffer is full."""
+        """Add an item; a full buffer drops its oldest one."""
         if self._ended:
             return
         if len(self._items) == self._items.maxlen:
@@ -116,14 +109,14 @@ class Stream(Generic[T]):
         self._wake()
 
     def end(self, failure: Callable[[], RobotiqError] | None) -> None:
-        """No more items: the reader gets what is left, then the end or the failure."""
+        """End the stream: the reader gets the remaining items, then the end or the failure."""
         if self._ended:
             return
         self._ended, self._failure, self._loop = True, failure, None
         self._wake()
 
     def belong_to(self, loop: asyncio.AbstractEventLoop) -> None:
-        """The hand runs in this loop. A reader that waits in another one wakes up and is refused."""
+        """Set the loop of the hand. A reader that waits in another loop wakes up and gets RuntimeError."""
         self._loop = loop
         if self._waiting is not None and self._waiting.get_loop() is not loop:
             self._wake()
@@ -138,7 +131,7 @@ class Stream(Generic[T]):
             return
         loop = waiting.get_loop()
         if loop.is_closed():
-            self._wait_no_longer()  # whoever waited there never wakes up
+            self._wait_no_longer()  # the reader in that loop never wakes up
         elif loop is asyncio.get_running_loop():
             waiting.set_result(None)
         else:
@@ -147,15 +140,16 @@ class Stream(Generic[T]):
 
 
 class DerivedStream(Stream[T]):
-    """A stream of what is made of the items of a channel; none of that is dropped."""
+    """A stream of items that ``make`` derives from those of a channel; it drops none.
+
+    ``make`` is called in the turn of each push, so it must be quick and must not fail.
+    """
 
     def __init__(self, make: Callable[[Any], Iterable[T]], kept: set[Stream[Any]]) -> None:
-        """Make something of every item, in the turn in which it is pushed: it must be quick, and not fail."""
         super().__init__(None, kept)
         self._make = make
 
-    def push(self, item: Any) -> None:  # noqa: ANN401  # whatever the channel spreads
-        """Hand on what is made of an item."""
+    def push(self, item: Any) -> None:  # noqa: ANN401  # the items of the channel, not of this stream
         if not self._ended:
             for made in self._make(item):
                 super().push(made)
@@ -167,29 +161,24 @@ def _wake(waiting: asyncio.Future[None]) -> None:
 
 
 class Channel(Generic[T]):
-    """Spreads items over any number of streams. A stream nobody holds any more is forgotten."""
+    """Gives every item to any number of streams, and to the listeners. A dropped stream is forgotten."""
 
     def __init__(self, listeners: Listeners) -> None:
-        """Begin without readers.
-
-        Args:
-            listeners: are told of every item, too.
-        """
         self._listeners = listeners
-        # Plain references: going through a WeakSet takes several times as long, at every poll.
+        # A list of references and not a WeakSet, which takes several times as long, at every poll.
         self._streams: list[weakref.ref[Stream[Any]]] = []
         self._has_dropped = False
-        """Whether some of them are held by nobody any more."""
+        """Whether some of these were dropped by their readers."""
         self._waited_for: set[Stream[Any]] = set()
         self._failure: Callable[[], RobotiqError] | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
 
     def open(self, buffer: int | None) -> Stream[T]:
-        """A new stream. Before a start it waits; after the hand gave up it raises the reason."""
+        """Open a stream. Before a start it waits; after the link was given up it raises the reason."""
         return self._begin(Stream(buffer, self._waited_for))
 
     def derive(self, make: Callable[[T], Iterable[U]]) -> Stream[U]:
-        """A new stream of what is made of each item from now on; as :meth:`open` for the rest."""
+        """Open a stream of the items that ``make`` derives from each item from now on."""
         return self._begin(DerivedStream(make, self._waited_for))
 
     def _begin(self, stream: Stream[U]) -> Stream[U]:
@@ -203,7 +192,7 @@ class Channel(Generic[T]):
         return stream
 
     def reopen(self, loop: asyncio.AbstractEventLoop) -> None:
-        """The hand starts in a loop: what it gave up on before does not count any more."""
+        """The hand starts in this loop: forget an earlier failure."""
         self._failure, self._loop = None, loop
         for reference in self._streams:
             stream = reference()
@@ -211,7 +200,6 @@ class Channel(Generic[T]):
                 stream.belong_to(loop)
 
     def push(self, item: T) -> None:
-        """Hand an item to every stream and every listener."""
         for reference in self._streams:
             stream = reference()
             if stream is not None:
@@ -230,24 +218,24 @@ class Channel(Generic[T]):
                 stream.end(failure)
 
     def _let_go(self) -> None:
-        """Keep the streams that somebody still holds."""
         self._has_dropped = False
         self._streams = [each for each in self._streams if each() is not None]
 
     def _forget(self, _: weakref.ref[Stream[Any]]) -> None:
-        # In whatever thread drops the last reference: another stream may be opened at this moment.
+        # Called in the thread that drops the last reference; only a flag, because another may open a stream
+        # now.
         self._has_dropped = True
 
 
 class Channels:
-    """Everything that a hand tells: its statuses, its changes of state, what is written.
+    """The statuses, changes of state and written requests of a hand.
 
     Attributes:
-        numbers: of the statuses, from the first start on.
+        numbers: the sequence numbers of the statuses, from the first start on.
+        changes: the changes of state during the present call, which are published after it.
     """
 
     def __init__(self, log: Log = log) -> None:
-        """Begin without readers; ``log`` is that of the hand."""
         self.numbers = itertools.count()
         self.listeners = Listeners(log)
         self.statuses: Channel[RobotiqStatus] = Channel(self.listeners)
@@ -255,19 +243,17 @@ class Channels:
         self.requests: Channel[SentRequest] = Channel(self.listeners)
         self._all: tuple[Channel[Any], ...] = (self.statuses, self.transitions, self.requests)
         self.changes: deque[Transition] = deque()
-        """Changes of state of the call under way, to be told after it."""
 
     def publish_changes(self) -> None:
-        """Tell of the changes of state that a call has brought about, now that it is over.
+        """Publish the changes of state of a call after the call.
 
-        A listener may command the hand, too. Told in the middle of a call it would come before what that
-        call still had to do, and its request would be overwritten by the older one.
+        A listener may command the hand. If it heard of a change in the middle of a call, the rest of that
+        call would overwrite its request.
         """
         while self.changes:
             self.transitions.push(self.changes.popleft())
 
     def reopen(self, loop: asyncio.AbstractEventLoop) -> None:
-        """The hand starts in a loop."""
         for channel in self._all:
             channel.reopen(loop)
 

@@ -54,7 +54,7 @@ async def outcome(world: World, phase: Phase, words: str) -> str:
             await end()
         kind, bound = words.split()[0], phase.bound
         if kind == "e-stop" and phase.name == "connecting":
-            bound += STALLED_S  # connected in time, start() waits for an activation that gets nowhere
+            bound += STALLED_S  # connected in time, start() waits for an activation that makes no progress
         told = _noticed(world) if task is None else await _told(task, before.time + bound)
         await _rest(world, (*SETTLED, *STUCK) if kind == "e-stop" else SETTLED)
         state = world.hand.state

@@ -226,7 +226,7 @@ async def test_a_link_that_goes_down_under_a_move(shell: Shell) -> None:
             await gripper.went.wait()
         await server.stop()
         outcome = await shell.finish(process)
-    outcome.assert_failed(1, server.address, "the fingers could not be told to stop")
+    outcome.assert_failed(1, server.address, "the stop was not delivered")
 
 
 async def test_a_reader_that_has_had_enough(shell: Shell, server: SimulatorServer) -> None:

@@ -241,7 +241,7 @@ async def test_an_activation_that_shows_nothing_new_is_not_reset() -> None:
     await hand.stop()
 
 
-STUCK = r"gets nowhere.*0x05.*emergency stop.*start\(activate=False\).*recover\(\)"
+STUCK = r"makes no progress.*0x05.*emergency stop.*start\(activate=False\).*recover\(\)"
 
 
 async def test_a_start_on_such_a_gripper_ends_soon_and_says_what_helps() -> None:

@@ -272,7 +272,7 @@ async def test_every_line_of_the_log_tells_the_hand(
         await eventful(RobotiqHand(server.address, name=name), server, clock)
     records = [each for each in caplog.records if each.name == "robotiq_async"]
     words = " ".join(record.getMessage() for record in records)
-    for part in ("->", "link lost", "link back", "another client", "a listener raised", "could not be told"):
+    for part in ("->", "link lost", "link back", "another client", "a listener raised", "was not delivered"):
         assert part in words
     known = name or server.address
     for record in records:
