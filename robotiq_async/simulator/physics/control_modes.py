@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 Goals = tuple[Goal | None, ...]
-"""Where A, B, C and the scissor go; None for an axis that stands still."""
+"""Where A, B, C and the scissor go; None for an axis at rest."""
 
 SCISSOR_LOW: Final = 15
 """Scissor reading when it is open: two drivers use 15..232."""

@@ -1,6 +1,6 @@
 """The gripper's firmware: turns requests and events into motion of the four axes.
 
-It knows no clock. Whoever drives it calls :meth:`Controller.update` at exactly :attr:`Controller.next_event`
+It knows no clock. Its caller must call :meth:`Controller.update` at exactly :attr:`Controller.next_event`
 before doing anything later; all times are simulated seconds.
 """
 
@@ -73,7 +73,7 @@ class Controller:
 
     @property
     def next_event(self) -> float:
-        """When something happens next by itself; infinite when nothing will."""
+        """The time of the next event without a request; infinite if there is none."""
         a, b, c, scissor = self.axes
         step_ends = self._step_lasts_until if self._steps and self._is_done(self._steps[0]) else math.inf
         return min(self.faults.changes_at, a.ends_at, b.ends_at, c.ends_at, scissor.ends_at, step_ends)
@@ -111,7 +111,7 @@ class Controller:
         self.reset(time)
 
     def reset(self, time: float) -> None:
-        """Stop at once and forget faults, sequences and what was touched; nothing moves after it."""
+        """Stop at once; forget faults, sequences and contacts."""
         self._stop.reset()
         self.faults.clear()
         self._release = Fault.NONE
@@ -177,7 +177,7 @@ class Controller:
         return None if self._obeyed.individual_scissor else self._obeyed.mode
 
     def _obeyed_of(self, request: Request) -> Request:
-        """What is done of an image: all, unless it wakes the gripper; then it moves nothing."""
+        """The part of an image that acts: all of it, unless it wakes the gripper; then it moves nothing."""
         if not self.is_asleep or not request.activate:
             return request
         self.is_asleep = False

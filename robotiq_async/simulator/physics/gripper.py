@@ -38,18 +38,18 @@ class SimulatedGripper(Surroundings):
     depend on how often anybody looks. Use one from one thread only.
 
     A write takes effect one device cycle later, as on the device. Speeds are the measured ones of
-    :mod:`robotiq_async.values.calibration.closing_time`; the scissor moves the same counts a second, as
-    none are published. What the motors draw is in :mod:`.mechanics.motor`; how much axes miss what they are
-    asked in :mod:`.mechanics.spread`: as with a real gripper, who waits for gPO = rPR may wait for ever.
+    :mod:`robotiq_async.values.calibration.closing_time`; the scissor moves the same counts a second, as none
+    are published. What the motors draw is in :mod:`.mechanics.motor`; how much axes miss what they are asked
+    in :mod:`.mechanics.spread`: as with a real gripper, a program that waits for gPO = rPR may wait for ever.
 
-    Choices where no source settles the behaviour; those that can be made otherwise stand in :class:`Habits`:
+    Choices where no source settles the behaviour; those that can be changed are in :class:`Habits`:
 
     * An axis that meets something, or tries again, presses for 50 ms with gDT 0 before it reports a contact.
-    * An axis that stands within 2 counts of a new request has reached it, and does not move.
+    * An axis within 2 counts of a new request has reached it, and does not move.
     * A failed activation stays at gIMC = 1 with fault 0x0D.
     * gMOD, gGTO and the position echoes follow the request also while reset.
     * A minor or major fault stops the axes where they are, with gDT 0; interference below 20 s stops the
-      scissor only. When a minor fault ends, a request with rGTO = 1 goes on by itself.
+      scissor only. When a minor fault ends, a request with rGTO = 1 resumes.
     * The scissor takes its requests as counts, within 15..232.
     """
 
@@ -197,13 +197,13 @@ class SimulatedGripper(Surroundings):
 
     @property
     def is_moving(self) -> bool:
-        """Whether an axis really moves, for whatever reason."""
+        """Whether an axis moves, for any reason."""
         self._catch_up()
         return any(axis.is_moving for axis in self._controller.axes)
 
     @property
     def grips(self) -> Finger:
-        """The axes that are driven against what they touch: rGTO is set, and the request lies beyond it."""
+        """The axes that press against an obstacle: rGTO is set, and the request lies beyond it."""
         self._catch_up()
         return self._those(lambda axis: axis.grips)
 
@@ -240,7 +240,7 @@ class SimulatedGripper(Surroundings):
         return self._axis(finger).target
 
     def travel(self, finger: Finger | int) -> float:
-        """The way one axis has gone so far, in counts, forth and back added up. It never decreases.
+        """The distance that one axis has travelled so far, in counts, in both directions. It never decreases.
 
         Raises:
             TypeError: finger is not an int.

@@ -34,9 +34,9 @@ class Habits:
             acknowledged and forgotten (manual 2014: leave 10 ms, or some are lost).
         echoes_limits: a request beyond a software limit is echoed as the limit. The manual says that it is
             replaced by the limit, and not which of the two gPR shows.
-        lets_go_on_halt: clearing rGTO, or a fault, lets go of what is held. By the vendor's article on
+        lets_go_on_halt: clearing rGTO, or a fault, releases the part. By the vendor's article on
             protective stops it stays held, and by the manual fingers lock themselves; no one has measured it.
-        keeps_status_on_halt: with rGTO = 0 an axis that stands in a contact or at its request keeps its gDT;
+        keeps_status_on_halt: with rGTO = 0 an axis in a contact or at its request keeps its gDT;
             otherwise gDT and gSTA are 0 then. The manual says only that their 0 means nothing while gGTO = 0.
         opens_without_rics: clearing rICS is a mode change: it opens the fingers, rGTO or not, and drops the
             part. Otherwise the scissor alone goes to its mode, as soon as rGTO is set. No source says.

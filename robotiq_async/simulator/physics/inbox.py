@@ -67,7 +67,7 @@ class Inbox:
         self._kept_at = time
         self.image = write.registers
         self.writes.append(write)
-        # In their order, also when the device cycle has become shorter meanwhile.
+        # Keep their order, even if the device cycle was shortened meanwhile.
         due = max(time + cycle, self.pending[-1][0] if self.pending else 0.0)
         self.pending.append((due, Request.from_registers(write.registers)))
 

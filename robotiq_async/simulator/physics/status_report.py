@@ -20,7 +20,7 @@ _MOVING, _SOME_STOPPED, _ALL_STOPPED, _ALL_ARRIVED = range(4)
 def status_registers(controller: Controller, time: float, fault: Fault) -> reg.Registers:
     """What the gripper reports at a time, with a fault code.
 
-    gDT and gSTA are 0 unless gIMC = 3. Without rGTO an axis that stands in a contact or at its request keeps
+    gDT and gSTA are 0 unless gIMC = 3. Without rGTO an axis in a contact or at its request keeps
     its gDT, unless the gripper has another habit; one that was stopped on its way reads 0. So gSTA = 0 then
     does not mean motion.
     """

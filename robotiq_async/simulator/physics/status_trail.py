@@ -26,7 +26,7 @@ class StatusTrail:
         self._entries = deque([_Entry(-math.inf, NOTHING)])
 
     def note(self, time: float, statuses: Statuses, lag: float) -> None:
-        """Remember what is so from now on, and as much of the past as that lag lets be seen."""
+        """Add the present value, and drop values older than the lag."""
         if statuses == self._entries[-1].statuses:
             return
         self._entries.append(_Entry(time, statuses))
@@ -36,7 +36,7 @@ class StatusTrail:
                 return
 
     def at(self, time: float) -> Statuses:
-        """What was so at a time; of what is forgotten, the oldest that is not."""
+        """The value at a time; for a time that is dropped, the oldest value kept."""
         for entry in reversed(self._entries):
             if entry.since <= time:
                 return entry.statuses

@@ -41,7 +41,7 @@ class Surroundings(ABC):
 
         An axis that has passed the position already has the object behind it: no contact until it comes
         from the other side. Each axis has room for one object per direction; a second replaces the first.
-        An axis that stands in a contact stays there, wherever the object is now.
+        An axis in contact stays there, wherever the object is now.
 
         Args:
             fingers: the axes it is in the way of.
@@ -67,7 +67,7 @@ class Surroundings(ABC):
             axis.look_again(self._time)
 
     def remove_object(self, fingers: Finger | int = Finger.ALL) -> None:
-        """Take away what is in the way of some axes.
+        """Remove the obstacles of some axes.
 
         Those it has stopped stay in their contact until a position on the other side is requested, the force
         is raised or rGTO goes from 0 to 1 (manual).
@@ -85,7 +85,7 @@ class Surroundings(ABC):
 
         Args:
             fault: the code, 1..15; unassigned codes count as major.
-            duration: simulated seconds until it ends by itself; None: until :meth:`clear_faults` or a reset.
+            duration: simulated seconds until it ends; None: until :meth:`clear_faults` or a reset.
 
         Raises:
             TypeError: duration is not a number.
@@ -133,7 +133,7 @@ class Surroundings(ABC):
     def is_asleep(self) -> bool:
         """Whether the next image with rACT = 1 only wakes the gripper: it is echoed, and moves nothing.
 
-        What moves already moves on, and rGTO = 0 stops. One driver found that a gripper ignores motions on a
+        Axes that move go on, and rGTO = 0 stops them. One driver found that a gripper ignores motions on a
         new connection until rACT = 1 has been written.
         """
         self._catch_up()
@@ -145,7 +145,7 @@ class Surroundings(ABC):
         self._controller.is_asleep = value
 
     def clear_faults(self) -> None:
-        """End the injected faults; a request with rGTO = 1 goes on by itself."""
+        """End the injected faults; a request with rGTO = 1 resumes."""
         self._catch_up()
         self._controller.faults.clear()
         self._controller.update(self._time)

@@ -47,7 +47,7 @@ class Endpoint(Protocol):
         """What to send for a reply, as a reply policy gives it."""
 
     def undelivered(self, part: bytes) -> None:
-        """Take what was to be sent to a client that is gone."""
+        """Drop what is left for a client that is gone."""
 
     def lets_in(self, client: Connection) -> bool:
         """Whether a client that has come may stay."""
@@ -70,9 +70,9 @@ class Connection(ServerRequestHandler):
         self._answering = False
         self._answer_task: asyncio.Task[None] | None = None
         self._outbox: deque[tuple[float, bytes]] = deque()
-        """What is sent later, and when, in order: no reply overtakes an older one."""
+        """Replies to send later, with their times, in order: no reply overtakes an older one."""
         self._is_clogged = False
-        """Whether the client does not take what was sent."""
+        """Whether the client does not read its replies."""
         self._is_held = False
         """Whether the client is not read from."""
 
@@ -91,7 +91,7 @@ class Connection(ServerRequestHandler):
         self._answer_next()
 
     def pause_writing(self) -> None:
-        """The system takes no more for the client, and what is kept here is enough."""
+        """The buffers of the system are full; do not fill ours."""
         self._is_clogged = True
 
     def resume_writing(self) -> None:
@@ -132,7 +132,7 @@ class Connection(ServerRequestHandler):
             self.transport.write(part)  # type: ignore[attr-defined]
 
     def hang_up(self, *, reset: bool = False) -> None:
-        """Drop the connection at once, with what has not been sent; a reset tells the client so (RST)."""
+        """Drop the connection at once with a reset (RST); what was not sent is lost."""
         if self.is_active():
             line = self.transport.get_extra_info("socket") if reset else None
             if line is not None:

@@ -34,7 +34,7 @@ class SimulatorEndpoint(ABC):
     Attributes:
         gripper: what answers. It keeps its state when the server is stopped and started again. One that is
             not given takes 12 s for an activation.
-        policy: decides what becomes of each reply that no trouble is about.
+        policy: changes, delays or drops each reply that no trouble concerns.
         fault_injector: makes troubles happen, and decides on requests and replies.
     """
 

@@ -79,7 +79,7 @@ def take_rtu(inbox: bytearray) -> Frame | None:
 
 
 def _rtu_size(inbox: bytearray) -> int | None:
-    """The bytes of the first frame; None while that cannot be told, 0 if it never can."""
+    """The bytes of the first frame; None while its length is not known, 0 if it has none."""
     if len(inbox) < 2:
         return None
     if inbox[1] not in RTU_FUNCTIONS:
@@ -98,7 +98,7 @@ def refusal(pdu: bytes, functions: Collection[int]) -> ExcCodes | None:
 
     Args:
         pdu: the request.
-        functions: what is served on this kind of link.
+        functions: the Modbus functions of this kind of link.
     """
     if pdu[0] not in functions:
         return ExcCodes.ILLEGAL_FUNCTION
@@ -113,7 +113,7 @@ def refusal(pdu: bytes, functions: Collection[int]) -> ExcCodes | None:
 
 
 def _refusal_to_read_and_write(pdu: bytes, count: int) -> ExcCodes | None:
-    """Nothing is written when what is to be read after it cannot be."""
+    """Refuse a request whose read part is out of range before its write part is carried out."""
     written = int.from_bytes(pdu[7:9], "big")
     if not (1 <= count <= _MOST_READ and 1 <= written <= _MOST_WRITTEN_AND_READ):
         return ExcCodes.ILLEGAL_VALUE

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 class RtuOverTcpSimulatorServer(SimulatorServer):
     """Serves a simulated gripper as a serial server does, or an arm's tool port: RTU frames in a TCP socket.
 
-    What is served is what :class:`~robotiq_async.simulator.SerialSimulatorServer` serves, at the speed of the
+    It serves what :class:`~robotiq_async.simulator.SerialSimulatorServer` serves, at the speed of the
     line behind. Who sends one request after the other without waiting loses those that the line cannot take.
     """
 

@@ -1,4 +1,4 @@
-"""The serial line of a simulator: where a frame ends, how long it takes, and bytes that nobody takes."""
+"""The serial line of a simulator: where a frame ends, how long it takes, and bytes that are not read."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ was kept from the other half for 1.9 ms (4000 frames on a busy machine). A clien
 answer waits longer before it asks again, so no more than one request is lost with what was cut off."""
 
 MOST_UNSENT: Final = 4096
-"""Bytes that nobody has taken from the line; beyond, replies are lost."""
+"""The most unread bytes on the line; further replies are lost."""
 
 
 class SerialConnection(Connection):
@@ -56,13 +56,13 @@ class SerialConnection(Connection):
 
     def _hear(self, data: bytes, pause: float) -> None:
         """Bytes have come; those of a frame that was cut off before them are dropped."""
-        self._answer_next()  # what is whole is not cut off, even if it has not had its turn
+        self._answer_next()  # complete frames are answered, even if their turn has not come
         if not self._answering and _begins_anew(pause, data):
             self._inbox.clear()
         super().data_received(data)
 
     def pass_on(self, part: bytes) -> None:
-        """Send bytes: whoever reads has them when the last one has come."""
+        """Send bytes; a reader has them when the last one has arrived."""
         now = self.loop.time()
         if self._wire is None:
             self._put(part)
@@ -70,7 +70,7 @@ class SerialConnection(Connection):
             self.loop.call_at(self._wire.sends(now, len(part)), self._put, part)
 
     def _put(self, part: bytes) -> None:
-        """Give bytes to the line, unless nobody has taken those before."""
+        """Put bytes on the line, unless too many are unread."""
         if self.is_active() and not self.transport.get_write_buffer_size():  # type: ignore[attr-defined]
             self._unsent = 0
         if self._unsent + len(part) <= MOST_UNSENT:
@@ -78,7 +78,7 @@ class SerialConnection(Connection):
             super().pass_on(part)
 
     def _regulate(self) -> None:
-        """Lose requests that come faster than they are answered: nobody can be made to wait."""
+        """Drop requests that come faster than the answers: a serial line cannot make a client wait."""
         if len(self._inbox) > MOST_UNREAD:
             self._inbox.clear()
 

@@ -27,7 +27,7 @@ BROADCAST: Final = 0
 
 
 def is_answered(reply: bytes) -> bool:
-    """Whether the gripper sends a reply over a serial line: no exceptions, and none to what is for all."""
+    """Whether the gripper sends a reply over a serial line: no exceptions, and none to a broadcast."""
     return reply[0] != BROADCAST and not reply[1] & 0x80
 
 

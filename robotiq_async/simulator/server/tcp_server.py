@@ -99,7 +99,7 @@ class SimulatorServer(SimulatorEndpoint):
 
         Raises:
             RuntimeError: the server is not running.
-            OSError: somebody else has taken the port.
+            OSError: another process has taken the port.
         """
         server = self._running()
         if not self._listener.is_serving():

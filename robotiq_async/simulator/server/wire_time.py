@@ -46,7 +46,7 @@ class WireTime:
         return self._heard_until + SILENCE_S, pause
 
     def heard(self, when: float) -> None:
-        """What was to come at that time is looked at now."""
+        """Call back for everything that is due."""
         self._answers_from = when
 
     def sends(self, now: float, size: int) -> float:

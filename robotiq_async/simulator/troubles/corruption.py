@@ -49,7 +49,7 @@ class Reply:
 
     @property
     def is_to_a_write(self) -> bool:
-        """Whether it answers a write; to FC23, which also writes, the answer is what was read."""
+        """Whether it answers a write; FC23 counts as a read, because its reply carries the status."""
         return self.pdu[0] & 0x7F in (WRITE_SINGLE, WRITE_MULTIPLE)
 
     @property
@@ -66,7 +66,7 @@ class Reply:
 
 
 Corruption = Callable[[Reply, float], Parts]
-"""Takes the reply and the value of the trouble (see trouble.py); says what is sent instead."""
+"""Makes the bytes to send out of a reply and the value of the trouble (see trouble.py)."""
 
 ReplyPolicy = Callable[[bytes], Iterable[tuple[float, bytes]] | None]
 """Takes the frame of one reply; gives what to send instead, as (delay in seconds, bytes), or None to hang up.
@@ -76,7 +76,7 @@ An empty answer loses the reply. The request behind the reply has been carried o
 
 
 def unchanged(frame: bytes) -> Parts:
-    """The policy of a simulator that nobody gave one: the reply at once and as it is."""
+    """The default policy of a simulator: the reply at once and unchanged."""
     return ((0.0, frame),)
 
 
@@ -107,7 +107,7 @@ def twice(reply: Reply, value: float) -> Parts:
 
 
 def wrong_function(reply: Reply, value: float) -> Parts:
-    """The reply is one to another function: 03 and 04, 06 and 16 stand for each other, 03 for 23."""
+    """Reply as another function: 03 and 04 replace each other, as do 06 and 16; 03 replaces 23."""
     return reply.changed(pdu=bytes((_ANOTHER[reply.pdu[0]],)) + reply.pdu[1:])
 
 

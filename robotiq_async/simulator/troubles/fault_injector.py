@@ -25,7 +25,7 @@ class Ongoing:
     """A trouble that has begun.
 
     Attributes:
-        trouble: what it is.
+        trouble: the trouble.
         hits: requests and replies it has met so far.
         over: set when it has ended.
     """
@@ -36,7 +36,7 @@ class Ongoing:
 
 
 class FaultInjector:
-    """Whatever goes wrong with one simulator. Troubles may overlap.
+    """Applies troubles to one simulator. Troubles may overlap.
 
     Of those that are about the same reply the oldest acts; with none of them, the simulator's policy.
     """
@@ -85,7 +85,7 @@ class FaultInjector:
         return ongoing
 
     async def end(self, ongoing: Ongoing) -> None:
-        """End a trouble; one that is over already stays over. What it did is undone also when cancelled."""
+        """End a trouble and undo what it did, also when cancelled. Idempotent."""
         if ongoing not in self._ongoing:
             return
         self._forget(ongoing)
@@ -114,7 +114,7 @@ class FaultInjector:
 
         Raises:
             ValueError: a trouble does not fit this kind of link; nothing has begun then.
-            OSError: somebody else took the port while new connections were refused.
+            OSError: another process took the port while new connections were refused.
         """
         self.check(plan)
         try:
@@ -151,7 +151,7 @@ class FaultInjector:
 
     @property
     def reads_only_with_function_3(self) -> bool:
-        """Whether function 4 is refused, and 3 serves in its place."""
+        """Whether function 4 is refused and 3 reads the status."""
         return bool(self._lasting("function-3-only"))
 
     def lets_in(self, present: int) -> bool:

@@ -15,8 +15,8 @@ class Target(Protocol):
 
     Attributes:
         link: the kind of link it is on.
-        gripper: what it serves.
-        policy: decides what becomes of each reply that no trouble is about.
+        gripper: the simulated gripper.
+        policy: changes, delays or drops each reply that no trouble concerns.
     """
 
     link: ClassVar[Link]

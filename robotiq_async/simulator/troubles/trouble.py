@@ -1,7 +1,7 @@
 """What can go wrong, as data: one table of kinds, and troubles written as words or as values.
 
-A trouble is an event (a reply is lost, another client writes) or a condition that lasts (nobody answers,
-the device is slow). In words it is
+A trouble is an event (a reply is lost, another client writes) or a condition that lasts (the gripper is
+silent, the device is slow). As text it is
 ``KIND [VALUE] [on read|write] [at S] [for S|for ever|once] [every S]``::
 
     drop at 5                      one reply is lost, 5 s after the beginning
@@ -30,18 +30,18 @@ Link = Literal["tcp", "rtu", "rtu+tcp"]
 
 
 class Kind(NamedTuple):
-    """What is known of one kind of trouble.
+    """One kind of trouble.
 
     Attributes:
         meaning: one line about it.
         lasts: how long it lasts when nothing is said: 0 for an event, infinity for a condition.
-        value: what its value is when nothing is said; None where it has none.
+        value: its default value; None if it has none.
         low: the least value.
         high: the greatest value.
-        corruption: what it does to a reply, if that is what it does.
+        corruption: how it changes a reply, if it does.
         on: the requests whose replies it can be about.
         link: the only kind of link it fits, if there is only one.
-        habit: the habit of the gripper that it changes, if that is what it does.
+        habit: the habit of the gripper that it changes, if it does.
     """
 
     meaning: str
@@ -105,7 +105,7 @@ KINDS: Final[dict[str, Kind]] = {
     ),
     "refuse": Kind("connections are reset; new ones are refused", _CONDITION, link="tcp"),
     "multiplexer": Kind(
-        "a gateway keeps its own connection: replies come VALUE seconds later, to whoever is connected then",
+        "a gateway keeps its own connection: replies come VALUE seconds later, to the client connected then",
         *(_CONDITION, 0.7, 0, 10),
         link="tcp",
     ),
@@ -150,7 +150,7 @@ KINDS: Final[dict[str, Kind]] = {
         _CONDITION,
         link="tcp",
     ),
-    "function-3-only": Kind("function 4 is refused, and 3 reads the status in its place", _CONDITION),
+    "function-3-only": Kind("function 4 is refused, and function 3 reads the status", _CONDITION),
     "one-connection-only": Kind("while there is a connection, a new one is reset", _CONDITION, link="tcp"),
 }
 """Every kind of trouble, by its name."""
@@ -213,7 +213,7 @@ class Trouble:
 
     @property
     def amount(self) -> float:
-        """Its value, or the usual one; 0 where there is none."""
+        """Its value, or the default; 0 if it has none."""
         return (KINDS[self.kind].value if self.value is None else self.value) or 0.0
 
     def is_about(self, *, write: bool) -> bool:
@@ -222,7 +222,7 @@ class Trouble:
         return self.on in (this, "any") and KINDS[self.kind].on in (this, "any")
 
     def corrupt(self, reply: Reply) -> Parts | None:
-        """What is sent in place of a reply; None if it is not about that one, or that one is a refusal."""
+        """The bytes to send in place of a reply; None for a refusal, or a reply that it does not concern."""
         # A multiplexer is late, and that is not all it does.
         kind = KINDS["delay" if self.kind == "multiplexer" else self.kind]
         if kind.corruption is None or reply.is_exception or not self.is_about(write=reply.is_to_a_write):
@@ -267,7 +267,7 @@ def parse_troubles(text: str) -> list[Trouble]:
     """Read troubles: one a line, or several with ``;`` between them. What follows a ``#`` is a remark.
 
     Raises:
-        ValueError: a line that is none; named with the reason.
+        ValueError: a line that is not a trouble, with the reason.
     """
     lines = (part for line in text.splitlines() for part in line.partition("#")[0].split(";"))
     return [_parse_one(line) for line in lines if line.strip()]

@@ -1,7 +1,7 @@
 """One motorised axis: straight lines in time, mechanical stops and obstacles.
 
 An axis never integrates in steps. It keeps where and when its present motion began, how fast it is and where
-it ends; everything else is computed. That makes a result independent of how often somebody looks.
+it ends; everything else is computed. So the result does not depend on how often it is read.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from .spread import Spread
 
 PRESSING: Final = 0.05
-"""Seconds for which an axis presses, still reported as motion, before it reports the contact. No source tells
-how long it is; this is ten polls."""
+"""Seconds for which an axis presses, still reported as motion, before it reports the contact. No source gives
+this time; it is ten polls."""
 
 
 class Obstacle(NamedTuple):
@@ -28,7 +28,7 @@ class Obstacle(NamedTuple):
     Attributes:
         position: the count at which the axis touches it.
         soft: counts by which a force of 255 presses the axis into it; less force, proportionally less.
-        fixed: it stays there in an activation; anything else is taken out for it and put back.
+        fixed: whether it stays in place during an activation; others are removed and put back.
     """
 
     position: int
@@ -36,8 +36,8 @@ class Obstacle(NamedTuple):
     fixed: bool = False
 
 
-class _Way(NamedTuple):
-    """A way that is planned: where it ends and why, and where the obstacle that ends it begins."""
+class _Path(NamedTuple):
+    """A planned path: its end, the outcome there, and the surface of the obstacle that ends it."""
 
     end: float
     outcome: ObjectStatus
@@ -48,7 +48,7 @@ class Axis:
     """A finger or the scissor.
 
     Times are simulated seconds, positions counts. Methods that take a time must be called with times that do
-    not decrease and never jump over :attr:`ends_at`; the end of a motion is told by :meth:`arrive`.
+    not decrease and never skip :attr:`ends_at`; call :meth:`arrive` at that time.
 
     Attributes:
         low: where the opening motion ends, in counts.
@@ -71,10 +71,10 @@ class Axis:
         self._closed = high
         self._goal: Goal | None = None
         self._is_locked = False
-        """Whether it was stopped in a grip and holds on, without a goal."""
+        """Whether it was stopped in a grip and still holds, without a goal."""
         self._origin = float(position)
         self._since = 0.0
-        self._way = _Way(self._origin, ObjectStatus.IN_MOTION)
+        self._path = _Path(self._origin, ObjectStatus.IN_MOTION)
         self._rate = self._running = self._peak = 0.0
         self._travelled = 0.0
 
@@ -85,7 +85,7 @@ class Axis:
 
     @property
     def grips(self) -> bool:
-        """Whether the axis is driven against what it touches."""
+        """Whether the axis presses against an obstacle."""
         return self._goal is not None and self._is_latched_against(self._goal)
 
     @property
@@ -102,11 +102,11 @@ class Axis:
         """Where the axis is."""
         if not self.is_moving:
             return self._origin
-        way = self._way.end - self._origin
-        return self._origin + math.copysign(min(self._rate * (time - self._since), abs(way)), way)
+        distance = self._path.end - self._origin
+        return self._origin + math.copysign(min(self._rate * (time - self._since), abs(distance)), distance)
 
     def travel(self, time: float) -> float:
-        """The way the axis has gone since it was made, in counts, forth and back added up."""
+        """The distance travelled so far, in counts, in both directions."""
         return self._travelled + abs(self.position(time) - self._origin)
 
     def within_stops(self, position: int) -> int:
@@ -133,20 +133,20 @@ class Axis:
             self._plan(time)
 
     def hold(self, time: float, *, locks: bool) -> None:
-        """Stop on the count the axis reads now, and forget the goal; one that locks holds what it held."""
+        """Stop at the present count and forget the goal. An axis that ``locks`` keeps its grip."""
         self._is_locked = locks and self.holds
         self._rest(time, float(round(self.position(time))))
         self._goal = None
 
     def clear(self, time: float) -> None:
-        """Stop, let go, and forget what was touched or reached."""
+        """Stop and release."""
         self.hold(time, locks=False)
         self.status = ObjectStatus.IN_MOTION
 
     def arrive(self) -> None:
         """End the present motion; to be called at :attr:`ends_at`."""
-        self._rest(self.ends_at, self._way.end)
-        self.status = self._way.outcome
+        self._rest(self.ends_at, self._path.end)
+        self.status = self._path.outcome
 
     def confine(self, time: float, high: int | None) -> None:
         """Let the closing motion end at a software limit, or with None at the mechanical stop."""
@@ -155,15 +155,15 @@ class Axis:
             self._plan(time)
 
     def look_again(self, time: float) -> None:
-        """Tell the axis that obstacles have changed. At rest it feels nothing of it: a contact latches."""
+        """Plan anew because obstacles have changed. An axis at rest ignores that: a contact latches."""
         if self.is_moving:
             self._plan(time)
 
     def _plan(self, time: float) -> None:
         """Begin the motion from here to the goal."""
         assert self._goal is not None, "only a motion with a goal is planned"
-        here, before, due = self.position(time), self._way, self.ends_at
-        self._way = self._way_to(here, self._goal)
+        here, before, due = self.position(time), self._path, self.ends_at
+        self._path = self._path_to(here, self._goal)
         reached = self._has_reached(here, self._goal)
         self._rest(time, here)
         if reached:
@@ -171,50 +171,47 @@ class Axis:
             return
         self.status = ObjectStatus.IN_MOTION
         self._rate = self._goal.rate
-        self._running = self._motor.running(self._rate, closing=self._way.end > here)
+        self._running = self._motor.running(self._rate, closing=self._path.end > here)
         self._peak = peak(self._goal.force)
-        self.ends_at = time + abs(self._way.end - here) / self._rate
-        if self._way.outcome.is_contact:
-            # A new request while it presses already does not begin the pressing anew.
-            presses = due < math.inf and here == before.end and self._way == before
+        self.ends_at = time + abs(self._path.end - here) / self._rate
+        if self._path.outcome.is_contact:
+            # A new request does not restart the pressing.
+            presses = due < math.inf and here == before.end and self._path == before
             self.ends_at = due if presses else self.ends_at + PRESSING
 
-    def _way_to(self, here: float, goal: Goal) -> _Way:
-        """The way from here to the goal.
-
-        An obstacle that the axis has passed already is behind it and no contact.
-        """
+    def _path_to(self, here: float, goal: Goal) -> _Path:
+        # Multiplied by the sign, both directions compare like a closing motion.
         target = self.within_stops(goal.position)
-        way = 1 if target > here else -1
-        end = self.within_stops(target + way * self._overshoot(goal))
-        obstacle = self.in_closing if way > 0 else self.in_opening
+        sign = 1 if target > here else -1
+        end = self.within_stops(target + sign * self._overshoot(goal))
+        obstacle = self.in_closing if sign > 0 else self.in_opening
         if obstacle is None or (goal.clears and not obstacle.fixed):
-            return _Way(end, ObjectStatus.AT_POSITION)
+            return _Path(end, ObjectStatus.AT_POSITION)
         surface = obstacle.position + self._spread.contact(obstacle.position)
-        far_side = max(way * obstacle.position, way * surface) + obstacle.soft + self._spread.tolerance
-        if way * here > far_side:
-            return _Way(end, ObjectStatus.AT_POSITION)
-        stopped = way * max(way * here, way * surface + _dent(obstacle, goal.force))
-        if way * stopped < way * target:
-            contact = ObjectStatus.CONTACT_CLOSING if way > 0 else ObjectStatus.CONTACT_OPENING
-            return _Way(stopped, contact, surface)
-        return _Way(way * min(way * end, way * stopped), ObjectStatus.AT_POSITION)
+        far_side = max(sign * obstacle.position, sign * surface) + obstacle.soft + self._spread.tolerance
+        if sign * here > far_side:  # the axis has passed the obstacle
+            return _Path(end, ObjectStatus.AT_POSITION)
+        stopped = sign * max(sign * here, sign * surface + _dent(obstacle, goal.force))
+        if sign * stopped < sign * target:
+            contact = ObjectStatus.CONTACT_CLOSING if sign > 0 else ObjectStatus.CONTACT_OPENING
+            return _Path(stopped, contact, surface)
+        return _Path(sign * min(sign * end, sign * stopped), ObjectStatus.AT_POSITION)
 
     def _overshoot(self, goal: Goal) -> int:
-        """Counts by which the axis will go too far: none at a stop, nor where a reading is what is asked."""
+        """Counts by which the axis will overshoot: none at a stop, or if the goal is a reading."""
         if goal.is_reading or not self.low < goal.position < self.high:
             return 0
         return self._spread.overshoot(goal.position)
 
     def _has_reached(self, here: float, goal: Goal) -> bool:
-        """Whether the way that is planned need not be gone: an axis that stands close by is there."""
-        if self._way.outcome is not ObjectStatus.AT_POSITION:
+        """Whether the axis need not move: an axis at rest within its tolerance has arrived."""
+        if self._path.outcome is not ObjectStatus.AT_POSITION:
             return False
         tolerance = 0 if goal.is_reading or self.is_moving else self._spread.tolerance
-        return self._way.end == here or abs(goal.position - here) <= tolerance
+        return self._path.end == here or abs(goal.position - here) <= tolerance
 
     def _is_latched_against(self, goal: Goal) -> bool:
-        """Whether the contact that the axis stands in holds against a goal beyond it with no more force."""
+        """Whether the axis is in a contact, and the goal lies beyond it with no more force."""
         if self._goal is None or self.is_moving or goal.force > self._goal.force:
             return False
         beyond = self.within_stops(goal.position) - self._origin
@@ -224,16 +221,16 @@ class Axis:
 
     def _pressed(self, time: float) -> float:
         """How far the axis has been pressed into what stops it, from 0 to 1."""
-        way = self._way
-        if not way.outcome.is_contact:
+        _, outcome, surface = path = self._path
+        if not outcome.is_contact:
             return 0.0
         position = self.position(time)
-        if position == way.end:
+        if position == path.end:
             return 1.0
-        return 0.0 if way.end == way.surface else max(0.0, (position - way.surface) / (way.end - way.surface))
+        return 0.0 if path.end == surface else max(0.0, (position - surface) / (path.end - surface))
 
     def _rest(self, time: float, position: float) -> None:
-        """Stand still at a position, with the way up to it accounted for."""
+        """Come to rest at a position, and add the distance up to it."""
         self._travelled += abs(position - self._origin)
         self._origin = position
         self._since = time

@@ -15,9 +15,9 @@ class Goal(NamedTuple):
         position: where to.
         speed: 0..255.
         force: 0..255.
-        is_reading: the axis ends where it reads the position, and not beside it as after a request.
+        is_reading: the axis ends exactly at the position, without the spread of a request.
         stroke_time: seconds of a full stroke, if not those of the speed.
-        clears: what is in the way and not fixed has been taken out.
+        clears: obstacles that are not fixed do not count.
     """
 
     position: int

@@ -29,15 +29,15 @@ class Motor(NamedTuple):
     """The motor of one axis.
 
     Attributes:
-        closing: what it draws while closing at full speed.
-        opening: what it draws while opening at full speed.
+        closing: current while closing at full speed.
+        opening: current while opening at full speed.
     """
 
     closing: int
     opening: int
 
     def running(self, rate: float, *, closing: bool) -> float:
-        """What it draws in free motion at so many counts a second."""
+        """Current in free motion, at a rate in counts a second."""
         full = self.closing if closing else self.opening
         return full * (_SHARE_OF_FRICTION + (1 - _SHARE_OF_FRICTION) * rate / _FULL_RATE)
 

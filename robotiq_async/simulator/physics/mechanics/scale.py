@@ -47,7 +47,7 @@ class SimulatedScale:
         self._random = random.Random(seed)
 
     def reading(self, force: int) -> int:
-        """What it shows at a force value, in steps of 10 g.
+        """The reading at a force value, in steps of 10 g.
 
         Raises:
             TypeError: force is not an int.

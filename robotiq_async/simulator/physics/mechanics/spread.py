@@ -5,8 +5,8 @@ grasp); a closed finger reads 240 or more, and others stop within 1 to 2 counts 
 asked and 112 and 210 reached (poses that TAMS recorded); a contact is precise to some millimetres only
 (manual), of which a count is 0.66.
 
-Nothing is drawn in passing: a figure follows from the seed, the axis and what is asked of it. So it does not
-depend on how often anybody looks, and what is done again ends in the same way.
+No random numbers are drawn in passing: a figure follows from the seed, the axis and its request. So it does
+not depend on how often it is read, and a repeated motion ends in the same way.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Spread:
 
     @property
     def tolerance(self) -> int:
-        """How many counts beside the request an axis may stand, and has still reached it."""
+        """Counts within which an axis at rest has reached its request."""
         return 0 if self._seed is None else _TOLERANCE
 
     @property
