@@ -1,4 +1,4 @@
-"""Hand: what every hand can do, what it promises, and what it refuses."""
+"""Hand: the calls of every hand, with their promises and argument checks."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ class Hand(ABC):
     Many calls take the same arguments. Any other value raises TypeError or ValueError, and nothing is sent:
 
     * ``fingers``: the axes, a :class:`Finger` mask or the same integer, 1..15. The others stay as they are.
-    * ``position``: the target in counts, 0 (open) .. 255 (closed). Integers are whatever has ``__index__``,
-      bool aside.
+    * ``position``: the target in counts, 0 (open) .. 255 (closed). Any object with ``__index__`` is an
+      integer, except a bool.
     * ``speed``: 0 (22 mm/s nominal) .. 255 (110 mm/s nominal); None leaves the speed of these axes.
     * ``force``: 0 (15 N nominal) .. 255 (60 N nominal), not linear; None leaves the force of these axes.
     * ``timeout``: seconds above 0; None for twice the expected time plus 2 s.
@@ -63,7 +63,7 @@ class Hand(ABC):
         address: which gripper; no two hands of a process have the same one.
         name: what the log, errors and metrics call the hand; empty for its address.
         units: what positions, speeds and forces mean.
-        keep_grip: whether :meth:`stop` keeps a grip unless told otherwise.
+        keep_grip: whether :meth:`stop` keeps a grip by default.
     """
 
     _session: Run | None = None
@@ -144,8 +144,8 @@ class Hand(ABC):
         """Stop the fingers (rGTO = 0), keep the activation, disconnect. Idempotent.
 
         The stop is final from the call on: every request is refused with NotStartedError, requests that were
-        not sent are dropped, and whatever else is being waited for ends with NotStartedError. Nothing that
-        starts or continues a motion is sent after the call. The state is SHUTDOWN when it returns.
+        not sent are dropped, and everything else that is being waited for ends with NotStartedError. Nothing
+        that starts or continues a motion is sent after the call. The state is SHUTDOWN when it returns.
 
         It ends within 2 s, even on a dead link and when cancelled meanwhile: the cancellation is raised once
         the hand has stopped. A link that is down is tried once more. Of several calls under way the strongest

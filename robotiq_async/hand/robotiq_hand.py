@@ -99,8 +99,8 @@ class RobotiqHand(Hand):
             :attr:`units`. None for the thesis's gripper.
         force_calibration: what :attr:`units` labels force values with. None for the manual's figures.
         keep_grip: what :meth:`stop` does by default, and leaving the block does always: False stops the
-            fingers for certain (rGTO = 0), True holds what moves and keeps a grip in force. A gripper that is
-            not polled afterwards may lose its activation, and with it the grip.
+            fingers for certain (rGTO = 0), True holds axes that move and keeps a grip in force. A gripper
+            that is not polled afterwards may lose its activation, and with it the grip.
 
     Raises:
         TypeError: an option of the wrong type.
@@ -224,7 +224,7 @@ class RobotiqHand(Hand):
             await session.answered(session.controller.halt)
 
     def _drop_requests(self, why: str) -> None:
-        """Drop what was asked and not sent, holds and halts aside: who asked commands no longer."""
+        """Drop the requests that were not sent, except holds and halts, for a client that lost control."""
         if self._session is not None and not self._session.is_over:
             self._session.ask(self._session.controller.drop_requests, MoveSupersededError(why))
 

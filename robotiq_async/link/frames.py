@@ -123,7 +123,7 @@ class Expected(NamedTuple):
         count = int.from_bytes(frame[at : at + 2], "big")  # of registers, in the answer to a write
         is_shorter = len(frame) == self.size and frame.startswith(self.start[:at]) and count < REGISTER_COUNT
         if function == _WRITE and is_shorter:
-            what = f"it tells of {count} registers written, and not of {REGISTER_COUNT}{_WHOLE}"
+            what = f"it reports {count} registers written, and not {REGISTER_COUNT}{_WHOLE}"
             return MisfitError(f"not the answer: {what}")
         return MisfitError(f"not the answer: {show(frame)}, expected {show(self.start)}...")
 

@@ -57,7 +57,7 @@ class Worker:
             return result
         if isinstance(call.error, Exception):
             raise call.error
-        raise RuntimeError(f"it ended by itself with {call.error!r}") from call.error
+        raise RuntimeError(f"it ended with {call.error!r}") from call.error
 
     def end(self, what: Callable[[], Awaitable[None]]) -> None:
         """Make a last call, which must limit its own time and not fail, then end the task. Does not wait."""

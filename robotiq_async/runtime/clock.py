@@ -17,8 +17,8 @@ _ASYNCIOS: Final = asyncio.BaseEventLoop.time
 
 
 def clock_of(loop: asyncio.AbstractEventLoop) -> Callable[[], float]:
-    """The clock of what happens in a loop."""
-    # Not told by comparing what both show: they may be close by chance, and part later.
+    """The clock of a loop: its own if it has one, else ``time.monotonic``."""
+    # Comparing the readings of both would not do: they may agree by chance and diverge later.
     method = type(loop).time
     is_own = isinstance(method, FunctionType) and method is not _ASYNCIOS
     return loop.time if is_own or "time" in getattr(loop, "__dict__", ()) else time.monotonic

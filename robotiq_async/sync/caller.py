@@ -1,4 +1,4 @@
-"""How calls get to the event loop of a hand; what Ctrl-C, a fork and the program's end do to it."""
+"""How calls get to the event loop of a hand; what Ctrl-C, a fork and the end of the program do."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ T = TypeVar("T")
 Function = Callable[[], Coroutine[Any, Any, T]]
 
 EXIT_S: Final = 4.0
-"""How long the end of the program waits for hands that were not stopped: stop() takes up to 2 s."""
+"""How long the end of the program waits for hands that are still running: stop() takes up to 2 s."""
 
 
 class Caller:
@@ -32,23 +32,18 @@ class Caller:
     """
 
     def __init__(self, hand: AsyncRobotiqHand) -> None:
-        """Keep the hand; nothing runs yet."""
         self.hand: Final = hand
         self._calls: set[object] = set()
-        """Those that are being made: what they do cannot be told yet."""
+        """The calls under way: the hand may be about to run."""
         self._is_left_behind = False
         self._has_warned = False
 
     def wait(self, function: Function[T]) -> T:
-        """Make a call, and wait for it.
-
-        Raises:
-            BaseException: whatever it raises, or strikes this thread meanwhile.
-        """
+        """Make a call and wait for its result."""
         self._warn_of_a_running_loop()
         call = object()
         self._calls.add(call)
-        _IN_USE.add(self)  # also when the program drops it: it runs on
+        _IN_USE.add(self)  # a hand that the program drops still runs
         try:
             return LOOP_THREAD.call(function, interrupted=self._hold)
         finally:
@@ -57,11 +52,7 @@ class Caller:
                 _IN_USE.discard(self)
 
     def tell(self, function: Callable[[], T]) -> T:
-        """Make a call that does not wait. Listeners may do so, too.
-
-        Raises:
-            Exception: whatever it raises.
-        """
+        """Make a call that does not wait. Listeners may make one, too."""
         if LOOP_THREAD.is_here:
             return function()
 
@@ -71,34 +62,26 @@ class Caller:
         return self.wait(call)
 
     def start(self, function: Function[None]) -> None:
-        """Make the call that starts the hand, unless the program ends.
-
-        Raises:
-            RuntimeError: it ends.
-            BaseException: as :meth:`wait`.
-        """
+        """Make the call that starts the hand; raises RuntimeError while the program ends."""
 
         async def start() -> None:
-            # In the loop: what begins before the end there is in use, and stopped after it has begun.
-            LOOP_THREAD.check_begins()
+            # Checked in the loop: a start that passes is in use, and stopped at the end of the program.
+            LOOP_THREAD.check_open()
             await function()
 
         self.wait(start)
 
     def stop(self, function: Function[None]) -> None:
-        """Make the call that stops the hand; of one that does not run, without the event loop.
+        """Make the call that stops the hand; without the event loop if the hand does not run.
 
-        Once the interpreter ends no thread can begin, and objects that are deleted then stop their hands.
-
-        Raises:
-            BaseException: as :meth:`wait`.
+        Objects that are deleted while the interpreter ends stop their hands, and no thread can start then.
         """
         if self._calls or self.is_running:
             self.wait(function)
             return
         stopping = function()
         try:
-            stopping.send(None)  # there is nothing to wait for
+            stopping.send(None)  # a hand that does not run stops without waiting
         except StopIteration:
             return
         finally:
@@ -108,41 +91,37 @@ class Caller:
     def has_commanded(self) -> bool:
         """Whether the hand has written to the gripper since its start, or is about to.
 
-        Of one that only looks nothing is written when the program is interrupted or ends.
+        If it has only read, an interruption and the end of the program write nothing, either.
         """
         return self.hand._has_commanded  # noqa: SLF001  # both are the hand
 
     def _warn_of_a_running_loop(self) -> None:
-        """Once: the loop stands still during each call, and whatever else runs in it, as other hands do."""
+        """Warn once that each call blocks a loop which runs in this thread, and everything in that loop."""
         if self._has_warned or LOOP_THREAD.is_here or "ipykernel" in sys.modules:
-            return  # the cells of a notebook run in its kernel's loop, and are meant to hold it up
+            return  # the cells of a notebook run in its kernel's loop, and may block it
         with contextlib.suppress(RuntimeError):
             asyncio.get_running_loop()
             self._has_warned = True
             Log(self.hand.name).warning(
-                "an event loop runs in this thread, and stands still at every call of the blocking hand: in "
+                "an event loop runs in this thread, and every call of the blocking hand blocks it: in "
                 "coroutines use robotiq_async.RobotiqHand, or call this one with asyncio.to_thread()"
             )
 
     def check_process(self) -> None:
-        """Refuse a hand that runs in the process that this one was forked from.
-
-        Raises:
-            RuntimeError: it does.
-        """
+        """Raise RuntimeError if the hand runs in the process from which this one was forked."""
         if self._is_left_behind:
             raise RuntimeError(
-                "the hand ran when this process was forked, and stays with the parent; what it shows here "
+                "the hand ran when this process was forked, and stays with the parent; its state here "
                 "is old: make another hand after the fork"
             )
 
     @property
     def is_running(self) -> bool:
-        """Whether the hand has been started, and not stopped."""
+        """Whether the hand was started and not stopped."""
         if self._is_left_behind or self.hand.state is State.SHUTDOWN:
             return False
         try:
-            self.hand.is_activated  # noqa: B018  # asked for what it raises
+            self.hand.is_activated  # noqa: B018  # read for its exception
         except NotStartedError:
             return False
         except RobotiqError:
@@ -150,12 +129,12 @@ class Caller:
         return True
 
     def after_fork(self) -> None:
-        """This is the child; a hand that ran goes on in the parent, and so do the calls of its threads."""
+        """Called in the child: a running hand, and its calls, stay with the parent."""
         self._is_left_behind = self._is_left_behind or self.is_running
         self._calls.clear()
 
     async def _hold(self) -> None:
-        """Let nothing move after Ctrl-C. A grip stays. A release goes on: it frees what may be trapped."""
+        """Stop motion after Ctrl-C. A grip stays; a release goes on, because something may be trapped."""
         if not self.has_commanded:
             return
         with contextlib.suppress(RobotiqError):
@@ -166,17 +145,17 @@ class Caller:
 
 
 _IN_USE: Final[set[Caller]] = set()
-"""Those of hands that run, and of those that are called at this moment."""
+"""The callers of hands that run, or are being called."""
 
 
 def _stop_all() -> None:
-    """The program ends: what it has set going must not go on."""
+    """Stop every hand at the end of the program."""
     left = list(_IN_USE)
     for each in left:
         log.warning("%s still running at exit: stopping it", each.hand.address)
 
     async def stop_one(caller: Caller) -> None:
-        # Whether it has commanded is asked in the turn that ends its requests.
+        # has_commanded is read in the turn in which the stop refuses further requests.
         await caller.hand.stop(halt=caller.has_commanded)
 
     async def stop() -> None:
@@ -196,11 +175,11 @@ def _after_fork() -> None:
 
 
 def _at_exit() -> None:
-    LOOP_THREAD.begins_no_more = True
+    LOOP_THREAD.is_closing = True
     _stop_all()
 
 
-# Threads that are daemons still run then: it comes before the interpreter ends.
+# atexit runs before the interpreter ends, while daemon threads still run.
 atexit.register(_at_exit)
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_after_fork)

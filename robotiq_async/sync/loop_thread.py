@@ -1,8 +1,8 @@
-"""The event loop of all blocking hands, in a thread that is there while something runs in it.
+"""The event loop of all blocking hands, in a thread that exists while the loop has work.
 
-Ctrl-C strikes between any two steps of the main thread. So that thread takes no lock that the loop's thread
-may need, and holds nothing that must be given back: the loop would stand still, and nobody would watch the
-fingers. It leaves calls with :meth:`~asyncio.loop.call_soon_threadsafe` and waits at a queue written in C.
+Ctrl-C can interrupt the main thread between any two steps. So that thread takes no lock that the loop thread
+may need, and holds nothing that it must release: otherwise the loop could stop, and nothing would watch the
+fingers. It passes calls with :meth:`~asyncio.loop.call_soon_threadsafe` and waits at a queue written in C.
 """
 
 from __future__ import annotations
@@ -23,34 +23,36 @@ T = TypeVar("T")
 Function = Callable[[], Coroutine[Any, Any, T]]
 
 NAME: Final = "robotiq_async"
-"""Of the thread."""
+"""The name of the thread."""
 LOOK_S: Final = 0.1
-"""Who waits looks so often whether the loop is still there. Windows tells of Ctrl-C no sooner."""
+"""A waiting thread checks at this interval whether the loop still exists. On Windows Ctrl-C arrives only
+then."""
 GIVE_UP_S: Final = 3.0
-"""What a call that was interrupted may take to end: stop() takes up to 2 s, a hold up to 1 s."""
+"""How long an interrupted call may take to end: stop() takes up to 2 s, a hold up to 1 s."""
 
 
 class LoopThread:
     """Makes calls in an event loop of its own, for any number of other threads.
 
-    The thread begins with the first call, and ends when neither a call nor a hand runs in it any more.
+    The thread starts with the first call and ends when no call and no hand is left in it.
+
+    Attributes:
+        is_closing: whether the program ends: see :meth:`check_open`.
     """
 
     def __init__(self) -> None:
-        """Begin without a thread."""
         self.forget()
 
     def forget(self) -> None:
-        """There is no thread: that of a parent process is not ours."""
-        self.begins_no_more = False
-        """Whether the program ends: see :meth:`check_begins`."""
-        self._beginning = threading.Lock()
-        """Only threads that Ctrl-C cannot strike take it."""
+        """Start without a thread; also after a fork, because the parent's thread is not in this process."""
+        self.is_closing = False
+        self._starting = threading.Lock()
+        """Taken only by loop threads, which Ctrl-C cannot interrupt."""
         self._server: _Server | None = None
 
     @property
     def is_running(self) -> bool:
-        """Whether there is a loop at this moment."""
+        """Whether there is a loop now."""
         return self._server is not None and not self._server.loop.is_closed()
 
     @property
@@ -60,33 +62,29 @@ class LoopThread:
             return self._server is not None and asyncio.get_running_loop() is self._server.loop
         return False
 
-    def check_begins(self) -> None:
-        """Refuse what begins while the program ends: a hand that starts now would not be stopped at its end.
-
-        Raises:
-            RuntimeError: it ends.
-        """
-        if self.begins_no_more:
+    def check_open(self) -> None:
+        """Raise RuntimeError while the program ends: a hand that starts now would not be stopped."""
+        if self.is_closing:
             raise RuntimeError("the program is ending: a blocking hand that starts now would not be stopped")
 
     def call(
         self, function: Function[T], *, interrupted: Function[None] | None = None, limit: float | None = None
     ) -> T:
-        """Make a call, and wait for it.
+        """Make a call and wait for its result.
 
-        An exception that strikes the waiting thread, as Ctrl-C does, cancels the call; it is raised when the
-        call has ended, or after 3 s.
+        An exception in the waiting thread, such as Ctrl-C, cancels the call; it is raised once the call has
+        ended, or after 3 s.
 
         Args:
-            function: what to call.
-            interrupted: what to call after a call that was cancelled so.
-            limit: seconds to wait for it; None for as long as it takes.
+            function: makes the coroutine.
+            interrupted: called after a call that was cancelled in this way.
+            limit: seconds to wait; None for as long as it takes.
 
         Raises:
-            RuntimeError: called in the loop's own thread, which would wait for itself; or there is no thread,
-                or the program ends.
-            LateError: not done within the limit; it goes on.
-            BaseException: whatever the call raises.
+            RuntimeError: called in the loop's own thread, which would wait for itself; or the thread cannot
+                start, or the program ends.
+            LateError: not done within the limit; the call goes on.
+            BaseException: raised by the call.
         """
         if self.is_here:
             raise RuntimeError(
@@ -94,7 +92,7 @@ class LoopThread:
                 "make it from another thread, or use the async robotiq_async.RobotiqHand"
             )
         if sys.is_finalizing():
-            # The thread does not run any more, and another one would never begin: this call would never end.
+            # The thread has stopped and no other can start: this call would never end.
             raise RuntimeError("the interpreter is ending: a blocking hand takes no calls now")
         call = _Call(function)
         try:
@@ -107,10 +105,10 @@ class LoopThread:
         try:
             return task.result()
         finally:
-            del call, task  # whoever keeps what it raises is not to keep the call with it
+            del call, task  # a kept exception must not keep the call alive
 
     def _made(self, call: _Call[T], limit: float | None) -> asyncio.Task[T]:
-        """Have a call made; again if the loop came to its end before it had begun with it."""
+        """Make a call; again if the loop ended before the call began."""
         until = None if limit is None else time.monotonic() + limit
         while True:
             server = self._server
@@ -122,12 +120,12 @@ class LoopThread:
             task = call.wait(server.loop, until)
             if task is not None:
                 return task
-            if call.has_begun:  # and is not made again, whatever became of it
+            if call.has_begun:  # do not make it twice
                 raise RuntimeError("the event loop of the hand has ended")
 
     def _serving(self, call: _Call[Any]) -> _Server:
-        """Begin a thread with a call, unless another thread does so at this moment."""
-        self.check_begins()
+        """Start the loop thread with a call, unless another thread starts it at this moment."""
+        self.check_open()
         answer: SimpleQueue[_Server | OSError] = SimpleQueue()
         threading.Thread(target=self._serve, args=(call, answer), name=NAME, daemon=True).start()
         server = answer.get()
@@ -136,11 +134,11 @@ class LoopThread:
         return server
 
     def _serve(self, call: _Call[Any], answer: SimpleQueue[_Server | OSError]) -> None:
-        with self._beginning:
+        with self._starting:
             server, is_new = self._server, False
             if server is None or server.loop.is_closed():
                 try:
-                    self._server = server = _Server(self._ends)
+                    self._server = server = _Server(self._ended)
                 except OSError as error:
                     answer.put(error)
                     return
@@ -151,13 +149,12 @@ class LoopThread:
         if is_new:
             server.run()
 
-    def _ends(self, server: _Server) -> None:
-        """A loop ends, and begins with nothing any more."""
-        if self._server is server:  # as long as it runs nobody else puts another in its place
+    def _ended(self, server: _Server) -> None:
+        if self._server is server:  # another thread replaces only a loop that has ended
             self._server = None
 
     def _give_up(self, call: _Call[Any], interrupted: Function[None] | None) -> None:
-        """Cancel a call that nobody waits for any more, and wait for that."""
+        """Cancel a call whose caller was interrupted, and wait for its end."""
         call.is_given_up = True
         server, settled = self._server, SimpleQueue[None]()
         if server is None:
@@ -173,24 +170,23 @@ class LoopThread:
 
 
 class _Server:
-    """One event loop, from the first call to the end of the last. All but the constructor runs in it."""
+    """One event loop, from its first call to the end of its last. All its methods run in the loop.
 
-    def __init__(self, ends: Callable[[_Server], None]) -> None:
-        """Make the loop.
+    Args:
+        ended: called when no task is left.
 
-        Args:
-            ends: is told when nothing runs in it any more.
+    Raises:
+        OSError: no file descriptors are left.
+    """
 
-        Raises:
-            OSError: there are no descriptors left.
-        """
+    def __init__(self, ended: Callable[[_Server], None]) -> None:
         self.loop: Final = asyncio.new_event_loop()
-        self._ends = ends
+        self._ended = ended
         self._is_ending = False
         self._giving_up: set[asyncio.Task[None]] = set()
 
     def run(self) -> None:
-        """Run the loop until nothing runs in it any more."""
+        """Run the loop until no task is left."""
         with asyncio.Runner(loop_factory=lambda: self.loop) as runner:
             runner.run(self._until_idle())
 
@@ -199,17 +195,17 @@ class _Server:
         while others := asyncio.all_tasks() - here:
             await asyncio.wait(others)
         self._is_ending = True
-        self._ends(self)
+        self._ended(self)
 
     def begin(self, call: _Call[Any]) -> None:
-        """Begin with a call, or say that it is too late for that."""
+        """Begin a call, or refuse it if the loop is ending."""
         if self._is_ending:
             call.refuse()
         elif not call.is_given_up:
             call.begin()
 
     def give_up(self, call: _Call[Any], then: Function[None] | None, settled: SimpleQueue[None]) -> None:
-        """Cancel a call if it has begun; do something else, and tell."""
+        """Cancel a call if it has begun, call ``then``, and signal ``settled``."""
 
         async def give_up() -> None:
             try:
@@ -225,14 +221,14 @@ class _Server:
 
 
 class _Call(Generic[T]):
-    """A call, and what comes of it."""
+    """A call and its result."""
 
     def __init__(self, function: Function[T]) -> None:
         self._function = function
         self._task: asyncio.Task[T] | None = None
         self._ended: SimpleQueue[asyncio.Task[T] | None] = SimpleQueue()
         self.is_given_up = False
-        """Whether nobody waits for it any more."""
+        """Whether its caller was interrupted."""
 
     @property
     def has_begun(self) -> bool:
@@ -243,14 +239,13 @@ class _Call(Generic[T]):
         self._task.add_done_callback(self._ended.put)
 
     def refuse(self) -> None:
-        """The loop ends before it begins."""
         self._ended.put(None)
 
     async def _run(self) -> T:
         return await self._function()
 
     async def cancelled(self) -> None:
-        """Cancel it, and wait until it has ended; what it raises is nobody's."""
+        """Cancel it and wait for its end; its exception is dropped."""
         if self._task is not None:
             self._task.cancel()
             await asyncio.wait({self._task})
@@ -258,10 +253,10 @@ class _Call(Generic[T]):
                 self._task.exception()
 
     def wait(self, loop: asyncio.AbstractEventLoop, until: float | None) -> asyncio.Task[T] | None:
-        """Wait in another thread until it has ended; None if the loop ended before.
+        """Wait in another thread for its end; None if the loop ended before.
 
         Raises:
-            LateError: it is late.
+            LateError: it has not ended by ``until``.
         """
         while True:
             is_closed = loop.is_closed()
@@ -274,4 +269,4 @@ class _Call(Generic[T]):
 
 
 LOOP_THREAD: Final = LoopThread()
-"""That of all hands of this process."""
+"""The one of this process."""

@@ -55,9 +55,9 @@ class RobotiqHand:
     which polls while your code runs. Calls may come from any thread, also from one in which another event
     loop runs: that loop waits meanwhile.
 
-    Ctrl-C does to a call what cancelling does to the async one, and then holds whatever moves. A hand that
-    was not stopped is stopped when the program ends. After a fork it stays with the parent. Listeners are
-    called in the hand's thread, where a call that waits raises RuntimeError.
+    Ctrl-C does to a call what cancelling does to the async one, and then holds every axis that moves. A hand
+    that was not stopped is stopped when the program ends. After a fork it stays with the parent. Listeners
+    are called in the hand's thread, where a call that waits raises RuntimeError.
 
     Nothing of this has run on real hardware yet.
     """

@@ -15,7 +15,6 @@ class Stream(Generic[T]):
     """An iterator with one reader; dropping it ends it. Made by a hand."""
 
     def __init__(self, stream: AsyncStream[T], caller: Caller) -> None:
-        """Read from a stream of the hand."""
         self._stream = stream
         self._caller = caller
 
@@ -48,11 +47,11 @@ class Stream(Generic[T]):
         return self._stream.missed
 
     def take_nowait(self) -> T | None:
-        """The next item if there is one already."""
+        """The next item if there is one now, or None."""
         return self._caller.tell(self._stream.take_nowait)
 
     def drain(self) -> Iterator[T]:
-        """What is there already, one after the other."""
+        """Iterate over the items that are there now."""
         return iter(self._caller.tell(lambda: list(self._stream.drain())))
 
     def close(self) -> None:

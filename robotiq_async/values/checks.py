@@ -1,7 +1,7 @@
 """Argument checks: each names the argument, the value and the range, and nothing is clamped.
 
-An int is whatever says that it is one (``__index__``), numpy's integers too; a number is a real one or an
-int. What comes out is a plain int or float. No bool passes for either: it stands where an argument slipped.
+An int is any object with ``__index__``, such as numpy's integers; a number is a real number or an int. The
+result is a plain int or float. A bool is refused: it hints at a misplaced argument.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def check_byte(name: str, value: object) -> int:
 
 
 def check_optional_byte(name: str, value: object) -> int | None:
-    """A value in 0..255, or None for what is left as it is.
+    """A value in 0..255, or None for no change.
 
     Raises:
         TypeError: neither None nor an int.
@@ -53,11 +53,11 @@ def check_int(name: str, value: object, low: int, high: int) -> int:
 
 
 def as_int(value: object) -> int | None:
-    """The plain int that a value stands for; None if it is no int, or a bool."""
+    """Convert to a plain int; None if it is not an int, or is a bool."""
     if isinstance(value, bool):
         return None
     try:
-        return int(operator.index(value))  # type: ignore[arg-type]  # what it refuses is what we ask
+        return int(operator.index(value))  # type: ignore[arg-type]  # TypeError: not an int
     except TypeError:
         return None
 
@@ -140,16 +140,16 @@ def check_number(name: str, value: object, low: float, high: float, what: str = 
 
 
 def as_float(value: object) -> float | None:
-    """The plain float that a value stands for, infinite beyond all; None if it is no number, or a bool.
+    """Convert to a plain float, infinite on overflow; None if it is not a number, or is a bool.
 
-    ``__float__`` alone does not make a number: numpy's bool has it, and its complex, which loses a part.
+    ``__float__`` alone is not enough: numpy's bool and its complex have it, too.
     """
     number = value if isinstance(value, float | Real) and not isinstance(value, bool) else as_int(value)
     try:
         return None if number is None else float(number)
     except OverflowError:
         return math.inf
-    except TypeError:  # numpy's timedelta counts as an integer, and is none
+    except TypeError:  # numpy's timedelta has __index__ and is not a number
         return None
 
 

@@ -155,7 +155,7 @@ class Fault(Code):
         if isinstance(value, bool):
             return None
         try:
-            code = int(operator.index(value))  # type: ignore[arg-type]  # what it refuses is no code
+            code = int(operator.index(value))  # type: ignore[arg-type]  # TypeError: not a code
         except TypeError:
             return None
         if not 0 <= code <= 15:

@@ -31,7 +31,7 @@ class Field:
         byte: index of the byte, 0..15.
         shift: lowest bit within the byte.
         width: number of bits.
-        doc: what it means, for people.
+        doc: its meaning.
     """
 
     byte: int
@@ -129,7 +129,7 @@ def check_registers(registers: Sequence[int]) -> Registers:
     block = tuple(registers)
     if len(block) != REGISTER_COUNT:
         raise ValueError(f"registers: expected {REGISTER_COUNT} of them, got {len(block)}")
-    # Quickly for what is right already: over a transport object this runs at every poll.
+    # A fast path for plain tuples: over a transport object this runs at every poll.
     return tuple(
         register if type(register) is int and 0 <= register <= 0xFFFF else _checked(index, register)
         for index, register in enumerate(block)

@@ -19,7 +19,7 @@ _NAMES = names_of(Finger.ALL)
 
 
 def _masks(wanted: Callable[[ObjectStatus], bool]) -> tuple[Finger, ...]:
-    """For each value of the byte that holds the four gDT: the axes that read what is wanted."""
+    """For each value of the byte with the four gDT: the axes whose gDT fits."""
     return tuple(
         Finger(
             sum(
@@ -153,7 +153,7 @@ class RobotiqStatus:
 
     @property
     def echo(self) -> reg.Echo:
-        """What is repeated of the request in force: gACT, gGTO, the positions of A, B, C and the scissor."""
+        """The echo of the request in force: gACT, gGTO, the positions of A, B, C and the scissor."""
         # By hand for speed: this runs at every poll.
         word = self._registers
         return (
@@ -187,7 +187,7 @@ class RobotiqStatus:
 
     @property
     def is_reset(self) -> bool:
-        """Whether gIMC = 0: reset, or in automatic release (the fault tells which)."""
+        """Whether gIMC = 0: reset, or in automatic release (see the fault)."""
         return self.initialization is Initialization.RESET
 
     @property
@@ -219,13 +219,13 @@ class RobotiqStatus:
         return _CONTACTS[self._registers[0] & 0xFF]
 
     def as_dict(self) -> dict[str, Any]:
-        """All of it in types that JSON and pandas take, each under the name of its attribute.
+        """The status in types for JSON and pandas, by attribute name.
 
-        Enumerations stand as their names, masks as lists of the names of axes; what is of one axis stands
-        below its name (``A``, ``B``, ``C``, ``SCISSOR``), and ``fault_code`` is the fault's number.
-        :meth:`from_registers` makes the same status of the first three again.
+        Enumerations become their names, masks become lists of axis names. Values of one axis are below its
+        name (``A``, ``B``, ``C``, ``SCISSOR``), and ``fault_code`` is the number of the fault.
+        :meth:`from_registers` makes the status again from the first three.
         """
-        # By register and not by property where there are many: a recorder does this at every poll.
+        # A recorder calls this at every poll: read registers and not the many properties.
         words, fault, states = self._registers, self.fault, self._states
         return {
             "registers": list(words),

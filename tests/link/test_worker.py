@@ -76,7 +76,7 @@ async def test_what_a_call_raises_is_raised(worker: Worker) -> None:
         await worker.call(fail, 1.0)
     with pytest.raises(BrokenPipeError):
         await worker.call(fail_at_once, 1.0)
-    with pytest.raises(RuntimeError, match="ended by itself"):
+    with pytest.raises(RuntimeError, match="it ended with"):
         await worker.call(cancel_itself, 1.0)
     with pytest.raises(TypeError):
         await worker.call(lambda: 3, 1.0)  # type: ignore[arg-type,return-value]

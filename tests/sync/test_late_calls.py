@@ -130,7 +130,7 @@ async def test_a_call_while_the_interpreter_ends_ends_too_and_nothing_goes_on(
 
 
 def test_stopping_a_hand_that_never_started_needs_no_thread(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(LOOP_THREAD, "begins_no_more", True)
+    monkeypatch.setattr(LOOP_THREAD, "is_closing", True)
     hand = RobotiqHand(Wire())
     hand.stop()
     hand.stop(halt=False)
@@ -145,7 +145,7 @@ def test_a_hand_that_starts_while_the_others_are_stopped_at_exit_is_refused(
     wire: Wire, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Another thread had it move, and it was not among those that the end stops."""
-    monkeypatch.setattr(LOOP_THREAD, "begins_no_more", False)  # and is so again after the test
+    monkeypatch.setattr(LOOP_THREAD, "is_closing", False)  # and is so again after the test
     slow, other = RobotiqHand(wire), RobotiqHand(Wire())
     slow.start()
     slow.set_speed(0)
