@@ -12,20 +12,16 @@ T_contra = TypeVar("T_contra", contravariant=True)
 
 
 class Waiter(Protocol[T_contra]):
-    """Where a result or an error is left for one caller. Done also when the caller has given up."""
+    """The answer to one caller. It is done, too, once the caller has given up."""
 
-    def done(self) -> bool:
-        """Whether nothing can be left any more."""
+    def done(self) -> bool: ...
 
-    def set_result(self, result: T_contra, /) -> None:
-        """Leave the result."""
+    def set_result(self, result: T_contra, /) -> None: ...
 
-    def set_exception(self, exception: RobotiqError, /) -> None:
-        """Leave the error."""
+    def set_exception(self, exception: RobotiqError, /) -> None: ...
 
 
 def resolve(waiters: Iterable[Waiter[None]]) -> None:
-    """Tell callers that it is done."""
     for waiter in waiters:
         if not waiter.done():
             waiter.set_result(None)

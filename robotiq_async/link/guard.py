@@ -57,7 +57,6 @@ class GuardedTransport:
 
     @property
     def is_open(self) -> bool:
-        """Whether requests can be sent."""
         try:
             return self._is_open and bool(self._inner.is_open)
         except Exception as error:  # noqa: BLE001  # treated as not open

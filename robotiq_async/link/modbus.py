@@ -143,7 +143,6 @@ class ModbusTransport:
 
     @property
     def is_open(self) -> bool:
-        """Whether requests can be sent."""
         return self._client is not None
 
     async def open(self) -> None:
@@ -173,11 +172,6 @@ class ModbusTransport:
         await self._resynchronise()
 
     async def read(self) -> Registers:
-        """The eight status registers.
-
-        Raises:
-            RobotiqConnectionError: no clean answer in time; the transport is closed.
-        """
         if not self._rtu:
             return registers_in(await self._exchange(self._poll), serial=False)
         try:

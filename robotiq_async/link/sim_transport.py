@@ -51,7 +51,6 @@ class SimulatedTransport:
 
     @property
     def is_open(self) -> bool:
-        """Whether requests can be sent."""
         return self._inner is not None and self._inner.is_open
 
     async def open(self) -> None:

@@ -27,12 +27,13 @@ U = TypeVar("U")
 class Stream(Generic[T]):
     """An async iterator with one reader; made by a :class:`Channel`.
 
+    It keeps the newest items, up to the buffer with which it was opened.
+
     Attributes:
         missed: items that were dropped because the reader was slow.
     """
 
     def __init__(self, buffer: int | None, kept: set[Stream[Any]]) -> None:
-        """Keep the newest ``buffer`` items; None keeps all."""
         self._kept = kept
         """Streams with a waiting reader: a strong reference, because nothing else may hold the task of the
         reader."""
