@@ -16,7 +16,6 @@ import asyncio
 import contextlib
 import heapq
 import math
-import sys
 import time
 from typing import ClassVar, Final, Literal
 
@@ -37,7 +36,6 @@ class Tick:
         due: the next deadline.
         late: the longest delay of a tick in seconds, since its reader last set this to 0.
         longest_late: the longest delay so far.
-        stood_still: whether the loop was not running during ``late``, as between two prompts of IPython.
     """
 
     def __init__(self, interval: float) -> None:
@@ -48,7 +46,6 @@ class Tick:
         self.due = 0.0
         self.late = 0.0
         self.longest_late = 0.0
-        self.stood_still = False
         self._passed = 0
         self._hurried = False
         self._waiter: asyncio.Future[None] | None = None
@@ -59,7 +56,7 @@ class Tick:
         self._timer = timer = _LoopTimer.of(self._loop)
         phase = self.interval * timer.next_phase()
         self.due = math.ceil((self.time() - phase) / self.interval) * self.interval + phase
-        self._passed, self._hurried, self.late, self.stood_still = 0, False, 0.0, False
+        self._passed, self._hurried, self.late = 0, False, 0.0
         timer.add(self)
 
     def close(self) -> None:
@@ -89,14 +86,11 @@ class Tick:
         passed, self._passed, self._hurried = self._passed, 0, False
         return passed
 
-    def expire(self, now: float, *, stood_still: bool) -> None:
-        """Count the deadline, and any further ones, that have passed; set the next.
-
-        ``stood_still`` if the loop was stopped and run again since the last tick.
-        """
+    def expire(self, now: float) -> None:
+        """Count the deadline, and any further ones, that have passed; set the next."""
         late = now - self.due
         if late > self.late:
-            self.late, self.stood_still = late, stood_still
+            self.late = late
             self.longest_late = max(self.longest_late, late)
         count = 1 + int(late / self.interval)
         self.due += count * self.interval
@@ -131,7 +125,6 @@ class _LoopTimer:
         self._heap: list[tuple[float, int, Tick]] = []
         self._handle: asyncio.TimerHandle | None = None
         self._clock = clock_of(loop)
-        self._run = _this_run()
         self._timerfd = self._watched_timerfd()
 
     @property
@@ -157,11 +150,10 @@ class _LoopTimer:
             self._close()
 
     def _expire_due(self) -> None:
-        heap, now, run = self._heap, self._clock(), _this_run()
-        stood_still, self._run = run is not self._run, run
+        heap, now = self._heap, self._clock()
         while heap and heap[0][0] <= now:
             _, number, tick = heap[0]
-            tick.expire(now, stood_still=stood_still)
+            tick.expire(now)
             heapq.heapreplace(heap, (tick.due, number, tick))
         self._arm()
 
@@ -201,11 +193,3 @@ class _LoopTimer:
         """Close the descriptor; the loop no longer watches it."""
         if self._timerfd is not None:
             self._timerfd.close()
-
-
-def _this_run() -> object:
-    """An object that identifies the present ``run_forever()`` of the running loop.
-
-    In asyncio and in uvloop each run sets new hooks for async generators.
-    """
-    return sys.get_asyncgen_hooks().firstiter

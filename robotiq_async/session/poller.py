@@ -58,9 +58,9 @@ LATE_S: Final = 0.05
 """A poll that is later than this is worth a warning; on a busy machine a few milliseconds are usual."""
 LATE_WARNING_S: Final = 1.0
 """Seconds between two warnings about late polls."""
-STOOD_STILL: Final = (
-    "the event loop was not running meanwhile, and nothing watched the fingers (as between the prompts of "
-    "IPython's terminal: use robotiq_async.sync there)"
+HELD_UP: Final = (
+    "something holds up the event loop, or it was not running (as between the prompts of IPython's terminal: "
+    "use robotiq_async.sync there)"
 )
 
 
@@ -328,12 +328,7 @@ class Poller:
         if now - self._warned < LATE_WARNING_S:
             return
         self._warned = now
-        if self._tick.late < late / 2:
-            why = "the gripper answers slowly"
-        elif self._tick.stood_still:
-            why = STOOD_STILL
-        else:
-            why = "something holds up the event loop"
+        why = "the gripper answers slowly" if self._tick.late < late / 2 else HELD_UP
         missed = self._counters.overruns
         self._log.warning("polling is %.0f ms late: %s (%d polls missed so far)", 1000 * late, why, missed)
 

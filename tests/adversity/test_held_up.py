@@ -12,7 +12,7 @@ from robotiq_async import Fault, Finger, NotActivatedError, RobotiqHand, State
 from robotiq_async.simulator import Trouble
 from robotiq_async.values.request import Request
 from tests.adversity.world import world
-from tests.virtual import VirtualLoop, run
+from tests.virtual import run
 
 A = Finger.A
 POLL_S = 0.01
@@ -219,9 +219,7 @@ def test_a_move_cancelled_while_the_loop_was_held_up_stops_where_it_is_by_then()
 
 
 @pytest.mark.parametrize("kind", ["asyncio", "uvloop"])
-def test_a_loop_that_stood_still_is_told_from_one_that_was_held_up(
-    kind: str, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_loop_that_was_not_running_is_late_and_goes_on(kind: str, caplog: pytest.LogCaptureFixture) -> None:
     factory = pytest.importorskip(kind).new_event_loop
     with asyncio.Runner(loop_factory=factory) as runner:
         hand = RobotiqHand("sim://?speedup=100")
@@ -233,7 +231,7 @@ def test_a_loop_that_stood_still_is_told_from_one_that_was_held_up(
         time.sleep(0.2)  # nothing is waited for: that nobody runs the loop is what is tried
         runner.run(asyncio.sleep(0.02))
         (warning,) = caplog.messages
-        assert "the event loop was not running meanwhile" in warning
+        assert "it was not running" in warning
         assert "robotiq_async.sync" in warning
         stall = hand.statistics.longest_stall
         assert 0.15 < stall < 0.6
@@ -241,28 +239,4 @@ def test_a_loop_that_stood_still_is_told_from_one_that_was_held_up(
         assert hand.state is State.RUNNING_IDLE
         assert runner.run(hand.move(200, A)).positions[A] == pytest.approx(200, abs=3)
         assert hand.statistics.reconnects == 0
-        runner.run(hand.stop())
-
-
-def test_one_that_is_run_again_and_then_held_up_is_told_so(caplog: pytest.LogCaptureFixture) -> None:
-    with asyncio.Runner(loop_factory=VirtualLoop) as runner:
-        loop = runner.get_loop()
-        assert isinstance(loop, VirtualLoop)
-        hand = RobotiqHand("sim://?speedup=100")
-        runner.run(hand.start())
-        runner.run(asyncio.sleep(0.02))
-
-        async def hold_up() -> None:
-            await asyncio.sleep(0.02)
-            loop.hold_up(0.5)
-            await asyncio.sleep(0.02)
-
-        runner.run(hold_up())
-        (warning,) = caplog.messages
-        assert "something holds up the event loop" in warning
-        runner.run(asyncio.sleep(1))
-        loop.hold_up(3.0)
-        runner.run(asyncio.sleep(0.02))
-        assert "the event loop was not running" in caplog.messages[-1]
-        assert hand.statistics.longest_stall == pytest.approx(3.0, abs=0.01)
         runner.run(hand.stop())
