@@ -118,10 +118,12 @@ $(STAMP): pyproject.toml constraints.txt
 		|| { echo "Installing the dependencies failed (see above). The package index must be reachable, once." >&2; exit 1; }
 	@touch $@
 
-$(SITE)/.complete: docs/site/requirements.txt
+$(SITE)/.complete: docs/site/requirements.txt constraints.txt
 	@echo "Setting up $(SITE), once"
 	@$(PYTHON) -m venv --clear $(SITE)
 	@$(SITE)/bin/python -m pip install --quiet --disable-pip-version-check --requirement docs/site/requirements.txt
+	@# Only for its copy of Mermaid, which draws the diagrams.
+	@$(SITE)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps -c constraints.txt nicegui
 	@touch $@
 
 $(RELEASE)/.complete: Makefile

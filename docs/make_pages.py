@@ -3,9 +3,8 @@
     python docs/make_pages.py
     python docs/make_pages.py --check
 
-The pictures come from make_architecture.py and make_diagram.py, the layout for viewers from make_layout.py
-and the tables from make_tables.py. With ``--check`` nothing is written: the stale files are named, and the
-exit code is 1 when there are any.
+The layout for viewers comes from make_layout.py, the tables and the diagram from make_tables.py. With
+``--check`` nothing is written: the stale files are named, and the exit code is 1 when there are any.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ ROOT: Final = Path(__file__).parents[1]
 if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
 
-from docs import make_architecture, make_diagram, make_layout, make_tables  # noqa: E402
+from docs import make_layout, make_tables  # noqa: E402
 
 
 def generated() -> dict[Path, str]:
@@ -28,10 +27,9 @@ def generated() -> dict[Path, str]:
 
     Raises:
         OSError: a page that holds tables is missing.
-        ValueError: a page has no place for one of its tables, or picture and table disagree.
+        ValueError: a page has no place for one of its tables.
     """
-    files = {each.PICTURE: each.draw() for each in (make_architecture, make_diagram)}
-    files[make_layout.FILE] = make_layout.draw()
+    files = {make_layout.FILE: make_layout.draw()}
     for page in make_tables.PAGES:
         path = make_tables.DOCS / page
         files[path] = make_tables.filled(page, path.read_text(encoding="utf-8"))
@@ -56,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 1 when ``--check`` found a stale file.
     """
-    parser = argparse.ArgumentParser(description="Make the picture and the tables in docs/ from the code.")
+    parser = argparse.ArgumentParser(description="Make the tables and the layout in docs/ from the code.")
     parser.add_argument("--check", action="store_true", help="write nothing; fail when a file is stale")
     check = parser.parse_args(arguments).check
     found = stale()

@@ -1,16 +1,19 @@
-"""Writes the tables in docs/ that repeat what the code says, between their marks.
+"""Writes the tables and the diagram in docs/ that repeat what the code says, between their marks.
 
     python docs/make_tables.py
 
-Each table stands between ``<!-- begin NAME -->`` and ``<!-- end NAME -->``; the rest of a page is written
+Each is between ``<!-- begin NAME -->`` and ``<!-- end NAME -->``; the rest of a page is written
 by hand. A test compares the pages with what this script makes.
 """
 
 from __future__ import annotations
 
+import ast
 import inspect
 import re
 import sys
+import tomllib
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
@@ -20,10 +23,9 @@ if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
 
 from robotiq_async import ReconnectPolicy, RobotiqHand  # noqa: E402
-from robotiq_async.control.state_machine import TABLE, Verdict  # noqa: E402
-from robotiq_async.simulator.troubles.trouble import KINDS  # noqa: E402
+from robotiq_async.control.state_machine import SEQUENCES, TABLE, Verdict  # noqa: E402
+from robotiq_async.simulator.troubles.trouble import KINDS, Kind  # noqa: E402
 from robotiq_async.values import registers  # noqa: E402
-from robotiq_async.values.calibration.csv_tables import SPEED, read_table, thesis_table  # noqa: E402
 from robotiq_async.values.enums import (  # noqa: E402
     Fault,
     Initialization,
@@ -44,7 +46,61 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
 
 
+# -- layers --------------------------------------------------------------------------------------------
+
+
+def layers() -> str:
+    """The folders from top to bottom, as the contract of import-linter orders them."""
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    contracts = contracts["tool"]["importlinter"]["contracts"]
+    order = next(each["layers"] for each in contracts if each["id"] == "layers")
+    return table(
+        ["layer", "for"],
+        ([f"`{name}`", _purpose(name)] for layer in order for name in re.findall(r"[a-z_0-9]+", layer)),
+    )
+
+
+def _purpose(name: str) -> str:
+    """The first sentence of a package's or module's docstring."""
+    path = ROOT / "robotiq_async" / name
+    file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    text = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
+    return _plain(text.split("\n\n")[0]).rstrip(".")
+
+
 # -- states --------------------------------------------------------------------------------------------
+
+
+FAMILIES: Final = {
+    Trigger.ASK_STOP: State.DO_SHUTDOWN,
+    Trigger.LINK_LOST: State.DISCONNECTED,
+    Trigger.ASK_RESET: State.DO_RESET,
+    Trigger.ASK_HALT: State.DO_RESET,
+}
+"""What leads from nearly every state to the same one."""
+
+
+def diagram() -> str:
+    """The states for Mermaid. What a status shows, and what leads from any state, is drawn once."""
+    seen = [trigger for trigger in Trigger if trigger.is_seen]
+    follows = {state for state, row in TABLE.items() if all(isinstance(row[each], State) for each in seen)}
+    shown = {each: Counter(TABLE[state][each] for state in follows).most_common(1)[0][0] for each in seen}
+    lines = ["stateDiagram-v2", "state shown <<choice>>", 'state "any state with a link" as any']
+    lines += [f"any --> {FAMILIES[each].name}: {each.value}" for each in list(FAMILIES)[:3]]
+    lines += [f"{state.name} --> shown" for state in TABLE if state in follows and is_on_the_way(state)]
+    lines += [f"shown --> {shown[each].name}: {each.value}" for each in seen]  # type: ignore[union-attr]
+    for source, row in TABLE.items():
+        drawn = FAMILIES | (shown if source in follows else {})
+        for target in TABLE:
+            found = [each.value for each in Trigger if row[each] is target is not drawn.get(each)]
+            if found and target is not source:
+                lines.append(f"{source.name} --> {target.name}: {', '.join(found)}")
+    return "```mermaid\n" + "\n    ".join(lines) + "\n```"
+
+
+def is_on_the_way(state: State) -> bool:
+    """Whether a hand does not stay there by itself."""
+    return state in SEQUENCES or state is State.DISCONNECTED
 
 
 def asked() -> str:
@@ -93,18 +149,8 @@ def status_fields() -> str:
 def _fields(prefix: str) -> str:
     found = sorted(_named(prefix), key=lambda each: (each[1].byte, each[1].shift))
     return table(
-        ["register", "half", "byte", "bits", "name", "meaning"],
-        (
-            [
-                str(field.byte // 2),
-                "low" if field.byte % 2 else "high",
-                str(field.byte),
-                _bits(field),
-                name,
-                field.doc,
-            ]
-            for name, field in found
-        ),
+        ["byte", "bits", "name", "meaning"],
+        ([str(field.byte), _bits(field), name, field.doc] for name, field in found),
     )
 
 
@@ -200,38 +246,17 @@ def reconnect_policy() -> str:
 
 def troubles() -> str:
     """What can go wrong with the simulator."""
+
+    def usually(kind: Kind) -> str:
+        parts = ["" if kind.value is None else f"{kind.value:g}", "once" if kind.lasts == 0 else "for ever"]
+        if kind.link is not None:
+            parts.append(f"{kind.link.upper()} only")
+        return ", ".join(filter(None, parts))
+
     return table(
-        ["kind", "what goes wrong", "VALUE", "unless said", "link"],
-        (
-            [
-                f"`{name}`",
-                kind.meaning,
-                "" if kind.value is None else f"{kind.value:g}",
-                "once" if kind.lasts == 0 else "for ever",
-                kind.link or "",
-            ]
-            for name, kind in KINDS.items()
-        ),
+        ["kind", "what goes wrong", "VALUE and duration by default"],
+        ([f"`{name}`", kind.meaning, usually(kind)] for name, kind in KINDS.items()),
     )
-
-
-# -- measurements --------------------------------------------------------------------------------------
-
-
-def closing_times() -> str:
-    """The thesis's table A1.1 beside a measured one, run by run."""
-    thesis = thesis_table("closing_time_ms", SPEED)
-    ours = read_table(DOCS / "measured" / "closing_time_ms.csv", SPEED)
-
-    def row(value: int) -> list[str]:
-        pairs = list(zip(thesis[value], ours[value], strict=True))
-        apart = [f"{100 * (mine / theirs - 1):+.1f}" for theirs, mine in pairs]
-        return [str(value), *(str(t) for t, _ in pairs), *(str(m) for _, m in pairs), *apart]
-
-    runs = ("2", "3")
-    firsts = ("thesis, ms: run 1", "simulated, ms: run 1", "apart, %: run 1")
-    head = ["speed", *(name for first in firsts for name in (first, *runs))]
-    return table(head, (row(value) for value in sorted(thesis)))
 
 
 def _arguments(documented: Callable[..., object], section: str) -> str:
@@ -259,7 +284,8 @@ def _plain(text: str) -> str:
 
 
 PAGES: Final[dict[str, dict[str, Callable[[], str]]]] = {
-    "state-machine.md": {"asked": asked, "seen": seen},
+    "architecture.md": {"layers": layers},
+    "state-machine.md": {"diagram": diagram, "asked": asked, "seen": seen},
     "registers.md": {
         "request": request_fields,
         "status": status_fields,
@@ -269,7 +295,6 @@ PAGES: Final[dict[str, dict[str, Callable[[], str]]]] = {
         "gFLT": faults,
     },
     "how-to/simulator.md": {"troubles": troubles},
-    "how-to/measure.md": {"closing_times": closing_times},
     "reference.md": {"options": options, "reconnect": reconnect_policy},
 }
 """The tables of each page."""

@@ -4,7 +4,6 @@
 module          what it does
 ==============  ===========================================================================
 ``pages``       gathers the pages, and makes their links right for where they stand then
-``api``         a page for each part of the public API, with a line for each name
 ``docstrings``  puts the docstrings into Markdown; ``griffe_extension`` has mkdocstrings do so
 ``check``       looks for dead links, and for what would come from another host
 ``versions``    puts a built site beside those of other versions

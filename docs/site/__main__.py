@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
+import sysconfig
+from pathlib import Path
 from typing import Final
 
-from .api import parts
 from .check import missing, problems
-from .pages import ROOT, stage
+from .pages import ROOT, described, stage
 from .versions import collect
 
 PAGES: Final = ROOT / "build" / "pages"
@@ -16,11 +18,14 @@ PAGES: Final = ROOT / "build" / "pages"
 BUILT: Final = ROOT / "build" / "site"
 """Its ``site_dir``."""
 SITE: Final = ROOT / "site"
+MERMAID: Final = Path(sysconfig.get_path("purelib"), "nicegui", "elements", "mermaid", "dist")
+"""Draws the diagrams in the reader's browser; NiceGUI's wheel has it as files."""
 
 
 def main() -> int:
     """Make the site; gives the exit code."""
     stage(PAGES)
+    shutil.copytree(MERMAID, PAGES / "mermaid")
     build = subprocess.run(
         [sys.executable, "-m", "zensical", "build", "--clean", "--strict"], cwd=ROOT, check=False
     )
@@ -28,8 +33,7 @@ def main() -> int:
         return build.returncode
     # Its links are absolute, and where the site will be is not known.
     (BUILT / "404.html").unlink()
-    described = {f"api/{file.removesuffix('.md')}.html": part.names for file, part in parts().items()}
-    found = [*problems(BUILT), *missing(BUILT, described)]
+    found = [*problems(BUILT), *missing(BUILT, described())]
     for line in found:
         print(line, file=sys.stderr)
     if found:

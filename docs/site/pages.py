@@ -1,4 +1,4 @@
-"""The pages of the site: those of docs/, those at the root of the project, and those of the API.
+"""The pages of the site: those of docs/ and those at the root of the project.
 
 They are gathered in a folder of their own, with links that are right there: on the site README.md and its
 like are pages too, and files of the source are not. So one link does for both, the site and the repository.
@@ -13,23 +13,21 @@ from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 from typing import Final
 
-from .api import api_pages
-
 ROOT: Final = Path(__file__).parents[2]
 DOCS: Final = ROOT / "docs"
 PROJECT: Final = {
-    "README.md": "project/readme.md",
+    "README.md": "index.md",
     "CHANGELOG.md": "project/changes.md",
     "CONTRIBUTING.md": "project/contributing.md",
     "SECURITY.md": "project/security.md",
     "LICENSE": "project/license.md",
 }
-"""What stands at the root, and where it is on the site."""
-STYLE: Final = Path(__file__).parent / "site.css"
+"""The pages at the root, and where they are on the site."""
+EXTRAS: Final = [Path(__file__).parent / name for name in ("site.css", "diagrams.js")]
 
 _FENCE: Final = re.compile(r"^ *```.*?^ *```$", re.MULTILINE | re.DOTALL)
 _LINK: Final = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
-_ON_THE_SITE: Final = re.compile(r"<!-- on the site: (.*?) -->", re.DOTALL)
+_DESCRIBED: Final = re.compile(r"^::: (\S+)", re.MULTILINE)
 
 
 def places() -> dict[str, str]:
@@ -60,10 +58,14 @@ def stage(folder: Path) -> None:
             target.write_text(staged(text, source, known), encoding="utf-8")
         else:
             shutil.copyfile(ROOT / source, target)
-    shutil.copyfile(STYLE, folder / STYLE.name)
-    for place, text in api_pages().items():
-        (folder / place).parent.mkdir(parents=True, exist_ok=True)
-        (folder / place).write_text(text, encoding="utf-8")
+    for extra in EXTRAS:
+        shutil.copyfile(extra, folder / extra.name)
+
+
+def described() -> dict[str, list[str]]:
+    """The objects on each page of the API, by the page's place on the built site."""
+    pages = sorted((DOCS / "api").glob("*.md"))
+    return {f"api/{page.stem}.html": _DESCRIBED.findall(page.read_text(encoding="utf-8")) for page in pages}
 
 
 def staged(text: str, source: str, known: Mapping[str, str]) -> str:
@@ -79,7 +81,6 @@ def staged(text: str, source: str, known: Mapping[str, str]) -> str:
     """
     if source == "LICENSE":
         text = f"# {text}"
-    text = _ON_THE_SITE.sub(r"\1", text)
     pieces, end = [], 0
     for fence in _FENCE.finditer(text):
         pieces += [_relinked(text[end : fence.start()], source, known), fence[0]]
@@ -96,7 +97,7 @@ def _link(link: re.Match[str], source: PurePosixPath, known: Mapping[str, str]) 
     mark, words, target = link.groups()
     path, hash_sign, anchor = target.partition("#")
     here = PurePosixPath(known[str(source)])
-    if not path or re.match(r"[a-z]+:", path) or (here.parent / path).as_posix().startswith("api/"):
+    if not path or re.match(r"[a-z]+:", path):
         return link[0]
     wanted = posixpath.normpath(source.parent / path)
     place = known.get(wanted) or known.get(f"{wanted}/README.md")

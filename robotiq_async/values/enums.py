@@ -92,7 +92,7 @@ class ObjectStatus(Code):
 
     The gripper also reports IN_MOTION for an axis at rest that was never asked to go; use
     :meth:`RobotiqStatus.axis_state` to show people what an axis does. The thesis's table swaps 1 and 2; the
-    hardware reports 1 for a contact while opening (see docs/thesis-map.md).
+    hardware reports 1 for a contact while opening (see docs/decisions/thesis-map.md).
     """
 
     IN_MOTION = 0

@@ -33,6 +33,7 @@ def cells() -> Iterator[Cell]:
     )
     phases = {phase.name: phase for phase in PHASES}
     assert head[1:] == list(phases), "a column for each phase"
+    (_, *rests_in), *rows = rows
     of_lines = {words for troubles, *_ in rows if is_of_lines(troubles) for words in words_in(troubles)}
     for troubles, *outcomes in rows:
         for trouble in words_in(troubles):
@@ -41,8 +42,9 @@ def cells() -> Iterator[Cell]:
                     continue
                 if link == "tcp" and is_of_lines(troubles):
                     continue
-                for name, outcome in zip(head[1:], outcomes, strict=True):
-                    yield Cell(words, link, phases[name], outcome)
+                for name, outcome, state in zip(head[1:], outcomes, rests_in, strict=True):
+                    ends = outcome if "→" in outcome else f"{outcome} → {state}"
+                    yield Cell(words, link, phases[name], ends)
 
 
 def is_of_lines(troubles: str) -> bool:

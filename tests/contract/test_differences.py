@@ -1,4 +1,4 @@
-"""What differs on another host: each row of the table in docs/on-another-host.md, on both hands."""
+"""What differs on another host: each row of the table in docs/how-to/fleet.md, on both hands."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.hand import Hand
 from tests.contract.bench import LOCAL, REMOTE, A, Bench, bench, contract, ended, until
 
-PAGE = Path(__file__).parents[2] / "docs" / "on-another-host.md"
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "fleet.md"
 
 
 class Row(NamedTuple):
@@ -25,9 +25,10 @@ class Row(NamedTuple):
 
 
 def rows() -> dict[str, Row]:
+    _, _, section = PAGE.read_text(encoding="utf-8").partition("\n## What differs\n")
     _, *rows = (
         Row(*(word.strip() for word in line.strip("|").split("|")))
-        for line in PAGE.read_text(encoding="utf-8").splitlines()
+        for line in section.splitlines()
         if line.startswith("|") and not line.startswith("| --")
     )
     return {row.what: row for row in rows}

@@ -170,9 +170,14 @@ def test_every_reason_for_losing_control_is_there() -> None:
 # -- FLEET.toml --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("settings", [AgentSettings, GripperSettings])
-def test_every_key_of_the_file_has_its_row(settings: type[AgentSettings | GripperSettings]) -> None:
-    for each in fields(settings):
+def test_every_option_of_a_gripper_is_named() -> None:
+    (about,) = re.findall(r"^The table of a gripper holds (.+?)\n\n", HOW_TO, re.MULTILINE | re.DOTALL)
+    named = set(re.findall(r"`(\w+)`", about)) - {"RobotiqHand"}
+    assert named == {each.name for each in fields(GripperSettings)}
+
+
+def test_every_key_of_the_file_has_its_row() -> None:
+    for each in fields(AgentSettings):
         key = "[grippers.NAME]" if each.name == "grippers" else each.name
         rows = re.findall(rf"^\| `{re.escape(key)}` \| ([^|]+) \|", HOW_TO, re.MULTILINE)
         assert len(rows) == 1, key

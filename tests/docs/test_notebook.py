@@ -24,17 +24,16 @@ def shown(cell: dict[str, Any]) -> str:
 async def test_its_cells_print_what_they_show() -> None:
     names: dict[str, Any] = {}
     for cell in CELLS:
-        if cell["cell_type"] == make_notebook.CODE:
-            source = cell["source"].replace("speedup=10", "speedup=100")
+        if cell["cell_type"] == "code":
+            source = "".join(cell["source"]).replace("speedup=10", "speedup=100")
             printed = io.StringIO()
             with contextlib.redirect_stdout(printed):
                 await prompt.run(prompt.compiled(source, cell["id"]), names)
             assert printed.getvalue() == shown(cell), cell["source"]
 
 
-def test_it_is_the_one_that_the_script_makes() -> None:
-    assert tuple((cell["cell_type"], cell["source"]) for cell in CELLS) == make_notebook.CELLS
-    executed = [cell["execution_count"] for cell in CELLS if cell["cell_type"] == make_notebook.CODE]
+def test_its_cells_were_executed_in_their_order() -> None:
+    executed = [cell["execution_count"] for cell in CELLS if cell["cell_type"] == "code"]
     assert executed == [*range(1, len(executed) + 1)]
 
 

@@ -13,12 +13,9 @@ from typing import Any
 
 import pytest
 
-from docs import make_diagram, make_pages
+from docs import make_layout, make_pages
 from robotiq_async import Finger, RobotiqHand
-from robotiq_async.control.state_machine import TABLE, Verdict
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.values.enums import State
-from robotiq_async.values.trigger import Trigger
 from tests.docs import prompt
 from tests.docs.agents import ROOM, agent_of_the_pages
 from tests.docs.pages import DOCS, PAGES, ROOT, Block, blocks, outputs, prose, requirements
@@ -83,7 +80,7 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 
 def test_every_page_can_be_reached() -> None:
-    seen, todo = set(), [DOCS / "index.md"]
+    seen, todo = set(), [ROOT / "README.md"]
     while todo:
         page = todo.pop()
         if page in seen or page.suffix != ".md" or not page.exists():
@@ -105,22 +102,14 @@ def test_nothing_is_stale(capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_stale_page_is_named_and_made_again(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    picture = tmp_path / "picture.svg"
-    monkeypatch.setattr(make_diagram, "PICTURE", picture)
+    layout = tmp_path / "layout.json"
+    monkeypatch.setattr(make_layout, "FILE", layout)
     assert make_pages.main(["--check"]) == 1
-    assert capsys.readouterr().out == "picture.svg is stale: run docs/make_pages.py\n"
-    assert not picture.exists()
+    assert capsys.readouterr().out == "layout.json is stale: run docs/make_pages.py\n"
+    assert not layout.exists()
     assert make_pages.main([]) == 0
-    assert picture.read_text(encoding="utf-8") == make_diagram.draw()
+    assert layout.read_text(encoding="utf-8") == make_layout.draw()
     assert make_pages.main(["--check"]) == 0
-
-
-def test_what_the_notes_of_the_picture_say_of_stop_and_a_lost_link_is_so() -> None:
-    """They stand for these entries, whatever else is drawn between the same two boxes."""
-    for state, row in TABLE.items():
-        is_off = state in (State.DO_SHUTDOWN, State.SHUTDOWN)
-        assert row[Trigger.ASK_STOP] is (Verdict.IGNORED if is_off else State.DO_SHUTDOWN)
-        assert row[Trigger.LINK_LOST] is (Verdict.IGNORED if is_off else State.DISCONNECTED)
 
 
 # -- code ----------------------------------------------------------------------------------------------

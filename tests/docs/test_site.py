@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pkgutil
 import re
 from pathlib import Path
 
@@ -10,38 +11,30 @@ import pytest
 
 import robotiq_async
 from docs.site import check, versions
-from docs.site.api import api_pages, exports, parts
 from docs.site.docstrings import in_markdown
-from docs.site.pages import PROJECT, places, stage, staged
-from robotiq_async import fleet, simulator
+from docs.site.pages import EXTRAS, PROJECT, described, places, stage, staged
+from robotiq_async import fleet, simulator, sync
 from tests.docs.pages import DOCS, PAGES, ROOT, blocks, prose
 
 CONFIGURATION = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
 NAVIGATION = re.findall(r"^ +- (?:.*: )?(\S+\.md)$", CONFIGURATION.partition("\nnav:\n")[2], re.MULTILINE)
-NOT_PUBLIC = {
-    "robotiq_async.tools.doctor": "the command's; what it finds is for people",
-    "robotiq_async.hand": "robotiq_async has it",
-}
-"""Rooms with an ``__all__`` that is for the other rooms."""
 
 
 # -- which pages there are ---------------------------------------------------------------------------------
 
 
 def test_every_page_is_in_the_navigation_once() -> None:
-    pages = {place for place in places().values() if place.endswith(".md")} | {*api_pages()}
+    pages = {place for place in places().values() if place.endswith(".md")}
     assert pages - {*NAVIGATION} == set(), "not in mkdocs.yml, under nav"
     assert {*NAVIGATION} - pages == set(), "in mkdocs.yml, under nav, and no page"
     assert len(NAVIGATION) == len(pages)
 
 
-def test_every_picture_of_the_measurements_is_in_the_gallery() -> None:
-    gallery = (DOCS / "gallery.md").read_text(encoding="utf-8")
-    pictures = [
-        path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*") if path.suffix in (".svg", ".webp")
-    ]
+def test_every_picture_is_on_a_page() -> None:
+    shown = "".join(page.read_text(encoding="utf-8") for page in [*PAGES, ROOT / "README.md"])
+    pictures = [path for path in DOCS.rglob("*") if path.suffix in (".svg", ".webp")]
     assert pictures
-    assert [each for each in pictures if f"]({each})" not in gallery] == []
+    assert [path.name for path in pictures if f"{path.parent.name}/{path.name}" not in shown] == []
 
 
 def test_what_makes_the_site_is_not_on_it() -> None:
@@ -54,7 +47,7 @@ def test_what_makes_the_site_is_not_on_it() -> None:
 )
 def test_a_page_is_the_same_in_every_dialect(page: Path) -> None:
     """The site's Markdown is stricter: a list or a table after a line of prose is prose to it."""
-    text = page.read_text(encoding="utf-8").replace("<!-- on the site: ", "")
+    text = page.read_text(encoding="utf-8")
     for fence in re.findall(r"^( *)```\w*$", text, re.MULTILINE):
         assert len(fence) % 4 == 0, "code within a list is indented by four"
     before = ""
@@ -67,8 +60,8 @@ def test_a_page_is_the_same_in_every_dialect(page: Path) -> None:
 # -- links -------------------------------------------------------------------------------------------------
 
 KNOWN = {
-    "README.md": "project/readme.md",
-    "docs/index.md": "index.md",
+    "README.md": "index.md",
+    "docs/tutorial.md": "tutorial.md",
     "docs/how-to/fleet.md": "how-to/fleet.md",
     "docs/decisions/README.md": "decisions/README.md",
     "docs/measured/web.webp": "measured/web.webp",
@@ -78,17 +71,20 @@ KNOWN = {
 @pytest.mark.parametrize(
     ("source", "text", "expected"),
     [
-        ("docs/index.md", "[a](how-to/fleet.md#b)", "[a](how-to/fleet.md#b)"),
-        ("docs/how-to/fleet.md", "[a](../../README.md#b)", "[a](../project/readme.md#b)"),
-        ("README.md", "[a](docs/how-to/fleet.md)", "[a](../how-to/fleet.md)"),
-        ("README.md", "[a](docs/decisions/)", "[a](../decisions/README.md)"),
-        ("README.md", "![a](docs/measured/web.webp)", "![a](../measured/web.webp)"),
-        ("docs/index.md", "[`hand`](../robotiq_async/hand/robotiq_hand.py)", "`hand`"),
-        ("docs/index.md", "[a](gone.md)", "[a](gone.md)"),
-        ("docs/index.md", "[a](#b), [c](https://example.org/d.md)", "[a](#b), [c](https://example.org/d.md)"),
-        ("docs/index.md", "```\n[a](../README.md)\n```", "```\n[a](../README.md)\n```"),
-        ("docs/index.md", "a <!-- on the site: [b](api/index.md) --> c", "a [b](api/index.md) c"),
-        ("docs/index.md", "<!-- begin b -->", "<!-- begin b -->"),
+        ("docs/tutorial.md", "[a](how-to/fleet.md#b)", "[a](how-to/fleet.md#b)"),
+        ("docs/how-to/fleet.md", "[a](../../README.md#b)", "[a](../index.md#b)"),
+        ("README.md", "[a](docs/how-to/fleet.md)", "[a](how-to/fleet.md)"),
+        ("README.md", "[a](docs/decisions/)", "[a](decisions/README.md)"),
+        ("README.md", "![a](docs/measured/web.webp)", "![a](measured/web.webp)"),
+        ("docs/tutorial.md", "[`hand`](../robotiq_async/hand/robotiq_hand.py)", "`hand`"),
+        ("docs/tutorial.md", "[a](gone.md)", "[a](gone.md)"),
+        (
+            "docs/tutorial.md",
+            "[a](#b), [c](https://example.org/d.md)",
+            "[a](#b), [c](https://example.org/d.md)",
+        ),
+        ("docs/tutorial.md", "```\n[a](../README.md)\n```", "```\n[a](../README.md)\n```"),
+        ("docs/tutorial.md", "<!-- begin b -->", "<!-- begin b -->"),
     ],
 )
 def test_a_link_leads_to_the_same_page_from_its_place_on_the_site(
@@ -98,8 +94,8 @@ def test_a_link_leads_to_the_same_page_from_its_place_on_the_site(
 
 
 def test_a_picture_that_is_not_on_the_site_is_an_error() -> None:
-    with pytest.raises(ValueError, match=r"docs/index.md: ../ros2/a.png is not on the site"):
-        staged("![a](../ros2/a.png)", "docs/index.md", KNOWN)
+    with pytest.raises(ValueError, match=r"docs/tutorial.md: ../ros2/a.png is not on the site"):
+        staged("![a](../ros2/a.png)", "docs/tutorial.md", KNOWN)
 
 
 def test_all_pages_are_gathered(tmp_path: Path) -> None:
@@ -107,43 +103,23 @@ def test_all_pages_are_gathered(tmp_path: Path) -> None:
     (tmp_path / "pages" / "left-over.md").touch()
     stage(tmp_path / "pages")
     gathered = {path.relative_to(tmp_path / "pages").as_posix() for path in (tmp_path / "pages").rglob("*.*")}
-    assert gathered == {*places().values(), *api_pages(), "site.css"}
+    assert gathered == {*places().values(), *(each.name for each in EXTRAS)}
 
 
 # -- the API -----------------------------------------------------------------------------------------------
 
-DESCRIBED = [name for part in parts().values() for name in part.names]
+DESCRIBED = [name for names in described().values() for name in names]
 
 
-@pytest.mark.parametrize("module", [robotiq_async, simulator, fleet])
+@pytest.mark.parametrize("module", [robotiq_async, simulator, fleet, sync])
 def test_every_public_name_is_described(module: object) -> None:
     names = {each.rpartition(".")[2] for each in DESCRIBED}
     assert {*module.__all__} <= names  # type: ignore[attr-defined]
 
 
-def test_nothing_is_described_twice() -> None:
+def test_what_is_described_exists_once() -> None:
     assert len(DESCRIBED) == len(set(DESCRIBED))
-
-
-def test_every_room_that_says_what_it_exports_is_described() -> None:
-    for file in sorted((ROOT / "robotiq_async").rglob("*.py")):
-        module = ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
-        if "\n__all__ = " in file.read_text(encoding="utf-8") and module not in NOT_PUBLIC:
-            names = {name.rpartition(".")[2] for name in exports(module)}
-            assert names <= {name.rpartition(".")[2] for name in DESCRIBED}, f"{module}: docs/site/api.py"
-
-
-def test_what_the_reference_names_of_other_rooms_is_described() -> None:
-    text = (DOCS / "reference.md").read_text(encoding="utf-8")
-    named = set(re.findall(r"^(?:\| |#+ )`(robotiq_async\.[\w.]+)`", text, re.MULTILINE))
-    assert len(named) > 8
-    assert [each for each in named if not any(f"{name}.".startswith(f"{each}.") for name in DESCRIBED)] == []
-
-
-def test_the_page_on_stability_names_what_is_described() -> None:
-    text = (DOCS / "stability.md").read_text(encoding="utf-8")
-    words = set(re.findall(r"`([\w.]+)`", text))
-    assert [name for name in DESCRIBED if not {name, name.rpartition(".")[0]} & words] == []
+    assert [name for name in DESCRIBED if pkgutil.resolve_name(name) is None] == []
 
 
 @pytest.mark.parametrize(
@@ -284,6 +260,6 @@ def test_the_environment_of_the_site_is_pinned_and_names_no_place() -> None:
 
 def test_the_code_on_the_front_page_is_short() -> None:
     (example,) = [
-        each for each in blocks((DOCS / "index.md").read_text(encoding="utf-8")) if each.language == "python"
+        each for each in blocks((ROOT / "README.md").read_text(encoding="utf-8")) if each.language == "python"
     ]
-    assert len(example.text.splitlines()) <= 10
+    assert len(example.text.splitlines()) <= 20

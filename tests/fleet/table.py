@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -30,7 +31,8 @@ def cells() -> Iterator[Cell]:
         for line in PAGE.read_text(encoding="utf-8").splitlines()
         if line.startswith("|") and not line.startswith("| --")
     )
-    for trouble, *outcomes, limit in rows:
+    for troubles, *outcomes, limit in rows:
         held_after = None if limit == "-" else float(limit.removesuffix(" s"))
-        for phase, outcome in zip(head[1:-1], outcomes, strict=True):
-            yield Cell(trouble.strip("`"), phase, tuple(outcome.split(" or ")), held_after)
+        for trouble in re.findall(r"`(.+?)`", troubles):
+            for phase, outcome in zip(head[1:-1], outcomes, strict=True):
+                yield Cell(trouble, phase, tuple(outcome.split(" or ")), held_after)
