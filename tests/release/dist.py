@@ -24,7 +24,7 @@ from tests.release.environments import CONSTRAINTS, ROOT, FailedError, installed
 DIST: Final = ROOT / "dist"
 IN_THE_SDIST: Final = (
     *("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md", "SECURITY.md"),
-    *("constraints.txt", "mkdocs.yml", "demo/demo.py", "docs/index.md", "ros2/package.xml"),
+    *("constraints.txt", "mkdocs.yml", "demo/demo.py", "docs/tutorial.md", "ros2/package.xml"),
     *("robotiq_async/__init__.py", "tests/conftest.py"),
 )
 IN_THE_WHEEL: Final = (
