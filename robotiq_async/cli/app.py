@@ -21,12 +21,13 @@ from .commands.recording.record import record
 from .commands.recording.recordings import export, plot, recover, replay
 from .commands.simulate import simulate
 from .commands.status import status
+from .commands.verify import verify
 from .commands.view import view
 from .commands.web import web
 from .output.reflow import reflow
 
 COMMANDS: Final = (
-    *(demo, simulate, status, move, monitor, web, view, doctor),
+    *(demo, simulate, status, move, monitor, web, view, doctor, verify),
     *(record, replay, export, plot, recover, agent),
 )
 """A new sub-command is a module with a function of its name, and an entry here."""
@@ -41,14 +42,14 @@ Every command that talks to a gripper takes its address as the last argument, an
     zenoh://lab/cell/left one that an agent on another host serves (extra fleet)
     sim://                a gripper simulated inside the command
 
-Without an address it is sim://; doctor and measure want one.
+Without an address it is sim://; doctor, verify and measure want one.
 
 What the extras beside cli are for:
 
     monitor   monitor
     web       web, demo --show
     view      view
-    record    record (not of a table, .csv), replay, export, plot, recover
+    record    record (not of a table, .csv), replay, export, plot, recover, verify
     plot      plot, the pictures of measure
     fleet     agent, fleet, doctor and all others with zenoh:// addresses
     serial    rtu:// addresses

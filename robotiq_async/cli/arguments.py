@@ -61,6 +61,7 @@ Byte = Annotated[int, Parameter(converter=_integer("the value", 0, 255), metavar
 Port = Annotated[int, Parameter(converter=_integer("the port", 0, 65535), metavar="0..65535")]
 Unit = Annotated[int, Parameter(converter=_integer("the unit id", 0, 255), metavar="0..255")]
 ReadFunction = Annotated[int, Parameter(converter=_integer("the function", 3, 4), metavar="3|4")]
+Stage = Annotated[int, Parameter(converter=_integer("the stage", 0, 9), metavar="0..9")]
 Seconds = Annotated[float, Parameter(metavar="SECONDS")]
 Register = Annotated[int, Parameter(converter=_integer("the register", 0, 65528), metavar="0..65528")]
 Fingers = Annotated[

@@ -6,7 +6,7 @@ import asyncio
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
 from ...link.address import Address
 from ...link.modbus import ModbusTransport
@@ -37,8 +37,20 @@ UNITS: Final = (2, 9, 1, 0, 255)
 ALONE: Final = "It may serve one client at a time"
 
 
-async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> Link:
-    """An open link to a gripper that answers.
+class Answering(NamedTuple):
+    """A gripper that answers.
+
+    Attributes:
+        link: open.
+        registers: where its blocks are, and under which unit id.
+    """
+
+    link: Link
+    registers: RegisterMap
+
+
+async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> Answering:
+    """An open link to a gripper that answers, and how it was asked.
 
     No connection is made to try the port: a gateway that serves one client would be busy with that one.
 
@@ -69,7 +81,7 @@ async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> 
         report(_answers(failure if registers == usual else None, number + 1, seconds))
         _report_place(usual, registers, report)
         _report_silence(status, report)
-        return link
+        return Answering(link, registers)
     if stranger is not None:
         _report_stranger(stranger, report)
         raise GiveUpError

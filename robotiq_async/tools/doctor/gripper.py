@@ -49,7 +49,7 @@ async def examine(address: Address, report: Report, *, device_id: int | None = N
     try:
         if address.is_socket:
             await _resolve(address, report)
-        link = await find_gripper(address, registers, report)
+        link, _ = await find_gripper(address, registers, report)
         try:
             if address.kind == "rtu":
                 report_adapter(address, report)

@@ -34,17 +34,18 @@ class Output(Protocol):
 class McapFile:
     """Makes the bytes of an MCAP file of messages."""
 
-    def __init__(self, hand: Hand, output: Output, *, ros2: bool) -> None:
+    def __init__(self, output: Output, *, name: str, address: str, ros2: bool = False) -> None:
         """Write the header.
 
         Args:
-            hand: what the file says it is of.
             output: takes the bytes.
+            name: of the hand that the file is of.
+            address: the hand's.
             ros2: joint states alone, in the profile ``ros2``.
         """
         self._writer: Any = Writer(output, compression=CompressionType.ZSTD)  # type: ignore[arg-type]
         self._writer.start(profile="ros2" if ros2 else "", library=f"robotiq_async {__version__}")
-        about = {"version": __version__, "name": hand.name, "address": hand.address, "note": NOTE}
+        about = {"version": __version__, "name": name, "address": address, "note": NOTE}
         self._writer.add_metadata("robotiq_async", about)
         self._channels = {topic: self._channel(topic) for topic in ((JOINTS,) if ros2 else TOPICS)}
 

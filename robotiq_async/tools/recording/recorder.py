@@ -178,7 +178,8 @@ class Recorder:
             return CsvFile(self._outbox.write)
         if _missing:
             raise ImportError(_missing)
-        return McapFile(self._hand, self._outbox, ros2=ros2)
+        hand = self._hand
+        return McapFile(self._outbox, name=hand.name, address=hand.address, ros2=ros2)
 
     def _take(self, message: Message) -> None:
         if self._failed.done():

@@ -1,0 +1,169 @@
+"""``robotiq-async verify``."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Mapping
+from contextlib import AbstractContextManager, AsyncExitStack, asynccontextmanager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from ...fleet.network.route import is_remote
+from ...link.address import parse_address
+from ...link.simulation import Simulation
+from ...runtime.concurrency import wait_shielded
+from ..addresses import gripper_words
+from ..arguments import Address, Stage, need
+from ..failures import CommandError, UsageError, usage
+from ..keyboard import Keyboard, has_terminal, wrapped
+
+if TYPE_CHECKING:
+    from ...tools.verify import Person, Plan, Report
+    from ...tools.verify.files import Folder
+
+HARMLESS = 2
+NOTE = (
+    "Nothing of this has run on real hardware: yours may be the first. It is no safety function: have an "
+    "emergency stop in reach that cuts the gripper's power. While a stage runs ANY KEY stops the fingers."
+)
+
+
+async def verify(
+    address: Address,
+    /,
+    *,
+    up_to: Stage | None = None,
+    from_: Annotated[Stage, Parameter(name="--from")] = 0,
+    report: Annotated[Path | None, Parameter(metavar="DIR")] = None,
+    yes_to: Annotated[Stage | None, Parameter(show_default=False)] = None,
+    label: Annotated[str, Parameter(metavar="TEXT", show_default=False)] = "",
+) -> None:
+    """Check a real gripper against all that this library assumes. FROM STAGE 3 ON THE FINGERS MOVE.
+
+    Ten stages: this computer; reading only; writing with rGTO = 0; activation; one
+    axis at a time, slowly; stopping; full strokes; something soft; loss of client,
+    cable, emergency stop and power; soak. Each says what moves, how far, how fast and
+    what must be clear. Enter begins it; any other key ends with the report so far.
+
+    Stages 0 to 2 move nothing, take four minutes, and make a report that is worth sending.
+    While a stage runs any key and Ctrl-C write rGTO = 0 first. No stage beyond 2 runs
+    without a terminal, and none after a fault or after a check about safety that failed.
+    A gripper that another client commands, or that holds something, is not written to.
+
+    The folder of the report gets report.json, report.md and recording.mcap with every
+    frame (extra record). No address, host or user stands in them.
+
+    For example:
+
+        robotiq-async verify tcp://192.168.1.11
+        robotiq-async verify tcp://192.168.1.11 --up-to 2
+        robotiq-async verify rtu:///dev/ttyUSB0 --from 4 --report second-try
+        robotiq-async verify tcp://192.168.1.11 --up-to 2 --yes-to 2
+
+    Args:
+        up_to: The last stage, 0..9; 9 unless given.
+        from_: The stage to begin with. Who answers is looked at all the same.
+        report: Folder for the report; made, and refused if it has one.
+        yes_to: Do not ask for the stages up to this one, at most 2.
+        label: What the report is to be called; whatever you write here is in it.
+    """
+    if is_remote(address):
+        raise UsageError("verify the gripper on the host that its line leads to: it uses no agent")
+    last = 9 if up_to is None else up_to
+    agreed = -1 if yes_to is None else yes_to
+    has_person = has_terminal()
+    if not has_person and not (last <= HARMLESS and agreed >= last):
+        raise UsageError(
+            "without a terminal to ask at, and to stop at, this needs --up-to and --yes-to, both at most 2"
+        )
+    with usage():
+        parsed = parse_address(address)
+    need("mcap", "record")
+    from ...tools.verify import Plan
+    from ...tools.verify.files import Folder
+
+    print(gripper_words(address), flush=True)
+    async with AsyncExitStack() as stack:
+        if parsed.kind == "sim":
+            parsed = parse_address(await stack.enter_async_context(_simulated(parsed.simulation)))
+        with usage():
+            plan = Plan(parsed, first=from_, last=last, agreed=agreed, label=label)
+        try:
+            folder = Folder(report or Path(time.strftime("verify-%Y%m%d-%H%M%S")), parsed)
+        except OSError as error:
+            raise CommandError(f"{error.filename}: {error.strerror}: nothing was sent") from error
+        person: Person = stack.enter_context(Keyboard()) if has_person else Unattended()
+        person.tell(NOTE)
+        await _run(plan, person, folder)
+
+
+@asynccontextmanager
+async def _simulated(simulation: Simulation) -> AsyncIterator[str]:
+    """The address of a gripper that is simulated in here."""
+    from ...link.sim_transport import new_gripper
+    from ...simulator import SimulatorServer
+
+    async with SimulatorServer(new_gripper(simulation)) as server:
+        yield server.address
+
+
+async def _run(plan: Plan, person: Person, folder: Folder) -> None:
+    from ...tools.verify import Runner
+
+    runner = Runner(plan, person, folder.recording, folder.save)
+    try:
+        await runner.run()
+    finally:
+        ending = asyncio.ensure_future(_end(runner.report, folder))
+        await wait_shielded(ending)
+        ending.result()
+    if runner.report.why != "done":
+        raise CommandError(f"{runner.report.why}: {runner.report.words}; see {folder.path}")
+
+
+async def _end(report: Report, folder: Folder) -> None:
+    """Write the report, and say the most of it here: also where it cannot be written."""
+    from ...tools.verify.advice import lines, sentences
+
+    failure = await folder.end(report)
+    print(wrapped("\n" + "\n".join(sentences(report))), flush=True)
+    for check in report.differing:
+        print(wrapped(f"  {check.name} differs: {check.found}. {check.follows}"), flush=True)
+    print("\n" + "\n\n".join(lines(report).values()), flush=True)
+    if failure:
+        raise CommandError(f"the report in {folder.path} is not complete: {failure}")
+    print(f"\n{folder.path}", flush=True)
+
+
+class Unattended:
+    """Nobody: for stages that were agreed to beforehand, in which nothing moves."""
+
+    @property
+    def has_stopped(self) -> bool:
+        """There is nobody to press a key."""
+        return False
+
+    def tell(self, words: str) -> None:
+        """Print."""
+        print(words, flush=True)
+
+    def alarm(self, words: str) -> None:
+        """Print."""
+        print(words, flush=True)
+
+    def guarding(self) -> AbstractContextManager[None]:
+        """Nothing moves."""
+        return nullcontext()
+
+    async def consents(self, words: str) -> bool:
+        """There is nobody to agree."""
+        print(words, flush=True)
+        return False
+
+    async def chooses(self, question: str, answers: Mapping[str, str]) -> str | None:
+        """There is nobody to choose."""
+        print(question, ", ".join(answers.values()), flush=True)
+        return None

@@ -1,0 +1,28 @@
+"""The first hour with a real gripper: guarded stages, checks of what is assumed, and a report.
+
+It uses the link and no hand: what a hand believes cannot hide what the gripper does. Nothing of this has met
+hardware yet. docs/decisions/verify.md has the reasons.
+"""
+
+from __future__ import annotations
+
+from .bench import Lengths
+from .catalogue import CATALOGUE
+from .checks import Check, Verdict
+from .endings import ENDINGS
+from .person import ENTER, Person
+from .report import Report
+from .runner import Plan, Runner
+
+__all__ = [
+    "CATALOGUE",
+    "ENDINGS",
+    "ENTER",
+    "Check",
+    "Lengths",
+    "Person",
+    "Plan",
+    "Report",
+    "Runner",
+    "Verdict",
+]

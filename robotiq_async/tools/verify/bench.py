@@ -1,0 +1,116 @@
+"""What a stage has at hand: the gripper, the person, and where results go."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Final
+
+from ...link.address import Address
+from ...link.modbus import ModbusTransport
+from ...session.options import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S, SERIAL_POLL_INTERVAL_S
+from ...values.registers import RegisterMap
+from ...values.status import RobotiqStatus
+from .catalogue import CATALOGUE
+from .checks import NO_OPTIONS, Check, Figure, Options, Verdict
+from .endings import EndError
+from .person import Person
+from .recorded_link import Frame, RecordedLink
+from .watch import Watch
+
+CONNECT_S: Final = 2.0
+"""For a connection: with this a stop over a link that was lost is tried soon again."""
+SPACING_S: Final = 0.02
+"""Twice what the manual wants between two writes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lengths:
+    """How long the long checks last; a rehearsal has shorter ones.
+
+    Attributes:
+        reads: round trips at each of three rates.
+        idle: seconds of silence in stage 1.
+        alone: seconds without a client in stage 8.
+        soak: seconds of reading in stage 9.
+        commands: seconds of commands at each rate in stage 9.
+    """
+
+    reads: int = 300
+    idle: tuple[float, ...] = (0.5, 1.0, 1.5, 2.0, 5.0, 30.0, 60.0)
+    alone: tuple[float, ...] = (10.0, 60.0, 300.0)
+    soak: float = 600.0
+    commands: float = 5.0
+
+
+@dataclass
+class Bench:
+    """The gripper under test and what surrounds it.
+
+    Attributes:
+        address: where it is; tcp, rtu or rtu+tcp.
+        person: beside it.
+        keep: is given every frame.
+        lengths: of the long checks.
+        checks: the results so far, by name.
+        link: to the gripper, once it has been found.
+        registers: how it is asked, once it has been found.
+        found: the first status.
+        spacing: seconds from one write to the next; stage 2 finds out whether more are needed.
+        is_active: whether it was active when a stage last came to its end.
+    """
+
+    address: Address
+    person: Person
+    keep: Callable[[Frame], None]
+    lengths: Lengths = field(default_factory=Lengths)
+    checks: dict[str, Check] = field(default_factory=dict)
+    link: RecordedLink = field(init=False)
+    registers: RegisterMap | None = None
+    found: RobotiqStatus | None = None
+    spacing: float = SPACING_S
+    is_active: bool = False
+
+    @property
+    def interval(self) -> float:
+        """The usual seconds between two reads on such a link."""
+        return SERIAL_POLL_INTERVAL_S if self.address.is_rtu else float(POLL_INTERVAL_S)
+
+    def another_link(
+        self, registers: RegisterMap, keep: Callable[[Frame], None] | None = None
+    ) -> RecordedLink:
+        """One more link, not opened; its frames are kept with the others unless told otherwise."""
+        transport = ModbusTransport(
+            self.address, registers, connect_timeout=CONNECT_S, response_timeout=RESPONSE_TIMEOUT_S
+        )
+        return RecordedLink(transport, keep or self.keep)
+
+    def watch(self, seconds: float) -> Watch:
+        """Look after the gripper for some seconds."""
+        return Watch(self.link, self.person, seconds=seconds, interval=self.interval, spacing=self.spacing)
+
+    # -- results ---------------------------------------------------------------------------------------------
+
+    def as_assumed(self, name: str, found: str, **figures: Figure) -> None:
+        """What was assumed holds."""
+        self._add(Check(name, Verdict.AS_ASSUMED, found, figures=figures))
+
+    def untold(self, name: str, why: str, **figures: Figure) -> None:
+        """It could not be told."""
+        self._add(Check(name, Verdict.UNTOLD, why, figures=figures))
+
+    def differs(
+        self, name: str, found: str, follows: str, options: Options = NO_OPTIONS, /, **figures: Figure
+    ) -> None:
+        """What was assumed does not hold.
+
+        Raises:
+            EndError: and that is about safety.
+        """
+        self._add(Check(name, Verdict.DIFFERS, found, follows, options, figures))
+        if CATALOGUE[name].is_safety:
+            raise EndError("deviation", f"{name}: {found}")
+
+    def _add(self, check: Check) -> None:
+        assert check.name in CATALOGUE
+        self.checks[check.name] = check

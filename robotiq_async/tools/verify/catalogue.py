@@ -1,0 +1,68 @@
+"""Everything that is checked: what the library assumes, and where it matters for safety."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+
+class Assumption(NamedTuple):
+    """One thing that the library takes for granted of every gripper.
+
+    Attributes:
+        stage: the stage that checks it.
+        assumed: what is assumed, in a sentence.
+        is_safety: whether nothing further is done when it does not hold.
+    """
+
+    stage: int
+    assumed: str
+    is_safety: bool = False
+
+
+CATALOGUE: Final[dict[str, Assumption]] = {
+    "host.timer": Assumption(0, "This computer's timers are at most 1 ms late."),
+    "host.adapter": Assumption(0, "A USB adapter passes on what it hears within 2 ms."),
+    "read.registers": Assumption(1, "Unit id, function and registers are the usual ones of the link."),
+    "read.others": Assumption(1, "What is asked at a wrong address is refused, or not answered."),
+    "read.counts": Assumption(1, "One to eight registers can be read at once."),
+    "read.round_trip": Assumption(1, "A status is read within the usual poll interval."),
+    "read.silence": Assumption(1, "The first read after a silence shows no fault."),
+    "read.idle": Assumption(1, "It answers after a minute of silence, and has kept its activation."),
+    "read.connections": Assumption(1, "A second and a third client are let in while the first reads."),
+    "write.same": Assumption(2, "The image that is in force already changes nothing when written.", True),
+    "write.still": Assumption(2, "With rGTO = 0 no position request moves anything.", True),
+    "write.echo": Assumption(2, "A write is echoed within 20 ms of its acknowledgement."),
+    "write.spacing": Assumption(2, "Of two writes 10 ms apart the second acts."),
+    "activation.time": Assumption(3, "An activation takes at most 20 s."),
+    "activation.words": Assumption(3, "After it no go is echoed, and every gDT is 0."),
+    "axis.finger": Assumption(
+        4, "A is the finger that stands alone; B, C and the scissor are as named.", True
+    ),
+    "axis.alone": Assumption(4, "An axis that is asked alone moves alone.", True),
+    "axis.lag": Assumption(4, "gDT shows a motion as soon as its request is echoed."),
+    "axis.end": Assumption(4, "An axis stops within 2 counts of its request."),
+    "stop.halt": Assumption(5, "rGTO = 0 stops a motion within 10 counts.", True),
+    "stop.resume": Assumption(5, "Setting rGTO again goes on to the same request."),
+    "stop.target": Assumption(5, "A new request in the middle of a motion is followed at once."),
+    "stop.hold": Assumption(5, "Requesting the present position stops within 10 counts.", True),
+    "stroke.time": Assumption(6, "A full stroke takes what the thesis measured, within a fifth."),
+    "stroke.readings": Assumption(6, "Open fingers read 6 or 7, closed ones 240 or more."),
+    "stroke.scissor": Assumption(6, "The scissor echoes what it is asked, also beyond its limits."),
+    "soft.contact": Assumption(7, "A contact while closing is gDT = 2."),
+    "soft.current": Assumption(7, "A finger at rest draws no current."),
+    "soft.halt": Assumption(7, "rGTO = 0 leaves the part held."),
+    "loss.client": Assumption(8, "A gripper that has lost its client goes on to its request."),
+    "loss.wake": Assumption(8, "The first motion on a new connection is followed."),
+    "loss.idle": Assumption(8, "The activation is kept while there is no client."),
+    "loss.cable": Assumption(8, "The activation outlives a cable that was out for 5 s."),
+    "loss.estop": Assumption(8, "After an emergency stop at most two resets are needed."),
+    "loss.power": Assumption(8, "A gripper that comes back from a loss of power is reset."),
+    "soak.reads": Assumption(9, "Fewer than one read in 10,000 fails."),
+    "soak.commands": Assumption(9, "Commands at 10 to 100 Hz are followed to the last one."),
+}
+"""By name, in the order in which they are checked."""
+
+LAST: Final = 9
+"""The last stage."""
+HARMLESS: Final = 2
+"""The last stage in which nothing moves."""

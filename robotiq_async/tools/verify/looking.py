@@ -1,0 +1,103 @@
+"""Who answers, and whether anything may be written there. Only reads."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Final
+
+from ...session.options import registers_of
+from ...values.enums import AXES, Fault
+from ...values.registers import STATUS_RESERVED
+from ...values.status import RobotiqStatus
+from ..doctor.answer import find_gripper
+from ..doctor.findings import Finding, GiveUpError
+from .bench import Bench
+from .endings import EndError
+from .watch import LASTING, words_of
+
+WATCH_S: Final = 2.0
+"""For so long the gripper is watched for another client, and for motion."""
+STILL_COUNTS: Final = 1
+
+
+async def find(bench: Bench) -> None:
+    """Find the gripper, and open the link to it.
+
+    Raises:
+        EndError: nothing answers, or another device.
+    """
+    findings: list[Finding] = []
+    try:
+        answering = await find_gripper(bench.address, registers_of(bench.address), findings.append)
+    except GiveUpError:
+        last = findings[-1]
+        raise EndError("refused", f"{last.what}: {last.found}. {last.advice}") from None
+    await answering.link.close()
+    bench.registers = answering.registers
+    bench.link = bench.another_link(answering.registers)
+    await asyncio.sleep(0.5)  # for a gateway that serves one client to see that the other has gone
+    await bench.link.open()
+    statuses = [await bench.link.read() for _ in range(LASTING)]
+    bench.found = statuses[-1]
+    strange = [why for status in statuses if (why := why_no_gripper(status))]
+    if strange:
+        raise EndError("refused", f"what answers cannot be told from another device: {strange[0]}")
+
+
+def why_no_gripper(status: RobotiqStatus) -> str:
+    """What a status shows that none of a 3-Finger does; empty if there is nothing."""
+    words = " ".join(f"{word:04X}" for word in status.registers)
+    if not any(status.registers):
+        return "all registers read 0; the gripper may be without power behind its fieldbus"
+    if any(field.read(status.registers) for field in STATUS_RESERVED):
+        return f"bits are set that are 0 in a gripper: {words}"
+    if status.fault.name.startswith("UNKNOWN"):
+        return f"a fault code that the manual does not assign: {words}"
+    if not status.activation_echo and not status.is_reset:
+        return f"gIMC says active or activating while gACT is 0: {words}"
+    if (
+        len({status.position(axis) for axis in AXES} | {status.requested_position(axis) for axis in AXES})
+        == 1
+    ):
+        return f"every position and every request read the same: {words}"
+    return ""
+
+
+async def see_that_it_may_be_written_to(bench: Bench) -> RobotiqStatus:
+    """Watch it for a while; returns the newest status.
+
+    Raises:
+        EndError: another client commands it, it moves, holds something, or has a fault.
+        RobotiqConnectionError: the link failed.
+    """
+    loop, first = asyncio.get_running_loop(), await bench.link.read()
+    until, not_ready, last = loop.time() + WATCH_S, 0, first
+    while loop.time() < until:
+        await asyncio.sleep(2 * bench.interval)
+        last = await bench.link.read()
+        if why := why_no_gripper(last):
+            raise EndError("refused", f"what answers cannot be told from another device: {why}")
+        if last.echo != first.echo:
+            raise EndError(
+                "refused", "another client commands the gripper: its requests change. Stop that one."
+            )
+        if any(abs(last.position(axis) - first.position(axis)) > STILL_COUNTS for axis in AXES):
+            raise EndError("refused", "the fingers move: wait until they stand, and find out who moves them")
+        not_ready = not_ready + 1 if last.fault is Fault.COMMUNICATION_NOT_READY else 0
+    bench.link.expect(last.echo)
+    _check_rest(last, not_ready)
+    return last
+
+
+def _check_rest(status: RobotiqStatus, not_ready: int) -> None:
+    fault = status.fault
+    passes = fault is Fault.COMMUNICATION_NOT_READY and not_ready < LASTING
+    if fault.is_serious and not passes:
+        raise EndError("refused", f"the gripper reports fault 0x{int(fault):02X}: {fault.description}")
+    if status.is_activated and status.contacts:
+        held = f"{status.contacts} reads a contact: the gripper holds something"
+        raise EndError("refused", f"{held}. Take it out with your usual program, and open the fingers.")
+    if status.is_moving:
+        raise EndError("refused", f"an axis is under way: it reads {words_of(status)}")
+    if status.activation_echo and not status.is_activated and fault is Fault.NONE:
+        raise EndError("refused", "an activation or a change of mode is under way: wait for its end")

@@ -1,0 +1,96 @@
+"""Motions that several stages make."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final
+
+from ...values.enums import AXES, Finger
+from ...values.request import AxisRequest, Request
+from ...values.status import RobotiqStatus
+from .endings import EndError
+from .watch import ANYWHERE, Watch, words_of
+
+MARGIN: Final = 4
+"""Counts beside its way that an axis may reach: it may stop 2 beside its request (manual)."""
+ASIDE: Final = 3
+"""Counts by which an axis that is not asked may waver."""
+ACTIVATION_S: Final = 60.0
+"""An activation that takes longer is taken back: drivers wait for 25 to 30 s."""
+
+
+def standing(status: RobotiqStatus, *, speed: int = 0, force: int = 0, go: bool = False) -> Request:
+    """The image that asks every axis to be where it is."""
+    axes = tuple(AxisRequest(status.position(axis), speed, force) for axis in AXES)
+    return Request(activate=True, go=go, mode=status.mode, axes=axes)
+
+
+def as_found(status: RobotiqStatus) -> Request:
+    """The image nearest to what is in force, with rGTO = 0: speeds and forces cannot be read back."""
+    axes = tuple(AxisRequest(status.requested_position(axis)) for axis in AXES)
+    return Request(activate=status.activation_echo, mode=status.mode, axes=axes)
+
+
+def way(status: RobotiqStatus, targets: Mapping[Finger, int]) -> dict[Finger, tuple[int, int]]:
+    """The envelope of a motion from a status to targets; the other axes stay."""
+    envelope = {}
+    for axis in AXES:
+        now = status.position(axis)
+        target = targets.get(axis, now)
+        aside = MARGIN if axis in targets else ASIDE
+        envelope[axis] = (min(now, target) - aside, max(now, target) + aside)
+    return envelope
+
+
+def are_near(status: RobotiqStatus, targets: Mapping[Finger, int], counts: int) -> bool:
+    """Whether axes are within so many counts of where they should be."""
+    return all(abs(status.position(axis) - target) <= counts for axis, target in targets.items())
+
+
+async def reset(watch: Watch) -> None:
+    """Take rACT back and wait for it to show. The fingers stay where they are.
+
+    Raises:
+        EndError: it does not show, or what :meth:`Watch.look` raises.
+    """
+    watch.needs_active = False
+    await watch.write(Request())
+    if await watch.until(lambda status: not status.activation_echo and status.is_reset, 2.0) is None:
+        raise EndError("inactive", "rACT = 0 was acknowledged, and the gripper does not show it")
+
+
+async def activate(watch: Watch) -> float:
+    """Reset and activate: all fingers move. Returns how many seconds the activation took.
+
+    Raises:
+        EndError: it did not come to its end in time, or what :meth:`Watch.look` raises.
+    """
+    watch.envelope = ANYWHERE
+    await reset(watch)
+    began = await watch.write(Request(activate=True))
+    if await watch.until(lambda status: status.is_activated, ACTIVATION_S, 0.02) is None:
+        shown = f": it reads {words_of(watch.last)}" if watch.last else ""
+        raise EndError("time", f"the activation was not over within {ACTIVATION_S:g} s{shown}")
+    watch.needs_active = True
+    return asyncio.get_running_loop().time() - began
+
+
+async def go(
+    watch: Watch, image: Request, targets: Mapping[Finger, int], seconds: float
+) -> RobotiqStatus | None:
+    """Send axes to targets and wait until they stand there; None if they do not in time.
+
+    Args:
+        watch: of the stage.
+        image: speeds, forces and the requests of the other axes.
+        targets: where the axes go.
+        seconds: for the way.
+    """
+    assert watch.last is not None
+    watch.envelope = way(watch.last, targets)
+    await watch.write(replace(image, go=True).with_positions(targets))
+    return await watch.until(lambda status: are_near(status, targets, MARGIN), seconds) and (
+        await watch.until_still(2.0)
+    )

@@ -1,0 +1,150 @@
+"""The link to the gripper under test: every exchange is kept with its time, and none is cut off."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections import deque
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
+from typing import Any, Final, TypeVar
+
+from ...link.transport import Link
+from ...runtime.concurrency import wait_shielded
+from ...values.errors import RobotiqConnectionError
+from ...values.registers import Echo, Registers
+from ...values.request import Request
+from ...values.status import RobotiqStatus
+
+T = TypeVar("T")
+
+RECENT_S: Final = 2.0
+"""For so long an image may still be on its way into effect: ten times what a slow gripper takes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One exchange.
+
+    Attributes:
+        began: when it was asked for, in the loop's time.
+        ended: when it was answered, or failed.
+        kind: "status", "command", "failure", or "probe" for a read in another place.
+        registers: what was read or written; empty for a probe and for a failure of a read.
+        words: why it failed, or what the probe found.
+    """
+
+    began: float
+    ended: float
+    kind: str
+    registers: Registers = ()
+    words: str = ""
+
+
+class RecordedLink:
+    """Reads and writes on one transport.
+
+    A cancellation waits for the exchange under way. One that was cut off would cost the connection, and the
+    stop that follows would have to make a new one first.
+
+    Attributes:
+        written: the last image that was written; None before the first.
+        shown: the last status that was read; None before the first.
+        asked: when that was asked for, in the loop's time.
+        wrote: when the last write was sent, in the loop's time.
+    """
+
+    def __init__(self, link: Link, keep: Callable[[Frame], None]) -> None:
+        """Use a link, open or not.
+
+        Args:
+            link: leads to the gripper.
+            keep: is given every frame.
+        """
+        self.link = link
+        self.written: Request | None = None
+        self.shown: RobotiqStatus | None = None
+        self.asked = 0.0
+        self.wrote = -math.inf
+        self._keep = keep
+        self._echoes: deque[tuple[float, Echo]] = deque(maxlen=2000)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether requests can be sent."""
+        return self.link.is_open
+
+    async def open(self) -> None:
+        """Connect anew.
+
+        Raises:
+            RobotiqConnectionError: nobody answers.
+        """
+        await self._whole(self.link.open())
+
+    async def close(self) -> None:
+        """Disconnect."""
+        await self._whole(self.link.close())
+
+    async def read(self) -> RobotiqStatus:
+        """The status.
+
+        Raises:
+            RobotiqConnectionError: no clean answer in time; the link is closed.
+        """
+        loop = asyncio.get_running_loop()
+        began = loop.time()
+        try:
+            registers = await self._whole(self.link.read())
+        except RobotiqConnectionError as error:
+            self._keep(Frame(began, loop.time(), "failure", words=str(error)))
+            raise
+        ended = loop.time()
+        self._keep(Frame(began, ended, "status", registers))
+        self.asked = began
+        self.shown = RobotiqStatus.from_registers(registers, timestamp=ended)
+        return self.shown
+
+    async def write(self, request: Request) -> float:
+        """Write an image, once; returns when that was acknowledged, in the loop's time.
+
+        Raises:
+            RobotiqConnectionError: no clean acknowledgement in time; the link is closed.
+        """
+        loop = asyncio.get_running_loop()
+        began = loop.time()
+        # Before it is sent: what is cut off may have arrived.
+        self.written = request
+        self.wrote = began
+        self._echoes.append((began, request.echo))
+        try:
+            await self._whole(self.link.send(lambda: request.registers))
+        except RobotiqConnectionError as error:
+            self._keep(Frame(began, loop.time(), "failure", request.registers, str(error)))
+            raise
+        ended = loop.time()
+        self._keep(Frame(began, ended, "command", request.registers))
+        return ended
+
+    def expect(self, echo: Echo) -> None:
+        """Take what the gripper shows for what is in force."""
+        self._echoes.clear()
+        self._echoes.append((asyncio.get_running_loop().time(), echo))
+
+    def expected(self) -> list[Echo]:
+        """What the gripper may echo now: the last image, and those that were in force in the last seconds."""
+        since = asyncio.get_running_loop().time() - RECENT_S
+        while len(self._echoes) > 1 and self._echoes[1][0] < since:
+            self._echoes.popleft()
+        return [echo for _, echo in self._echoes]
+
+    async def _whole(self, work: Coroutine[Any, Any, T]) -> T:
+        """Carry something out to its end; a cancellation is raised after it."""
+        task = asyncio.ensure_future(work)
+        try:
+            await wait_shielded(task)
+        except BaseException:
+            if task.done() and not task.cancelled():
+                task.exception()  # asked for, or the loop complains
+            raise
+        return task.result()

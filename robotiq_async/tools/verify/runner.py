@@ -1,0 +1,210 @@
+"""Goes through the stages: asks, runs, stops the fingers, and goes on only if all is well."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from typing import Final, Protocol
+
+from ...link.address import Address
+from ...runtime.concurrency import wait_shielded
+from ...values.errors import RobotiqConnectionError
+from ...values.request import Request
+from .bench import Bench, Lengths
+from .catalogue import HARMLESS, LAST
+from .endings import EndError
+from .fingers import stop_fingers
+from .looking import find, see_that_it_may_be_written_to
+from .motions import as_found
+from .person import Person
+from .recorded_link import Frame
+from .report import Report
+from .stages.loss import report_lost_activation
+from .stages.stage import STAGES, Stage
+from .watch import words_of
+
+LEFT_SET: Final = (
+    "A program has left rGTO set. Going on writes rGTO = 0 first: it stops every axis, and starts none."
+)
+
+
+class Tape(Protocol):
+    """Where frames go."""
+
+    @property
+    def failure(self) -> str:
+        """Why nothing is kept any more; empty as long as it is."""
+
+    def keep(self, frame: Frame) -> None:
+        """Take a frame; never blocks and never fails."""
+
+    def begin(self, stage: int) -> None:
+        """Note that a stage begins."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What is to be done.
+
+    Attributes:
+        address: the gripper; tcp, rtu or rtu+tcp.
+        first: the stage to begin with.
+        last: the last stage.
+        agreed: up to this stage nobody is asked; -1 for none, at most 2.
+        label: what the report is called.
+        lengths: of the long checks.
+    """
+
+    address: Address
+    first: int = 0
+    last: int = LAST
+    agreed: int = -1
+    label: str = ""
+    lengths: Lengths = field(default_factory=Lengths)
+
+    def __post_init__(self) -> None:
+        """Check it.
+
+        Raises:
+            ValueError: a stage that there is not, or consent beforehand to one that moves.
+        """
+        if not 0 <= self.first <= self.last <= LAST:
+            raise ValueError(f"--from and --up-to must be 0 <= from <= up-to <= {LAST}")
+        if not -1 <= self.agreed <= HARMLESS:
+            raise ValueError(f"--yes-to must be in 0..{HARMLESS}: what moves is asked for, got {self.agreed}")
+        if self.address.kind == "sim":
+            raise ValueError("a simulated gripper is verified through its server")
+
+
+class Runner:
+    """One run.
+
+    Attributes:
+        report: what it has found so far.
+    """
+
+    def __init__(self, plan: Plan, person: Person, tape: Tape, save: Callable[[Report], object]) -> None:
+        """Prepare; nothing is opened.
+
+        Args:
+            plan: what is to be done.
+            person: answers and watches.
+            tape: takes every frame.
+            save: is called with the report after each stage, while nothing moves; an OSError ends the run.
+        """
+        self.report = Report(plan.address.kind, label=plan.label)
+        self._plan = plan
+        self._person = person
+        self._tape = tape
+        self._save = save
+        self._bench = Bench(plan.address, person, tape.keep, plan.lengths, self.report.checks)
+        self._is_found = False
+
+    async def run(self) -> Report:
+        """Go through the stages. Whatever happens, the fingers of a stage that moves are stopped first.
+
+        Raises:
+            asyncio.CancelledError: it was interrupted; the report says so.
+        """
+        report = self.report
+        try:
+            for stage in STAGES[self._plan.first : self._plan.last + 1]:
+                await self._do(stage)
+            report.why, report.words = "done", "the last stage that was asked for is over"
+        except EndError as end:
+            report.why, report.words = end.why, end.words
+        except RobotiqConnectionError as error:
+            report.why, report.words = "link", str(error)
+        except asyncio.CancelledError:
+            report.why, report.words = "interrupted", "Ctrl-C, or a signal"
+            raise
+        finally:
+            report.complete()
+            closing = asyncio.ensure_future(self._close())
+            with suppress(asyncio.CancelledError):
+                await wait_shielded(closing)
+        return report
+
+    async def _close(self) -> None:
+        if self._is_found:
+            await self._bench.link.close()
+
+    async def _do(self, stage: Stage) -> None:
+        """Look, ask, run, stop."""
+        image = await self._look_first(stage)
+        await self._ask(stage)
+        if stage.number == 1 and not self._is_found:
+            await self._find()
+        self.report.entered.append(stage.number)
+        self._tape.begin(stage.number)
+        try:
+            await stage.run(self._bench)
+        finally:
+            if stage.number >= HARMLESS:
+                await self._stop(image)
+        self.report.stages.append(stage.number)
+        self._bench.is_active = stage.number > HARMLESS
+        try:
+            self._save(self.report)
+        except OSError as error:
+            raise EndError("disk", f"the report cannot be written: {error.strerror or error}") from error
+        if self._person.has_stopped:
+            raise EndError("stopped", "a key was pressed, or the terminal was closed")
+        if self._tape.failure:
+            raise EndError("disk", f"the recording has failed: {self._tape.failure}")
+
+    # -- before a stage --------------------------------------------------------------------------------------
+
+    async def _look_first(self, stage: Stage) -> Request:
+        """See that the stage may begin; returns the image that would stop everything now."""
+        if stage.number < HARMLESS:
+            return Request()
+        if not self._is_found:
+            await self._find()
+        status = await see_that_it_may_be_written_to(self._bench)
+        self._person.tell(f"The gripper is {words_of(status)}.")
+        if status.go_echo:
+            await self._ask_to_clear_go(stage)
+        if stage.needs_active and not status.is_activated:
+            if self._bench.is_active:
+                report_lost_activation(self._bench, "while it was left alone between two stages")
+            raise EndError("inactive", f"stage {stage.number} needs an active gripper: begin with --from 3")
+        return as_found(status)
+
+    async def _ask_to_clear_go(self, stage: Stage) -> None:
+        if stage.number <= self._plan.agreed:
+            raise EndError(
+                "refused", "rGTO is set: a program has left it so, or commands it. Run without --yes-to."
+            )
+        if not await self._person.consents(LEFT_SET):
+            raise EndError("declined", "rGTO is set, and was left so")
+
+    async def _ask(self, stage: Stage) -> None:
+        if stage.number <= self._plan.agreed:
+            self._person.tell(stage.as_text())
+        elif not await self._person.consents(stage.as_text()):
+            raise EndError("declined", f"stage {stage.number} was not agreed to")
+
+    async def _find(self) -> None:
+        try:
+            await find(self._bench)
+        finally:
+            self.report.registers = self._bench.registers
+            self.report.found = self._bench.found
+            self._is_found = self._bench.registers is not None
+        assert self._bench.found is not None
+        self._bench.link.expect(self._bench.found.echo)
+
+    # -- after it --------------------------------------------------------------------------------------------
+
+    async def _stop(self, image: Request) -> None:
+        """RGTO = 0, whatever has happened; an activation that is under way is taken back."""
+        link = self._bench.link
+        written, shown = link.written or image, link.shown
+        if written.activate and shown is not None and not shown.is_activated:
+            written = replace(written, activate=False)
+        stopping = asyncio.ensure_future(stop_fingers(link, written, self._person.alarm))
+        await wait_shielded(stopping)
+        self.report.last = stopping.result()

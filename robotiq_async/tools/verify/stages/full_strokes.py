@@ -1,0 +1,127 @@
+"""Stage 6: full strokes of the fingers at three speeds, and of the scissor. Nothing is between them."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+from typing import Final
+
+from ....values.calibration.closing_time import closing_time
+from ....values.enums import CLOSED, OPEN, OPEN_READING, STROKE_COUNTS, Finger, ObjectStatus
+from ....values.request import Request
+from ....values.status import RobotiqStatus
+from ..bench import Bench
+from ..checks import Figure
+from ..endings import EndError
+from ..motions import ASIDE, standing
+from ..watch import Watch
+
+SECONDS: Final = 180.0
+SPEEDS: Final = (0, 64, 255)
+FINGERS: Final = (Finger.A, Finger.B, Finger.C)
+STROKE_S: Final = 20.0
+"""Twice what the slowest one takes."""
+READ_S: Final = 0.01
+SCISSOR_SPEED: Final = 64
+SHARE: Final = 0.2
+CLOSED_AT_LEAST: Final = 240
+OPEN_AT_MOST: Final = OPEN_READING + 1
+PART_OF_STROKE: Final = 0.9
+
+
+async def full_strokes(bench: Bench) -> None:
+    """The scissor with open fingers, then the fingers, slow ones first."""
+    watch = bench.watch(SECONDS)
+    with bench.person.guarding():
+        start = await watch.look()
+        await watch.write(standing(start))
+        await _fingers_to(watch, start, OPEN, 64)
+        await _scissor(bench, watch, start.position(Finger.SCISSOR))
+        times: dict[int, float] = {}
+        readings: list[list[int]] = []
+        for speed in SPEEDS:
+            before = await watch.look()
+            closed, took = await _fingers_to(watch, before, CLOSED, speed)
+            opened, _ = await _fingers_to(watch, closed, OPEN, speed)
+            times[speed] = took
+            readings.append([each.position(finger) for each in (opened, closed) for finger in FINGERS])
+    _judge_times(bench, times)
+    _judge_readings(bench, readings)
+
+
+async def _fingers_to(
+    watch: Watch, start: RobotiqStatus, goal: int, speed: int
+) -> tuple[RobotiqStatus, float]:
+    """Where they end, and for how many seconds a finger was seen to move."""
+    scissor = start.position(Finger.SCISSOR)
+    watch.envelope = {Finger.SCISSOR: (scissor - ASIDE, scissor + ASIDE)}
+    image = replace(standing(start, speed=speed), go=True).with_positions(dict.fromkeys(FINGERS, goal))
+    return await _stroke(watch, image, FINGERS)
+
+
+async def _stroke(watch: Watch, image: Request, axes: tuple[Finger, ...]) -> tuple[RobotiqStatus, float]:
+    loop = asyncio.get_running_loop()
+    began = moved = await watch.write(image)
+    at: list[int] = []
+
+    def stands(status: RobotiqStatus) -> bool:
+        nonlocal at, moved
+        positions = [status.position(axis) for axis in axes]
+        if positions != at:
+            at, moved = positions, loop.time()
+        rests = all(status.finger_status(axis) is not ObjectStatus.IN_MOTION for axis in axes)
+        return status.echo == image.echo and rests and loop.time() - moved >= 0.5
+
+    # By the scissor's echo alone the end is not known where limits are echoed: it stands long enough then.
+    status = await watch.until(lambda now: stands(now) or loop.time() - moved >= 2.0, STROKE_S, READ_S)
+    if status is None:
+        raise EndError("time", f"a stroke was not over within {STROKE_S:g} s")
+    return status, moved - began
+
+
+async def _scissor(bench: Bench, watch: Watch, home: int) -> None:
+    """Both ends, and what is echoed there."""
+    echoes: list[Figure] = []
+    readings: list[Figure] = []
+    for goal in (0, 255, home):
+        start = await watch.look()
+        fingers = {f: (start.position(f) - ASIDE, start.position(f) + ASIDE) for f in FINGERS}
+        watch.envelope = fingers
+        image = replace(standing(start, speed=SCISSOR_SPEED), go=True).with_positions({Finger.SCISSOR: goal})
+        status, _ = await _stroke(watch, image, (Finger.SCISSOR,))
+        if goal != home:
+            echoes.append(status.requested_position(Finger.SCISSOR))
+            readings.append(status.position(Finger.SCISSOR))
+    words = f"0 and 255 are echoed as {echoes[0]} and {echoes[1]}, and read {readings[0]} and {readings[1]}"
+    if echoes == [0, 255]:
+        bench.as_assumed("stroke.scissor", words, echoes=echoes, readings=readings)
+    else:
+        follows = "Nothing is to be set: a hand learns the limits, and its moves end there."
+        bench.differs("stroke.scissor", words, follows, echoes=echoes, readings=readings)
+
+
+def _judge_times(bench: Bench, times: dict[int, float]) -> None:
+    figures: dict[str, Figure] = {f"speed_{speed}_s": took for speed, took in times.items()}
+    share = max(abs(took / closing_time(speed) - 1) for speed, took in times.items())
+    words = ", ".join(f"{took:.2f} s at speed {speed}" for speed, took in times.items())
+    if share <= SHARE:
+        bench.as_assumed("stroke.time", words, **figures)
+    else:
+        words += f"; up to {100 * share:.0f} % beside the thesis"
+        follows = "Run robotiq-async measure speed, and give its table to the hand as calibration."
+        bench.differs("stroke.time", words, follows, **figures)
+
+
+def _judge_readings(bench: Bench, readings: list[list[int]]) -> None:
+    opened = sorted({each for row in readings for each in row[: len(FINGERS)]})
+    closed = sorted({each for row in readings for each in row[len(FINGERS) :]})
+    words = f"open {opened[0]} to {opened[-1]}, closed {closed[0]} to {closed[-1]}"
+    figures: dict[str, Figure] = {"open": list(opened), "closed": list(closed)}
+    is_usual = opened[0] >= OPEN_READING and opened[-1] <= OPEN_AT_MOST and closed[0] >= CLOSED_AT_LEAST
+    if is_usual:
+        bench.as_assumed("stroke.readings", words, **figures)
+    elif closed[0] - opened[-1] < PART_OF_STROKE * STROKE_COUNTS:
+        bench.untold("stroke.readings", f"{words}: something was in the way, or the scissor was", **figures)
+    else:
+        follows = "Nothing is to be set: a hand goes by gDT and not by readings. Please report."
+        bench.differs("stroke.readings", words, follows, **figures)

@@ -1,0 +1,247 @@
+"""Stage 1: reading only. Nothing is written, and nothing moves."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from dataclasses import replace
+from typing import Final
+
+from ....session.options import registers_of
+from ....values.enums import Fault
+from ....values.errors import RobotiqConnectionError
+from ....values.registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap, Registers
+from ....values.statistics import percentile
+from ..bench import Bench
+from ..checks import Figure
+from ..endings import EndError
+from ..recorded_link import Frame, RecordedLink
+from ..watch import LASTING, show_echo
+
+UNITS: Final = (0, 1, 2, 9, 255)
+NOWHERE: Final = 3000
+"""No source has registers of a 3-Finger there."""
+PERIODS_S: Final = (0.02, 0.01)
+"""Between reads, beside the usual interval."""
+LET_GO_S: Final = 0.5
+"""For a gateway that serves one client to see that one has gone."""
+GONE_S: Final = 0.05
+"""For a gripper to see that a connection has been closed."""
+LONGEST_INTERVAL_S: Final = 0.1
+OTHERS: Final = 2
+
+
+async def reading(bench: Bench) -> None:
+    """Everything that reading tells."""
+    _registers(bench)
+    await _others(bench)
+    await _counts(bench)
+    await _round_trip(bench)
+    await _connections(bench)
+    await _silence(bench)
+    await _unchanged(bench)
+
+
+async def _unchanged(bench: Bench) -> None:
+    """Nothing was written, so what is requested is what it was.
+
+    Raises:
+        EndError: it is not; or there is a fault.
+    """
+    assert bench.found is not None
+    statuses = [await bench.link.read() for _ in range(LASTING)]
+    if statuses[-1].echo != bench.found.echo:
+        words = f"from {show_echo(bench.found.echo)} to {show_echo(statuses[-1].echo)}"
+        raise EndError("foreign", f"another client commands the gripper: its requests changed {words}")
+    if all(status.fault.is_serious for status in statuses):
+        fault = statuses[-1].fault
+        raise EndError("fault", f"0x{int(fault):02X} {fault.name}: {fault.description}")
+
+
+def _registers(bench: Bench) -> None:
+    usual, found = registers_of(bench.address), bench.registers
+    assert found is not None
+    given = {
+        "device_id": (found.device_id, usual.device_id),
+        "read_function": (found.read_function, usual.read_function),
+        "request_address": (found.request, usual.request),
+        "status_address": (found.status, usual.status),
+    }
+    options = {name: value for name, (value, as_usual) in given.items() if value != as_usual}
+    words = (
+        f"unit {found.device_id}, function {found.read_function}, "
+        f"requests at {found.request}, status at {found.status}"
+    )
+    if options:
+        follows = (
+            "Give the hand the options below. See that what is read is the status, and not the requests."
+        )
+        bench.differs("read.registers", words, follows, options)
+    else:
+        bench.as_assumed("read.registers", words)
+
+
+async def _others(bench: Bench) -> None:
+    """Which unit ids, functions and places answer beside the one that is used."""
+    found = bench.registers
+    assert found is not None
+    await bench.link.close()
+    await asyncio.sleep(LET_GO_S)
+    units = UNITS if not bench.address.is_rtu else tuple(unit for unit in UNITS if 1 <= unit <= 247)
+    answering: list[Figure] = [
+        unit for unit in units if await _answers(bench, replace(found, device_id=unit))
+    ]
+    places: list[Figure] = [
+        f"function {function} at {kind.status}"
+        for function in (3, 4)
+        for kind in (TCP_REGISTERS, RTU_REGISTERS)
+        if await _answers(bench, replace(found, read_function=function, status=kind.status))
+    ]
+    nowhere = await _answers(bench, replace(found, status=NOWHERE))
+    await bench.link.open()
+    words = f"answers as unit {', '.join(map(str, answering))}; {', '.join(map(str, places))}"
+    if nowhere:
+        follows = "Another register map may be in it: please report the firmware's version."
+        bench.differs(
+            "read.others", f"registers are read at {NOWHERE}, too", follows, units=answering, places=places
+        )
+    else:
+        bench.as_assumed("read.others", words, units=answering, places=places)
+
+
+async def _answers(bench: Bench, registers: RegisterMap) -> bool:
+    """Whether something is read there; what it is need not be the status."""
+    loop = asyncio.get_running_loop()
+    link, began = bench.another_link(registers, lambda _: None), loop.time()
+    block: Registers = ()
+    try:
+        await link.open()
+        block = (await link.read()).registers
+        words = " ".join(f"{word:04X}" for word in block)
+    except RobotiqConnectionError as error:
+        words = str(error)
+    finally:
+        await link.close()
+    asked = f"unit {registers.device_id}, function {registers.read_function} at {registers.status}"
+    bench.keep(Frame(began, loop.time(), "probe", words=f"{asked}: {words}"))
+    await asyncio.sleep(GONE_S)
+    return bool(block)
+
+
+async def _counts(bench: Bench) -> None:
+    """Opening reads one to seven registers, another count each time."""
+    refused: list[Figure] = []
+    for count in range(1, 8):
+        try:
+            await bench.link.open()
+        except RobotiqConnectionError as error:
+            refused.append(f"{count}: {error}")
+            await asyncio.sleep(LET_GO_S)
+    if refused:
+        await bench.link.open()
+        bench.differs(
+            "read.counts",
+            f"{len(refused)} of 7 openings failed, each of which reads another count",
+            "A hand reads so after each connection: connecting will fail now and then. Please report.",
+            refused=refused,
+        )
+    else:
+        bench.as_assumed("read.counts", "1 to 8 registers can be read; 7 connections one after the other")
+
+
+async def _round_trip(bench: Bench) -> None:
+    limit, figures = bench.interval, dict[str, Figure]()
+    worst = 0.0
+    for period in (*PERIODS_S, bench.interval):
+        times = sorted(await _trips(bench.link, bench.lengths.reads, period))
+        p50, p99 = percentile(times, 0.5), percentile(times, 0.99)
+        name = f"at_{1000 * period:g}_ms"
+        figures |= {f"{name}_p50_ms": 1000 * p50, f"{name}_p99_ms": 1000 * p99}
+        worst = max(worst, p99)
+    found = f"99 of 100 reads take at most {1000 * worst:.1f} ms"
+    if worst < limit:
+        bench.as_assumed("read.round_trip", found, **figures)
+        return
+    interval = min(LONGEST_INTERVAL_S, math.ceil(1000 * worst * 1.2) / 1000)
+    follows = (
+        f"Fingers are watched every {1000 * interval:g} ms at best; use a wired network if this is none."
+    )
+    bench.differs("read.round_trip", found, follows, {"poll_interval": interval}, **figures)
+
+
+async def _trips(link: RecordedLink, count: int, period: float) -> list[float]:
+    loop, times = asyncio.get_running_loop(), []
+    for _ in range(count):
+        began = loop.time()
+        await link.read()
+        times.append(loop.time() - began)
+        await asyncio.sleep(max(0.0, began + period - loop.time()))
+    return times
+
+
+async def _connections(bench: Bench) -> None:
+    """Others come while the first reads."""
+    assert bench.registers is not None
+    if bench.address.kind == "rtu":
+        bench.as_assumed("read.connections", "a serial port has one owner", connections=1)
+        return
+    others: list[RecordedLink] = []
+    why = ""
+    try:
+        for _ in range(OTHERS):
+            others.append(bench.another_link(bench.registers))
+            await others[-1].open()
+            await others[-1].read()
+            await bench.link.read()
+    except RobotiqConnectionError as error:
+        why = str(error)
+    finally:
+        for each in others:
+            await each.close()
+    let_in = len(others) if why else 1 + len(others)
+    if not why:
+        bench.as_assumed("read.connections", f"{let_in} at once, each answered", connections=let_in)
+        return
+    if not bench.link.is_open:
+        await asyncio.sleep(LET_GO_S)
+        await bench.link.open()
+    follows = "One program at a time: stop it before you start another; an agent of a fleet can share it."
+    bench.differs("read.connections", f"{let_in} at once: {why}", follows, connections=let_in)
+
+
+async def _silence(bench: Bench) -> None:
+    """What the first two reads show after a silence, and whether the activation is still there."""
+    link, first = bench.link, await bench.link.read()
+    shown: list[Figure] = []
+    lasting, lost = "", ""
+    watch = bench.watch(sum(bench.lengths.idle) + 60)
+    for seconds in bench.lengths.idle:
+        await watch.rest(seconds)
+        statuses = [await link.read(), await link.read()]
+        codes = [int(status.fault) for status in statuses]
+        shown.append([seconds, *codes])
+        if Fault.COMMUNICATION_NOT_READY in codes[1:]:
+            lasting = f"after {seconds:g} s two reads in a row show fault 0x09"
+        if statuses[1].is_activated != first.is_activated:
+            lost = f"after {seconds:g} s"
+            break
+    longest = sum(bench.lengths.idle)
+    if lost:
+        follows = "A program that polls keeps it; after a pause the next start activates: it MOVES."
+        bench.differs("read.idle", f"the activation was lost {lost} of silence", follows)
+    else:
+        bench.as_assumed("read.idle", f"answers after each of {longest:g} s of silence in all")
+    _judge_silence(bench, shown, lasting)
+
+
+def _judge_silence(bench: Bench, shown: list[Figure], lasting: str) -> None:
+    passing = [each for each in shown if isinstance(each, list) and each[1] == Fault.COMMUNICATION_NOT_READY]
+    if lasting:
+        follows = "A hand takes that for a fault: poll all the time, and report this, please."
+        bench.differs("read.silence", lasting, follows, faults=shown)
+    elif passing:
+        found = f"after {passing[0][0]} s of silence the first read shows fault 0x09, and the next does not"
+        follows = "Nothing is to be set: a hand waits for a third read before it believes 0x09."
+        bench.differs("read.silence", found, follows, faults=shown)
+    else:
+        bench.as_assumed("read.silence", "no fault in the first read after any silence", faults=shown)

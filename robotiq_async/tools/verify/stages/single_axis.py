@@ -1,0 +1,143 @@
+"""Stage 4: one axis at a time, a little way, at the slowest speed and the weakest force."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass, field
+from typing import Final
+
+from ....values.enums import AXES, Finger, ObjectStatus
+from ....values.request import Request
+from ....values.status import RobotiqStatus
+from ..bench import Bench
+from ..endings import EndError
+from ..motions import are_near, standing, way
+from ..watch import Watch
+
+SECONDS: Final = 300.0
+STEP: Final = 30
+STEP_S: Final = 6.0
+"""For one way: 1.3 s at the slowest speed (thesis, table A1.1), and what a gripper may take to begin."""
+LAG_WINDOW_S: Final = 0.5
+LAG_READ_S: Final = 0.002
+LAG_S: Final = 0.25
+"""So long a hand does not believe an object status that nothing else speaks for."""
+END_COUNTS: Final = 2
+
+ANSWERS: Final = {
+    "a": "the finger that stands alone",
+    "p": "one finger of the pair",
+    "o": "the other finger of the pair",
+    "s": "the pair came together or spread",
+    "n": "none, or more than one of these",
+}
+RIGHT: Final = {Finger.A: "a", Finger.B: "p", Finger.C: "o", Finger.SCISSOR: "s"}
+
+
+@dataclass
+class _Found:
+    """What the motions have shown so far."""
+
+    lags: list[float] = field(default_factory=list)
+    errors: list[int] = field(default_factory=list)
+
+
+async def single_axis(bench: Bench) -> None:
+    """Each axis there and back; the person says which finger it was."""
+    found = _Found()
+    for axis in AXES:
+        await _there_and_back(bench, axis, found)
+        question = "Which finger has moved, there and back?"
+        answer = await bench.person.chooses(question, ANSWERS)
+        if answer is None:
+            raise EndError("declined", "the finger was not named")
+        if answer != RIGHT[axis]:
+            seen = f"the register of {axis.name} moves: {ANSWERS[answer]}"
+            bench.differs("axis.finger", seen, "Do not use this gripper with names of fingers; report this.")
+    bench.as_assumed("axis.finger", "each as named by the person")
+    bench.as_assumed("axis.alone", "the other axes stood still each time")
+    _judge(bench, found)
+
+
+async def _there_and_back(bench: Bench, axis: Finger, found: _Found) -> None:
+    watch = bench.watch(4 * STEP_S)
+    start = await watch.look()
+    image = standing(start)
+    await watch.write(image)
+    position = start.position(axis)
+    target = position - STEP if position > 127 else position + STEP
+    with bench.person.guarding():
+        try:
+            for goal in (target, position):
+                await _one_way(watch, image, axis, goal, found)
+        except EndError as end:
+            if end.why == "envelope":
+                bench.differs("axis.alone", end.words, "Do not use this gripper before that is understood.")
+            raise
+        await watch.write(standing(await watch.look()))
+        await watch.until(lambda status: not status.go_echo, 1.0)
+
+
+async def _one_way(watch: Watch, image: Request, axis: Finger, goal: int, found: _Found) -> None:
+    start = await watch.look()
+    watch.envelope = way(start, {axis: goal})
+    asked = Request(activate=True, go=True, mode=image.mode, axes=image.with_positions({axis: goal}).axes)
+    await watch.write(asked)
+    if start.go_echo and start.finger_status(axis) is ObjectStatus.AT_POSITION:
+        lag = await _lag(watch, axis, goal)
+        found.lags += [] if lag is None else [lag]
+    arrived = await watch.until(lambda status: _rests(status, axis, goal), STEP_S)
+    if arrived is None:
+        where = watch.last.position(axis) if watch.last else "?"
+        raise EndError("time", f"{axis.name} was asked to {goal} and is at {where} after {STEP_S:g} s")
+    still = await watch.until_still(2.0)
+    found.errors.append(abs((still or arrived).position(axis) - goal))
+
+
+def _rests(status: RobotiqStatus, axis: Finger, goal: int) -> bool:
+    return (
+        are_near(status, {axis: goal}, END_COUNTS + 2)
+        and status.finger_status(axis) is not ObjectStatus.IN_MOTION
+    )
+
+
+async def _lag(watch: Watch, axis: Finger, goal: int) -> float | None:
+    """Seconds from the first read that shows the echo to the first in which gDT says that the axis moves."""
+    loop, echoed = asyncio.get_running_loop(), 0.0
+
+    def shows_motion(status: RobotiqStatus) -> bool:
+        nonlocal echoed
+        if status.requested_position(axis) != goal:
+            return False
+        echoed = echoed or loop.time()
+        return status.finger_status(axis) is ObjectStatus.IN_MOTION
+
+    if await watch.until(shows_motion, LAG_WINDOW_S, LAG_READ_S) is None:
+        return None
+    return loop.time() - echoed
+
+
+def _judge(bench: Bench, found: _Found) -> None:
+    if found.lags:
+        worst = max(found.lags)
+        words = f"at most {1000 * worst:.0f} ms after the echo"
+        if worst <= max(0.01, bench.interval):
+            bench.as_assumed("axis.lag", words, worst_ms=1000 * worst)
+        else:
+            follows = "Nothing is to be set: a hand does not believe an object status for 250 ms."
+            if worst > LAG_S:
+                follows = (
+                    "That is longer than a hand waits: its moves may end before they begin. Please report."
+                )
+            bench.differs("axis.lag", words, follows, worst_ms=1000 * worst)
+            if worst > LAG_S:
+                raise EndError("deviation", f"axis.lag: {words}, longer than a hand waits")
+    else:
+        bench.untold("axis.lag", "gDT showed no motion that began at a known status")
+    worst_error = max(found.errors)
+    words = f"at most {worst_error} counts beside the request"
+    if worst_error <= END_COUNTS:
+        bench.as_assumed("axis.end", words, counts=worst_error)
+    else:
+        follows = "Do not compare positions with requests; a hand goes by gDT."
+        bench.differs("axis.end", words, follows, counts=worst_error)

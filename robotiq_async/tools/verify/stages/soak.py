@@ -1,0 +1,130 @@
+"""Stage 9: reading for minutes, then small motions at higher and higher rates."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+from typing import Final
+
+from ....link.modbus import ModbusTransport
+from ....values.enums import Finger
+from ....values.errors import RobotiqConnectionError
+from ....values.request import Request
+from ....values.statistics import percentile
+from ..bench import Bench
+from ..checks import Figure
+from ..endings import EndError
+from ..motions import ASIDE, MARGIN, are_near, go, standing
+from ..watch import Watch
+
+RATES: Final = (10, 20, 50, 100)
+SPEED: Final = 64
+SWING: Final = 15
+FAILED: Final = 1e-4
+LEAST_READS: Final = 10_000
+"""With fewer a single failure would be too many."""
+MOST_FAILURES: Final = 20
+
+
+async def soak(bench: Bench) -> None:
+    """Read at the usual interval, then command."""
+    with bench.person.guarding():
+        await _read(bench)
+        await _command(bench)
+
+
+async def _read(bench: Bench) -> None:
+    loop, times = asyncio.get_running_loop(), list[float]()
+    watch = bench.watch(bench.lengths.soak + 120)
+    await watch.look()
+    failures: list[Figure] = []
+    repeated = _repeats(bench)
+    until = loop.time() + bench.lengths.soak
+    while loop.time() < until:
+        began = loop.time()
+        try:
+            if not bench.link.is_open:
+                await bench.link.open()
+            await watch.look()
+            times.append(loop.time() - began)
+        except RobotiqConnectionError as error:
+            failures.append(str(error))
+            if len(failures) > MOST_FAILURES:
+                raise
+        await asyncio.sleep(max(0.0, began + bench.interval - loop.time()))
+    times.sort()
+    failed = len(failures) + _repeats(bench) - repeated
+    figures: dict[str, Figure] = {
+        "reads": len(times),
+        "failed": failed,
+        "p50_ms": 1000 * percentile(times, 0.5),
+        "p99_ms": 1000 * percentile(times, 0.99),
+        "worst_ms": 1000 * times[-1],
+        "failures": failures,
+    }
+    words = f"{failed} of {len(times) + len(failures)} reads failed"
+    if failed <= FAILED * max(len(times), LEAST_READS):
+        bench.as_assumed("soak.reads", words, **figures)
+    else:
+        follows = "Look at cable, shield and switch: each lost connection ends the moves that are awaited."
+        bench.differs("soak.reads", words, follows, **figures)
+
+
+def _repeats(bench: Bench) -> int:
+    return bench.link.link.repeats if isinstance(bench.link.link, ModbusTransport) else 0
+
+
+async def _command(bench: Bench) -> None:
+    """Finger A back and forth a little; at each rate the last command must be followed."""
+    watch = bench.watch(len(RATES) * (bench.lengths.commands + 20))
+    start = await watch.look()
+    image = standing(start, speed=SPEED)
+    await watch.write(image)
+    home = start.position(Finger.A)
+    step = 1 if home < 128 else -1
+    reached = [home - MARGIN, home + MARGIN, home + step * (SWING + MARGIN)]
+    watch.envelope = {
+        axis: (start.position(axis) - ASIDE, start.position(axis) + ASIDE)
+        for axis in (Finger.B, Finger.C, Finger.SCISSOR)
+    } | {Finger.A: (min(reached), max(reached))}
+    envelope = watch.envelope
+    achieved: list[Figure] = []
+    for rate in RATES:
+        sent, seconds, ends = await _burst(bench, watch, image, home, step, rate)
+        achieved.append([rate, sent / seconds])
+        if not ends:
+            found = f"after commands at {rate} Hz the last one is not followed"
+            follows = f"Write no faster: write_spacing={2 / rate:g}."
+            options = {"write_spacing": min(0.1, 2 / rate)}
+            bench.differs("soak.commands", found, follows, options, rates=achieved)
+            return
+    if await go(watch, image, {Finger.A: home}, 5.0) is None:
+        raise EndError("time", "finger A did not come back within 5 s")
+    watch.envelope = envelope
+    bench.as_assumed("soak.commands", "followed to the last one at each rate", rates=achieved)
+
+
+async def _burst(
+    bench: Bench, watch: Watch, image: Request, home: int, step: int, rate: int
+) -> tuple[int, float, bool]:
+    """Commands at a rate; how many there were, in how many seconds, and whether the last was followed."""
+    loop = asyncio.get_running_loop()
+    began, sent = loop.time(), 0
+    moving = replace(image, go=True)
+    while loop.time() - began < bench.lengths.commands:
+        due = loop.time() + 1 / rate
+        await watch.write(_at(moving, home + step * (5 + sent % 6)), spaced=False)
+        sent += 1
+        await watch.look()
+        await asyncio.sleep(max(0.0, due - loop.time()))
+    seconds = loop.time() - began
+    await asyncio.sleep(0.1)
+    last = {Finger.A: home + step * SWING}
+    await watch.write(_at(moving, last[Finger.A]))
+    ends = await watch.until(lambda status: are_near(status, last, MARGIN), 3.0) is not None
+    await watch.until_still(2.0)
+    return sent, seconds, ends
+
+
+def _at(image: Request, position: int) -> Request:
+    return image.with_positions({Finger.A: position})

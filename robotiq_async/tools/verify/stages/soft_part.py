@@ -1,0 +1,104 @@
+"""Stage 7: something soft between the fingers, at the slowest speed and the weakest force."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+from ....values.enums import CLOSED, Finger, ObjectStatus
+from ....values.status import RobotiqStatus
+from ..bench import Bench
+from ..endings import EndError
+from ..motions import ASIDE, MARGIN, are_near, standing
+from ..watch import Watch
+
+SECONDS: Final = 60.0
+FINGERS: Final = (Finger.A, Finger.B, Finger.C)
+CLOSE_S: Final = 15.0
+LEFT_S: Final = 5.0
+
+PLACE: Final = (
+    "Put a block of foam, wider than your fist, between the fingers so that it lies there by itself. "
+    "Take your hand away. Then press Enter: the fingers close on it."
+)
+RELEASE: Final = "The fingers open now, and the foam falls. Keep your hands away. Enter opens them."
+STAYS: Final = "rGTO has been 0 for some seconds. Is the foam still held?"
+ANSWERS: Final = {"y": "yes, it is held", "n": "no, it is loose or has fallen"}
+
+
+async def soft_part(bench: Bench) -> None:
+    """Close on it, stop with it held, and open."""
+    person = bench.person
+    if not await person.consents(PLACE):
+        raise EndError("declined", "nothing was closed on")
+    watch = bench.watch(SECONDS)
+    start = await watch.look()
+    home = {finger: start.position(finger) for finger in FINGERS}
+    scissor = start.position(Finger.SCISSOR)
+    watch.envelope = {Finger.SCISSOR: (scissor - ASIDE, scissor + ASIDE)}
+    with person.guarding():
+        held = await _close(watch, start)
+        _judge_contact(bench, held)
+        await watch.write(replace(standing(held)).with_positions(dict.fromkeys(FINGERS, CLOSED)))
+        left = await watch.pass_by(LEFT_S)
+    answer = await person.chooses(STAYS, ANSWERS) if held.contacts else "?"
+    if answer is None or not await person.consents(RELEASE):
+        raise EndError("declined", "the fingers were not opened: they stand closed, with rGTO = 0")
+    _judge_halt(bench, answer, held, left)
+    watch = bench.watch(SECONDS)
+    with person.guarding():
+        now = await watch.look()
+        await watch.write(replace(standing(now), go=True).with_positions(home))
+        if await watch.until(lambda status: are_near(status, home, MARGIN), CLOSE_S) is None:
+            raise EndError("time", f"the fingers did not open within {CLOSE_S:g} s")
+        await watch.until_still(2.0)
+
+
+async def _close(watch: Watch, start: RobotiqStatus) -> RobotiqStatus:
+    """Close, and wait until every finger rests; the status in which all of them have for a while."""
+    await watch.write(standing(start))
+    await watch.write(replace(standing(start), go=True).with_positions(dict.fromkeys(FINGERS, CLOSED)))
+    # What gDT shows just after a write may be from before it.
+    await watch.pass_by(0.3)
+
+    def rest(status: RobotiqStatus) -> bool:
+        return all(status.finger_status(finger) is not ObjectStatus.IN_MOTION for finger in FINGERS)
+
+    if await watch.until(rest, CLOSE_S) is None:
+        raise EndError("time", f"the fingers did not come to rest within {CLOSE_S:g} s")
+    return await watch.pass_by(0.5)
+
+
+def _judge_contact(bench: Bench, held: RobotiqStatus) -> None:
+    shown = {finger: held.finger_status(finger) for finger in FINGERS}
+    words = ", ".join(f"{finger.name} {what.name}" for finger, what in shown.items())
+    if ObjectStatus.CONTACT_OPENING in shown.values():
+        follows = (
+            "The codes of gDT are the other way round than assumed: outcomes of moves are wrong. Report this."
+        )
+        bench.differs("soft.contact", words, follows)
+    elif ObjectStatus.CONTACT_CLOSING in shown.values():
+        bench.as_assumed("soft.contact", words)
+    else:
+        bench.untold("soft.contact", f"no finger has touched anything: {words}")
+    drawn = max(held.current_ma(finger) for finger in FINGERS)
+    if not held.contacts:
+        bench.untold("soft.current", "nothing was held")
+    elif drawn == 0:
+        bench.as_assumed("soft.current", "0 mA while it is held", milliampere=0)
+    else:
+        follows = "Nothing is to be set: a hand takes no current for a sign of a grip."
+        bench.differs("soft.current", f"up to {drawn} mA while it is held", follows, milliampere=drawn)
+
+
+def _judge_halt(bench: Bench, answer: str, held: RobotiqStatus, left: RobotiqStatus) -> None:
+    moved = max(abs(left.position(finger) - held.position(finger)) for finger in FINGERS)
+    if answer == "y":
+        bench.as_assumed("soft.halt", f"held for {LEFT_S:g} s; fingers moved by {moved} counts", counts=moved)
+    elif answer == "n":
+        follows = "A stop, and the end of a program without keep_grip, lets go of the part."
+        bench.differs(
+            "soft.halt", f"the part came loose; fingers moved by {moved} counts", follows, counts=moved
+        )
+    else:
+        bench.untold("soft.halt", "nothing was held")

@@ -1,0 +1,122 @@
+"""The ten stages and what a person is told before each."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from typing import Final, NamedTuple
+
+from ..bench import Bench
+from .activation import activation
+from .full_strokes import full_strokes
+from .host import host
+from .loss import loss
+from .reading import reading
+from .single_axis import single_axis
+from .soak import soak
+from .soft_part import soft_part
+from .stopping import stopping
+from .writing import writing
+
+
+class Stage(NamedTuple):
+    """One stage.
+
+    Attributes:
+        number: 0..9.
+        title: a few words.
+        run: does it; what must end the run raises.
+        moves: what moves.
+        how_far: how far.
+        how_fast: how fast.
+        clear: what must be clear.
+        lasts: how long it takes.
+        is_moving: whether fingers move.
+        needs_active: whether the gripper must be active before.
+    """
+
+    number: int
+    title: str
+    run: Callable[[Bench], Awaitable[None]]
+    moves: str
+    how_far: str
+    how_fast: str
+    clear: str
+    lasts: str
+    is_moving: bool = True
+    needs_active: bool = True
+
+    def as_text(self) -> str:
+        """What a person reads before it."""
+        lines = [f"Stage {self.number}: {self.title}", f"  moves:    {self.moves}"]
+        if self.is_moving:
+            lines += [
+                f"  how far:  {self.how_far}",
+                f"  how fast: {self.how_fast}",
+                f"  clear:    {self.clear}",
+            ]
+        return "\n".join([*lines, f"  takes:    {self.lasts}"])
+
+
+_NOTHING: Final = ("nothing", "", "", "")
+_WAY: Final = "the fingers' whole way, and the way of what they could push; no hand, no cable"
+_SLOWEST: Final = "the slowest there is (22 mm/s by the manual), the weakest force"
+
+STAGES: Final = (
+    Stage(0, "this computer", host, *_NOTHING, "1 s", is_moving=False, needs_active=False),
+    Stage(1, "reading only", reading, *_NOTHING, "3 minutes", is_moving=False, needs_active=False),
+    Stage(
+        *(2, "writing with rGTO = 0", writing),
+        "nothing should; stay clear all the same, for that is what is checked",
+        *("", "", "", "20 s"),
+        is_moving=False,
+        needs_active=False,
+    ),
+    Stage(
+        *(3, "activation", activation),
+        "ALL FINGERS AND THE SCISSOR; what is held falls",
+        "open and close to their stops",
+        "the gripper's own pace; no option sets it",
+        _WAY,
+        "5 to 30 s",
+        needs_active=False,
+    ),
+    Stage(
+        *(4, "one axis at a time", single_axis),
+        "A, then B, then C, then the scissor, each there and back; you say which it was",
+        "30 counts of 255, about 2 cm at the tip",
+        *(_SLOWEST, _WAY, "1 minute"),
+    ),
+    Stage(
+        *(5, "stopping", stopping),
+        "A, B and C together, stopped and turned half way",
+        "80 counts of 255, about a third of the way",
+        "speed 64 of 255, the weakest force",
+        *(_WAY, "20 s"),
+    ),
+    Stage(
+        *(6, "full strokes", full_strokes),
+        "the scissor to both ends, then A, B and C closed and open three times",
+        "the whole way",
+        "slowest, speed 64, and at last the FASTEST there is (2 s), the weakest force",
+        *("everything; nothing may be between the fingers", "1 minute"),
+    ),
+    Stage(
+        *(7, "something soft", soft_part),
+        "A, B and C close on a block of foam that you put there, and open again",
+        "until they touch it",
+        *(_SLOWEST, "your hands, once the foam lies there", "2 minutes"),
+    ),
+    Stage(
+        *(8, "losing client, cable, emergency stop, power", loss),
+        "finger A there and back, and ALL FINGERS in activations that are asked for",
+        "60 counts of 255; the activations to the stops",
+        *(_SLOWEST, _WAY, "10 minutes, with your hands on cable and switches"),
+    ),
+    Stage(
+        *(9, "soak", soak),
+        "nothing for 10 minutes, then finger A back and forth",
+        "15 counts of 255, about 1 cm",
+        *("speed 64 of 255, the weakest force", _WAY, "11 minutes"),
+    ),
+)
+"""In their order."""

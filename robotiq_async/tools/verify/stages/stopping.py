@@ -1,0 +1,125 @@
+"""Stage 5: stopping in the middle of slow motions of the three fingers."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Final
+
+from ....values.enums import Finger
+from ....values.request import Request
+from ....values.status import RobotiqStatus
+from ..bench import Bench
+from ..endings import EndError
+from ..motions import MARGIN, are_near, go, standing, way
+from ..watch import Watch
+
+SECONDS: Final = 90.0
+SPEED: Final = 64
+STROKE: Final = 80
+LEG_S: Final = 12.0
+FINGERS: Final = (Finger.A, Finger.B, Finger.C)
+COUNTS: Final = 10
+
+
+async def stopping(bench: Bench) -> None:
+    """RGTO = 0, rGTO = 1 again, a new request, and a hold, each half way."""
+    watch = bench.watch(SECONDS)
+    with bench.person.guarding():
+        start = await watch.look()
+        if any(start.position(finger) > 100 for finger in FINGERS):
+            raise EndError("refused", "the fingers are not open; begin with --from 3")
+        home = {finger: start.position(finger) for finger in FINGERS}
+        image = standing(start, speed=SPEED)
+        await watch.write(image)
+        far = {finger: home[finger] + STROKE for finger in FINGERS}
+        watch.envelope = way(start, far)
+        away = replace(image, go=True).with_positions(far)
+        await _halt(bench, watch, away, home)
+        await _resume(bench, watch, away, far)
+        await _new_target(bench, watch, image, home)
+        await _hold(bench, watch, image, home)
+        watch.envelope = way(start, far)
+        if await go(watch, image, home, LEG_S) is None:
+            raise EndError("time", "the fingers did not come back to where they began")
+
+
+async def _until_past(watch: Watch, is_past: Callable[[RobotiqStatus], bool]) -> RobotiqStatus:
+    status = await watch.until(is_past, LEG_S)
+    if status is None:
+        raise EndError("time", f"the fingers did not come half way within {LEG_S:g} s")
+    return status
+
+
+async def _halt(bench: Bench, watch: Watch, away: Request, home: dict[Finger, int]) -> None:
+    await watch.write(away)
+    status = await _until_past(watch, lambda s: all(s.position(f) >= home[f] + STROKE // 2 for f in FINGERS))
+    counts, seconds = await _stop(watch, replace(away, go=False), status)
+    words = f"{counts} counts and {1000 * seconds:.0f} ms at speed {SPEED}"
+    if counts <= COUNTS:
+        bench.as_assumed("stop.halt", words, counts=counts, seconds=seconds)
+    else:
+        follows = "Do not rely on a stop by software; report this."
+        bench.differs("stop.halt", words, follows, counts=counts, seconds=seconds)
+
+
+async def _stop(watch: Watch, image: Request, status: RobotiqStatus) -> tuple[int, float]:
+    """Write an image that stops; counts that a finger still goes, and seconds until the last moves."""
+    loop = asyncio.get_running_loop()
+    before = {finger: status.position(finger) for finger in FINGERS}
+    began = moved = loop.time()
+    await watch.write(image)
+    at = before
+
+    def stands(now: RobotiqStatus) -> bool:
+        nonlocal at, moved
+        positions = {finger: now.position(finger) for finger in FINGERS}
+        if positions != at:
+            at, moved = positions, loop.time()
+        return loop.time() - moved >= 0.3
+
+    await watch.until(stands, 4.0)
+    return max(abs(at[finger] - before[finger]) for finger in FINGERS), moved - began
+
+
+async def _resume(bench: Bench, watch: Watch, away: Request, far: dict[Finger, int]) -> None:
+    await watch.write(away)
+    if await watch.until(lambda status: are_near(status, far, MARGIN), LEG_S) is None:
+        where = [watch.last.position(finger) for finger in FINGERS] if watch.last else []
+        follows = "Nothing is to be set: a hand writes fresh requests after a stop. Please report."
+        bench.differs("stop.resume", f"stands at {where} although rGTO is set again", follows)
+    else:
+        bench.as_assumed("stop.resume", "goes on to its request")
+    await watch.until_still(2.0)
+
+
+async def _new_target(bench: Bench, watch: Watch, image: Request, home: dict[Finger, int]) -> None:
+    """Towards home; half way back out a little."""
+    near = {finger: home[finger] + 10 for finger in FINGERS}
+    await watch.write(replace(image, go=True).with_positions(near))
+    await _until_past(watch, lambda s: all(s.position(f) <= home[f] + STROKE - 30 for f in FINGERS))
+    turned = {finger: home[finger] + STROKE - 10 for finger in FINGERS}
+    await watch.write(replace(image, go=True).with_positions(turned))
+    if await watch.until(lambda status: are_near(status, turned, MARGIN), LEG_S) is None:
+        bench.differs(
+            "stop.target", "the new request is not followed", "A motion cannot be replaced: report this."
+        )
+    else:
+        bench.as_assumed("stop.target", "fingers turn round, and stop at the new request")
+    await watch.until_still(2.0)
+
+
+async def _hold(bench: Bench, watch: Watch, image: Request, home: dict[Finger, int]) -> None:
+    near = {finger: home[finger] + 10 for finger in FINGERS}
+    await watch.write(replace(image, go=True).with_positions(near))
+    status = await _until_past(watch, lambda s: all(s.position(f) <= home[f] + STROKE - 30 for f in FINGERS))
+    here = {finger: status.position(finger) for finger in FINGERS}
+    counts, seconds = await _stop(watch, replace(image, go=True).with_positions(here), status)
+    words = f"within {counts} counts, {1000 * seconds:.0f} ms"
+    if counts <= COUNTS:
+        bench.as_assumed("stop.hold", words, counts=counts, seconds=seconds)
+    else:
+        bench.differs(
+            "stop.hold", words, "hold() does not stop soon enough: use halt(). Please report.", counts=counts
+        )

@@ -1,0 +1,172 @@
+"""Stage 2: writing with rGTO = 0. Nothing may move."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Final
+
+from ....session.options import LONGEST_SPACING_S, WRITE_SPACING_S
+from ....values.enums import AXES, Finger
+from ....values.request import Request
+from ....values.statistics import percentile
+from ....values.status import RobotiqStatus
+from ..bench import Bench
+from ..checks import Figure
+from ..motions import as_found
+from ..watch import Watch, words_of
+
+SECONDS: Final = 60.0
+STILL_S: Final = 1.0
+PROBES: Final = 20
+ECHO_S: Final = 0.02
+LONGEST_ECHO_S: Final = 1.0
+APART_S: Final = 0.1
+"""Between two probes: what is forgotten within that is another matter."""
+GAPS_S: Final = (0.002, 0.005, 0.011, 0.021)
+"""From one write to the next; 1 ms above what is of interest where a timer that is early would decide."""
+PAIRS: Final = 5
+
+
+async def writing(bench: Bench) -> None:
+    """Write what changes nothing, then positions without rGTO, then pairs of images close together."""
+    watch = bench.watch(SECONDS)
+    watch.needs_active = False
+    before = await watch.look()
+    image = as_found(before)
+    await _same(bench, watch, image)
+    await _still(bench, watch, image)
+    if await _echoes_positions(watch, image):
+        await _echo(bench, watch, image)
+        await _spacing(bench, watch, image)
+    else:
+        why = "it echoes no positions while it is not active; run this stage again after stage 3"
+        bench.untold("write.echo", why)
+        bench.untold("write.spacing", why)
+    await watch.write(image)
+    await _echoed(watch, image)
+
+
+async def _same(bench: Bench, watch: Watch, image: Request) -> None:
+    """The image as found, twice; the first clears rGTO if it was left set."""
+    await watch.write(image)
+    before = await watch.pass_by(0.2)
+    await watch.write(image)
+    after = await watch.pass_by(0.5)
+    if _lasting(before) == _lasting(after):
+        bench.as_assumed("write.same", f"still {words_of(after)}")
+    else:
+        found = f"from {words_of(before)} to {words_of(after)}"
+        bench.differs("write.same", found, "Writing has side effects: command nothing, and report this.")
+
+
+def _lasting(status: RobotiqStatus) -> tuple[object, ...]:
+    """What must not change; a position may waver by a count, and 0x09 is shown in passing."""
+    return status.activation_echo, status.initialization, status.mode, status.echo
+
+
+async def _still(bench: Bench, watch: Watch, image: Request) -> None:
+    before = await watch.look()
+    await watch.write(_marked(image, 1))
+    moved: list[str] = []
+
+    def moves(status: RobotiqStatus) -> bool:
+        moved.extend(
+            f"{axis.name} from {before.position(axis)} to {status.position(axis)}"
+            for axis in AXES
+            if abs(status.position(axis) - before.position(axis)) > 1
+        )
+        return bool(moved)
+
+    if await watch.until(moves, STILL_S) is None:
+        bench.as_assumed("write.still", f"nothing has moved within {STILL_S:g} s")
+    else:
+        await watch.write(image)
+        follows = "Keep away from the fingers, and report this: a stop may be none."
+        bench.differs("write.still", f"with rGTO = 0 {', '.join(moved)}", follows)
+
+
+async def _echoes_positions(watch: Watch, image: Request) -> bool:
+    marked = _marked(image, 2)
+    await asyncio.sleep(APART_S)
+    await watch.write(marked)
+    return await watch.until(lambda status: status.echo == marked.echo, LONGEST_ECHO_S) is not None
+
+
+async def _echo(bench: Bench, watch: Watch, image: Request) -> None:
+    """From the acknowledgement to the asking of the first read that shows the echo."""
+    times, lost = list[float](), 0
+    for number in range(PROBES):
+        await asyncio.sleep(APART_S)
+        marked = _marked(image, number)
+        acknowledged = await watch.write(marked)
+        if await _echoed(watch, marked, interval=0.001) is None:
+            lost += 1
+        else:
+            times.append(bench.link.asked - acknowledged)
+    if not times:
+        bench.untold("write.echo", f"none of {PROBES} images was echoed within {LONGEST_ECHO_S:g} s")
+        return
+    times.sort()
+    p50, worst = percentile(times, 0.5), times[-1]
+    figures: dict[str, Figure] = {
+        "p50_ms": 1000 * p50,
+        "worst_ms": 1000 * worst,
+        "lost": lost,
+        "probes": PROBES,
+    }
+    found = f"after {1000 * p50:.0f} ms, at most {1000 * worst:.0f} ms"
+    if not lost and p50 <= ECHO_S:
+        bench.as_assumed("write.echo", found, **figures)
+    else:
+        found += f"; {lost} of {PROBES} never" if lost else ""
+        follows = "Nothing is to be set: a hand goes by the echo. Commands and stops begin so much later."
+        bench.differs("write.echo", found, follows, **figures)
+
+
+async def _echoed(watch: Watch, image: Request, interval: float | None = None) -> RobotiqStatus | None:
+    return await watch.until(lambda status: status.echo == image.echo, LONGEST_ECHO_S, interval)
+
+
+async def _spacing(bench: Bench, watch: Watch, image: Request) -> None:
+    """Pairs of images, closer and closer: does the second act?"""
+    loop, kept = asyncio.get_running_loop(), list[Figure]()
+    enough: list[float] = []
+    for gap in reversed(GAPS_S):
+        acted, apart = 0, 0.0
+        for number in range(PAIRS):
+            await asyncio.sleep(APART_S)
+            began = loop.time()
+            await watch.write(_marked(image, 2 * number))
+            await asyncio.sleep(max(0.0, began + gap - loop.time()))
+            apart = max(apart, loop.time() - began)
+            second = _marked(image, 2 * number + 1)
+            await watch.write(second, spaced=False)
+            shown = await watch.until(lambda status, image=second: status.echo == image.echo, 0.3)  # type: ignore[misc]
+            acted += shown is not None
+        kept.append([1000 * gap, 1000 * apart, acted])
+        if acted == PAIRS:
+            enough.append(gap)
+    _judge_spacing(bench, kept, enough)
+
+
+def _judge_spacing(bench: Bench, kept: list[Figure], enough: list[float]) -> None:
+    if len(enough) == len(GAPS_S):
+        bench.as_assumed("write.spacing", f"all {PAIRS} pairs at each distance", gap_apart_acted=kept)
+        return
+    forgotten = max(set(GAPS_S) - set(enough))
+    found = f"writes that follow within {1000 * forgotten:.0f} ms are acknowledged and forgotten"
+    if forgotten < WRITE_SPACING_S:
+        spacing = WRITE_SPACING_S
+        follows = "The usual write_spacing is enough; other programs that write faster lose commands."
+    else:
+        spacing = min(LONGEST_SPACING_S, 2 * forgotten)
+        follows = "Leave more time between writes."
+    bench.spacing = max(bench.spacing, spacing)
+    bench.differs("write.spacing", found, follows, {"write_spacing": round(spacing, 3)}, gap_apart_acted=kept)
+
+
+def _marked(image: Request, number: int) -> Request:
+    """The image with another position request of finger A, by which its echo is known."""
+    position = image.position(Finger.A)
+    step = 1 + number % 20
+    return image.with_positions({Finger.A: position - step if position > 127 else position + step})

@@ -1,0 +1,209 @@
+"""Watches over a stage that moves: the person, the fingers' range, the time, faults and other clients.
+
+Every look can end the stage. What ends it raises; the runner then stops the fingers.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from ...values.enums import AXES, Fault, Finger
+from ...values.request import Request
+from ...values.status import RobotiqStatus
+from .endings import EndError
+from .person import Person
+from .recorded_link import RecordedLink
+
+Envelope = Mapping[Finger, tuple[int, int]]
+"""The lowest and the highest position that each axis may have."""
+
+ANYWHERE: Final[Envelope] = dict.fromkeys(AXES, (0, 255))
+LASTING: Final = 3
+"""Reads in which 0x09 must be seen to be a fault: siblings show it once after a second of silence."""
+SLICE_S: Final = 0.05
+"""While nothing may be sent the person is looked at so often."""
+STILL_S: Final = 0.15
+"""What has not moved for so long stands: at the slowest speed a count takes 43 ms (thesis, table A1.1)."""
+LIMITS: Final = 20, 225
+"""A request beyond may be echoed as a software limit (drivers keep the scissor within 15..232)."""
+
+
+class Watch:
+    """Looks after one stage.
+
+    Attributes:
+        envelope: where each axis may be; changed by the stage before each motion.
+        needs_active: whether the gripper must be active.
+        bears_faults: whether faults are what the stage is about.
+        last: the newest status.
+    """
+
+    def __init__(
+        self, link: RecordedLink, person: Person, *, seconds: float, interval: float, spacing: float
+    ) -> None:
+        """Begin.
+
+        Args:
+            link: to the gripper.
+            person: is asked before every exchange whether to stop.
+            seconds: for the whole stage.
+            interval: seconds between two reads.
+            spacing: seconds from one write to the next.
+        """
+        self.envelope = ANYWHERE
+        self.needs_active = True
+        self.bears_faults = False
+        self.last: RobotiqStatus | None = None
+        self._link = link
+        self._person = person
+        self._interval = interval
+        self._spacing = spacing
+        self._seconds = seconds
+        self._loop = asyncio.get_running_loop()
+        self._until = self._loop.time() + seconds
+        self._not_ready = 0
+
+    async def look(self) -> RobotiqStatus:
+        """Read, and see that all is well.
+
+        Raises:
+            EndError: it is not.
+            RobotiqConnectionError: the link failed.
+        """
+        self.heed()
+        status = self.last = await self._link.read()
+        self.heed()
+        self._check(status)
+        return status
+
+    async def write(self, request: Request, *, spaced: bool = True) -> float:
+        """Write an image unless the person has stopped; returns when it was acknowledged.
+
+        Args:
+            request: the image.
+            spaced: whether to wait until the last write is long enough ago to be kept.
+
+        Raises:
+            EndError: they have, or the time is over.
+            RobotiqConnectionError: the link failed.
+        """
+        self.heed()
+        due = self._link.wrote + self._spacing if spaced else 0.0
+        if (left := due - self._loop.time()) > 0:
+            await self.rest(left)
+        return await self._link.write(request)
+
+    async def until(
+        self, is_so: Callable[[RobotiqStatus], bool], seconds: float, interval: float | None = None
+    ) -> RobotiqStatus | None:
+        """Look again and again until something is so; None if it is not within some seconds."""
+        end = self._loop.time() + seconds
+        while True:
+            began = self._loop.time()
+            status = await self.look()
+            if is_so(status):
+                return status
+            if self._loop.time() >= end:
+                return None
+            await asyncio.sleep(max(0.0, began + (interval or self._interval) - self._loop.time()))
+
+    async def pass_by(self, seconds: float) -> RobotiqStatus:
+        """Look for some seconds; returns the last status."""
+        await self.until(lambda _: False, seconds)
+        assert self.last is not None
+        return self.last
+
+    async def until_still(self, seconds: float) -> RobotiqStatus | None:
+        """Look until no axis has moved for a while; None if one moves all the time."""
+        positions: list[int] = []
+        since = self._loop.time()
+
+        def stands(status: RobotiqStatus) -> bool:
+            nonlocal positions, since
+            now = [status.position(axis) for axis in AXES]
+            if now != positions:
+                positions, since = now, self._loop.time()
+            return self._loop.time() - since >= STILL_S
+
+        return await self.until(stands, seconds)
+
+    async def rest(self, seconds: float) -> None:
+        """Ask nothing of the gripper for some seconds; the person still stops it.
+
+        Raises:
+            EndError: they do.
+        """
+        end = self._loop.time() + seconds
+        while (left := end - self._loop.time()) > 0:
+            self.heed()
+            await asyncio.sleep(min(SLICE_S, left))
+        self.heed()
+
+    def heed(self) -> None:
+        """See whether the person has stopped, or the time is over.
+
+        Raises:
+            EndError: so it is.
+        """
+        if self._person.has_stopped:
+            raise EndError("stopped", "a key was pressed, or the terminal was closed")
+        if self._loop.time() > self._until:
+            raise EndError("time", f"the stage was not over within {self._seconds:g} s")
+
+    # -- what a status tells ---------------------------------------------------------------------------------
+
+    def _check(self, status: RobotiqStatus) -> None:
+        if not self.bears_faults:
+            self._check_fault(status)
+        if self.needs_active and not status.is_activated:
+            raise EndError("inactive", f"the gripper is not active any more: it reads {words_of(status)}")
+        for axis, (low, high) in self.envelope.items():
+            if not low <= status.position(axis) <= high:
+                where = f"{axis.name} is at {status.position(axis)}, and may be in {low}..{high} only"
+                raise EndError("envelope", where)
+        self._check_echo(status)
+
+    def _check_fault(self, status: RobotiqStatus) -> None:
+        fault = status.fault
+        self._not_ready = self._not_ready + 1 if fault is Fault.COMMUNICATION_NOT_READY else 0
+        passes = fault is Fault.COMMUNICATION_NOT_READY and self._not_ready < LASTING
+        if fault.is_serious and not passes:
+            raise EndError("fault", f"0x{int(fault):02X} {fault.name}: {fault.description}")
+
+    def _check_echo(self, status: RobotiqStatus) -> None:
+        expected = self._link.expected()
+        # Whether a gripper that is not active echoes positions, no source says.
+        size = len(status.echo) if status.is_activated else 2
+        if expected and not any(_may_echo(each[:size], status.echo[:size]) for each in expected):
+            found = (
+                f"rACT, rGTO and positions {show_echo(status.echo)}, and this wrote {show_echo(expected[-1])}"
+            )
+            why = "another client commands the gripper, or it has forgotten a write"
+            raise EndError("foreign", f"{why}: it echoes {found}")
+
+
+def _may_echo(asked: tuple[int, ...], shown: tuple[int, ...]) -> bool:
+    """Whether an echo is that of a request; one beyond a limit may be shown as the limit."""
+    return asked[:2] == shown[:2] and all(
+        wanted == got or wanted <= got <= LIMITS[0] or LIMITS[1] <= got <= wanted
+        for wanted, got in zip(asked[2:], shown[2:], strict=True)
+    )
+
+
+def show_echo(echo: tuple[int, ...]) -> str:
+    """An echo for a sentence."""
+    return ", ".join(str(int(each)) for each in echo)
+
+
+def words_of(status: RobotiqStatus) -> str:
+    """What a status says, for a person."""
+    if status.is_activated:
+        words = "active"
+    else:
+        words = "activating or changing its mode" if status.activation_echo else "not active"
+    go = "rGTO is set" if status.go_echo else "rGTO is clear"
+    where = ", ".join(f"{axis.name} {status.position(axis)}" for axis in AXES)
+    fault = "" if status.fault is Fault.NONE else f", fault 0x{int(status.fault):02X}"
+    return f"{words}{fault}, {go}, positions {where}"

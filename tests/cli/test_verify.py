@@ -1,0 +1,198 @@
+"""``robotiq-async verify``: who may be asked, and what keys do while fingers move."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from robotiq_async.cli.keyboard import AGREE, wrapped
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.tools.verify.stages import STAGES
+from robotiq_async.values.registers import rACT, rGTO
+from tests.cli.terminal import Terminal
+
+if TYPE_CHECKING:
+    from tests.cli.conftest import Call
+
+WITHOUT_TERMINAL = "without a terminal"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["127.0.0.1"], WITHOUT_TERMINAL),
+        (["127.0.0.1", "--yes-to", "2"], WITHOUT_TERMINAL),
+        (["127.0.0.1", "--up-to", "3", "--yes-to", "3"], WITHOUT_TERMINAL),
+        (["127.0.0.1", "--up-to", "2", "--yes-to", "1"], WITHOUT_TERMINAL),
+        (["127.0.0.1", "--up-to", "1", "--yes-to", "2", "--from", "2"], "--from"),
+        (["127.0.0.1", "--up-to", "2", "--yes-to", "9"], "--yes-to"),
+        (["127.0.0.1", "--up-to", "10"], "0..9"),
+        (["127.0.0.1", "--from", "-1"], "0..9"),
+        (["300.1.1.1", "--up-to", "2", "--yes-to", "2"], "300.1.1.1"),
+        (["zenoh://lab/cell/left", "--up-to", "2", "--yes-to", "2"], "agent"),
+        ([], "ADDRESS"),
+    ],
+)
+def test_what_it_refuses_before_anything_is_opened(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], words: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    call("verify", *arguments).assert_failed(2, words)
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_the_extra_nothing_is_sent(
+    call: Call, there: SimulatorServer, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("robotiq_async.cli.arguments.find_spec", lambda _: None)
+    arguments = ("--up-to", "2", "--yes-to", "2", "--report", str(tmp_path / "report"))
+    call("verify", there.address, *arguments).assert_failed(1, "mcap", "extra record")
+    assert not there.gripper.writes
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_sent(
+    call: Call, there: SimulatorServer, tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("")
+    where = str(tmp_path / "file" / "report")
+    outcome = call("verify", there.address, "--up-to", "2", "--yes-to", "2", "--report", where)
+    outcome.assert_failed(1, "nothing was sent")
+    assert not there.gripper.writes
+
+
+def test_nobody_there_is_one_line_and_a_report(call: Call, tmp_path: Path) -> None:
+    where = tmp_path / "report"
+    outcome = call("verify", "127.0.0.1:1", "--up-to", "2", "--yes-to", "2", "--report", str(where))
+    outcome.assert_failed(1, "refused")
+    assert "could not be judged" in outcome.out
+    assert {path.name for path in where.iterdir()} == {"report.json", "report.md", "recording.mcap"}
+
+
+def test_stages_that_move_nothing_run_without_a_person(call: Call, tmp_path: Path) -> None:
+    """Against the gripper of sim://."""
+    outcome = call("verify", "sim://", "--up-to", "0", "--yes-to", "0", "--report", str(tmp_path / "report"))
+    outcome.assert_succeeded()
+    assert "can be used as it is, as far as stage 0 can tell" in outcome.out.replace("\n", " ")
+
+
+@pytest.mark.parametrize("columns", [40, 60, 100])
+@pytest.mark.parametrize("stage", STAGES, ids=lambda stage: str(stage.number))
+def test_a_stage_is_told_within_the_width_of_the_terminal(stage: object, columns: int) -> None:
+    text = wrapped(f"{stage.as_text()}\n{AGREE}", columns)  # type: ignore[attr-defined]
+    assert all(len(line) < columns for line in text.splitlines())
+    assert text.split() == f"{stage.as_text()}\n{AGREE}".split()  # type: ignore[attr-defined]
+
+
+def test_what_moves_is_told_with_all_that_a_person_must_know() -> None:
+    for stage in STAGES:
+        assert stage.moves
+        assert stage.lasts
+        if stage.is_moving:
+            assert stage.how_far
+            assert stage.how_fast
+            assert stage.clear
+    assert [stage.number for stage in STAGES if stage.is_moving] == list(range(3, 10))
+
+
+# -- at a terminal -----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+async def served() -> AsyncIterator[SimulatorServer]:
+    async with SimulatorServer(SimulatedGripper()) as server:
+        yield server
+
+
+def at_terminal(server: SimulatorServer, folder: Path, *arguments: str) -> Terminal:
+    where = ("--report", str(folder / "report"))
+    return Terminal("-m", "robotiq_async", "verify", server.address, *arguments, *where)
+
+
+async def moving(server: SimulatorServer) -> None:
+    async with asyncio.timeout(20):
+        while not server.gripper.is_moving:  # noqa: ASYNC110  # a gripper has no event for it
+            await asyncio.sleep(0.02)
+
+
+async def stood(server: SimulatorServer) -> None:
+    """The fingers stand, in a moment, and what was written last stops them."""
+    async with asyncio.timeout(2):
+        while server.gripper.is_moving:  # noqa: ASYNC110  # a gripper has no event for it
+            await asyncio.sleep(0.02)
+    image = server.gripper.writes[-1].registers
+    assert not rGTO.read(image)
+    assert not rACT.read(image)
+
+
+async def test_enter_begins_and_any_other_key_ends(served: SimulatorServer, tmp_path: Path) -> None:
+    terminal = at_terminal(served, tmp_path, "--up-to", "1")
+    await terminal.shows(b"Stage 0")
+    terminal.press("\n")
+    await terminal.shows(b"Stage 1")
+    terminal.press("y")
+    assert await terminal.end() == 1
+    assert b"declined" in terminal.out
+    assert (tmp_path / "report" / "report.md").exists()
+    assert not served.gripper.writes
+
+
+async def test_what_was_typed_before_the_question_is_no_answer(
+    served: SimulatorServer, tmp_path: Path
+) -> None:
+    terminal = at_terminal(served, tmp_path, "--from", "3", "--up-to", "3")
+    await terminal.shows(b"Gripper tcp")
+    terminal.press("\n\n\n")
+    await terminal.shows(b"Stage 3")
+    await asyncio.sleep(0.5)
+    assert not served.gripper.writes
+    terminal.press("n")
+    assert await terminal.end() == 1
+
+
+KEYS: dict[str, Callable[[Terminal], object]] = {
+    "space": lambda terminal: terminal.press(" "),
+    "Enter": lambda terminal: terminal.press("\n"),
+    "Ctrl-Z": lambda terminal: terminal.press("\x1a"),
+    "Ctrl-backslash": lambda terminal: terminal.press("\x1c"),
+    "Ctrl-S": lambda terminal: terminal.press("\x13"),
+    "Ctrl-D": lambda terminal: terminal.press("\x04"),
+    "Ctrl-C": lambda terminal: terminal.press("\x03"),
+    "SIGTERM": lambda terminal: terminal.kill(signal.SIGTERM),
+    "closed": lambda terminal: terminal.hang_up(),
+}
+
+
+@pytest.mark.parametrize("key", KEYS)
+async def test_whatever_the_person_does_stops_the_fingers(
+    served: SimulatorServer, tmp_path: Path, key: str
+) -> None:
+    terminal = at_terminal(served, tmp_path, "--from", "3", "--up-to", "3")
+    await terminal.shows(b"Stage 3")
+    terminal.press("\n")
+    await moving(served)
+    KEYS[key](terminal)
+    await stood(served)
+    assert await terminal.end() != 0
+    text = (tmp_path / "report" / "report.json").read_text()
+    assert '"why": "interrupted"' in text or '"why": "stopped"' in text
+
+
+async def test_a_terminal_that_shows_nothing_does_not_keep_the_fingers_moving(
+    served: SimulatorServer, tmp_path: Path
+) -> None:
+    """As after Ctrl-S somewhere on the way, or over a network that stands still."""
+    terminal = at_terminal(served, tmp_path, "--from", "3", "--up-to", "3")
+    await terminal.shows(b"Stage 3")
+    terminal.press("\n")
+    await moving(served)
+    terminal.stop_reading()
+    terminal.press("x")
+    await stood(served)
+    terminal.read_on()
+    assert await terminal.end() == 1

@@ -1,0 +1,29 @@
+"""The tables of docs/verify-under-trouble.md."""
+
+from __future__ import annotations
+
+import re
+
+from tests.docs.pages import DOCS
+
+PAGE = DOCS / "verify-under-trouble.md"
+
+
+def rows(heading: str) -> list[list[str]]:
+    """The cells of the table under a heading, without its head."""
+    section = PAGE.read_text(encoding="utf-8").partition(f"## {heading}\n")[2].partition("\n## ")[0]
+    lines = [line for line in section.splitlines() if line.startswith("|")]
+    return [[cell.strip().strip("`") for cell in line.strip("|").split("|")] for line in lines[2:]]
+
+
+HABITS = rows("A gripper with another habit")
+EVENTS = [
+    (trouble, stage, cell)
+    for trouble, *cells in rows("Something happens in a stage")
+    for stage, cell in enumerate(cells, 1)
+]
+
+
+def options(cell: str) -> dict[str, float]:
+    """Those of a cell."""
+    return {name: float(value) for name, value in re.findall(r"(\w+)=([0-9.]+)", cell)}

@@ -1,0 +1,180 @@
+"""Persons beside a simulated gripper, and runs with them."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
+from typing import Any
+
+from robotiq_async.link.address import parse_address
+from robotiq_async.simulator import RtuOverTcpSimulatorServer, SimulatedGripper, SimulatorServer, Trouble
+from robotiq_async.tools.verify import ENTER, Lengths, Plan, Report, Runner, Verdict
+from robotiq_async.tools.verify.catalogue import CATALOGUE, LAST
+from robotiq_async.tools.verify.recorded_link import Frame
+from robotiq_async.tools.verify.stages import loss, soft_part
+from robotiq_async.values.enums import Finger
+from tests.grippers import activate_beforehand
+
+SHORT = Lengths(reads=50, idle=(0.5, 1.0, 1.5, 5.0), alone=(10.0,), soak=10.0, commands=1.0)
+FOAM = 120
+"""Where the fingers meet it."""
+
+
+@contextlib.asynccontextmanager
+async def threads() -> AsyncIterator[None]:
+    """Let threads come to their end in a virtual loop, to which a wait for one is a wait for nothing."""
+
+    async def turn() -> None:
+        while True:  # noqa: ASYNC110  # threads say nothing to a virtual clock
+            await asyncio.sleep(0.001)
+
+    turning = asyncio.ensure_future(turn())
+    try:
+        yield
+    finally:
+        turning.cancel()
+
+
+class Roll:
+    """Takes frames, in memory."""
+
+    failure = ""
+
+    def __init__(self) -> None:
+        self.frames: list[Frame] = []
+        self.stages: list[int] = []
+
+    def keep(self, frame: Frame) -> None:
+        self.frames.append(frame)
+
+    def begin(self, stage: int) -> None:
+        self.stages.append(stage)
+
+    def written(self) -> list[tuple[int, ...]]:
+        return [frame.registers for frame in self.frames if frame.registers and frame.kind != "status"]
+
+
+class Helper:
+    """Agrees to everything, names the finger that really moved, and does what is asked for by hand.
+
+    Attributes:
+        asked: what it was asked.
+        alarms: what it was warned of.
+        has_stopped: whether a key was pressed.
+        is_guarding: whether a key would stop the fingers.
+        before: is called with every question; what it returns, if anything, is the answer.
+    """
+
+    def __init__(self, server: SimulatorServer) -> None:
+        self.asked: list[str] = []
+        self.told: list[str] = []
+        self.alarms: list[str] = []
+        self.has_stopped = False
+        self.is_guarding = False
+        self.before: Callable[[str], object] = lambda _: None
+        self._server = server
+        self._travel = dict.fromkeys(Finger.ALL, 0.0)
+
+    def tell(self, words: str) -> None:
+        assert not self.is_guarding, f"said while fingers may move: {words}"
+        self.told.append(words)
+
+    def alarm(self, words: str) -> None:
+        self.alarms.append(words)
+
+    async def consents(self, words: str) -> bool:
+        self.asked.append(words)
+        answer = self.before(words)
+        if answer is not None:
+            return bool(answer)
+        if words == soft_part.PLACE:
+            self._server.gripper.place_object(Finger.ABC, FOAM)
+        elif words == soft_part.RELEASE:
+            self._server.gripper.remove_object(Finger.ABC)
+        return True
+
+    async def chooses(self, question: str, answers: Mapping[str, str]) -> str | None:
+        assert answers
+        self.asked.append(question)
+        answer = self.before(question)
+        if isinstance(answer, str):
+            return answer
+        if question == soft_part.STAYS:
+            return "y" if self._server.gripper.holds else "n"
+        if question == loss.CABLE:
+            await self._meanwhile(Trouble("refuse"))
+        elif question == loss.ESTOP:
+            await self._meanwhile(Trouble("e-stop"))
+        elif question == loss.POWER:
+            await self._meanwhile(Trouble("power-cut"))
+        elif "Which finger" in question:
+            return self._which()
+        return ENTER
+
+    @contextlib.contextmanager
+    def guarding(self) -> Iterator[None]:
+        self.is_guarding = True
+        self._look()
+        try:
+            yield
+        finally:
+            self.is_guarding = False
+
+    async def _meanwhile(self, trouble: Trouble) -> None:
+        async with self._server.fault_injector.making(trouble):
+            await asyncio.sleep(5)
+
+    def _look(self) -> None:
+        self._travel = {axis: self._server.gripper.travel(axis) for axis in Finger.ALL}
+
+    def _which(self) -> str:
+        gone = {axis: self._server.gripper.travel(axis) - self._travel[axis] for axis in Finger.ALL}
+        axis = max(gone, key=lambda axis: gone[axis])
+        return {Finger.A: "a", Finger.B: "p", Finger.C: "o", Finger.SCISSOR: "s"}[axis]
+
+
+@contextlib.asynccontextmanager
+async def served(
+    *troubles: str, active: bool = False, serial: bool = False, **options: Any
+) -> AsyncIterator[SimulatorServer]:
+    """A gripper in the loop's time, on TCP or on a paced serial line, with what goes wrong all the time."""
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, **options)
+    make = RtuOverTcpSimulatorServer if serial else SimulatorServer
+    async with make(gripper) as server:
+        if active:
+            await activate_beforehand(gripper)
+        for words in troubles:
+            kind, _, value = words.partition(" ")
+            await server.fault_injector.begin(Trouble(kind, float(value) if value else None))
+        yield server
+
+
+async def verified(
+    server: SimulatorServer,
+    helper: Helper | None = None,
+    roll: Roll | None = None,
+    *,
+    save: Callable[[Report], Awaitable[None] | None] = lambda _: None,
+    **plan: Any,
+) -> Report:
+    """A run to its end."""
+    wanted: dict[str, Any] = {"last": LAST, "lengths": SHORT} | plan
+    runner = Runner(
+        Plan(parse_address(server.address), **wanted), helper or Helper(server), roll or Roll(), save
+    )
+    async with asyncio.timeout(3600):
+        return await runner.run()
+
+
+def differing(report: Report) -> dict[str, dict[str, int | float]]:
+    """The checks that differ, and the options that each names."""
+    return {check.name: dict(check.options) for check in report.differing}
+
+
+def assert_as_assumed(report: Report) -> None:
+    """Every check of the stages that ran ended well."""
+    assert report.why == "done", report.words
+    wrong = {name: check for name, check in report.checks.items() if check.verdict is not Verdict.AS_ASSUMED}
+    assert not wrong
+    assert report.checks.keys() == {name for name, each in CATALOGUE.items() if each.stage in report.stages}

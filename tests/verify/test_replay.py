@@ -1,0 +1,138 @@
+"""A recording is replayed against the simulator and the decoder: ``python -m tests.hardware``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.writer import Writer
+
+from robotiq_async.link.address import parse_address
+from robotiq_async.simulator.physics.habits import Habits
+from robotiq_async.simulator.troubles.like_hardware import LIKE_HARDWARE, OWN_HABITS
+from robotiq_async.tools.recording.recordings import read_recording
+from robotiq_async.tools.verify import Plan, Runner
+from robotiq_async.tools.verify.files import Folder
+from robotiq_async.tools.verify.recording import NAME
+from tests import hardware
+from tests.verify.people import SHORT, Helper, served, threads
+from tests.virtual import run
+
+Change = Callable[[str, dict[str, Any]], None]
+
+
+async def record(folder: Path, *, like_hardware: bool = False, last: int = 6) -> None:
+    troubles = [habit.kind for habit in LIKE_HARDWARE] if like_hardware else []
+    habits = OWN_HABITS if like_hardware else None
+    async with served(*troubles, habits=habits) as server, threads():
+        address = parse_address(server.address)
+        into = Folder(folder, address)
+        plan = Plan(address, last=last, lengths=SHORT)
+        report = await Runner(plan, Helper(server), into.recording, into.save).run()
+        assert report.why == "done"
+        assert not await into.end(report)
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("plain")
+    run(lambda: record(folder))
+    return folder / NAME
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Up to the activation."""
+    folder = tmp_path_factory.mktemp("short")
+    run(lambda: record(folder, last=3))
+    return folder / NAME
+
+
+@pytest.fixture(scope="module")
+def hardware_like(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("like hardware")
+    run(lambda: record(folder, like_hardware=True))
+    return folder / NAME
+
+
+def changed(source: Path, target: Path, change: Change) -> Path:
+    """A copy of a recording in which each message has passed through a function."""
+    with open(target, "wb") as file:
+        writer = Writer(file)
+        writer.start()
+        channels: dict[str, int] = {}
+        for entry in read_recording(source):
+            if entry.topic not in channels:
+                channels[entry.topic] = writer.register_channel(entry.topic, "json", 0)
+            fields = json.loads(entry.data)
+            change(entry.topic, fields)
+            stamp = entry.nanoseconds
+            writer.add_message(
+                channels[entry.topic], stamp, json.dumps(fields).encode(), stamp, entry.sequence
+            )
+        writer.finish()  # type: ignore[no-untyped-call]
+    return target
+
+
+def test_a_recorded_simulation_differs_in_nothing(plain: Path, hardware_like: Path) -> None:
+    assert hardware.main([str(plain), "--plain"]) == 0
+    assert hardware.main([str(hardware_like)]) == 0
+
+
+def test_habits_that_the_simulator_has_not_are_listed(hardware_like: Path) -> None:
+    found = list(hardware.differences(str(hardware_like), Habits()))
+    assert {"gDTA", "gFLT", "gPRA"} <= {each.field for each in found}
+    assert {each.stage for each in found if each.field == "gFLT"} == {1}
+    assert {each.stage for each in found if each.field == "gPRA"} == {2}
+
+
+@pytest.mark.parametrize(
+    ("register", "bits", "field"),
+    [
+        (0, 0x0100, "gACT"),
+        (0, 0x0800, "gGTO"),
+        (0, 0x2000, "gIMC"),
+        (0, 0x8000, "gSTA"),
+        (0, 0x0002, "gDTA"),
+        (0, 0x0080, "gDTS"),
+        (1, 0x0A00, "gFLT"),
+        (1, 0x0040, "gPRA"),
+        (2, 0x4000, "gPOA"),
+        (3, 0x0040, "gPOB"),
+        (6, 0x4000, "gPRS"),
+        (6, 0x0040, "gPOS"),
+    ],
+)
+def test_a_frame_that_was_changed_by_hand_is_listed_and_no_other(
+    short: Path, tmp_path: Path, register: int, bits: int, field: str
+) -> None:
+    """The first status of stage 3, which still shows a gripper that is reset."""
+    left = [0]
+
+    def change(topic: str, fields: dict[str, Any]) -> None:
+        if fields.get("target") == "verify stage 3":
+            left[0] = 1
+        elif topic == "/gripper/status" and left[0]:
+            left[0] += 1
+            if left[0] == 2:
+                fields["registers"][register] ^= bits
+
+    found = list(hardware.differences(str(changed(short, tmp_path / "changed.mcap", change)), Habits()))
+    assert {each.stage for each in found} == {3}
+    assert {each.field for each in found} - {"decoder"} == {field}
+    assert len({each.seconds for each in found}) == 1
+
+
+def test_what_the_decoder_understands_otherwise_is_listed(short: Path, tmp_path: Path) -> None:
+    seen = [0]
+
+    def change(topic: str, fields: dict[str, Any]) -> None:
+        seen[0] += topic == "/gripper/status"
+        if seen[0] == 100 and topic == "/gripper/status":
+            fields["is_activated"] = not fields["is_activated"]
+
+    found = list(hardware.differences(str(changed(short, tmp_path / "changed.mcap", change)), Habits()))
+    assert [each.field for each in found] == ["decoder"]

@@ -1,0 +1,128 @@
+"""Each trouble alone is found as what it is: the tables of docs/verify-under-trouble.md, row by row."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable
+
+import pytest
+
+from robotiq_async.link.address import parse_address
+from robotiq_async.simulator import SimulatorServer, Trouble
+from robotiq_async.simulator.troubles.like_hardware import LIKE_HARDWARE, OWN_HABITS
+from robotiq_async.tools.verify import Plan, Report, Runner
+from robotiq_async.tools.verify.catalogue import CATALOGUE, HARMLESS
+from robotiq_async.values.registers import rGTO
+from tests.verify.matrix import EVENTS, HABITS, options
+from tests.verify.people import SHORT, Helper, Roll, assert_as_assumed, differing, served, verified
+
+pytestmark = pytest.mark.virtual_time
+
+
+@pytest.mark.parametrize(("trouble", "check", "option", "ending"), HABITS)
+async def test_a_habit_is_found_and_nothing_else(trouble: str, check: str, option: str, ending: str) -> None:
+    async with served(*([] if trouble == "none" else [trouble])) as server:
+        helper = Helper(server)
+        report = await verified(server, helper)
+        assert not server.gripper.is_moving
+    assert report.why == ending, report.words
+    assert differing(report) == ({} if check == "-" else {check: options(option)})
+    assert report.options == options(option)
+    if ending == "done":
+        assert not report.untold
+        assert report.checks.keys() == CATALOGUE.keys()
+    assert not helper.alarms
+
+
+async def test_a_gripper_like_hardware_has_its_three_habits() -> None:
+    async with served(*(habit.kind for habit in LIKE_HARDWARE), habits=OWN_HABITS) as server:
+        report = await verified(server)
+    assert report.why == "done", report.words
+    assert differing(report).keys() == {"read.silence", "write.spacing", "axis.lag"}
+    assert not report.untold
+
+
+@pytest.mark.parametrize("first", range(10))
+async def test_every_stage_can_be_the_first(first: int) -> None:
+    """One that was activated before, and left without rGTO."""
+    async with served(active=first > 3) as server:
+        report = await verified(server, first=first, last=max(first, 3))
+        assert_as_assumed(report)
+
+
+class Cue(Roll):
+    """Lets something happen after so many frames of a stage, and knows what was written from then on."""
+
+    def __init__(self, count: int, act: Callable[[], object]) -> None:
+        super().__init__()
+        self._left = count
+        self._act = act
+        self._at = 0
+
+    def keep(self, frame: object) -> None:
+        super().keep(frame)  # type: ignore[arg-type]
+        if self.stages:
+            self._left -= 1
+            if self._left == 0:
+                self._at = len(self.frames)
+                self._act()
+
+    def written_after(self) -> list[tuple[int, ...]]:
+        frames = self.frames[self._at :]
+        return [frame.registers for frame in frames if frame.registers and frame.kind != "status"]
+
+
+async def with_trouble(
+    server: SimulatorServer, helper: Helper, trouble: str, stage: int
+) -> tuple[Report, Cue]:
+    """A run of one stage in the middle of which something happens."""
+    begun: list[asyncio.Future[object]] = []
+
+    def act() -> None:
+        kind, _, value = trouble.partition(" ")
+        if trouble == "a key":
+            helper.has_stopped = True
+        elif trouble == "Ctrl-C":
+            running.cancel()
+        else:
+            what = Trouble(kind, float(value) if value else None)
+            begun.append(asyncio.ensure_future(server.fault_injector.begin(what)))
+
+    cue = Cue(25, act)
+    plan = Plan(parse_address(server.address), first=stage, last=stage, lengths=SHORT)
+    runner = Runner(plan, helper, cue, lambda _: None)
+    running = asyncio.ensure_future(runner.run())
+    with contextlib.suppress(asyncio.CancelledError):
+        await running
+    assert trouble in ("a key", "Ctrl-C") or begun, "the stage was over before it began"
+    await asyncio.gather(*begun)
+    return runner.report, cue
+
+
+@pytest.mark.parametrize(("trouble", "stage", "cell"), EVENTS)
+async def test_what_happens_in_a_stage_ends_it(trouble: str, stage: int, cell: str) -> None:
+    async with served(active=stage > 3) as server:
+        helper = Helper(server)
+        report, cue = await with_trouble(server, helper, trouble, stage)
+        assert report.why == cell.rstrip("!"), report.words
+        assert bool(helper.alarms) == cell.endswith("!")
+        if not cell.endswith("!"):
+            assert not server.gripper.is_moving
+        if stage >= HARMLESS and report.why != "done":
+            assert cue.written_after() or helper.alarms, "nothing was written after it"
+            assert not any(rGTO.read(image) for image in cue.written_after())
+
+
+@pytest.mark.parametrize("stage", range(3, 10))
+async def test_a_key_stops_a_gripper_that_forgets_writes_and_shows_them_late(stage: int) -> None:
+    """What was written last may be a moment ago: the stop is written again until it shows."""
+    habits = ("write-spacing 0.05", "status-lag 0.1", "slow-device 0.1")
+    async with served(*habits, active=stage > 3) as server:
+        helper = Helper(server)
+        report, cue = await with_trouble(server, helper, "a key", stage)
+        assert report.why == "stopped", report.words
+        assert not server.gripper.is_moving
+        assert not any(rGTO.read(image) for image in cue.written_after())
+        assert report.last is not None
+        assert not report.last.go_echo
