@@ -12,8 +12,8 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
+from contextlib import suppress
 from types import TracebackType
 from typing import Any, Final, Self
 
@@ -21,6 +21,7 @@ from ..runtime.concurrency import in_a_thread
 
 ENTER: Final = "\n"
 END: Final = "q"
+PROMPT: Final = "> "
 WIDEST: Final = 100
 """Columns that a line of text takes at most."""
 AGREE: Final = "Enter goes on; any other key ends with the report so far."
@@ -91,8 +92,14 @@ class Keyboard:
         return self._was_pressed or self._is_gone
 
     def tell(self, words: str) -> None:
-        """Print."""
-        print(wrapped(words), flush=True)
+        """Print; a terminal that is gone is noticed."""
+        self._print(f"{wrapped(words)}\n")
+
+    def _print(self, text: str) -> None:
+        try:
+            print(text, end="", flush=True)
+        except OSError:
+            self._is_gone = True
 
     def alarm(self, words: str) -> None:
         """Print from a thread: a terminal that takes nothing must not keep the loop."""
@@ -116,25 +123,21 @@ class Keyboard:
             if key in (END, ""):
                 return None
 
-    @contextmanager
-    def guarding(self) -> Iterator[None]:
-        """Keys count from the last answer on: there is nothing to begin."""
-        yield
-
     async def _key(self) -> str:
         """The next key; empty when the terminal is gone. What was typed before counts for nothing."""
         import termios
 
-        if self._is_gone:
-            return ""
         with suppress(termios.error):
             termios.tcflush(self._file, termios.TCIFLUSH)
+        self._print(PROMPT)  # after the flush: what is typed when it shows, counts
+        if self._is_gone:
+            return ""
         self._answer = self._loop.create_future()
         try:
-            key = await self._answer
+            return await self._answer
         finally:
             self._answer = None
-        return key
+            self._print("\n")
 
     def _read(self) -> None:
         try:

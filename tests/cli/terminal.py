@@ -39,9 +39,9 @@ class Terminal:
             asyncio.get_running_loop().remove_reader(self._fd)
         self._read_something.set()
 
-    async def shows(self, words: bytes) -> None:
+    async def shows(self, words: bytes, after: bytes = b"") -> None:
         async with asyncio.timeout(30):
-            while words not in self.out:
+            while words not in self.out[self.out.find(after) :]:
                 self._read_something.clear()
                 await self._read_something.wait()
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from robotiq_async.cli.keyboard import AGREE, wrapped
+from robotiq_async.cli.keyboard import AGREE, PROMPT, wrapped
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.verify.stages import STAGES
 from robotiq_async.values.registers import rACT, rGTO
@@ -109,6 +109,12 @@ async def served() -> AsyncIterator[SimulatorServer]:
         yield server
 
 
+async def asks(terminal: Terminal, words: bytes) -> None:
+    """Wait for a question, and until it takes an answer."""
+    await terminal.shows(words)
+    await terminal.shows(PROMPT.encode(), after=words)
+
+
 def at_terminal(server: SimulatorServer, folder: Path, *arguments: str) -> Terminal:
     where = ("--report", str(folder / "report"))
     return Terminal("-m", "robotiq_async", "verify", server.address, *arguments, *where)
@@ -132,9 +138,9 @@ async def stood(server: SimulatorServer) -> None:
 
 async def test_enter_begins_and_any_other_key_ends(served: SimulatorServer, tmp_path: Path) -> None:
     terminal = at_terminal(served, tmp_path, "--up-to", "1")
-    await terminal.shows(b"Stage 0")
+    await asks(terminal, b"Stage 0")
     terminal.press("\n")
-    await terminal.shows(b"Stage 1")
+    await asks(terminal, b"Stage 1")
     terminal.press("y")
     assert await terminal.end() == 1
     assert b"declined" in terminal.out
@@ -148,7 +154,7 @@ async def test_what_was_typed_before_the_question_is_no_answer(
     terminal = at_terminal(served, tmp_path, "--from", "3", "--up-to", "3")
     await terminal.shows(b"Gripper tcp")
     terminal.press("\n\n\n")
-    await terminal.shows(b"Stage 3")
+    await asks(terminal, b"Stage 3")
     await asyncio.sleep(0.5)
     assert not served.gripper.writes
     terminal.press("n")
@@ -173,7 +179,7 @@ async def test_whatever_the_person_does_stops_the_fingers(
     served: SimulatorServer, tmp_path: Path, key: str
 ) -> None:
     terminal = at_terminal(served, tmp_path, "--from", "3", "--up-to", "3")
-    await terminal.shows(b"Stage 3")
+    await asks(terminal, b"Stage 3")
     terminal.press("\n")
     await moving(served)
     KEYS[key](terminal)
@@ -188,7 +194,7 @@ async def test_a_terminal_that_shows_nothing_does_not_keep_the_fingers_moving(
 ) -> None:
     """As after Ctrl-S somewhere on the way, or over a network that stands still."""
     terminal = at_terminal(served, tmp_path, "--from", "3", "--up-to", "3")
-    await terminal.shows(b"Stage 3")
+    await asks(terminal, b"Stage 3")
     terminal.press("\n")
     await moving(served)
     terminal.stop_reading()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from typing import Any
 
 from robotiq_async.link.address import parse_address
@@ -19,6 +19,7 @@ from tests.grippers import activate_beforehand
 SHORT = Lengths(reads=50, idle=(0.5, 1.0, 1.5, 5.0), alone=(10.0,), soak=10.0, commands=1.0)
 FOAM = 120
 """Where the fingers meet it."""
+WHICH = {Finger.A: "a", Finger.B: "p", Finger.C: "o", Finger.SCISSOR: "s"}
 
 
 @contextlib.asynccontextmanager
@@ -62,7 +63,6 @@ class Helper:
         asked: what it was asked.
         alarms: what it was warned of.
         has_stopped: whether a key was pressed.
-        is_guarding: whether a key would stop the fingers.
         before: is called with every question; what it returns, if anything, is the answer.
     """
 
@@ -71,20 +71,19 @@ class Helper:
         self.told: list[str] = []
         self.alarms: list[str] = []
         self.has_stopped = False
-        self.is_guarding = False
         self.before: Callable[[str], object] = lambda _: None
         self._server = server
         self._travel = dict.fromkeys(Finger.ALL, 0.0)
 
     def tell(self, words: str) -> None:
-        assert not self.is_guarding, f"said while fingers may move: {words}"
+        assert not self._server.gripper.is_moving, f"said while fingers move: {words}"
         self.told.append(words)
 
     def alarm(self, words: str) -> None:
         self.alarms.append(words)
 
     async def consents(self, words: str) -> bool:
-        self.asked.append(words)
+        self._ask(words)
         answer = self.before(words)
         if answer is not None:
             return bool(answer)
@@ -96,7 +95,7 @@ class Helper:
 
     async def chooses(self, question: str, answers: Mapping[str, str]) -> str | None:
         assert answers
-        self.asked.append(question)
+        gone = self._ask(question)
         answer = self.before(question)
         if isinstance(answer, str):
             return answer
@@ -109,29 +108,19 @@ class Helper:
         elif question == loss.POWER:
             await self._meanwhile(Trouble("power-cut"))
         elif "Which finger" in question:
-            return self._which()
+            return WHICH[max(gone, key=lambda axis: gone[axis])]
         return ENTER
-
-    @contextlib.contextmanager
-    def guarding(self) -> Iterator[None]:
-        self.is_guarding = True
-        self._look()
-        try:
-            yield
-        finally:
-            self.is_guarding = False
 
     async def _meanwhile(self, trouble: Trouble) -> None:
         async with self._server.fault_injector.making(trouble):
             await asyncio.sleep(5)
 
-    def _look(self) -> None:
+    def _ask(self, question: str) -> dict[Finger, float]:
+        """Note a question; how far each axis has gone since the one before."""
+        self.asked.append(question)
+        before = self._travel
         self._travel = {axis: self._server.gripper.travel(axis) for axis in Finger.ALL}
-
-    def _which(self) -> str:
-        gone = {axis: self._server.gripper.travel(axis) - self._travel[axis] for axis in Finger.ALL}
-        axis = max(gone, key=lambda axis: gone[axis])
-        return {Finger.A: "a", Finger.B: "p", Finger.C: "o", Finger.SCISSOR: "s"}[axis]
+        return {axis: self._travel[axis] - before[axis] for axis in Finger.ALL}
 
 
 @contextlib.asynccontextmanager

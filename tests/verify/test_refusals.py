@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from robotiq_async.link.address import parse_address
-from robotiq_async.simulator import SimulatorServer, Trouble
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.tools.verify import Plan, Report, Runner
 from robotiq_async.tools.verify.runner import LEFT_SET
 from robotiq_async.values.enums import Finger
@@ -169,7 +169,7 @@ STRANGERS = {
 @pytest.mark.parametrize("block", STRANGERS.values(), ids=STRANGERS)
 async def test_another_device_is_not_written_to(block: Callable[[], bytes]) -> None:
     async with device(block) as (address, written):
-        helper = Helper(SimpleNamespace(gripper=SimpleNamespace()))  # type: ignore[arg-type]
+        helper = Helper(SimpleNamespace(gripper=SimulatedGripper()))  # type: ignore[arg-type]
         runner = Runner(Plan(parse_address(address), lengths=SHORT), helper, Roll(), lambda _: None)
         report = await runner.run()
         assert not written
@@ -178,7 +178,7 @@ async def test_another_device_is_not_written_to(block: Callable[[], bytes]) -> N
 
 
 async def test_nobody_there() -> None:
-    helper = Helper(SimpleNamespace(gripper=SimpleNamespace()))  # type: ignore[arg-type]
+    helper = Helper(SimpleNamespace(gripper=SimulatedGripper()))  # type: ignore[arg-type]
     report = await Runner(Plan(parse_address("127.0.0.1:1")), helper, Roll(), lambda _: None).run()
     assert report.why == "refused"
     assert report.stages == [0]

@@ -58,6 +58,18 @@ def hardware_like(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / NAME
 
 
+def test_each_measured_curve_has_its_picture(plain: Path, short: Path) -> None:
+    for recording, names in (
+        (plain, ["activation.png", "echo.png", "round_trips.png", "strokes.png"]),
+        (short, ["activation.png", "round_trips.png"]),
+    ):
+        pictures = sorted(recording.parent.glob("*.png"))
+        assert [picture.name for picture in pictures] == names
+        text = (recording.parent / "report.md").read_text()
+        assert [name for name in names if f"({name})" in text] == names
+        assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in pictures)
+
+
 def changed(source: Path, target: Path, change: Change) -> Path:
     """A copy of a recording in which each message has passed through a function."""
     with open(target, "wb") as file:

@@ -8,6 +8,7 @@ import json
 import platform
 import re
 import resource
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,10 +22,10 @@ from robotiq_async.ros2.translation.settings import PARAMETERS, check_parameter
 from robotiq_async.simulator import Trouble
 from robotiq_async.tools.recording.recordings import read_recording
 from robotiq_async.tools.verify import CATALOGUE, ENDINGS, Check, Plan, Report, Runner, Verdict
-from robotiq_async.tools.verify.advice import lines, sentences
-from robotiq_async.tools.verify.files import JSON, PAGE, Folder
+from robotiq_async.tools.verify.files import JSON, PAGE, Folder, Scrubber
+from robotiq_async.tools.verify.page import lines, sentences
 from robotiq_async.tools.verify.recording import NAME
-from robotiq_async.tools.verify.report import SCHEMA, Scrubber
+from robotiq_async.tools.verify.report import SCHEMA
 from tests.docs.pages import DOCS
 from tests.verify.people import SHORT, Helper, Roll, served, threads, verified
 
@@ -57,6 +58,16 @@ async def test_the_files_hold_the_run(tmp_path: Path) -> None:
     for name in report.checks:
         assert f"`{name}`" in text
     assert not list(folder.path.glob(".*"))
+
+
+@pytest.mark.virtual_time
+async def test_without_the_extra_for_pictures_the_page_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    monkeypatch.delitem(sys.modules, "robotiq_async.tools.verify.pictures", raising=False)
+    _, folder, _ = await recorded(tmp_path, last=1)
+    assert "pictures need matplotlib" in (folder.path / PAGE).read_text()
 
 
 @pytest.mark.virtual_time

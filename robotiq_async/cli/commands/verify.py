@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import AsyncIterator, Mapping
-from contextlib import AbstractContextManager, AsyncExitStack, asynccontextmanager, nullcontext
+from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -126,7 +126,7 @@ async def _run(plan: Plan, person: Person, folder: Folder) -> None:
 
 async def _end(report: Report, folder: Folder) -> None:
     """Write the report, and say the most of it here: also where it cannot be written."""
-    from ...tools.verify.advice import lines, sentences
+    from ...tools.verify.page import lines, sentences
 
     failure = await folder.end(report)
     print(wrapped("\n" + "\n".join(sentences(report))), flush=True)
@@ -153,10 +153,6 @@ class Unattended:
     def alarm(self, words: str) -> None:
         """Print."""
         print(words, flush=True)
-
-    def guarding(self) -> AbstractContextManager[None]:
-        """Nothing moves."""
-        return nullcontext()
 
     async def consents(self, words: str) -> bool:
         """There is nobody to agree."""

@@ -7,9 +7,7 @@ hardware yet. docs/decisions/verify.md has the reasons.
 from __future__ import annotations
 
 from .bench import Lengths
-from .catalogue import CATALOGUE
-from .checks import Check, Verdict
-from .endings import ENDINGS
+from .catalogue import CATALOGUE, ENDINGS, Check, Verdict
 from .person import ENTER, Person
 from .report import Report
 from .runner import Plan, Runner

@@ -11,9 +11,7 @@ from ...link.modbus import ModbusTransport
 from ...session.options import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S, SERIAL_POLL_INTERVAL_S
 from ...values.registers import RegisterMap
 from ...values.status import RobotiqStatus
-from .catalogue import CATALOGUE
-from .checks import NO_OPTIONS, Check, Figure, Options, Verdict
-from .endings import EndError
+from .catalogue import CATALOGUE, NO_OPTIONS, Check, EndError, Figure, Options, Verdict
 from .person import Person
 from .recorded_link import Frame, RecordedLink
 from .watch import Watch

@@ -1,8 +1,12 @@
-"""Everything that is checked: what the library assumes, and where it matters for safety."""
+"""What is checked and how a check ends, and how a run ends."""
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from types import MappingProxyType
+from typing import Any, Final, NamedTuple
 
 
 class Assumption(NamedTuple):
@@ -66,3 +70,85 @@ LAST: Final = 9
 """The last stage."""
 HARMLESS: Final = 2
 """The last stage in which nothing moves."""
+
+
+Figure = int | float | str | bool | None | list[Any]
+"""What JSON takes, for the figures of a check."""
+Options = Mapping[str, int | float]
+"""Options of a hand, by the names of its constructor."""
+
+NO_OPTIONS: Final[Options] = MappingProxyType({})
+
+
+class Verdict(Enum):
+    """How a check ended."""
+
+    AS_ASSUMED = "as assumed"
+    DIFFERS = "differs"
+    UNTOLD = "could not be told"
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One check that was made, or could not be.
+
+    Attributes:
+        name: of the assumption, see :mod:`.catalogue`.
+        verdict: how it ended.
+        found: what was found, in a sentence.
+        follows: what follows for the user, where it differs.
+        options: those that make the library right, where it differs.
+        figures: what was measured, with the unit at the end of each name.
+    """
+
+    name: str
+    verdict: Verdict
+    found: str
+    follows: str = ""
+    options: Options = field(default_factory=lambda: NO_OPTIONS)
+    figures: Mapping[str, Figure] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The same in types that JSON takes."""
+        return {
+            "name": self.name,
+            "verdict": self.verdict.value,
+            "found": self.found,
+            "follows": self.follows,
+            "options": dict(self.options),
+            "figures": dict(self.figures),
+        }
+
+
+ENDINGS: Final = {
+    "done": "every stage that was asked for has run",
+    "declined": "the answer was not Enter",
+    "stopped": "a key was pressed, or the terminal closed",
+    "interrupted": "Ctrl-C, or a signal",
+    "refused": "nothing was written: the gripper is not in a state for it",
+    "link": "the link failed",
+    "fault": "the gripper reports a fault",
+    "envelope": "an axis left the range of its stage",
+    "time": "the time of a stage was over",
+    "foreign": "the gripper echoes what this program has not written",
+    "inactive": "the gripper is not active, and the stage needs it",
+    "deviation": "a check about safety differs",
+    "disk": "the report cannot be written",
+}
+"""By the word that stands in the report."""
+
+
+class EndError(Exception):
+    """The run ends here.
+
+    Attributes:
+        why: one of :data:`ENDINGS`.
+        words: what happened, in a sentence.
+    """
+
+    def __init__(self, why: str, words: str) -> None:
+        """Keep why, and what happened."""
+        assert why in ENDINGS
+        self.why = why
+        self.words = words
+        super().__init__(f"{why}: {words}")

@@ -12,7 +12,7 @@ from ...values.status import RobotiqStatus
 from ..doctor.answer import find_gripper
 from ..doctor.findings import Finding, GiveUpError
 from .bench import Bench
-from .endings import EndError
+from .catalogue import EndError
 from .watch import LASTING, words_of
 
 WATCH_S: Final = 2.0

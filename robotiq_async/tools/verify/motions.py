@@ -10,7 +10,7 @@ from typing import Final
 from ...values.enums import AXES, Finger
 from ...values.request import AxisRequest, Request
 from ...values.status import RobotiqStatus
-from .endings import EndError
+from .catalogue import EndError
 from .watch import ANYWHERE, Watch, words_of
 
 MARGIN: Final = 4

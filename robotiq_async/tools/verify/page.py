@@ -1,14 +1,68 @@
-"""A report for people: ``report.md``."""
+"""A report for people: three sentences, lines to paste, a table (``report.md``)."""
 
 from __future__ import annotations
 
 from typing import Final
 
-from .advice import lines, sentences
-from .catalogue import CATALOGUE
-from .checks import Check, Verdict
-from .endings import ENDINGS
+from .catalogue import CATALOGUE, ENDINGS, LAST, Check, Verdict
 from .report import Report
+
+UNUSABLE: Final = ("fault", "envelope", "time", "foreign", "deviation", "inactive")
+"""Endings after which nobody should rely on the gripper before they are understood."""
+NOT_JUDGED: Final = ("refused", "link")
+WITHOUT_ROS: Final = ("activation_timeout", "request_address", "status_address")
+"""Options that are no parameters of the ROS node."""
+
+
+def sentences(report: Report) -> tuple[str, str, str]:
+    """Whether the gripper can be used as it is; what is known and what not; what to report."""
+    return _usable(report), _known(report), _to_report(report)
+
+
+def _usable(report: Report) -> str:
+    words = report.words.rstrip(".")
+    if report.why in UNUSABLE:
+        return f"Do not use this gripper with robotiq_async before this is understood: {words}."
+    if report.why in NOT_JUDGED and 2 not in report.stages:
+        return f"Whether this gripper can be used could not be judged: {words}."
+    how_far = "" if LAST in report.stages else f", as far as stage {max(report.stages, default=0)} can tell"
+    if report.options:
+        options = ", ".join(f"{name}={value:g}" for name, value in report.options.items())
+        return f"This gripper can be used with {options}{how_far}."
+    if report.differing:
+        return f"This gripper can be used as it is{how_far}: what differs needs no option."
+    return f"This gripper can be used as it is{how_far}: nothing that was checked differs."
+
+
+def _known(report: Report) -> str:
+    counts = {verdict: sum(each.verdict is verdict for each in report.checks.values()) for verdict in Verdict}
+    words = ", ".join(f"{count} {verdict.value}" for verdict, count in counts.items())
+    missing = [number for number in range(LAST + 1) if number not in report.stages]
+    rest = f"; nothing is known of stage {', '.join(map(str, missing))}" if missing else ""
+    return f"Of {len(report.checks)} checks: {words}{rest}."
+
+
+def _to_report(report: Report) -> str:
+    names = ", ".join(check.name for check in report.differing)
+    if names:
+        return f"Please send the folder with an issue: {names} differ from what the library assumes."
+    return "Please send the folder with an issue all the same: that a gripper is as assumed is news."
+
+
+def lines(report: Report) -> dict[str, str]:
+    """Lines to paste, by what they are for; the address is left to the user."""
+    options = report.options
+    hand = "".join(f", {name}={value:g}" for name, value in options.items())
+    toml = "".join(f"{name} = {value:g}\n" for name, value in options.items())
+    ros = "".join(f" -p {name}:={value:g}" for name, value in options.items() if name not in WITHOUT_ROS)
+    missing = [name for name in options if name in WITHOUT_ROS]
+    note = f"  # the node has no parameter {', '.join(missing)}" if missing else ""
+    return {
+        "Python": f'RobotiqHand("ADDRESS"{hand})',
+        "FLEET.toml": f'[grippers.NAME]\naddress = "ADDRESS"\n{toml}'.rstrip(),
+        "ROS 2": f"ros2 run robotiq_async gripper --ros-args -p address:=ADDRESS{ros}{note}",
+    }
+
 
 MARKS: Final = {
     Verdict.AS_ASSUMED: "as assumed",
@@ -17,8 +71,14 @@ MARKS: Final = {
 }
 
 
-def page(report: Report, pictures: tuple[str, ...] = ()) -> str:
-    """The text of the page."""
+def page(report: Report, pictures: tuple[str, ...] = (), why_none: str = "") -> str:
+    """The text of the page.
+
+    Args:
+        report: what it tells.
+        pictures: files beside it.
+        why_none: why there are no pictures.
+    """
     fields = report.as_dict()
     head = [
         f"# A gripper, looked at by robotiq_async {fields['library']}",
@@ -37,7 +97,9 @@ def page(report: Report, pictures: tuple[str, ...] = ()) -> str:
     ]
     table = ["## Checks", "", "| stage | check | assumed | | found |", "| -- | -- | -- | -- | -- |"]
     table += [_row(report.checks[name]) for name in CATALOGUE if name in report.checks]
-    shown = [f"\n![{name}]({name})" for name in pictures]
+    shown = [f"\n![{name}]({name})" for name in pictures] or (
+        [f"\nNo pictures: {why_none}."] if why_none else []
+    )
     return "\n".join([*head, *paste, *table, *shown]) + "\n"
 
 

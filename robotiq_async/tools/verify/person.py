@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import AbstractContextManager
 from typing import Final, Protocol
 
 ENTER: Final = "\n"
@@ -35,6 +34,3 @@ class Person(Protocol):
         Returns:
             One of the keys; None to end the run.
         """
-
-    def guarding(self) -> AbstractContextManager[None]:
-        """While the block runs, any key stops the fingers."""

@@ -7,9 +7,11 @@ Statuses and commands are those of a recorded hand. An event of the kind "state"
 from __future__ import annotations
 
 import asyncio
+import json
 import os
 import time
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from io import FileIO
 from pathlib import Path
 from typing import Final
@@ -22,10 +24,43 @@ from ..recording.feed import COMMAND, EVENT, STATUS, Message, Topic, compact
 from ..recording.mcap_file import McapFile
 from ..recording.payloads import Fields
 from ..recording.raw_output import write_all
+from ..recording.recordings import read_recording
 from .recorded_link import Frame
 
 FLUSH_S: Final = 0.5
 NAME: Final = "recording.mcap"
+STAGE: Final = "verify stage "
+"""Before the number, in the event that tells that a stage begins."""
+
+
+@dataclass
+class Segment:
+    """What was recorded in a stage, each with its time in seconds."""
+
+    stage: int
+    began: float
+    statuses: list[tuple[float, RobotiqStatus]] = field(default_factory=list)
+    commands: list[tuple[float, Request]] = field(default_factory=list)
+
+
+def segments(path: Path, stages: tuple[int, ...]) -> list[Segment]:
+    """Some stages of a recording, in their order."""
+    found: list[Segment] = []
+    for entry in read_recording(path):
+        seconds = entry.nanoseconds / 1e9
+        if entry.topic == EVENT.name:
+            target = str(json.loads(entry.data).get("target", ""))
+            if target.startswith(STAGE):
+                found.append(Segment(int(target.removeprefix(STAGE)), seconds))
+        elif found and found[-1].stage in stages:
+            registers = tuple(json.loads(entry.data)["registers"])
+            if entry.topic == STATUS.name:
+                found[-1].statuses.append(
+                    (seconds, RobotiqStatus.from_registers(registers, timestamp=seconds))
+                )
+            elif entry.topic == COMMAND.name:
+                found[-1].commands.append((seconds, Request.from_registers(registers)))
+    return [segment for segment in found if segment.stage in stages]
 
 
 class Recording:
@@ -90,7 +125,7 @@ class Recording:
     def begin(self, stage: int) -> None:
         """Note that a stage begins."""
         now = asyncio.get_running_loop().time()
-        self._add(EVENT, now, {"kind": "state", "timestamp": now, "target": f"verify stage {stage}"})
+        self._add(EVENT, now, {"kind": "state", "timestamp": now, "target": f"{STAGE}{stage}"})
 
     def _add(self, topic: Topic, seconds: float, fields: Fields) -> None:
         self._counts[topic] += 1

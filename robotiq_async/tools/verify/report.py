@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import json
-import os
 import platform
-from collections.abc import Iterable
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any, Final, TypeVar, cast
+from typing import Any, Final, TypeVar
 
-from ...link.address import Address
 from ...runtime.version import __version__
 from ...values.registers import RegisterMap
 from ...values.status import RobotiqStatus
-from .catalogue import CATALOGUE
-from .checks import Check, Verdict
+from .catalogue import CATALOGUE, Check, Verdict
 
 T = TypeVar("T")
 
@@ -109,49 +103,3 @@ class Report:
             "options": self.options,
             "checks": [self.checks[name].as_dict() for name in CATALOGUE if name in self.checks],
         }
-
-
-class Scrubber:
-    """Takes out of texts what tells where a gripper is: addresses, ports of this machine, users, hosts."""
-
-    def __init__(self, address: Address) -> None:
-        """Know the address."""
-        names = [str(address), f"{address.host}:{address.port}" if address.port else "", address.host]
-        names += [platform.node(), os.path.expanduser("~")]
-        self._secrets = sorted({name for name in names if len(name) > 1}, key=len, reverse=True)
-
-    def clean(self, what: T) -> T:
-        """The same without; looks into lists and objects."""
-        cleaned: object = what
-        if isinstance(what, str):
-            cleaned = self._cleaned(what)
-        elif isinstance(what, dict):
-            cleaned = {key: self.clean(value) for key, value in what.items()}
-        elif isinstance(what, list):
-            cleaned = [self.clean(each) for each in what]
-        return cast("T", cleaned)
-
-    def _cleaned(self, text: str) -> str:
-        for secret in self._secrets:
-            text = text.replace(secret, "HIDDEN")
-        return text
-
-
-def write_files(folder: Path, files: Iterable[tuple[str, str]]) -> None:
-    """Write texts into a folder, each whole or not at all.
-
-    Raises:
-        OSError: that failed.
-    """
-    for name, text in files:
-        partial = folder / f".{name}.part"
-        with open(partial, "w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        partial.replace(folder / name)
-
-
-def as_json(fields: dict[str, Any]) -> str:
-    """The text of report.json."""
-    return json.dumps(fields, indent=2, ensure_ascii=False) + "\n"

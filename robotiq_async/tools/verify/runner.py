@@ -13,8 +13,7 @@ from ...runtime.concurrency import wait_shielded
 from ...values.errors import RobotiqConnectionError
 from ...values.request import Request
 from .bench import Bench, Lengths
-from .catalogue import HARMLESS, LAST
-from .endings import EndError
+from .catalogue import HARMLESS, LAST, EndError
 from .fingers import stop_fingers
 from .looking import find, see_that_it_may_be_written_to
 from .motions import as_found

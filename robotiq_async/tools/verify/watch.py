@@ -12,7 +12,7 @@ from typing import Final
 from ...values.enums import AXES, Fault, Finger
 from ...values.request import Request
 from ...values.status import RobotiqStatus
-from .endings import EndError
+from .catalogue import EndError
 from .person import Person
 from .recorded_link import RecordedLink
 

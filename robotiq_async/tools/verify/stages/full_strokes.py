@@ -11,8 +11,7 @@ from ....values.enums import CLOSED, OPEN, OPEN_READING, STROKE_COUNTS, Finger, 
 from ....values.request import Request
 from ....values.status import RobotiqStatus
 from ..bench import Bench
-from ..checks import Figure
-from ..endings import EndError
+from ..catalogue import EndError, Figure
 from ..motions import ASIDE, standing
 from ..watch import Watch
 
@@ -32,19 +31,18 @@ PART_OF_STROKE: Final = 0.9
 async def full_strokes(bench: Bench) -> None:
     """The scissor with open fingers, then the fingers, slow ones first."""
     watch = bench.watch(SECONDS)
-    with bench.person.guarding():
-        start = await watch.look()
-        await watch.write(standing(start))
-        await _fingers_to(watch, start, OPEN, 64)
-        await _scissor(bench, watch, start.position(Finger.SCISSOR))
-        times: dict[int, float] = {}
-        readings: list[list[int]] = []
-        for speed in SPEEDS:
-            before = await watch.look()
-            closed, took = await _fingers_to(watch, before, CLOSED, speed)
-            opened, _ = await _fingers_to(watch, closed, OPEN, speed)
-            times[speed] = took
-            readings.append([each.position(finger) for each in (opened, closed) for finger in FINGERS])
+    start = await watch.look()
+    await watch.write(standing(start))
+    await _fingers_to(watch, start, OPEN, 64)
+    await _scissor(bench, watch, start.position(Finger.SCISSOR))
+    times: dict[int, float] = {}
+    readings: list[list[int]] = []
+    for speed in SPEEDS:
+        before = await watch.look()
+        closed, took = await _fingers_to(watch, before, CLOSED, speed)
+        opened, _ = await _fingers_to(watch, closed, OPEN, speed)
+        times[speed] = took
+        readings.append([each.position(finger) for each in (opened, closed) for finger in FINGERS])
     _judge_times(bench, times)
     _judge_readings(bench, readings)
 

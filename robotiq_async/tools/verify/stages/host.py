@@ -9,7 +9,7 @@ from typing import Final
 from ....link.serial_ports import USB_SERIAL, latency_file, latency_timer
 from ....values.statistics import percentile
 from ..bench import Bench
-from ..checks import Figure
+from ..catalogue import Figure
 
 TIMERS: Final = 300
 SLEEP_S: Final = 0.002

@@ -11,8 +11,7 @@ from ....values.errors import RobotiqConnectionError
 from ....values.request import Request
 from ....values.status import RobotiqStatus
 from ..bench import Bench
-from ..checks import Figure
-from ..endings import EndError
+from ..catalogue import EndError, Figure
 from ..motions import MARGIN, activate, are_near, standing, way
 from ..person import ENTER
 from ..watch import Watch
@@ -66,27 +65,26 @@ async def _wants(bench: Bench, words: str, name: str) -> bool:
 async def _client(bench: Bench) -> None:
     """Finger A, slowly; the client goes away half way, and comes back."""
     watch = bench.watch(60.0)
-    with bench.person.guarding():
-        start = await watch.look()
-        image, home = standing(start), {Finger.A: start.position(Finger.A)}
-        far = {Finger.A: home[Finger.A] + (STEP if home[Finger.A] < 128 else -STEP)}
-        await watch.write(image)
-        watch.envelope = way(start, far)
-        away = replace(image, go=True).with_positions(far)
-        await watch.write(away)
-        if await watch.until(lambda status: not are_near(status, home, MARGIN), 3.0) is None:
-            raise EndError("time", "finger A did not begin to move within 3 s")
-        await bench.link.close()
-        await watch.rest(GONE_S)
-        await bench.link.open()
-        status = await watch.look()
-        where = status.position(Finger.A)
-        if are_near(status, far, MARGIN):
-            bench.as_assumed("loss.client", f"finger A went on to {where}")
-        else:
-            follows = "It stops by itself when it loses its client; that is safer than assumed."
-            bench.differs("loss.client", f"finger A stands at {where}, asked {far[Finger.A]}", follows)
-        await _wake(bench, watch, image, home)
+    start = await watch.look()
+    image, home = standing(start), {Finger.A: start.position(Finger.A)}
+    far = {Finger.A: home[Finger.A] + (STEP if home[Finger.A] < 128 else -STEP)}
+    await watch.write(image)
+    watch.envelope = way(start, far)
+    away = replace(image, go=True).with_positions(far)
+    await watch.write(away)
+    if await watch.until(lambda status: not are_near(status, home, MARGIN), 3.0) is None:
+        raise EndError("time", "finger A did not begin to move within 3 s")
+    await bench.link.close()
+    await watch.rest(GONE_S)
+    await bench.link.open()
+    status = await watch.look()
+    where = status.position(Finger.A)
+    if are_near(status, far, MARGIN):
+        bench.as_assumed("loss.client", f"finger A went on to {where}")
+    else:
+        follows = "It stops by itself when it loses its client; that is safer than assumed."
+        bench.differs("loss.client", f"finger A stands at {where}, asked {far[Finger.A]}", follows)
+    await _wake(bench, watch, image, home)
 
 
 async def _wake(bench: Bench, watch: Watch, image: Request, home: dict[Finger, int]) -> None:
@@ -119,16 +117,15 @@ async def _alone(bench: Bench) -> None:
     """No client at all for a while, longer and longer."""
     alone = 0.0
     watch = bench.watch(SECONDS)
-    with bench.person.guarding():
-        for seconds in bench.lengths.alone:
-            await bench.link.close()
-            await watch.rest(seconds)
-            await bench.link.open()
-            statuses = [await bench.link.read() for _ in range(3)]
-            status, alone = statuses[-1], seconds
-            if not status.is_activated:
-                report_lost_activation(bench, f"after {seconds:g} s without a client")
-                raise EndError("inactive", f"the activation was lost after {seconds:g} s without a client")
+    for seconds in bench.lengths.alone:
+        await bench.link.close()
+        await watch.rest(seconds)
+        await bench.link.open()
+        statuses = [await bench.link.read() for _ in range(3)]
+        status, alone = statuses[-1], seconds
+        if not status.is_activated:
+            report_lost_activation(bench, f"after {seconds:g} s without a client")
+            raise EndError("inactive", f"the activation was lost after {seconds:g} s without a client")
     bench.as_assumed("loss.idle", f"still active after {alone:g} s without a client")
 
 
@@ -225,12 +222,11 @@ async def _activated_anew(bench: Bench) -> bool:
         raise EndError("declined", "the gripper was not activated anew")
     watch = bench.watch(SECONDS)
     watch.bears_faults = True
-    with bench.person.guarding():
-        try:
-            await activate(watch)
-        except EndError as end:
-            if end.why in ("time", "inactive"):
-                return False
-            raise
-        status = await watch.pass_by(0.5)
+    try:
+        await activate(watch)
+    except EndError as end:
+        if end.why in ("time", "inactive"):
+            return False
+        raise
+    status = await watch.pass_by(0.5)
     return status.is_activated and not status.fault.is_serious

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+from collections import Counter
 from dataclasses import replace
 from typing import Final
 
@@ -13,8 +14,7 @@ from ....values.errors import RobotiqConnectionError
 from ....values.registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap, Registers
 from ....values.statistics import percentile
 from ..bench import Bench
-from ..checks import Figure
-from ..endings import EndError
+from ..catalogue import EndError, Figure
 from ..recorded_link import Frame, RecordedLink
 from ..watch import LASTING, show_echo
 
@@ -157,6 +157,7 @@ async def _round_trip(bench: Bench) -> None:
         p50, p99 = percentile(times, 0.5), percentile(times, 0.99)
         name = f"at_{1000 * period:g}_ms"
         figures |= {f"{name}_p50_ms": 1000 * p50, f"{name}_p99_ms": 1000 * p99}
+        figures[f"{name}_histogram"] = _histogram(times)
         worst = max(worst, p99)
     found = f"99 of 100 reads take at most {1000 * worst:.1f} ms"
     if worst < limit:
@@ -167,6 +168,12 @@ async def _round_trip(bench: Bench) -> None:
         f"Fingers are watched every {1000 * interval:g} ms at best; use a wired network if this is none."
     )
     bench.differs("read.round_trip", found, follows, {"poll_interval": interval}, **figures)
+
+
+def _histogram(seconds: list[float]) -> list[Figure]:
+    """How many took so many milliseconds, in steps of a tenth: [milliseconds, count] each."""
+    counts = Counter(round(1000 * each, 1) for each in seconds)
+    return [[tenth, counts[tenth]] for tenth in sorted(counts)]
 
 
 async def _trips(link: RecordedLink, count: int, period: float) -> list[float]:

@@ -10,7 +10,7 @@ from ....values.enums import AXES, Finger, ObjectStatus
 from ....values.request import Request
 from ....values.status import RobotiqStatus
 from ..bench import Bench
-from ..endings import EndError
+from ..catalogue import EndError
 from ..motions import are_near, standing, way
 from ..watch import Watch
 
@@ -66,16 +66,15 @@ async def _there_and_back(bench: Bench, axis: Finger, found: _Found) -> None:
     await watch.write(image)
     position = start.position(axis)
     target = position - STEP if position > 127 else position + STEP
-    with bench.person.guarding():
-        try:
-            for goal in (target, position):
-                await _one_way(watch, image, axis, goal, found)
-        except EndError as end:
-            if end.why == "envelope":
-                bench.differs("axis.alone", end.words, "Do not use this gripper before that is understood.")
-            raise
-        await watch.write(standing(await watch.look()))
-        await watch.until(lambda status: not status.go_echo, 1.0)
+    try:
+        for goal in (target, position):
+            await _one_way(watch, image, axis, goal, found)
+    except EndError as end:
+        if end.why == "envelope":
+            bench.differs("axis.alone", end.words, "Do not use this gripper before that is understood.")
+        raise
+    await watch.write(standing(await watch.look()))
+    await watch.until(lambda status: not status.go_echo, 1.0)
 
 
 async def _one_way(watch: Watch, image: Request, axis: Finger, goal: int, found: _Found) -> None:

@@ -12,8 +12,7 @@ from ....values.errors import RobotiqConnectionError
 from ....values.request import Request
 from ....values.statistics import percentile
 from ..bench import Bench
-from ..checks import Figure
-from ..endings import EndError
+from ..catalogue import EndError, Figure
 from ..motions import ASIDE, MARGIN, are_near, go, standing
 from ..watch import Watch
 
@@ -28,9 +27,8 @@ MOST_FAILURES: Final = 20
 
 async def soak(bench: Bench) -> None:
     """Read at the usual interval, then command."""
-    with bench.person.guarding():
-        await _read(bench)
-        await _command(bench)
+    await _read(bench)
+    await _command(bench)
 
 
 async def _read(bench: Bench) -> None:

@@ -8,7 +8,7 @@ from typing import Final
 from ....values.enums import CLOSED, Finger, ObjectStatus
 from ....values.status import RobotiqStatus
 from ..bench import Bench
-from ..endings import EndError
+from ..catalogue import EndError
 from ..motions import ASIDE, MARGIN, are_near, standing
 from ..watch import Watch
 
@@ -36,22 +36,20 @@ async def soft_part(bench: Bench) -> None:
     home = {finger: start.position(finger) for finger in FINGERS}
     scissor = start.position(Finger.SCISSOR)
     watch.envelope = {Finger.SCISSOR: (scissor - ASIDE, scissor + ASIDE)}
-    with person.guarding():
-        held = await _close(watch, start)
-        _judge_contact(bench, held)
-        await watch.write(replace(standing(held)).with_positions(dict.fromkeys(FINGERS, CLOSED)))
-        left = await watch.pass_by(LEFT_S)
+    held = await _close(watch, start)
+    _judge_contact(bench, held)
+    await watch.write(replace(standing(held)).with_positions(dict.fromkeys(FINGERS, CLOSED)))
+    left = await watch.pass_by(LEFT_S)
     answer = await person.chooses(STAYS, ANSWERS) if held.contacts else "?"
     if answer is None or not await person.consents(RELEASE):
         raise EndError("declined", "the fingers were not opened: they stand closed, with rGTO = 0")
     _judge_halt(bench, answer, held, left)
     watch = bench.watch(SECONDS)
-    with person.guarding():
-        now = await watch.look()
-        await watch.write(replace(standing(now), go=True).with_positions(home))
-        if await watch.until(lambda status: are_near(status, home, MARGIN), CLOSE_S) is None:
-            raise EndError("time", f"the fingers did not open within {CLOSE_S:g} s")
-        await watch.until_still(2.0)
+    now = await watch.look()
+    await watch.write(replace(standing(now), go=True).with_positions(home))
+    if await watch.until(lambda status: are_near(status, home, MARGIN), CLOSE_S) is None:
+        raise EndError("time", f"the fingers did not open within {CLOSE_S:g} s")
+    await watch.until_still(2.0)
 
 
 async def _close(watch: Watch, start: RobotiqStatus) -> RobotiqStatus:

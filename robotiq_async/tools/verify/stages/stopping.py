@@ -11,7 +11,7 @@ from ....values.enums import Finger
 from ....values.request import Request
 from ....values.status import RobotiqStatus
 from ..bench import Bench
-from ..endings import EndError
+from ..catalogue import EndError
 from ..motions import MARGIN, are_near, go, standing, way
 from ..watch import Watch
 
@@ -26,23 +26,22 @@ COUNTS: Final = 10
 async def stopping(bench: Bench) -> None:
     """RGTO = 0, rGTO = 1 again, a new request, and a hold, each half way."""
     watch = bench.watch(SECONDS)
-    with bench.person.guarding():
-        start = await watch.look()
-        if any(start.position(finger) > 100 for finger in FINGERS):
-            raise EndError("refused", "the fingers are not open; begin with --from 3")
-        home = {finger: start.position(finger) for finger in FINGERS}
-        image = standing(start, speed=SPEED)
-        await watch.write(image)
-        far = {finger: home[finger] + STROKE for finger in FINGERS}
-        watch.envelope = way(start, far)
-        away = replace(image, go=True).with_positions(far)
-        await _halt(bench, watch, away, home)
-        await _resume(bench, watch, away, far)
-        await _new_target(bench, watch, image, home)
-        await _hold(bench, watch, image, home)
-        watch.envelope = way(start, far)
-        if await go(watch, image, home, LEG_S) is None:
-            raise EndError("time", "the fingers did not come back to where they began")
+    start = await watch.look()
+    if any(start.position(finger) > 100 for finger in FINGERS):
+        raise EndError("refused", "the fingers are not open; begin with --from 3")
+    home = {finger: start.position(finger) for finger in FINGERS}
+    image = standing(start, speed=SPEED)
+    await watch.write(image)
+    far = {finger: home[finger] + STROKE for finger in FINGERS}
+    watch.envelope = way(start, far)
+    away = replace(image, go=True).with_positions(far)
+    await _halt(bench, watch, away, home)
+    await _resume(bench, watch, away, far)
+    await _new_target(bench, watch, image, home)
+    await _hold(bench, watch, image, home)
+    watch.envelope = way(start, far)
+    if await go(watch, image, home, LEG_S) is None:
+        raise EndError("time", "the fingers did not come back to where they began")
 
 
 async def _until_past(watch: Watch, is_past: Callable[[RobotiqStatus], bool]) -> RobotiqStatus:

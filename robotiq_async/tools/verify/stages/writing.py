@@ -11,7 +11,7 @@ from ....values.request import Request
 from ....values.statistics import percentile
 from ....values.status import RobotiqStatus
 from ..bench import Bench
-from ..checks import Figure
+from ..catalogue import Figure
 from ..motions import as_found
 from ..watch import Watch, words_of
 

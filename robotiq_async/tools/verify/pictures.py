@@ -1,0 +1,151 @@
+"""Pictures of what was measured, from the recording and the figures of a report. Needs the extra ``plot``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+try:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+except ModuleNotFoundError as error:
+    from ...runtime.extras import install
+
+    raise ImportError(f"pictures need matplotlib: {install('plot')}") from error
+
+from ...values.enums import AXES, CLOSED, Finger
+from ...values.request import Request
+from ...values.status import RobotiqStatus
+from .recording import Segment, segments
+from .report import Report
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FINGERS: Final = (Finger.A, Finger.B, Finger.C)
+BEFORE_S: Final = 0.05
+AFTER_S: Final = 0.4
+"""What is shown around the request of one axis: longer than a hand waits for an object status (0.25 s)."""
+
+Draw = Callable[[tuple["Axes", ...], Segment], bool]
+
+
+def draw(folder: Path, recording: Path, report: Report) -> tuple[str, ...]:
+    """Draw what the run has measured; the names of the files.
+
+    Raises:
+        OSError: a picture cannot be written.
+    """
+    drawn: list[str] = []
+    for segment in segments(recording, tuple(PICTURES)):
+        name, title, rows, curve = PICTURES[segment.stage]
+        figure, axes = _figure(title, rows)
+        if segment.statuses and curve(axes, segment):
+            axes[-1].set_xlabel("s")
+            drawn += _save(figure, folder, name)
+    if "read.round_trip" in report.checks:
+        figure, (axis,) = _figure("Round trips of reads (stage 1)", 1)
+        if _round_trips(axis, report.checks["read.round_trip"].figures):
+            drawn += _save(figure, folder, "round_trips.png")
+    return tuple(sorted(set(drawn)))
+
+
+def _figure(title: str, rows: int) -> tuple[Figure, tuple[Axes, ...]]:
+    figure = Figure(figsize=(8, 2 + 2.2 * rows), layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(title)
+    axes = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
+    for axis in axes:
+        axis.grid(alpha=0.3)
+    return figure, tuple(axes)
+
+
+def _save(figure: Figure, folder: Path, name: str) -> list[str]:
+    figure.savefig(folder / name, dpi=110)
+    return [name]
+
+
+def _round_trips(axis: Axes, figures: Mapping[str, object]) -> bool:
+    named = {name: value for name, value in figures.items() if name.endswith("_histogram")}
+    for name, histogram in named.items():
+        assert isinstance(histogram, list)
+        label = name.removesuffix("_histogram").replace("_", " ")
+        axis.step([each[0] for each in histogram], [each[1] for each in histogram], where="mid", label=label)
+    axis.set_xlabel("ms")
+    axis.set_ylabel("reads")
+    axis.set_yscale("log")
+    axis.legend(title="a read")
+    return bool(named)
+
+
+def _activation(axes: tuple[Axes, ...], segment: Segment) -> bool:
+    states, positions = axes
+    began = segment.began
+    times = [seconds - began for seconds, _ in segment.statuses]
+    shown = [status for _, status in segment.statuses]
+    for name, values in {
+        "gACT": [int(status.activation_echo) for status in shown],
+        "gIMC": [int(status.initialization) for status in shown],
+        "gFLT": [int(status.fault) for status in shown],
+    }.items():
+        states.step(times, values, where="post", label=name)
+    states.legend()
+    _positions(positions, times, shown)
+    return True
+
+
+def _positions(axis: Axes, times: list[float], shown: list[RobotiqStatus]) -> None:
+    for each in AXES:
+        axis.plot(times, [status.position(each) for status in shown], lw=1, label=each.name)
+    axis.set_ylabel("position, counts")
+    axis.legend()
+
+
+def _echo(axes: tuple[Axes, ...], segment: Segment) -> bool:
+    """The first motion of A: what is requested, what is echoed, where it is, and what gDT says."""
+    sent = next((seconds for seconds, request in segment.commands if request.go), None)
+    if sent is None:
+        return False
+    near = [(s - sent, status) for s, status in segment.statuses if -BEFORE_S <= s - sent <= AFTER_S]
+    times, shown = [seconds for seconds, _ in near], [status for _, status in near]
+    echo, words = axes
+    echo.step(times, [status.requested_position(Finger.A) for status in shown], where="post", label="gPRA")
+    echo.plot(times, [status.position(Finger.A) for status in shown], ".-", label="gPOA")
+    echo.set_ylabel("counts")
+    words.step(times, [int(status.finger_status(Finger.A)) for status in shown], where="post", label="gDTA")
+    words.set_yticks([0, 1, 2, 3], ["0 moves", "1 opening", "2 closing", "3 at position"])
+    for axis in axes:
+        axis.axvline(0, color="0.5", lw=1, label="written")
+        axis.legend()
+    return True
+
+
+def _strokes(axes: tuple[Axes, ...], segment: Segment) -> bool:
+    (axis,) = axes
+    found = list(_closings(segment))
+    for began, until, request in found:
+        inside = [
+            (seconds - began, status) for seconds, status in segment.statuses if began <= seconds < until
+        ]
+        means = [sum(status.position(each) for each in FINGERS) / len(FINGERS) for _, status in inside]
+        axis.plot([seconds for seconds, _ in inside], means, label=f"speed {request.axes[0].speed}")
+    axis.set_ylabel("mean position of A, B, C")
+    axis.legend()
+    return bool(found)
+
+
+def _closings(segment: Segment) -> Iterator[tuple[float, float, Request]]:
+    """When the fingers were asked to close, and when the next was asked."""
+    ends = [seconds for seconds, _ in segment.commands[1:]] + [segment.statuses[-1][0]]
+    for (seconds, request), end in zip(segment.commands, ends, strict=True):
+        if request.go and all(request.position(each) == CLOSED for each in FINGERS):
+            yield seconds, end, request
+
+
+PICTURES: Final[dict[int, tuple[str, str, int, Draw]]] = {
+    3: ("activation.png", "The activation, state by state (stage 3)", 2, _activation),
+    4: ("echo.png", "Echo, position and object status of A (stage 4)", 2, _echo),
+    6: ("strokes.png", "Closing at three speeds (stage 6)", 1, _strokes),
+}
+"""By stage: file, title, rows, and what draws."""
