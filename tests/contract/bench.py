@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import functools
-from collections.abc import AsyncIterator, Callable, Coroutine
+from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
 from contextlib import asynccontextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +14,7 @@ import pytest
 
 from robotiq_async import Finger, RobotiqHand, State
 from robotiq_async.hand import Hand
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.values.enums import AXES
 from robotiq_async.values.request import Request
 from tests.fleet.lab import SPEEDUP, Lab, lab
@@ -22,6 +23,8 @@ from tests.virtual import virtual
 
 LOCAL, REMOTE = "local", "remote"
 A, B, C, S = AXES
+HABIT: ContextVar[tuple[Trouble | None, Mapping[str, Any]]] = ContextVar("habit", default=(None, {}))
+"""What is otherwise with the gripper of a hand of this process, and the options of that hand."""
 LIMIT_S = 1000.0
 """Of virtual time: what takes longer hangs."""
 
@@ -71,7 +74,10 @@ async def bench(where: str, *, active: bool = True) -> AsyncIterator[Bench]:
     async with SimulatorServer(gripper) as server:
         if active:
             await activate_beforehand(gripper)
-        yield Bench(gripper, server, lambda: RobotiqHand(server.address))
+        habit, options = HABIT.get()
+        if habit is not None:
+            await server.fault_injector.begin(habit)
+        yield Bench(gripper, server, lambda: RobotiqHand(server.address, **options))
 
 
 async def connected(here: Lab) -> None:

@@ -26,4 +26,5 @@ EVENTS = [
 
 def options(cell: str) -> dict[str, float]:
     """Those of a cell."""
-    return {name: float(value) for name, value in re.findall(r"(\w+)=([0-9.]+)", cell)}
+    found = re.findall(r"(\w+)=([0-9.]+)", cell)
+    return {name: int(value) if value.isdecimal() else float(value) for name, value in found}

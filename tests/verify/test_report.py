@@ -15,8 +15,8 @@ from pathlib import Path
 
 import pytest
 
+from robotiq_async import RobotiqHand
 from robotiq_async.fleet.agent.agent_file import read_agent_file
-from robotiq_async.hand import RobotiqHand
 from robotiq_async.link.address import parse_address
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_parameter
 from robotiq_async.simulator import Trouble

@@ -11,7 +11,6 @@ except ModuleNotFoundError as error:
 
     raise ImportError(f"recordings need mcap: {install('record')}") from error
 
-from ...hand import Hand
 from ...runtime.version import __version__
 from .feed import JOINTS, TOPICS, Message, Topic
 

@@ -1,0 +1,97 @@
+"""With the option that the report names, a hand keeps its contract on a gripper with the habit."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+from collections.abc import Callable, Iterator
+from functools import partial
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from robotiq_async.simulator.troubles.trouble import parse_troubles
+from tests import contract
+from tests.contract.bench import HABIT, LOCAL
+from tests.verify.matrix import HABITS, options
+
+ROWS = [(trouble, option) for trouble, _, option, _ in HABITS if option != "-"]
+FORGOTTEN = "the write that the gripper forgets is the other client's"
+IMPATIENT = "the test itself waits for less"
+SLOWER = "the test counts polls or milliseconds at 200 Hz"
+EXCEPT: dict[str, dict[str, str]] = {
+    "write-spacing": {"test_superseded_by_another_client_of_the_gripper": FORGOTTEN},
+    "write-spacing 0.03": {
+        "test_superseded_by_another_client_of_the_gripper": FORGOTTEN,
+        "test_a_foreign_reset": FORGOTTEN,
+    },
+    "slow-activation 35": {"test_a_cancelled_activation_goes_on": IMPATIENT},
+    "delay": dict.fromkeys(
+        [
+            "test_a_command_moves_from_the_moment_it_is_asked_for",
+            "test_timestamps_are_of_this_process_and_only_rise",
+            "test_statistics",
+            "test_statuses_opened_before_the_start_end_after_the_stop",
+            "test_a_transition_finds_the_status_that_made_it",
+            "test_the_state_and_what_it_comes_from_are_there",
+            "test_a_cancelled_wait_leaves_nothing",
+        ],
+        SLOWER,
+    ),
+}
+"""Tests of the contract that a habit keeps from passing, whatever the hand does, and why."""
+
+
+def scenes() -> Iterator[tuple[str, Callable[[], None]]]:
+    """Every test of the contract on a hand of this process, by its name, but those that need a fixture."""
+    files = sorted(Path(contract.__path__[0]).glob("test_*.py"))
+    for file in files:
+        if file.stem == "test_differences":
+            continue  # of hands on other hosts
+        for name, test in vars(importlib.import_module(f"tests.contract.{file.stem}")).items():
+            marks = [mark for mark in getattr(test, "pytestmark", []) if mark.name == "parametrize"]
+            if not name.startswith("test_") or not any(mark.args[0] == "where" for mark in marks):
+                continue
+            for chosen in product(*map(choices, marks)):
+                arguments = {key: value for choice in chosen for key, value in choice.items()}
+                if (
+                    arguments["where"] == LOCAL
+                    and inspect.signature(test).parameters.keys() <= arguments.keys()
+                ):
+                    yield name, partial(test, **arguments)
+
+
+def choices(mark: pytest.Mark) -> list[dict[str, Any]]:
+    """The arguments that a mark gives to a test, for each of its values."""
+    names, values = mark.args[:2]
+    names = [each.strip() for each in names.split(",")] if isinstance(names, str) else list(names)
+    values = [getattr(each, "values", each) if hasattr(each, "marks") else each for each in values]
+    return [
+        dict(
+            zip(
+                names,
+                each if len(names) > 1 or isinstance(each, pytest.ParameterSet) else (each,),
+                strict=True,
+            )
+        )
+        for each in values
+    ]
+
+
+@pytest.mark.parametrize(("trouble", "option"), ROWS)
+def test_with_its_option_a_hand_keeps_its_contract(trouble: str, option: str) -> None:
+    habit = HABIT.set((parse_troubles(trouble)[0], options(option)))
+    failed, count = set(), 0
+    try:
+        for name, scene in scenes():
+            count += 1
+            try:
+                scene()
+            except Exception:  # noqa: BLE001  # every way to fail counts
+                failed.add(name)
+    finally:
+        HABIT.reset(habit)
+    assert failed == EXCEPT.get(trouble, {}).keys()
+    assert count > 200
