@@ -14,9 +14,10 @@ from robotiq_async.link.address import parse_address
 from robotiq_async.simulator.physics.habits import Habits
 from robotiq_async.simulator.troubles.like_hardware import LIKE_HARDWARE, OWN_HABITS
 from robotiq_async.tools.recording.recordings import read_recording
-from robotiq_async.tools.verify import Plan, Runner
+from robotiq_async.tools.verify import Plan, Runner, pictures
 from robotiq_async.tools.verify.files import Folder
-from robotiq_async.tools.verify.recording import NAME
+from robotiq_async.tools.verify.recording import NAME, segments
+from robotiq_async.values.enums import ObjectStatus
 from tests import hardware
 from tests.verify.people import SHORT, Helper, served, threads
 from tests.virtual import run
@@ -68,6 +69,16 @@ def test_each_measured_curve_has_its_picture(plain: Path, short: Path) -> None:
         text = (recording.parent / "report.md").read_text()
         assert [name for name in names if f"({name})" in text] == names
         assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in pictures)
+
+
+def test_the_picture_of_the_echo_shows_a_motion_from_rest(plain: Path) -> None:
+    """Right after an activation every gDT is 0, as in a motion: such a motion would hide its lag."""
+    (segment,) = segments(plain, (4,))
+    motion = pictures._motion_from_rest(segment)
+    assert motion is not None
+    sent, axis = motion
+    before = [status for seconds, status in segment.statuses if seconds < sent][-1]
+    assert before.finger_status(axis) is ObjectStatus.AT_POSITION
 
 
 def changed(source: Path, target: Path, change: Change) -> Path:

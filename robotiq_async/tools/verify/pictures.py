@@ -14,7 +14,7 @@ except ModuleNotFoundError as error:
 
     raise ImportError(f"pictures need matplotlib: {install('plot')}") from error
 
-from ...values.enums import AXES, CLOSED, Finger
+from ...values.enums import AXES, CLOSED, Finger, ObjectStatus
 from ...values.request import Request
 from ...values.status import RobotiqStatus
 from .recording import Segment, segments
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 FINGERS: Final = (Finger.A, Finger.B, Finger.C)
+FAR: Final = 10
+"""Counts that make a motion: more than an axis ends beside its request."""
 BEFORE_S: Final = 0.05
 AFTER_S: Final = 0.4
 """What is shown around the request of one axis: longer than a hand waits for an object status (0.25 s)."""
@@ -103,22 +105,45 @@ def _positions(axis: Axes, times: list[float], shown: list[RobotiqStatus]) -> No
 
 
 def _echo(axes: tuple[Axes, ...], segment: Segment) -> bool:
-    """The first motion of A: what is requested, what is echoed, where it is, and what gDT says."""
-    sent = next((seconds for seconds, request in segment.commands if request.go), None)
-    if sent is None:
+    """One motion: what is echoed, where the axis is, and what gDT says."""
+    found = _motion_from_rest(segment)
+    if found is None:
         return False
+    sent, finger = found
     near = [(s - sent, status) for s, status in segment.statuses if -BEFORE_S <= s - sent <= AFTER_S]
     times, shown = [seconds for seconds, _ in near], [status for _, status in near]
+    name = "S" if finger is Finger.SCISSOR else finger.name
     echo, words = axes
-    echo.step(times, [status.requested_position(Finger.A) for status in shown], where="post", label="gPRA")
-    echo.plot(times, [status.position(Finger.A) for status in shown], ".-", label="gPOA")
+    echo.step(
+        times, [status.requested_position(finger) for status in shown], where="post", label=f"gPR{name}"
+    )
+    echo.plot(times, [status.position(finger) for status in shown], ".-", label=f"gPO{name}")
     echo.set_ylabel("counts")
-    words.step(times, [int(status.finger_status(Finger.A)) for status in shown], where="post", label="gDTA")
+    words.step(
+        times, [int(status.finger_status(finger)) for status in shown], where="post", label=f"gDT{name}"
+    )
     words.set_yticks([0, 1, 2, 3], ["0 moves", "1 opening", "2 closing", "3 at position"])
     for axis in axes:
         axis.axvline(0, color="0.5", lw=1, label="written")
         axis.legend()
     return True
+
+
+def _motion_from_rest(segment: Segment) -> tuple[float, Finger] | None:
+    """When a motion was written, and of which axis: the first whose gDT said before that it is at rest.
+
+    Only such a motion shows how late gDT is. After an activation every gDT is 0, as in a motion.
+    """
+    fallback = None
+    for sent, request in segment.commands:
+        before = [status for seconds, status in segment.statuses if seconds < sent][-1:]
+        for status in before if request.go else []:
+            for axis in AXES:
+                if abs(request.position(axis) - status.position(axis)) > FAR:
+                    if status.go_echo and status.finger_status(axis) is ObjectStatus.AT_POSITION:
+                        return sent, axis
+                    fallback = fallback or (sent, axis)
+    return fallback
 
 
 def _strokes(axes: tuple[Axes, ...], segment: Segment) -> bool:
@@ -145,7 +170,7 @@ def _closings(segment: Segment) -> Iterator[tuple[float, float, Request]]:
 
 PICTURES: Final[dict[int, tuple[str, str, int, Draw]]] = {
     3: ("activation.png", "The activation, state by state (stage 3)", 2, _activation),
-    4: ("echo.png", "Echo, position and object status of A (stage 4)", 2, _echo),
+    4: ("echo.png", "Echo, position and object status of one motion (stage 4)", 2, _echo),
     6: ("strokes.png", "Closing at three speeds (stage 6)", 1, _strokes),
 }
 """By stage: file, title, rows, and what draws."""
