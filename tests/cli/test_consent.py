@@ -14,6 +14,7 @@ import pytest
 from robotiq_async.cli.app import COMMANDS
 from robotiq_async.cli.commands.measure.force import force
 from robotiq_async.cli.commands.measure.speed import speed
+from robotiq_async.cli.commands.verify import verify
 from robotiq_async.simulator import SimulatorServer
 from tests.cli.terminal import ROOT, Terminal
 
@@ -177,8 +178,9 @@ def test_nothing_is_asked_when_there_is_nothing_left_to_measure(
 def test_every_command_that_moves_takes_yes() -> None:
     commands: list[Callable[..., object]] = [*COMMANDS, speed, force]
     moving = {each for each in commands if "FINGERS MOVE" in (each.__doc__ or "")}
-    assert {each.__name__ for each in moving} == {"demo", "move", "speed", "force"}
-    assert {each for each in commands if "yes" in inspect.signature(each).parameters} == moving
+    assert {each.__name__ for each in moving} == {"demo", "move", "speed", "force", "verify"}
+    # verify asks before each stage that moves, and takes no consent to one beforehand.
+    assert {each for each in commands if "yes" in inspect.signature(each).parameters} == moving - {verify}
 
 
 def test_what_does_not_move_writes_nothing(call: Call, there: SimulatorServer, file: Path) -> None:

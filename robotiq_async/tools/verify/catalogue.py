@@ -147,8 +147,10 @@ class EndError(Exception):
     """
 
     def __init__(self, why: str, words: str) -> None:
-        """Keep why, and what happened."""
         assert why in ENDINGS
+        super().__init__(why, words)
         self.why = why
         self.words = words
-        super().__init__(f"{why}: {words}")
+
+    def __str__(self) -> str:
+        return f"{self.why}: {self.words}"
