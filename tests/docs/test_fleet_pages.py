@@ -121,7 +121,7 @@ def test_a_status_byte_by_byte() -> None:
 
 
 def test_every_state_has_its_number() -> None:
-    numbers = re.findall(r"(\d+) ([A-Z_]+)", PROTOCOL[PROTOCOL.index("The states:") :].partition("\n\n")[0])
+    numbers = re.findall(r"(\d+)\s([A-Z_]+)", PROTOCOL[PROTOCOL.index("The states:") :].partition("\n\n")[0])
     assert [(int(number), name) for number, name in numbers] == [
         (number, state.name) for number, state in enumerate(State)
     ]
