@@ -45,7 +45,6 @@ from robotiq_async import (
 )
 from robotiq_async.control.motion import Move
 from robotiq_async.fleet import ControlLostError, GripperName, Member, NotAllStoppedError, Route
-from robotiq_async.fleet.agent.agent_file import GripperSettings
 from robotiq_async.fleet.control.lease import Holder
 from robotiq_async.fleet.keys.access_list import AccessList
 from robotiq_async.fleet.keys.credentials import Credentials
@@ -127,7 +126,6 @@ VALUES: list[object] = [
     Endpoint("tls/[::1]:7447", "tls", "::1"),
     AccessList(read=("alice",)),
     Credentials("read:alice", datetime(2026, 1, 1, tzinfo=UTC), datetime(2028, 1, 1, tzinfo=UTC)),
-    GripperSettings("tcp://192.168.1.11"),
     Fault.SCISSOR_BLOCKED,
     Fault(0x0C),
     Severity.MAJOR,
@@ -230,7 +228,9 @@ NO_VALUES = {
     "Link": "arguments of a command",
     "Message": "bytes on their way",
     "Ongoing": "work in progress",
-    "Options": "internal: holds the transport",
+    "Option": "internal: holds the check",
+    "HandOptions": "internal: holds the transport",
+    "GripperLink": "internal: makes the transport",
     "Recovered": "work in progress",
     "Reply": "internal",
     "Entry": "bytes on their way",

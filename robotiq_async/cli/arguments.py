@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, make_dataclass
 from importlib.util import find_spec
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 from cyclopts import Parameter, Token
 
 from ..runtime.extras import install
-from ..session.options import RESPONSE_TIMEOUT_S
+from ..session.options import Option, Place, offered
 from ..values.checks import parse_fingers
 from ..values.enums import Finger
 from .failures import CommandError, UsageError, usage
@@ -60,10 +60,7 @@ Position = Annotated[int, Parameter(converter=_integer("POSITION", 0, 255))]
 Byte = Annotated[int, Parameter(converter=_integer("the value", 0, 255), metavar="0..255")]
 Port = Annotated[int, Parameter(converter=_integer("the port", 0, 65535), metavar="0..65535")]
 Unit = Annotated[int, Parameter(converter=_integer("the unit id", 0, 255), metavar="0..255")]
-ReadFunction = Annotated[int, Parameter(converter=_integer("the function", 3, 4), metavar="3|4")]
 Stage = Annotated[int, Parameter(converter=_integer("the stage", 0, 9), metavar="0..9")]
-Seconds = Annotated[float, Parameter(metavar="SECONDS")]
-Register = Annotated[int, Parameter(converter=_integer("the register", 0, 65528), metavar="0..65528")]
 Fingers = Annotated[
     Finger,
     Parameter(
@@ -77,24 +74,32 @@ Fingers = Annotated[
 ]
 
 
+def _argument(option: Option) -> object:
+    """The type of an argument that is an option of the hand."""
+    low, high = option.low, option.high
+    if option.default is not None:
+        return Annotated[float, Parameter(metavar="SECONDS", help=f"{option.help}, {low:g}..{high:g}.")]
+    convert = _integer("the value", int(low), int(high))
+    text = f"{option.help} (default: {option.tcp} on TCP, {option.rtu} serial)."
+    return Annotated[int | None, Parameter(converter=convert, metavar=f"{low:g}..{high:g}", help=text)]
+
+
+_ARGUMENTS: Final = offered(Place.COMMAND_LINE)
+_Arguments: Any = make_dataclass(
+    "_Arguments",
+    [(name, _argument(option), option.default) for name, option in _ARGUMENTS.items()],
+    frozen=True,
+)
+
+
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Link:
+class Link(_Arguments):  # type: ignore[misc]  # made from the table of options
     """How to reach a gripper that is not set up as usual; the command doctor finds out."""
 
-    device_id: Annotated[Unit | None, Parameter(help="Modbus unit id (default: 2 on TCP, 9 serial).")] = None
-    read_function: Annotated[
-        ReadFunction | None, Parameter(help="Modbus function that reads (default: 4 on TCP, 3 serial).")
-    ] = None
-    request_address: Annotated[
-        Register | None, Parameter(help="First request register (default: 0 on TCP, 1000 serial).")
-    ] = None
-    status_address: Annotated[
-        Register | None, Parameter(help="First status register (default: 0 on TCP, 2000 serial).")
-    ] = None
-    response_timeout: Annotated[Seconds, Parameter(help="Seconds for one answer, up to 5.")] = (
-        RESPONSE_TIMEOUT_S
-    )
+    def options(self) -> dict[str, Any]:
+        """They, as RobotiqHand takes them."""
+        return asdict(self)
 
 
 USUAL: Final = Link()

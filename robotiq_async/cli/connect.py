@@ -47,11 +47,7 @@ def make_hand(
     with usage():
         return RobotiqHand(
             address,
-            device_id=link.device_id,
-            read_function=link.read_function,
-            response_timeout=link.response_timeout,
-            request_address=link.request_address,
-            status_address=link.status_address,
+            **link.options(),
             poll_interval=poll_interval,
             speed=speed,
             force=force,

@@ -21,7 +21,7 @@ from ..session.options import (
     POLL_INTERVAL_S,
     RESPONSE_TIMEOUT_S,
     WRITE_SPACING_S,
-    check_options,
+    HandOptions,
 )
 from ..session.reconnecting import ReconnectPolicy
 from ..session.session import Session
@@ -130,7 +130,7 @@ class RobotiqHand(Hand):
         force_calibration: ForceCalibration | None = None,
         keep_grip: bool = False,
     ) -> None:
-        self._options = options = check_options(
+        self._options = options = HandOptions(
             address,
             name=name,
             device_id=device_id,
@@ -150,7 +150,7 @@ class RobotiqHand(Hand):
             keep_grip=keep_grip,
         )
         super().__init__(
-            options.address, units=options.units, name=options.given_name, keep_grip=options.keep_grip
+            options.link.address, units=options.units, name=options.given_name, keep_grip=options.keep_grip
         )
         self._machine = StateMachine(log=options.log)
 

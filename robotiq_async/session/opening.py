@@ -14,14 +14,14 @@ from ..values.errors import (
     ResponseTimeoutError,
     RobotiqConnectionError,
 )
-from .options import Options
+from .options import HandOptions
 from .reconnecting import Backoff, ReconnectPolicy
 
 
 class Opener:
     """Tries until the link is open. :meth:`end` ends that at any moment, and for good."""
 
-    def __init__(self, connect: Callable[[], Awaitable[None]], options: Options) -> None:
+    def __init__(self, connect: Callable[[], Awaitable[None]], options: HandOptions) -> None:
         """Prepare; must be made inside a running event loop.
 
         Args:
@@ -63,7 +63,7 @@ class Opener:
             return await self._open(policy, tell)
         except (ResponseTimeoutError, ConnectionLostError) as error:
             why = f"connected, but nobody answers: {error}"
-            raise ConnectFailedError(self._options.address, why) from error
+            raise ConnectFailedError(self._options.link.address, why) from error
 
     async def again(self, policy: ReconnectPolicy) -> bool:
         """Open a link that was lost; False when that was ended meanwhile.

@@ -1,23 +1,26 @@
-"""The options of a hand, checked, and the transport they describe."""
+"""The options of a hand, in one table.
+
+:class:`HandOptions` checks what a hand is made with. Each of its fields carries an :class:`Option`: range,
+unit, help, default, and the places that offer it. FLEET.toml, the parameters of ROS, the command line and the
+tables in docs/ are made from :data:`OPTIONS`. A new option is a field here, and an argument of
+:class:`~robotiq_async.RobotiqHand`, whose signature is written out for editors and type checkers.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields, replace
+from enum import Flag, auto
 from functools import partial
-from typing import Final, NamedTuple
+from typing import Annotated, Final, get_type_hints
 
-from ..link.address import Address, parse_address
-from ..link.canonical import canonical_address
-from ..link.guard import GuardedTransport
-from ..link.modbus import ModbusTransport
-from ..link.sim_transport import SimulatedTransport, new_gripper
 from ..link.transport import Link, Transport
-from ..runtime.log import Log, log
+from ..runtime.log import Log
 from ..values.calibration import ForceCalibration, SpeedCalibration, Units
 from ..values.checks import check_byte, check_flag, check_int, check_seconds
-from ..values.registers import REGISTER_COUNT, RTU_REGISTERS, TCP_REGISTERS, RegisterMap
-from .claims import Gripper
+from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ..values.registers import RTU_REGISTERS, TCP_REGISTERS
+from .gripper_link import LAST_BLOCK, GripperLink, gripper_link
 from .reconnecting import ReconnectPolicy
 
 
@@ -40,217 +43,250 @@ WRITE_SPACING_S: Final = 0.01
 """The manual of 2014 (chapters on TCP and RTU): registers are renewed at 100 Hz; leave 10 ms, or some writes
 are lost. Users of two-finger grippers on two arms saw that."""
 LONGEST_SPACING_S: Final = 0.1
+"""A command waits that long at most before it is written."""
 CONNECT_TIMEOUT_S: Final = 2.0
+"""A lost first packet is sent again after 1 s; what answers neither is not there."""
 RESPONSE_TIMEOUT_S: Final = 0.4
 """Two of these, a read in flight and a write, still end within the second that a write may take; on a serial
 line also with the time in which the read may be asked once more."""
 LONGEST_RESPONSE_S: Final = 5.0
 """For gateways that are slow; a write may take more than a second then."""
 LONGEST_WAIT_S: Final = 86400.0
-"""For which a start may wait for its gripper: a day."""
+"""How long a start may wait for its gripper: a day."""
 ACTIVATION_TIMEOUT_S: Final = 40.0
 """Drivers that ran on hardware saw about 15 s, and wait for 25 to 30 s; the notes of one list time-outs of
 the activation. What ends one early leaves a hand that does not know where its fingers are."""
 LONGEST_NAME: Final = 64
 """Characters of a hand's name: it begins every line of the log."""
-_GATEWAY: Final = " (two grippers behind one gateway: give each of the hands its device_id)"
-_LINE: Final = " (a serial port has one owner, whatever the device_id: two would read each other's replies)"
 
-# Read when this is imported: a hand may be made in a running loop, and that waits for no disk.
+# Read when this is imported: a hand may be made in a running loop, which must not wait for a disk.
 _THESIS: Final = SpeedCalibration.thesis()
 _NOMINAL: Final = ForceCalibration.nominal()
 
 
+class Place(Flag):
+    """Where an option is offered, besides :class:`~robotiq_async.RobotiqHand`."""
+
+    NONE = 0
+    FILE = auto()
+    """A key of a gripper's table in FLEET.toml."""
+    ROS = auto()
+    """A parameter of the ROS node."""
+    COMMAND_LINE = auto()
+    """An argument of the commands that reach a gripper."""
+
+
 @dataclass(frozen=True, slots=True)
-class Options:
-    """Everything a hand is constructed with, checked."""
+class Option:
+    """What the table says about one option.
 
-    make_transport: Callable[[], Link]
-    """A transport for one start of the hand."""
-    address: str
-    gripper: Callable[[], Gripper]
-    """Which one it is, at this moment: a serial port may have been plugged in meanwhile."""
-    poll_interval: float
-    write_spacing: float
-    activation_timeout: float
-    policy: ReconnectPolicy | None
-    speed: int
-    force: int
-    units: Units
-    """What positions, speeds and forces mean to people; default timeouts of moves come from its speeds."""
-    keep_grip: bool = False
-    """What a stop does about it unless told."""
-    given_name: str = ""
-    """What the hand is to be called; empty if nothing was said."""
-    log: Log = log
-    """For what happens to it."""
-
-    @property
-    def name(self) -> str:
-        """What the hand is called: by its address, unless something else was said."""
-        return self.given_name or self.address
-
-
-def check_options(
-    address: object,
-    *,
-    device_id: object,
-    read_function: object = None,
-    poll_interval: object,
-    write_spacing: object,
-    connect_timeout: object,
-    response_timeout: object,
-    activation_timeout: object,
-    reconnect: object,
-    speed: object,
-    force: object,
-    request_address: object,
-    status_address: object,
-    calibration: object,
-    force_calibration: object,
-    keep_grip: object,
-    name: object = None,
-) -> Options:
-    """Check every option and make the transport; opens nothing and needs no running loop.
-
-    Raises:
-        TypeError: an option of the wrong type; named with value and range.
-        ValueError: an option outside its range, or a malformed address.
+    Attributes:
+        help: what it is, with its unit, as a sentence without its full stop.
+        check: takes name and value, and returns the value that is kept.
+        places: where it is offered.
+        low: the lowest number, of all links.
+        high: the highest number, of all links.
+        tcp: what None stands for over TCP.
+        rtu: what None stands for on a serial line.
+        default: what counts unless another value is given; None where it depends on the link.
     """
-    given_name = _check_name(name)
-    connect_s = check_seconds("connect_timeout", connect_timeout, 0.01, 5.0)
-    response_s = check_seconds("response_timeout", response_timeout, 0.005, LONGEST_RESPONSE_S)
-    interval = check_seconds("poll_interval", poll_interval, 0.001, 0.1)
-    registers = {
-        "device_id": device_id,
-        "read_function": read_function,
-        "request_address": request_address,
-        "status_address": status_address,
-    }
-    way = _way_to(address, registers, given_name)
-    if way.is_rtu:
-        interval = SERIAL_POLL_INTERVAL_S if isinstance(poll_interval, Usual) else interval
-    return Options(
-        make_transport=partial(way.make, connect_timeout=connect_s, response_timeout=response_s),
-        address=way.address,
-        gripper=way.gripper,
-        poll_interval=interval,
-        write_spacing=check_seconds("write_spacing", write_spacing, 0.0, LONGEST_SPACING_S),
-        activation_timeout=check_seconds("activation_timeout", activation_timeout, 0.01, 120.0),
-        policy=_check_reconnect(reconnect),
-        speed=check_byte("speed", speed),
-        force=check_byte("force", force),
-        units=check_units(calibration, force_calibration),
-        keep_grip=check_flag("keep_grip", keep_grip),
-        given_name=given_name,
-        log=Log(given_name or way.address),
-    )
+
+    help: str
+    check: Callable[[str, object], object]
+    places: Place = Place.NONE
+    low: float = 0
+    high: float = 0
+    tcp: int | None = None
+    rtu: int | None = None
+    default: object = None
 
 
-def registers_of(
-    address: Address,
-    *,
-    device_id: object = None,
-    read_function: object = None,
-    request_address: object = None,
-    status_address: object = None,
-) -> RegisterMap:
-    """How the registers of a gripper are asked for; None for what is usual on its kind of link.
-
-    Raises:
-        TypeError: an option is no int.
-        ValueError: an option is outside its range.
-    """
-    usual = RTU_REGISTERS if address.is_rtu else TCP_REGISTERS
-    last = 0x10000 - REGISTER_COUNT
-    # On a line 0 is everybody, who do not answer, and more than 247 are reserved. Over TCP units in the
-    # field answer to any, and drivers have used 0 and 255.
-    units = (1, 247) if address.is_rtu else (0, 255)
-    return RegisterMap(
-        request=_int_or("request_address", request_address, 0, last, usual.request),
-        status=_int_or("status_address", status_address, 0, last, usual.status),
-        read_function=_int_or("read_function", read_function, 3, 4, usual.read_function),
-        device_id=_int_or("device_id", device_id, *units, usual.device_id),
-    )
+def _seconds(help: str, low: float, high: float, places: Place = Place.FILE) -> Option:
+    return Option(help, partial(check_seconds, low=low, high=high), places, low, high)
 
 
-def _int_or(name: str, value: object, low: int, high: int, usual: int) -> int:
-    return usual if value is None else check_int(name, value, low, high)
+def _byte(help: str) -> Option:
+    return Option(help, check_byte, Place.FILE | Place.ROS, 0, 255)
 
 
-class _Way(NamedTuple):
-    """How a gripper is reached: the address that is shown, which one it is, and what makes its transport."""
+def _by_link(help: str, register: str, low: int, high: int, places: Place = Place.NONE) -> Option:
+    """One that depends on the link unless it is given; ``register`` is its field of a RegisterMap."""
 
-    address: str
-    gripper: Callable[[], Gripper]
-    make: Callable[..., Link]
-    is_rtu: bool = False
+    def check(name: str, value: object) -> object:
+        return None if value is None else check_int(name, value, low, high)
 
-
-def _way_to(address: object, registers: Mapping[str, object], name: str) -> _Way:
-    if isinstance(address, str):
-        parsed = parse_address(address)
-        names_unit = registers["device_id"] is not None
-        return _over_modbus(parsed, registers_of(parsed, **registers), names_unit, name)
-    if isinstance(address, Transport):
-        shown = f"<{type(address).__name__} at {id(address):#x}>"
-        guarded = partial(GuardedTransport, address, shown, log=Log(name or shown))
-        return _Way(shown, partial(Gripper, shown), guarded)
-    raise TypeError(f"address must be a string or a Transport, got {address!r}")
+    tcp, rtu = getattr(TCP_REGISTERS, register), getattr(RTU_REGISTERS, register)
+    return Option(help, check, places | Place.FILE | Place.COMMAND_LINE, low, high, tcp, rtu)
 
 
-def _over_modbus(address: Address, registers: RegisterMap, names_unit: bool, name: str) -> _Way:
-    if address.kind == "sim":
-        simulated = new_gripper(address.simulation)
-        shown = f"{address}#{id(simulated):x}"  # every sim:// is a gripper of its own
-        return _Way(shown, partial(Gripper, shown), partial(SimulatedTransport, simulated, registers))
-    # A gateway takes several connections; on a serial line replies carry no number, and whoever has it open
-    # gets part of what arrives.
-    unit = registers.device_id if names_unit and not address.is_rtu else None
-    hint = _LINE if address.is_rtu else _GATEWAY  # for people who meant two grippers
-    return _Way(
-        str(address),
-        lambda: Gripper(canonical_address(address), unit, hint),
-        partial(ModbusTransport, address, registers, log=Log(name or str(address))),
-        address.is_rtu,
-    )
+def _check_address(_: str, value: object) -> object:
+    return value  # gripper_link() has parsed it
 
 
-def _check_name(name: object) -> str:
+def _check_name(_: str, name: object) -> str | None:
+    form = f"None or a text of 1..{LONGEST_NAME} printable characters without blanks around it"
     if name is None:
-        return ""
-    form = f"a text of 1..{LONGEST_NAME} printable characters without blanks around it"
+        return None
     if not isinstance(name, str):
-        raise TypeError(f"name must be None or {form}, got {name!r}")
+        raise TypeError(f"name must be {form}, got {name!r}")
     if not 1 <= len(name) <= LONGEST_NAME or not name.isprintable() or name != name.strip():
-        raise ValueError(f"name must be None or {form}, got {name!r:.100}")
+        raise ValueError(f"name must be {form}, got {name!r:.100}")
     return name
 
 
-def check_units(calibration: object, force_calibration: object) -> Units:
+def _check_reconnect(_: str, reconnect: object) -> object:
+    if not isinstance(reconnect, bool | ReconnectPolicy):
+        raise TypeError(f"reconnect must be True, False or a ReconnectPolicy, got {reconnect!r}")
+    return reconnect
+
+
+def _check_speeds(_: str, speeds: object) -> SpeedCalibration | None:
+    if not isinstance(speeds, SpeedCalibration | None):
+        raise TypeError(f"calibration must be None or a SpeedCalibration, got {speeds!r}")
+    if speeds is not None and (ends := (speeds.points[0][0], speeds.points[-1][0])) != (0, 255):
+        raise ValueError(f"calibration must reach over the speed values 0..255, got {ends[0]}..{ends[1]}")
+    return speeds
+
+
+def _check_forces(_: str, forces: object) -> ForceCalibration | None:
+    if not isinstance(forces, ForceCalibration | None):
+        raise TypeError(f"force_calibration must be None or a ForceCalibration, got {forces!r}")
+    return forces
+
+
+@dataclass(frozen=True, slots=True)
+class HandOptions:
+    """The options of a hand, checked. Opens nothing and needs no running loop.
+
+    :class:`~robotiq_async.RobotiqHand` documents each; ``link``, ``units`` and ``log`` follow from them.
+
+    Raises:
+        TypeError: an option of the wrong type; the message names option, value and range.
+        ValueError: an option outside its range, or a malformed address.
+    """
+
+    address: Annotated[
+        str | Transport,
+        Option("Gripper: tcp://, rtu://, rtu+tcp:// or sim://", _check_address, Place.FILE | Place.ROS),
+    ] = "sim://"
+    name: Annotated[str | None, Option("What errors and the log call the hand", _check_name)] = None
+    device_id: Annotated[
+        int | None, _by_link("Modbus unit id (1..247 on a serial line)", "device_id", 0, 255, Place.ROS)
+    ] = None
+    read_function: Annotated[
+        int | None, _by_link("Modbus function that reads the status", "read_function", 3, 4, Place.ROS)
+    ] = None
+    poll_interval: Annotated[
+        float,
+        _seconds(
+            f"Seconds between polls; the default is {SERIAL_POLL_INTERVAL_S} on a serial line",
+            0.001,
+            0.1,
+            Place.FILE | Place.ROS,
+        ),
+    ] = POLL_INTERVAL_S
+    write_spacing: Annotated[
+        float,
+        _seconds(
+            "Seconds from one write to the next; 0 for a gripper that loses none. Stops do not wait",
+            0.0,
+            LONGEST_SPACING_S,
+            Place.FILE | Place.ROS,
+        ),
+    ] = WRITE_SPACING_S
+    connect_timeout: Annotated[float, _seconds("Seconds for opening the link", 0.01, 5.0)] = CONNECT_TIMEOUT_S
+    response_timeout: Annotated[
+        float,
+        _seconds(
+            "Seconds for one answer",
+            0.005,
+            LONGEST_RESPONSE_S,
+            Place.FILE | Place.ROS | Place.COMMAND_LINE,
+        ),
+    ] = RESPONSE_TIMEOUT_S
+    activation_timeout: Annotated[float, _seconds("Seconds for an activation", 0.01, 120.0)] = (
+        ACTIVATION_TIMEOUT_S
+    )
+    reconnect: Annotated[
+        bool | ReconnectPolicy, Option("Whether a lost link is opened again", _check_reconnect)
+    ] = True
+    speed: Annotated[int, _byte("Speed of the axes until another is set, in counts")] = DEFAULT_SPEED
+    force: Annotated[int, _byte("Force of the axes until another is set, in counts")] = DEFAULT_FORCE
+    request_address: Annotated[int | None, _by_link("First request register", "request", 0, LAST_BLOCK)] = (
+        None
+    )
+    status_address: Annotated[int | None, _by_link("First status register", "status", 0, LAST_BLOCK)] = None
+    calibration: Annotated[SpeedCalibration | None, Option("How fast this gripper is", _check_speeds)] = None
+    force_calibration: Annotated[
+        ForceCalibration | None, Option("Labels of the force values", _check_forces)
+    ] = None
+    keep_grip: Annotated[bool, Option("Whether a stop keeps a grip in force", check_flag, Place.FILE)] = False
+
+    link: GripperLink = field(default=None, repr=False, compare=False)  # type: ignore[assignment]
+    """How the gripper is reached; made from the address."""
+    units: Units = field(init=False, repr=False, compare=False)
+    """What positions, speeds and forces mean to people; default timeouts of moves come from its speeds."""
+    log: Log = field(init=False, repr=False, compare=False)
+    """For what happens to the hand."""
+
+    def __post_init__(self) -> None:
+        self._keep("name", _check_name("name", self.name))  # the log of the link begins with it
+        if self.link is None:
+            registers = {name: getattr(self, name) for name, each in OPTIONS.items() if each.tcp is not None}
+            self._keep("link", gripper_link(self.address, registers, self.given_name))
+        on_purpose = not isinstance(self.poll_interval, Usual)
+        for name, option in OPTIONS.items():
+            self._keep(name, option.check(name, getattr(self, name)))
+        if self.link.is_rtu and not on_purpose:
+            self._keep("poll_interval", SERIAL_POLL_INTERVAL_S)
+        self._keep("units", units_of(self.calibration, self.force_calibration))
+        self._keep("log", Log(self.given_name or self.link.address))
+
+    def _keep(self, name: str, value: object) -> None:
+        object.__setattr__(self, name, value)
+
+    @property
+    def given_name(self) -> str:
+        """The name that was given; empty if there was none."""
+        return self.name or ""
+
+    @property
+    def policy(self) -> ReconnectPolicy | None:
+        """What is done about a lost link; None for nothing."""
+        if isinstance(self.reconnect, ReconnectPolicy):
+            return self.reconnect
+        return ReconnectPolicy() if self.reconnect else None
+
+    def make_transport(self) -> Link:
+        """A transport for one start of the hand."""
+        return self.link.make(connect_timeout=self.connect_timeout, response_timeout=self.response_timeout)
+
+
+def _table() -> Mapping[str, Option]:
+    hints = get_type_hints(HandOptions, include_extras=True)
+    return {
+        each.name: replace(hints[each.name].__metadata__[0], default=each.default)
+        for each in fields(HandOptions)
+        if hasattr(hints[each.name], "__metadata__")
+    }
+
+
+OPTIONS: Final = _table()
+"""The table: every option by name, in the order of the arguments of a hand."""
+
+
+def offered(place: Place) -> dict[str, Option]:
+    """The options that a place offers."""
+    return {name: option for name, option in OPTIONS.items() if place in option.places}
+
+
+def units_of(calibration: object, force_calibration: object) -> Units:
     """What the values of a hand mean; None for the thesis's speeds, and for the manual's forces.
 
     Raises:
         TypeError: not a calibration of its kind.
-        ValueError: speeds that do not reach over 0..255.
+        ValueError: speeds that do not cover 0..255.
     """
-    speeds = _THESIS if calibration is None else calibration
-    forces = _NOMINAL if force_calibration is None else force_calibration
-    if not isinstance(speeds, SpeedCalibration):
-        raise TypeError(f"calibration must be None or a SpeedCalibration, got {calibration!r}")
-    if not isinstance(forces, ForceCalibration):
-        raise TypeError(f"force_calibration must be None or a ForceCalibration, got {force_calibration!r}")
-    first, last = speeds.points[0][0], speeds.points[-1][0]
-    if (first, last) != (0, 255):
-        raise ValueError(f"calibration must reach over the speed values 0..255, got {first}..{last}")
-    return Units(speeds, forces)
-
-
-def _check_reconnect(reconnect: object) -> ReconnectPolicy | None:
-    if isinstance(reconnect, ReconnectPolicy):
-        return reconnect
-    if reconnect is True:
-        return ReconnectPolicy()
-    if reconnect is False:
-        return None
-    raise TypeError(f"reconnect must be True, False or a ReconnectPolicy, got {reconnect!r}")
+    speeds = _check_speeds("calibration", calibration)
+    forces = _check_forces("force_calibration", force_calibration)
+    return Units(speeds or _THESIS, forces or _NOMINAL)

@@ -33,7 +33,7 @@ from ..values.status import RobotiqStatus
 from .counters import Counters
 from .ending import Ending
 from .opening import Opener
-from .options import LONGEST_SPACING_S, Options
+from .options import LONGEST_SPACING_S, HandOptions
 from .streams import Channels
 
 # anyio loads its backend at its first use, which would hold up the loop for some 20 ms when a hand starts.
@@ -87,7 +87,7 @@ class Poller:
         controller: Controller,
         counters: Counters,
         channels: Channels,
-        options: Options,
+        options: HandOptions,
         *,
         wait: float = 0.0,
     ) -> None:

@@ -32,7 +32,7 @@ from ..values.trigger import Trigger
 from .activation_progress import ActivationProgress
 from .claims import Claims
 from .counters import Counters
-from .options import Options
+from .options import HandOptions
 from .poller import Poller
 from .stall_watch import STALLED_S, StallWatch
 from .state_waiters import StateWaiters
@@ -64,7 +64,7 @@ class Session:
 
     def __init__(
         self,
-        options: Options,
+        options: HandOptions,
         machine: StateMachine,
         channels: Channels,
         *,
@@ -128,13 +128,13 @@ class Session:
         self._channels.publish_changes()
 
     def _claim(self) -> None:
-        gripper = self.options.gripper
+        gripper = self.options.link.gripper
         owner = self._claims.claim(gripper, self, lambda each: each.is_over)
         if owner is not None:
             is_this = owner.machine is self.machine
             who, hint = ("this hand", "") if is_this else ("another hand", gripper().hint)
             raise InvalidStateError(
-                f"{who} runs on {owner.options.address} already: stop() it first{hint}",
+                f"{who} runs on {owner.options.link.address} already: stop() it first{hint}",
                 self.machine.state,
                 {State.DISCONNECTED, State.SHUTDOWN},
             )

@@ -124,7 +124,7 @@ async def latency(seconds: float, ports: list[int]) -> Figures:
     """
     it = RobotiqHand(f"127.0.0.1:{ports[0]}", write_spacing=0.0)
     link: Any = it._options.make_transport()
-    it._options = replace(it._options, make_transport=lambda: link)
+    it._options = replace(it._options, link=replace(it._options.link, make=lambda **_: link))
     arrived = written = 0.0
     hear, write = link._on_data, link.write
 

@@ -14,7 +14,7 @@ import pytest
 
 from robotiq_async import Finger, MoveResult, ObjectStatus, RobotiqHand, State, Transition, Trigger
 from robotiq_async.fleet import GripperName
-from robotiq_async.fleet.agent.agent_file import AgentSettings, GripperSettings, read_agent_file
+from robotiq_async.fleet.agent.agent_file import AgentSettings, read_agent_file
 from robotiq_async.fleet.agent.publisher import AT_ONCE, KEPT, HandPublisher
 from robotiq_async.fleet.agent.records import NoRecords
 from robotiq_async.fleet.agent.served_hand import COMMANDS, ServedHand
@@ -24,6 +24,7 @@ from robotiq_async.fleet.wire.envelope import Answer, Call, failure
 from robotiq_async.fleet.wire.names import ROOT
 from robotiq_async.fleet.wire.status_message import StatusMessage
 from robotiq_async.fleet.wire.values import request_fields, result_fields, transition_fields
+from robotiq_async.session.options import Place, offered
 from robotiq_async.values.errors import ControlLostError
 from robotiq_async.values.events import SentRequest
 from robotiq_async.values.request import AxisRequest, Request
@@ -173,7 +174,7 @@ def test_every_reason_for_losing_control_is_there() -> None:
 def test_every_option_of_a_gripper_is_named() -> None:
     (about,) = re.findall(r"^The table of a gripper holds (.+?)\n\n", HOW_TO, re.MULTILINE | re.DOTALL)
     named = set(re.findall(r"`(\w+)`", about)) - {"RobotiqHand"}
-    assert named == {each.name for each in fields(GripperSettings)}
+    assert named == offered(Place.FILE).keys()
 
 
 def test_every_key_of_the_file_has_its_row() -> None:

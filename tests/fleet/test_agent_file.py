@@ -6,7 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from robotiq_async.fleet.agent.agent_file import AgentFileError, AgentSettings, machine_name, read_agent_file
+from robotiq_async.fleet.agent.agent_file import (
+    AgentFileError,
+    AgentSettings,
+    machine_name,
+    make_hand,
+    read_agent_file,
+)
 from robotiq_async.fleet.network.configuration import LOOPBACK, LOOPBACK_TLS, agent_configuration
 from robotiq_async.fleet.wire.names import check_name
 
@@ -64,7 +70,7 @@ def test_everything(tmp_path: Path) -> None:
     assert settings.grippers["left"].speed == 255
     assert settings.grippers["right"].status_address == 2000
     assert [each.keep_grip for each in settings.grippers.values()] == [False, True]
-    hand = settings.grippers["left"].make_hand("left")
+    hand = make_hand(settings.grippers["left"])
     assert (hand.name, hand.address) == ("left", "tcp://192.168.1.11:502")
 
 
@@ -148,9 +154,9 @@ def test_a_bad_file_is_told_in_one_line(text: str, words: list[str], tmp_path: P
 def test_a_gripper_on_a_serial_line_gets_its_defaults_unless_told(tmp_path: Path) -> None:
     line = '[grippers.left]\naddress = "rtu+tcp://192.168.1.20:54321"\nread_function = 4\n'
     grippers = read(tmp_path, f'site = "lab"\n{line}').grippers
-    assert grippers["left"].make_hand("left")._options.poll_interval == 0.015
+    assert grippers["left"].poll_interval == 0.015
     grippers = read(tmp_path, f'site = "lab"\n{line}poll_interval = 0.005\n').grippers
-    assert grippers["left"].make_hand("left")._options.poll_interval == 0.005
+    assert grippers["left"].poll_interval == 0.005
     assert grippers["left"].read_function == 4
 
 

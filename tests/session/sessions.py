@@ -7,30 +7,25 @@ from contextlib import asynccontextmanager
 
 from robotiq_async.control.state_machine import StateMachine
 from robotiq_async.session.claims import Gripper
-from robotiq_async.session.options import Options
+from robotiq_async.session.gripper_link import GripperLink
+from robotiq_async.session.options import HandOptions
 from robotiq_async.session.reconnecting import ReconnectPolicy
 from robotiq_async.session.session import Session
 from robotiq_async.session.streams import Channels
-from robotiq_async.values.calibration import Units
 from robotiq_async.values.errors import ConnectionLostError
 from tests.session.wire import Wire
 
 LOST = ConnectionLostError("unplugged")
 
 
-def options(wire: Wire, policy: ReconnectPolicy | None, key: str = "wire") -> Options:
+def options(wire: Wire, policy: ReconnectPolicy | None, key: str = "wire") -> HandOptions:
     """Those of a hand at this wire."""
-    return Options(
-        make_transport=lambda: wire,
-        address="wire",
-        gripper=lambda: Gripper(key),
+    return HandOptions(
+        link=GripperLink("wire", gripper=lambda: Gripper(key), make=lambda **_: wire),
         poll_interval=0.01,
         write_spacing=0.0,
         activation_timeout=20.0,
-        policy=policy,
-        speed=128,
-        force=64,
-        units=Units(),
+        reconnect=policy or False,
     )
 
 

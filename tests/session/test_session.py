@@ -44,10 +44,10 @@ async def test_an_address_has_one_session_at_a_time() -> None:
 async def test_a_session_that_could_not_begin_leaves_the_address_free() -> None:
     here = Run()
 
-    def fail() -> Wire:
+    def fail(**_: float) -> Wire:
         raise ZeroDivisionError
 
-    broken = replace(here.options, make_transport=fail)
+    broken = replace(here.options, link=replace(here.options.link, make=fail))
     with pytest.raises(ZeroDivisionError):
         Session(broken, here.machine, here.channels, activate=False)
     await begins_and_ends(here)

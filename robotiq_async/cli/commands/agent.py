@@ -78,6 +78,7 @@ def _settings(file: Path) -> AgentSettings:
 
 async def _serve(settings: AgentSettings) -> None:
     from ...fleet.agent.agent import Agent
+    from ...fleet.agent.agent_file import make_hand
     from ...fleet.agent.records import file_records
     from ...fleet.network.configuration import agent_configuration
 
@@ -91,7 +92,7 @@ async def _serve(settings: AgentSettings) -> None:
     )
     if settings.insecure:
         tell("anyone who reaches this host can command its grippers: there are no keys")
-    hands = {name: gripper.make_hand(name) for name, gripper in settings.grippers.items()}
+    hands = {name: make_hand(options) for name, options in settings.grippers.items()}
     try:
         bus = await _open(configuration, ", ".join(settings.listen or settings.connect))
         try:
@@ -123,8 +124,8 @@ async def _open(configuration: dict[str, object], where: str) -> ZenohBus:
 
 def _announce(served: Agent, settings: AgentSettings) -> None:
     for name, gripper in settings.grippers.items():
-        if is_simulated(gripper.address):
-            tell(f"{name}: {gripper_words(gripper.address)}")
+        if is_simulated(address := str(gripper.address)):
+            tell(f"{name}: {gripper_words(address)}")
     try:
         for each in served.hands.values():
             print(each.name, flush=True)

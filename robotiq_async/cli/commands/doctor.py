@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ...fleet.network.route import is_remote
 from ...link.address import parse_address
 from ...runtime.log import printable
-from ...session.options import registers_of
+from ...session.gripper_link import registers_of
 from ..addresses import full_address, gripper_words
 from ..arguments import Address, Unit, need
 from ..failures import CommandError, UsageError, usage

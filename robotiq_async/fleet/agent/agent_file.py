@@ -7,24 +7,15 @@ import socket
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import MISSING, asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 from itertools import combinations
 from pathlib import Path
 from typing import Any, Final
 
 from ...hand.robotiq_hand import RobotiqHand
-from ...session.options import (
-    ACTIVATION_TIMEOUT_S,
-    CONNECT_TIMEOUT_S,
-    POLL_INTERVAL_S,
-    RESPONSE_TIMEOUT_S,
-    WRITE_SPACING_S,
-    Options,
-    check_options,
-)
+from ...session.options import HandOptions, Place, offered
 from ...values.checks import check_seconds
-from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..control.lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
 from ..keys.access_list import AccessList
 from ..keys.key_folder import ACCESS, check_key_folder
@@ -41,42 +32,12 @@ class AgentFileError(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class GripperSettings:
-    """One gripper of an agent: what :class:`~robotiq_async.RobotiqHand` takes, under the same names."""
-
-    address: str
-    device_id: int | None = None
-    read_function: int | None = None
-    poll_interval: float = POLL_INTERVAL_S
-    write_spacing: float = WRITE_SPACING_S
-    connect_timeout: float = CONNECT_TIMEOUT_S
-    response_timeout: float = RESPONSE_TIMEOUT_S
-    activation_timeout: float = ACTIVATION_TIMEOUT_S
-    speed: int = DEFAULT_SPEED
-    force: int = DEFAULT_FORCE
-    request_address: int | None = None
-    status_address: int | None = None
-    keep_grip: bool = False
-
-    def make_hand(self, name: str) -> RobotiqHand:
-        """A hand for the gripper; opens nothing.
-
-        Args:
-            name: the gripper's, by which the log calls it.
-
-        Raises:
-            TypeError, ValueError: a value that :func:`read_agent_file` would have refused.
-        """
-        return RobotiqHand(**asdict(self), name=name)
-
-
-@dataclass(frozen=True, slots=True)
 class AgentSettings:
     """Everything an agent goes by, checked.
 
     Attributes:
         site: the site's name.
-        grippers: by name.
+        grippers: the options of each hand, by its name.
         host: the host's name; by default this machine's.
         listen: endpoints of zenoh where clients come in; none with a router.
         connect: endpoints of a router, by which clients come in.
@@ -86,7 +47,7 @@ class AgentSettings:
     """
 
     site: str
-    grippers: Mapping[str, GripperSettings]
+    grippers: Mapping[str, HandOptions]
     host: str = field(default_factory=lambda: machine_name())
     listen: tuple[str, ...] = (LOOPBACK,)
     connect: tuple[str, ...] = ()
@@ -95,11 +56,13 @@ class AgentSettings:
     window: float = WINDOW_S
 
 
-_OF_GRIPPER: Final = tuple(each.name for each in fields(GripperSettings))
+_OF_GRIPPER: Final = tuple(offered(Place.FILE))
 _OF_AGENT: Final = tuple(each.name for each in fields(AgentSettings))
-_DEFAULTS: Final[Mapping[str, Any]] = {
-    each.name: each.default for each in fields(GripperSettings) if each.default is not MISSING
-}
+
+
+def make_hand(options: HandOptions) -> RobotiqHand:
+    """A hand for a gripper of the file; opens nothing."""
+    return RobotiqHand(name=options.name, **{name: getattr(options, name) for name in _OF_GRIPPER})
 
 
 def machine_name() -> str:
@@ -181,25 +144,21 @@ class _Reader:
         AccessList.read_file(folder / ACCESS)
         return folder
 
-    def _grippers(self, tables: object) -> dict[str, GripperSettings]:
+    def _grippers(self, tables: object) -> dict[str, HandOptions]:
         with self._blaming(_GRIPPERS):
             if not isinstance(tables, dict) or not tables:
                 raise ValueError(f"a table for each gripper is needed: [grippers.left], got {tables!r}")
-        grippers, checked = {}, {}
-        for name, table in tables.items():
-            grippers[name], checked[name] = self._gripper(name, table)
-        for one, other in combinations(checked, 2):
-            if checked[one].gripper().may_be(checked[other].gripper()):
-                address = f"{grippers[other].address!r}{self._hint(checked[other])}"
+        grippers = {name: self._gripper(name, table) for name, table in tables.items()}
+        for one, other in combinations(grippers, 2):
+            gripper = grippers[other].link.gripper()
+            if grippers[one].link.gripper().may_be(gripper):
+                address = f"{grippers[other].address!r}{gripper.hint.replace('hands', 'grippers')}"
                 raise self._error(
                     (_GRIPPERS, other, "address"), f"address must be another than {one}'s, got {address}"
                 )
         return grippers
 
-    def _hint(self, options: Options) -> str:
-        return options.gripper().hint.replace("hands", "grippers")
-
-    def _gripper(self, name: str, table: object) -> tuple[GripperSettings, Options]:
+    def _gripper(self, name: str, table: object) -> HandOptions:
         path = (_GRIPPERS, name)
         with self._blaming(*path):
             check_name("the name of a gripper", name)
@@ -208,13 +167,15 @@ class _Reader:
         self._check_keys_of(table, path, _OF_GRIPPER, needed=("address",))
         address = table["address"]
         with self._blaming(*path, "address"):
-            if isinstance(address, str) and has_scheme(address):
+            if not isinstance(address, str):
+                raise TypeError(f"address must be a string, got {address!r}")
+            if has_scheme(address):
                 raise ValueError(f"address must be of a gripper on this host, got {address!r}")
-            _check_gripper(address, {})
-        for key, value in table.items():
+            HandOptions(address)
+        for key, value in table.items():  # one by one: the error names the line of the key
             with self._blaming(*path, key):
-                _check_gripper(address, {key: value})
-        return GripperSettings(**table), _check_gripper(address, table)
+                HandOptions(**{"address": address, key: value})
+        return HandOptions(name=name, **table)
 
     def _check_keys_of(
         self,
@@ -252,14 +213,6 @@ class _Reader:
         if len(path) > 1:
             where += f", in [{path[0]}.{path[1]}]"
         return AgentFileError(f"{where}: {message}")
-
-
-def _check_gripper(address: object, given: Mapping[str, object]) -> Options:
-    if not isinstance(address, str):
-        raise TypeError(f"address must be a string, got {address!r}")
-    options = {key: value for key, value in given.items() if key != "address"}
-    fixed = {"reconnect": True, "calibration": None, "force_calibration": None}
-    return check_options(address, **{**_DEFAULTS, **fixed, **options})
 
 
 def _check_bool(name: str, value: object) -> bool:

@@ -12,7 +12,7 @@ from ...control.state_machine import RUNNING, refusal
 from ...hand import Hand
 from ...session.counters import Counters
 from ...session.ending import Ending
-from ...session.options import check_units
+from ...session.options import units_of
 from ...values.calibration import ForceCalibration, SpeedCalibration
 from ...values.checks import check_flag, check_seconds
 from ...values.enums import Finger, State
@@ -104,7 +104,7 @@ class RemoteHand(Hand):
         self._gripper, self._route = parse_remote_address(address)
         self._connect_timeout = check_seconds("connect_timeout", connect_timeout, 0.1, 60.0)
         self._control = control
-        units = check_units(calibration, force_calibration)
+        units = units_of(calibration, force_calibration)
         super().__init__(str(self._gripper), units=units, keep_grip=check_flag("keep_grip", keep_grip))
         if bus is None:
             self._route.configuration()  # a malformed or unprotected route fails here, not at the start

@@ -9,9 +9,8 @@ from ...fleet.remote.remote_hand import RemoteHand
 from ...hand import Hand
 from ...hand.robotiq_hand import RobotiqHand
 from ...runtime.extras import install
-from ...session.options import POLL_INTERVAL_S
 from ...values.errors import RobotiqError
-from ..translation.settings import USUAL, Settings
+from ..translation.settings import Settings
 
 
 def make_hand(settings: Settings) -> Hand:
@@ -27,22 +26,4 @@ def make_hand(settings: Settings) -> Hand:
         if find_spec("zenoh") is None:
             raise RobotiqError(f"a gripper on another host needs zenoh: {install('fleet')}")
         return RemoteHand(settings.address, control=None)
-    return RobotiqHand(
-        settings.address,
-        device_id=_given(settings.device_id),
-        read_function=_given(settings.read_function),
-        poll_interval=_or_usual(settings.poll_interval),
-        write_spacing=settings.write_spacing,
-        response_timeout=settings.response_timeout,
-        speed=settings.speed,
-        force=settings.force,
-    )
-
-
-def _given(number: int) -> int | None:
-    return None if number == USUAL else number
-
-
-def _or_usual(interval: float) -> float:
-    """The default comes back from ROS as a plain figure, which would count as given on purpose."""
-    return POLL_INTERVAL_S if interval == POLL_INTERVAL_S else interval
+    return RobotiqHand(settings.address, speed=settings.speed, force=settings.force, **settings.options)

@@ -1,27 +1,22 @@
-"""The parameters of the node: names, meaning, ranges, and what is made of their values."""
+"""The parameters of the node: names, meaning, ranges and checks. Those of the hand come from its options."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, fields
+from typing import Any, Final
 
 from ...fleet.network.route import is_remote, parse_remote_address
 from ...link.address import parse_address
-from ...session.options import (
-    LONGEST_RESPONSE_S,
-    LONGEST_SPACING_S,
-    POLL_INTERVAL_S,
-    RESPONSE_TIMEOUT_S,
-    WRITE_SPACING_S,
-)
-from ...values.checks import check_int, check_number, check_seconds
-from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ...session.options import Option, Place, offered
+from ...values.checks import check_int, check_number
 
 Value = str | int | float | bool
 USUAL: Final = -1
-"""A parameter of ROS always has a value: this one stands for none."""
+"""A parameter of ROS always has a value: this one stands for None."""
+OF_HAND: Final = offered(Place.ROS)
+"""The parameters that are options of the hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +24,7 @@ class Parameter:
     """One parameter.
 
     Attributes:
-        default: what it is unless somebody says otherwise; its type is that of the parameter.
+        default: its value unless another is given, of the parameter's type.
         description: for ``ros2 param describe``.
         low: the lowest value of a number.
         high: the highest value of a number.
@@ -43,45 +38,33 @@ class Parameter:
     live: bool = False
 
 
+def _of_hand(name: str, option: Option) -> Parameter:
+    text, low, default = option.help, option.low, option.default
+    if default is None:  # it depends on the link
+        text += f"; {USUAL} stands for {option.tcp} over TCP, {option.rtu} on a serial line"
+        low = default = USUAL
+    # A plain figure: ROS does not know subclasses of float.
+    default = float(default) if isinstance(default, float) else default
+    return Parameter(default, f"{text}.", low, option.high, live=name in ("speed", "force"))  # type: ignore[arg-type]
+
+
 PARAMETERS: Final[Mapping[str, Parameter]] = {
+    **{name: _of_hand(name, option) for name, option in OF_HAND.items()},
     "address": Parameter(
         "sim://",
-        "The gripper: tcp://HOST[:502], rtu:///dev/ttyUSB0, rtu+tcp://HOST:PORT, zenoh://SITE/HOST/GRIPPER, "
-        "or sim://, simulated.",
+        "The gripper: tcp://HOST[:502], rtu:///dev/ttyUSB0, rtu+tcp://HOST:PORT, zenoh://SITE/HOST/GRIPPER "
+        "(set up on its host: the other options of the hand have no effect), or sim://, simulated.",
     ),
-    "device_id": Parameter(USUAL, "Modbus unit id; -1 is what is usual: 2 over TCP, 9 over RTU.", USUAL, 255),
-    "read_function": Parameter(
-        USUAL, "Modbus function that reads, 3 or 4; -1 is what is usual: 4 over TCP, 3 over RTU.", USUAL, 4
-    ),
-    "poll_interval": Parameter(
-        float(POLL_INTERVAL_S),
-        "Seconds between two polls; 0.005 is 0.015 over RTU. A gripper on another host is polled there.",
-        0.001,
-        0.1,
-    ),
-    "write_spacing": Parameter(
-        WRITE_SPACING_S,
-        "Seconds from one write to the next; 0 for a gripper that forgets none. Stops do not wait.",
-        0.0,
-        LONGEST_SPACING_S,
-    ),
-    "response_timeout": Parameter(RESPONSE_TIMEOUT_S, "Seconds for one answer.", 0.005, LONGEST_RESPONSE_S),
     "publish_rate": Parameter(50.0, "Joint states a second.", 1.0, 200.0),
     "joint_prefix": Parameter(
-        "", "Stands before the name of every joint, as it is: left_ makes left_finger_1_joint_1."
-    ),
-    "frame_id": Parameter("", "Of the headers of joint states; joint states need none."),
-    "urdf": Parameter(
         "",
-        "File to publish as robot_description, as it is; empty for the one that the package brings.",
+        "Prefix of the name of every joint: left_ makes left_finger_1_joint_1. Letters, digits, _ . / and -.",
     ),
+    "frame_id": Parameter("", "Frame in the headers of the joint states, which need none."),
+    "urdf": Parameter("", "File to publish as robot_description, unchanged; empty for the packaged one."),
     "allow_stalling": Parameter(
-        True,
-        "Whether a goal that ends in a contact has succeeded: it is a grasp. False aborts it.",
-        live=True,
+        True, "Whether a goal that ends in a contact, a grasp, succeeds. False aborts it.", live=True
     ),
-    "speed": Parameter(DEFAULT_SPEED, "Speed of the axes of a goal, in counts.", 0, 255, live=True),
-    "force": Parameter(DEFAULT_FORCE, "Force of the axes of a goal, in counts.", 0, 255, live=True),
     "autostart": Parameter(
         False, "Whether the node configures and activates itself when it starts. That moves nothing."
     ),
@@ -93,22 +76,21 @@ PARAMETERS: Final[Mapping[str, Parameter]] = {
 class Settings:
     """The parameters, checked.
 
-    Attributes: as the parameters of the same name.
+    Attributes:
+        options: of the hand, as :class:`~robotiq_async.RobotiqHand` takes them, besides the next three.
+
+    The others are the parameters of the same name.
     """
 
+    options: Mapping[str, Any]
     address: str
-    device_id: int
-    read_function: int
-    poll_interval: float
-    write_spacing: float
-    response_timeout: float
+    speed: int
+    force: int
     publish_rate: float
     joint_prefix: str
     frame_id: str
     urdf: str
     allow_stalling: bool
-    speed: int
-    force: int
     autostart: bool
 
 
@@ -116,17 +98,24 @@ def check_settings(values: Mapping[str, object]) -> Settings:
     """Check the value of every parameter.
 
     Raises:
-        ValueError: a value that will not do; names the parameter, the value and what would do.
+        ValueError: a value out of range or of the wrong type; names the parameter, the value and the range.
     """
-    # One after the other: each is told with its own name.
-    return Settings(**{name: check_parameter(name, values[name]) for name in PARAMETERS})  # type: ignore[arg-type]
+    checked = {name: check_parameter(name, values[name]) for name in PARAMETERS}
+    own = {each.name for each in fields(Settings)}
+    options = {name: _option_value(name, checked.pop(name)) for name in OF_HAND if name not in own}
+    return Settings(options, **checked)  # type: ignore[arg-type]
+
+
+def _option_value(name: str, value: Value) -> object:
+    # The default itself for a value that equals it: on a serial line the default poll_interval is another.
+    return OF_HAND[name].default if value == PARAMETERS[name].default else value
 
 
 def check_parameter(name: str, value: object) -> Value:
-    """A value of a parameter, in its type. An integer will do for a float: people write 50 for 50.0.
+    """A value of a parameter, in its type. An integer may stand for a float: people write 50 for 50.0.
 
     Raises:
-        ValueError: it will not do.
+        ValueError: out of range or of the wrong type.
     """
     parameter = PARAMETERS[name]
     try:
@@ -138,12 +127,11 @@ def check_parameter(name: str, value: object) -> Value:
             return text if check is None else check(str(text))
         if isinstance(parameter.default, int):
             number = check_int(name, value, int(parameter.low), int(parameter.high))
-            if name == "read_function" and number not in (USUAL, 3, 4):
-                raise ValueError(f"read_function must be 3, 4 or {USUAL}, got {value!r}")
+            if USUAL < number < (low := int(OF_HAND[name].low)):
+                raise ValueError(f"{name} must be {USUAL} or in {low}..{int(parameter.high)}, got {value!r}")
             return number
-        if name.endswith(("interval", "spacing", "timeout")):
-            return check_seconds(name, value, parameter.low, parameter.high)
-        return check_number(name, value, parameter.low, parameter.high)
+        what = "seconds" if name in OF_HAND else "a number"
+        return check_number(name, value, parameter.low, parameter.high, what)
     except TypeError as error:
         raise ValueError(str(error)) from None
 
@@ -155,18 +143,18 @@ def _check_kind(name: str, value: object, kind: type[Value], what: str) -> Value
 
 
 def _check_address(address: str) -> str:
-    """Refuse what is none before anything is opened."""
+    """Refuse a malformed address before anything is opened."""
     parse = parse_remote_address if is_remote(address) else parse_address
     parse(address)
     return address
 
 
 def _check_prefix(prefix: str) -> str:
-    """Refuse what is no part of a name: it gets into a URDF and into the names of frames."""
+    """Refuse characters that names in a URDF and names of frames cannot have."""
     if not re.fullmatch(r"[A-Za-z0-9_./-]*", prefix):
         raise ValueError(f"joint_prefix may have letters, digits, _ . / and -, got {prefix!r}")
     return prefix
 
 
 _CHECKS: Final = {"address": _check_address, "joint_prefix": _check_prefix}
-"""Of strings that are not free."""
+"""Of the strings that are restricted."""

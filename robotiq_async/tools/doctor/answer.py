@@ -12,7 +12,8 @@ from ...link.address import Address
 from ...link.modbus import ModbusTransport
 from ...link.sim_transport import SimulatedTransport, new_gripper
 from ...link.transport import Link
-from ...session.options import LONGEST_RESPONSE_S, registers_of
+from ...session.gripper_link import registers_of
+from ...session.options import LONGEST_RESPONSE_S
 from ...values.errors import (
     ConnectFailedError,
     ConnectionLostError,

@@ -12,11 +12,11 @@ from typing import Final
 from ...link.address import Address
 from ...link.host_names import addresses_of
 from ...link.transport import Link
+from ...session.gripper_link import registers_of
 from ...session.options import (
     POLL_INTERVAL_S,
     RESPONSE_TIMEOUT_S,
     SERIAL_POLL_INTERVAL_S,
-    registers_of,
 )
 from ...values.enums import Severity
 from ...values.errors import ConnectionLostError, RobotiqConnectionError

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import Final
 
-from ...session.options import registers_of
+from ...session.gripper_link import registers_of
 from ...values.enums import AXES, Fault
 from ...values.registers import STATUS_RESERVED
 from ...values.status import RobotiqStatus

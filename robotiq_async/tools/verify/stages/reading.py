@@ -8,7 +8,7 @@ from collections import Counter
 from dataclasses import replace
 from typing import Final
 
-from ....session.options import registers_of
+from ....session.gripper_link import registers_of
 from ....values.enums import Fault
 from ....values.errors import RobotiqConnectionError
 from ....values.registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap, Registers

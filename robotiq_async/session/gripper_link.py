@@ -1,0 +1,111 @@
+"""How a gripper is reached: its address as text, its identity, and what opens a transport to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Final
+
+from ..link.address import Address, parse_address
+from ..link.canonical import canonical_address
+from ..link.guard import GuardedTransport
+from ..link.modbus import ModbusTransport
+from ..link.sim_transport import SimulatedTransport, new_gripper
+from ..link.transport import Link, Transport
+from ..runtime.log import Log
+from ..values.checks import check_int
+from ..values.registers import REGISTER_COUNT, RTU_REGISTERS, TCP_REGISTERS, RegisterMap
+from .claims import Gripper
+
+LAST_BLOCK: Final = 0x10000 - REGISTER_COUNT
+"""The highest first register of a block: registers are numbered to 0xFFFF."""
+_GATEWAY: Final = " (two grippers behind one gateway: give each of the hands its device_id)"
+_LINE: Final = " (a serial port has one owner, whatever the device_id: two would read each other's replies)"
+
+
+@dataclass(frozen=True, slots=True)
+class GripperLink:
+    """How a gripper is reached.
+
+    Attributes:
+        address: in its full form, as errors and the log show it.
+        gripper: identifies the gripper at the time of the call: a serial port may have been plugged in since.
+        make: makes a transport for one start of the hand, from ``connect_timeout`` and ``response_timeout``.
+        is_rtu: whether frames go over a serial line, which is slower.
+    """
+
+    address: str
+    gripper: Callable[[], Gripper]
+    make: Callable[..., Link]
+    is_rtu: bool = False
+
+
+def gripper_link(address: object, registers: Mapping[str, object], name: str = "") -> GripperLink:
+    """The way to the gripper at an address. Opens nothing.
+
+    Args:
+        address: a string or a transport object.
+        registers: the options that :func:`registers_of` takes; a transport object has no use for them.
+        name: of the hand, for the log; empty for the address.
+
+    Raises:
+        TypeError: neither a string nor a Transport, or an option that is no int.
+        ValueError: a malformed address, or an option outside its range.
+    """
+    if isinstance(address, str):
+        parsed = parse_address(address)
+        names_unit = registers["device_id"] is not None
+        return _over_modbus(parsed, registers_of(parsed, **registers), names_unit, name)
+    if isinstance(address, Transport):
+        shown = f"<{type(address).__name__} at {id(address):#x}>"
+        guarded = partial(GuardedTransport, address, shown, log=Log(name or shown))
+        return GripperLink(shown, partial(Gripper, shown), guarded)
+    raise TypeError(f"address must be a string or a Transport, got {address!r}")
+
+
+def registers_of(
+    address: Address,
+    *,
+    device_id: object = None,
+    read_function: object = None,
+    request_address: object = None,
+    status_address: object = None,
+) -> RegisterMap:
+    """How the registers of a gripper are read and written; None stands for the usual value of the link.
+
+    Raises:
+        TypeError: an option is no int.
+        ValueError: an option is outside its range.
+    """
+    usual = RTU_REGISTERS if address.is_rtu else TCP_REGISTERS
+    # On a serial line 0 is a broadcast, which no device answers, and ids above 247 are reserved. Over TCP
+    # grippers in the field answer to any id, and drivers have used 0 and 255.
+    units = (1, 247) if address.is_rtu else (0, 255)
+    return RegisterMap(
+        request=_int_or("request_address", request_address, 0, LAST_BLOCK, usual.request),
+        status=_int_or("status_address", status_address, 0, LAST_BLOCK, usual.status),
+        read_function=_int_or("read_function", read_function, 3, 4, usual.read_function),
+        device_id=_int_or("device_id", device_id, *units, usual.device_id),
+    )
+
+
+def _int_or(name: str, value: object, low: int, high: int, usual: int) -> int:
+    return usual if value is None else check_int(name, value, low, high)
+
+
+def _over_modbus(address: Address, registers: RegisterMap, names_unit: bool, name: str) -> GripperLink:
+    if address.kind == "sim":
+        simulated = new_gripper(address.simulation)
+        shown = f"{address}#{id(simulated):x}"  # every sim:// is a gripper of its own
+        return GripperLink(shown, partial(Gripper, shown), partial(SimulatedTransport, simulated, registers))
+    # A gateway takes several connections. On a serial line replies carry no number, so every program that has
+    # it open gets part of what arrives: there the unit id tells no two grippers apart.
+    unit = registers.device_id if names_unit and not address.is_rtu else None
+    hint = _LINE if address.is_rtu else _GATEWAY  # for users who meant two grippers
+    return GripperLink(
+        str(address),
+        lambda: Gripper(canonical_address(address), unit, hint),
+        partial(ModbusTransport, address, registers, log=Log(name or str(address))),
+        address.is_rtu,
+    )
