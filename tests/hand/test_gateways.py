@@ -71,7 +71,7 @@ async def test_a_gateway_that_writes_fewer_registers_is_told_so(gateway: Simulat
 
     async with RobotiqHand(gateway.address) as hand:
         gateway.policy = shorten
-        with pytest.raises(ConnectionLostError, match=r"6 registers written, and not of 8.*gateway"):
+        with pytest.raises(ConnectionLostError, match=r"6 registers written, and not 8.*gateway"):
             await hand.set_position(100)
 
 
