@@ -117,5 +117,4 @@ __all__ = [
 
 
 def __dir__() -> list[str]:
-    """The public names, without the modules that they come from."""
     return sorted([*__all__, "__version__"])

@@ -1,4 +1,4 @@
-"""Opens a page in the browser of whoever sits at this machine."""
+"""Opens a page in the browser of this machine."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from typing import Final
 from ..runtime.concurrency import in_a_thread
 
 OPEN_S: Final = 1.0
-"""Some browsers are only done with opening a page when somebody closes them."""
-DOOR: Final = '<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="0; url={0}">'
+"""Some browsers return from opening a page only when they are closed."""
+REDIRECT: Final = '<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="0; url={0}">'
 
 
 @asynccontextmanager
 async def opened(url: str, opener: Callable[[str], bool] = webbrowser.open) -> AsyncIterator[bool]:
-    """Open a page while a block runs; whether a browser was started.
+    """Open a page for the time of a block; yields whether a browser was started.
 
-    Without a screen Python would start a browser in the terminal, which has other things to show.
+    Without a screen nothing is opened: Python would start a text browser in this terminal.
     """
-    file = _door(url) if _has_screen() else None
+    file = _redirect_file(url) if _has_screen() else None
     if file is None:
         yield False
         return
@@ -39,19 +39,15 @@ async def opened(url: str, opener: Callable[[str], bool] = webbrowser.open) -> A
             file.unlink()
 
 
-def _door(url: str) -> Path | None:
-    """A file that leads to a page, and that only this user reads; None if the home folder takes none.
-
-    What a browser is started with is there for every user of the machine to read, and the token of the page
-    is no business of theirs. The file has a name that shows, and lies where the user's own do: browsers that
-    come as a snap see neither hidden folders nor the temporary one.
-    """
+def _redirect_file(url: str) -> Path | None:
+    # The URL holds the token, and every user of the machine can read the arguments of a process. The file has
+    # a visible name in the home folder: browsers in a snap see neither hidden folders nor the temporary one.
     try:
         descriptor, name = mkstemp(".html", "robotiq-async-", Path.home())
     except (OSError, RuntimeError):
         return None
     with os.fdopen(descriptor, "w", encoding="utf-8") as file:
-        file.write(DOOR.format(escape(url)))
+        file.write(REDIRECT.format(escape(url)))
     return Path(name)
 
 

@@ -51,7 +51,6 @@ class Keyboard:
     """A :class:`~robotiq_async.tools.verify.Person`; use it as a context manager, in a running loop."""
 
     def __init__(self) -> None:
-        """Nothing is changed yet."""
         self._file = sys.stdin.fileno()
         self._before: list[Any] = []
         self._is_gone = False
@@ -60,7 +59,6 @@ class Keyboard:
         self._loop: asyncio.AbstractEventLoop
 
     def __enter__(self) -> Self:
-        """Have every key at once."""
         import termios
 
         self._loop = asyncio.get_running_loop()
@@ -79,7 +77,6 @@ class Keyboard:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Leave the terminal as it was."""
         import termios
 
         self._loop.remove_reader(self._file)

@@ -119,7 +119,6 @@ class Fleet:
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Listen no longer."""
         for undo in self._undo:
             undo()
         self._changes.end()
@@ -229,7 +228,6 @@ class Fleet:
             self._changes.push(after)
 
     def __iter__(self) -> Iterator[Member]:
-        """The members."""
         return iter(self.members.values())
 
 

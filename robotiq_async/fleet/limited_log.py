@@ -16,7 +16,6 @@ class LimitedLog:
     """Of one kind, about one source: the first at once, then one in ten seconds, with how many there were."""
 
     def __init__(self, log: Log = log) -> None:
-        """Nothing to complain about yet; ``log`` is that of the hand that it is about."""
         self._log = log
         self._next = -math.inf
         self._count = 0

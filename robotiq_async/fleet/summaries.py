@@ -26,7 +26,6 @@ class Summaries:
     """Reads what arrives."""
 
     def __init__(self) -> None:
-        """Nothing has arrived yet."""
         self._runs: dict[GripperName, _Run] = {}
         """The run that was heard last."""
 

@@ -78,27 +78,23 @@ class Hand(ABC):
         self._naming = NamesErrors(name)
 
     def __repr__(self) -> str:
-        """Kind, name if one was given, address and state."""
         name = f"{self._given_name} " if self._given_name else ""
         return f"<{type(self).__name__} {name}{self._address} {self.state.name}>"
 
     # -- lifetime --------------------------------------------------------------------------------------
 
     async def __aenter__(self) -> Self:
-        """Start, with activation. Raises what :meth:`start` raises."""
         await self.start()
         return self
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Stop, also when the block failed or was cancelled."""
         await self.stop()
 
     if not TYPE_CHECKING:  # type checkers report the mistake themselves
 
         def __enter__(self) -> None:
-            """Refuse ``with``."""
             kind = type(self).__name__
             raise TypeError(
                 f"a {kind} is used with 'async with'; for 'with' use robotiq_async.sync.RobotiqHand"

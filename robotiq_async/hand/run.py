@@ -39,6 +39,5 @@ class NamesErrors:
         """Nothing to prepare: one object serves any number of calls at a time."""
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        """Name the error."""
         if self._name and isinstance(error, RobotiqError):
             error.hand = self._name

@@ -46,7 +46,6 @@ class Stream(Generic[T]):
         self._failure: Callable[[], RobotiqError] | None = None
 
     def __aiter__(self) -> Self:
-        """The stream itself."""
         return self
 
     if not TYPE_CHECKING:  # type checkers report the mistake themselves

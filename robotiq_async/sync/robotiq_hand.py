@@ -110,13 +110,11 @@ class RobotiqHand:
         return self._hand
 
     def __repr__(self) -> str:
-        """That of the async hand."""
         return repr(self._hand)
 
     # -- lifetime --------------------------------------------------------------------------------------
 
     def __enter__(self) -> Self:
-        """Start, with activation. Raises what :meth:`start` raises."""
         try:
             self.start()
         except Exception:
@@ -129,7 +127,6 @@ class RobotiqHand:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Stop, also when the block failed or was interrupted."""
         self.stop()
 
     def start(self, activate: bool = True, *, wait: float = 0.0) -> None:

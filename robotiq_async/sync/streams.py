@@ -19,7 +19,6 @@ class Stream(Generic[T]):
         self._caller = caller
 
     def __iter__(self) -> Self:
-        """The stream itself."""
         return self
 
     def __next__(self) -> T:

@@ -122,7 +122,6 @@ class Viewer:
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Stop publishing and close the port. Takes a second at most; completed even when cancelled."""
         await wait_shielded(asyncio.ensure_future(self._close()))
 
     async def _close(self) -> None:

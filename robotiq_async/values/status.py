@@ -57,7 +57,6 @@ class RobotiqStatus:
 
     # The hand makes one of these 200 times a second: it keeps the registers and nothing else.
     def __init__(self, registers: reg.Registers, timestamp: float = 0.0, sequence: int = 0) -> None:
-        """Keep eight checked registers; :meth:`from_registers` checks them."""
         if hasattr(self, "_sequence"):
             raise AttributeError("RobotiqStatus is immutable: it is made once")
         _set(self, "_registers", registers)
@@ -253,25 +252,20 @@ class RobotiqStatus:
         }
 
     def __eq__(self, other: object) -> bool:
-        """Equal registers, timestamp and sequence."""
         if not isinstance(other, RobotiqStatus):
             return NotImplemented
         return self._key() == other._key()
 
     def __hash__(self) -> int:
-        """Hash of what is compared."""
         return hash(self._key())
 
     def __reduce__(self) -> tuple[type[RobotiqStatus], tuple[reg.Registers, float, int]]:
-        """Copy and pickle."""
         return RobotiqStatus, self._key()
 
     def __setattr__(self, name: str, value: object) -> None:
-        """Refuse changes after construction."""
         raise AttributeError(f"RobotiqStatus is immutable: cannot set {name!r}")
 
     def __repr__(self) -> str:
-        """The words a person looks for first."""
         axes = ", ".join(
             f"{axis.name}={self.position(axis)}->{self.requested_position(axis)} "
             f"{self.axis_state(axis)} {self.current_ma(axis)}mA"

@@ -11,7 +11,7 @@ import pytest
 from robotiq_async import Finger, RobotiqHand, State
 from robotiq_async.ros2.gripper.connection import Connection, RefusedError
 from robotiq_async.ros2.gripper.goals import Ending, Outcome
-from robotiq_async.ros2.gripper.owed_stop import OWED_S
+from robotiq_async.ros2.gripper.pending_stop import PENDING_S
 from robotiq_async.ros2.translation.joints import Targets
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_settings
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
@@ -215,7 +215,7 @@ async def test_a_stop_that_would_come_too_late_for_anything_is_not_sent(
 ) -> None:
     await lose_link(connection, server)
     await connection.forbid("the node was deactivated")
-    await asyncio.sleep(OWED_S + 1)
+    await asyncio.sleep(PENDING_S + 1)
     writes = len(gripper.writes)
     await server.accept()
     await connection.hand.wait_for_state(State.RUNNING_IDLE)

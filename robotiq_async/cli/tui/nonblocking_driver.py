@@ -37,7 +37,6 @@ class NonblockingDriver(LinuxDriver):
         mouse: bool = True,
         size: tuple[int, int] | None = None,
     ) -> None:
-        """Take the arguments of textual's own driver."""
         super().__init__(app, debug=debug, mouse=mouse, size=size)
         self.is_behind = False
         self._waiting: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()

@@ -85,7 +85,6 @@ class Monitor(App[None]):
     ]
 
     def __init__(self, operator: Operator) -> None:
-        """Prepare the screen; the hand of the operator must have been started."""
         super().__init__(driver_class=DRIVER)
         self._operator = operator
         self._hand = operator.hand

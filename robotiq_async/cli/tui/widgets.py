@@ -56,7 +56,6 @@ class Axes(Widget):
     """
 
     def __init__(self) -> None:
-        """Begin with a status of zeros."""
         super().__init__(id="axes")
         self._status = RobotiqStatus((0,) * 8)
         self._currents = {axis: deque([0] * HISTORY, maxlen=HISTORY) for axis in AXES}

@@ -36,7 +36,6 @@ class HandPublisher:
     """
 
     def __init__(self, name: GripperName, hand: RobotiqHand, bus: Bus, epoch: int, lease: Lease) -> None:
-        """Tell of this hand; nothing is sent yet."""
         self.problem = ""
         self._name = name
         self._mark = name.mark

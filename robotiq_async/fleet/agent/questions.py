@@ -21,7 +21,6 @@ class Questions:
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
-        """None were asked yet; ``clock`` is that of the agent's loop, and is read in any thread."""
         self._clock = clock
         self._budget = Budget()
         self._lock = threading.Lock()

@@ -30,7 +30,6 @@ class Request:
     """
 
     def __init__(self, name: str, call: Call, query: Query) -> None:
-        """As it came."""
         self.name = name
         self.call = call
         self.queries = [query]
@@ -51,7 +50,6 @@ class Requests:
     def __init__(
         self, publisher: HandPublisher, epoch: int, log: Log, carried_out: Callable[[Request], None]
     ) -> None:
-        """None yet; ``carried_out`` is called with each that was."""
         self._publisher = publisher
         self._epoch = epoch
         self._log = log

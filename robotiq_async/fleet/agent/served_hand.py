@@ -29,7 +29,7 @@ from .arguments import axes_of, label_of
 from .publisher import HandPublisher
 from .records import Records
 from .requests import Request, Requests, Work
-from .settings import OwedSettings
+from .settings import RestoredSettings
 
 RETRY_S: Final = 1.0
 """From one attempt to reach a gripper that is not there to the next."""
@@ -50,7 +50,6 @@ class ServedHand:
     def __init__(
         self, name: GripperName, hand: RobotiqHand, bus: Bus, records: Records, *, epoch: int, window: float
     ) -> None:
-        """Serve a hand that is not started."""
         self.name = name
         self._log = Log(name.gripper)
         self._hand = hand
@@ -60,7 +59,7 @@ class ServedHand:
         self._admission = Admission(name.base, epoch, self._lease)
         self.publisher = HandPublisher(name, hand, bus, epoch, self._lease)
         self._requests = Requests(self.publisher, epoch, self._log, self._note)
-        self._settings = OwedSettings(hand)
+        self._settings = RestoredSettings(hand)
         self._released: Request | None = None
         """The last one that gave the lease back."""
         self._commanded = Finger(0)
@@ -83,7 +82,7 @@ class ServedHand:
     async def run(self) -> None:
         """Keep the hand running, with or without its gripper, until cancelled; then stop the fingers."""
         loop = asyncio.get_running_loop()
-        removes = [self._hand.add_listener(each) for each in (self.publisher.hear, self._settings.hear)]
+        removes = [self._hand.add_listener(each) for each in (self.publisher.hear, self._settings.observe)]
         try:
             while True:
                 await self._run_once()
@@ -207,7 +206,7 @@ class ServedHand:
             # Of the same client: it has lost the thread, and what it asked before is not to go on.
             self.end_lease("expired" if holder.client == call.client else "taken", label)
         number = self._admission.acquire(call, label)
-        self._settings.owe(settings)
+        self._settings.restore(settings)
         self._log.info("%s commands the gripper", label)
         self.publisher.add({"kind": "lease", "number": number, "holder": label, "reason": "granted"})
         self._watch_expiry()
@@ -237,7 +236,7 @@ class ServedHand:
 
     async def _come_to_rest(self) -> None:
         """Hold what moves; halt if that does not come to rest in time, and nobody commands by then."""
-        self._settings.give({})
+        self._settings.merge({})
         await self._hand.hold(Finger.ALL)
         with suppress(TimeoutError):
             async with asyncio.timeout(KEEP_S):
@@ -270,7 +269,7 @@ class ServedHand:
 
     async def _hold(self, axes: Finger) -> None:
         self._owed &= ~axes
-        self._settings.give({})
+        self._settings.merge({})
         try:
             await self._hand.hold(axes)
         except RobotiqConnectionError as error:
@@ -358,7 +357,7 @@ class ServedHand:
 
     async def _carry_out(self, name: str, arguments: Fields) -> MoveResult | None:
         if name not in SEQUENCES:
-            self._settings.give(settings_of(name, arguments))
+            self._settings.merge(settings_of(name, arguments))
         result: MoveResult | None = await getattr(self._hand, name)(**arguments)
         return result
 
@@ -368,7 +367,7 @@ class ServedHand:
         for changes in asked.values():  # all of them before the first is asked for
             for name, value in changes.items():
                 check_byte(name, value)
-        self._settings.give(settings_of("command", {"axes": axes}))
+        self._settings.merge(settings_of("command", {"axes": axes}))
         for mask, changes in asked.items():
             self._hand.command(mask, **changes)
 

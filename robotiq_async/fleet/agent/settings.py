@@ -1,4 +1,4 @@
-"""Speeds and forces that a client had asked of a former run of the agent, until the gripper has them."""
+"""RestoredSettings: speeds and forces from before a restart of the agent, until the gripper has them."""
 
 from __future__ import annotations
 
@@ -11,30 +11,31 @@ from ...values.events import SentRequest
 from ..wire.settings import Setting
 
 
-class OwedSettings:
-    """Asked of the hand with each command, so that both leave in one image, until one is acknowledged."""
+class RestoredSettings:
+    """Merged into each command, so that both go out in one image, until an image is acknowledged."""
 
     def __init__(self, hand: RobotiqHand) -> None:
-        """None."""
         self._hand = hand
-        self._owed: dict[Setting, int] = {}
+        self._missing: dict[Setting, int] = {}
 
-    def owe(self, settings: Mapping[Setting, int]) -> None:
-        """A client has given them."""
-        self._owed.update(settings)
+    def restore(self, settings: Mapping[Setting, int]) -> None:
+        """Send these with the next command."""
+        self._missing.update(settings)
 
-    def give(self, renewed: Mapping[Setting, int]) -> None:
-        """A command follows in this turn, and sets some of them anew."""
+    def merge(self, renewed: Mapping[Setting, int]) -> None:
+        """Merge them into the command of this turn, which sets some of them anew."""
         try:
-            for (axis, what), value in self._owed.items():
+            for (axis, what), value in self._missing.items():
                 self._hand.command(axis, **{what: value})
         except RobotiqError:
-            return  # it does not take the command either
-        self._owed.update({setting: value for setting, value in renewed.items() if setting in self._owed})
+            return  # the hand refuses the command, too
+        self._missing.update(
+            {setting: value for setting, value in renewed.items() if setting in self._missing}
+        )
 
-    def hear(self, what: object) -> None:
-        """The hand has written something, perhaps."""
-        if self._owed and isinstance(what, SentRequest) and what.acknowledged:
+    def observe(self, what: object) -> None:
+        """Forget them when an image with all of them is acknowledged."""
+        if self._missing and isinstance(what, SentRequest) and what.acknowledged:
             axes = dict(zip(AXES, what.request.axes, strict=True))
-            if all(getattr(axes[axis], name) == value for (axis, name), value in self._owed.items()):
-                self._owed.clear()
+            if all(getattr(axes[axis], name) == value for (axis, name), value in self._missing.items()):
+                self._missing.clear()

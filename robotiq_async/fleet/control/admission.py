@@ -24,7 +24,6 @@ class Admission:
     """
 
     def __init__(self, base: str, epoch: int, lease: Lease) -> None:
-        """Serve the gripper of this base key, in this run of the agent."""
         self.lease = lease
         self._base = base
         self._epoch = epoch

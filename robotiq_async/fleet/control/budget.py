@@ -36,7 +36,6 @@ class Budget:
     """Of one agent."""
 
     def __init__(self) -> None:
-        """Full."""
         self._all = _Bucket(ALL, 0.0)
         self._each: dict[str, _Bucket] = {}
 

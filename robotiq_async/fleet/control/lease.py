@@ -49,7 +49,6 @@ class Lease:
     def __init__(
         self, window: float = WINDOW_S, run: int = 0, changed: Callable[[], object] = lambda: None
     ) -> None:
-        """Nobody's yet, in this run of the agent; ``changed`` is called when :attr:`record` is another."""
         self.window = window
         self.runs: tuple[int, ...] = (run,)
         self._changed = changed

@@ -41,7 +41,6 @@ class Mailbox:
     """
 
     def __init__(self) -> None:
-        """Belong to the running loop."""
         self._loop = asyncio.get_running_loop()
         self._halts: deque[Callable[[], None]] = deque()
         self._deliveries: deque[Callable[[], None]] = deque()

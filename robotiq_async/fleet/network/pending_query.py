@@ -16,7 +16,6 @@ class PendingQuery:
     """
 
     def __init__(self, decides: Callable[[Reply], bool]) -> None:
-        """Belong to the running loop; see :meth:`Bus.ask`."""
         self.answered: asyncio.Future[Reply | None] = asyncio.get_running_loop().create_future()
         self._decides = decides
         self._last: Reply | None = None

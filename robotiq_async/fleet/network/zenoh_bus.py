@@ -27,7 +27,7 @@ from .bus import Query, Reply, Undo, Urgency, is_any, is_anything
 from .locators import locators
 from .mailbox import Kind, Mailbox
 from .pending_query import PendingQuery
-from .replier import Replier
+from .reply_sender import ReplySender
 
 CLOSE_S: Final = 1.0
 LAST_ANSWERS_S: Final = 0.2
@@ -88,9 +88,9 @@ def _drop(query: zenoh.Query) -> None:
 class _Query:
     """A query that has arrived."""
 
-    def __init__(self, query: zenoh.Query, replier: Replier) -> None:
+    def __init__(self, query: zenoh.Query, reply_sender: ReplySender) -> None:
         self._query = query
-        self._replier = replier
+        self._reply_sender = reply_sender
         self.key = str(query.key_expr)
         self.payload = b"" if query.payload is None else query.payload.to_bytes()
 
@@ -101,7 +101,7 @@ class _Query:
             with contextlib.suppress(zenoh.ZError), query:  # the asker is gone
                 query.reply(key, payload, attachment=attachment)
 
-        self._replier.put(send, functools.partial(_drop, query))
+        self._reply_sender.put(send, functools.partial(_drop, query))
 
 
 class _Reply:
@@ -116,13 +116,12 @@ class ZenohBus:
     """An open session."""
 
     def __init__(self, session: zenoh.Session, endpoints: Sequence[str] = ()) -> None:
-        """Use an open session, which was told to connect to endpoints, from the running loop."""
         self._session = session
         self._endpoints = endpoints
         self._mailbox = Mailbox()
         # A halt is acknowledged also where others do not read their answers.
-        self._repliers = {True: Replier(), False: Replier()}
-        self._dropping = Replier()
+        self._repliers = {True: ReplySender(), False: ReplySender()}
+        self._dropping = ReplySender()
         self._closing: asyncio.Future[None] | None = None
 
     def publisher(self, key: str, urgency: Urgency) -> Callable[[bytes], None]:
@@ -162,14 +161,14 @@ class ZenohBus:
     ) -> Undo:
         """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
         is_halt = expression.endswith("/halt")
-        replier, kind = self._repliers[is_halt], Kind.HALT if is_halt else Kind.REQUEST
+        reply_sender, kind = self._repliers[is_halt], Kind.HALT if is_halt else Kind.REQUEST
 
         def deliver(query: zenoh.Query) -> None:
             payload = query.payload
             if (
                 (payload is None or len(payload) <= LONGEST)
                 and allows(b"" if payload is None else payload.to_bytes())
-                and self._mailbox.put(lambda: handler(_Query(query, replier)), kind)
+                and self._mailbox.put(lambda: handler(_Query(query, reply_sender)), kind)
             ):
                 return
             # Not here: whoever asked is told, and where nobody reads that takes until the link is given up.
@@ -259,12 +258,12 @@ class ZenohBus:
 
     def _close(self) -> None:
         repliers = [*self._repliers.values(), self._dropping]
-        for replier in repliers:
-            replier.close()
-            replier.join(LAST_ANSWERS_S)
+        for reply_sender in repliers:
+            reply_sender.close()
+            reply_sender.join(LAST_ANSWERS_S)
         self._session.close()  # type: ignore[no-untyped-call]
-        for replier in repliers:
-            replier.join(CLOSE_S)
+        for reply_sender in repliers:
+            reply_sender.join(CLOSE_S)
 
     def _undo(self, declared: Any) -> Undo:  # noqa: ANN401  # each kind has a class of its own
         def undo() -> None:

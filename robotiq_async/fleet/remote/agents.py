@@ -20,7 +20,6 @@ class Agents:
     """Those that are seen to serve one gripper. Of two one is a mistake, and which one it is people know."""
 
     def __init__(self, name: GripperName, bus: Bus, two: Callable[[], None]) -> None:
-        """Begin to look; ``two`` is called when there are two of them from now on."""
         self._name = name
         self._bus = bus
         self._two = two

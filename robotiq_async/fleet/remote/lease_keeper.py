@@ -70,7 +70,6 @@ class LeaseKeeper:
     """
 
     def __init__(self, run: AgentClient, *, wants_control: bool) -> None:
-        """Hold nothing yet."""
         self.is_in_control = False
         self.lease = 0
         self.lost: ControlLostError | None = None

@@ -44,7 +44,6 @@ class AgentClock:
     """
 
     def __init__(self) -> None:
-        """Know nothing yet."""
         self._offset: float | None = None
         self._at = 0.0
 
@@ -60,7 +59,6 @@ class AgentClock:
         self._at = arrival
 
     def __call__(self, stamp: float) -> float:
-        """The time of this process at a time of the agent."""
         return stamp + (self._offset or 0.0)
 
 

@@ -23,7 +23,6 @@ class MissedEvents:
         ask: Callable[[int], Coroutine[Any, Any, Any]],
         spawn: Callable[[Coroutine[Any, Any, Any]], object],
     ) -> None:
-        """Fetch for a mirror; ``ask`` asks for what happened after an event."""
         self._mirror = mirror
         self._ask = ask
         self._spawn = spawn

@@ -24,7 +24,6 @@ class Outbox:
     """Merges what is asked while enough is under way. What it sends keeps its place among other requests."""
 
     def __init__(self, session: RemoteSession) -> None:
-        """Send through a session."""
         self._session = session
         self._asked: Call | None = None
         """As which the oldest of those that wait would have gone out: its lease, and what was heard then."""

@@ -57,7 +57,6 @@ class PendingRequest:
     """
 
     def __init__(self, call: Call, verb: str, timeout: float, urgency: Urgency) -> None:
-        """Not said yet; belongs to the running loop."""
         self.call = call
         self.verb = verb
         self.timeout = timeout

@@ -59,7 +59,6 @@ class Requests:
     """
 
     def __init__(self, name: GripperName, bus: Bus) -> None:
-        """Ask the agent that serves a gripper."""
         self._name = name
         self._bus = bus
         self._client = secrets.token_hex(8)

@@ -16,7 +16,6 @@ class Settings:
     """
 
     def __init__(self) -> None:
-        """Whatever the agent has will do until something is asked for."""
         self._asked: dict[Setting, tuple[int, int]] = {}
         """The number of the request, and the value."""
 

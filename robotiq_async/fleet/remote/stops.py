@@ -39,7 +39,6 @@ class Stops:
     """What one run has asked for that ends motion."""
 
     def __init__(self, run: Asker) -> None:
-        """Nothing yet."""
         self._run = run
         self._halts: set[asyncio.Task[Any]] = set()
         self._cancels: set[asyncio.Task[Any]] = set()

@@ -97,5 +97,4 @@ class GripperName:
         return "/".join((self.base, *parts))
 
     def __str__(self) -> str:
-        """The address."""
         return f"{SCHEME}{self.site}/{self.host}/{self.gripper}"

@@ -14,7 +14,7 @@ from ..translation.joints import Targets
 from ..translation.readiness import why_not
 from ..translation.settings import Settings
 from .goals import GoalRunner, Outcome
-from .owed_stop import OwedStop
+from .pending_stop import PendingStop
 
 COMMANDS: Final = ("activate", "reset", "halt", "recover", "release")
 """What the services are called, and the actions behind them."""
@@ -49,8 +49,8 @@ class Connection:
         self.takes_commands = False
         self.stops = 0
         self._operator = Operator(hand, speed=settings.speed, force=settings.force)
-        self._owed = OwedStop(hand)
-        self._goals = GoalRunner(hand, lost=lambda axes: self._owed.owe(lambda: hand.hold(axes)))
+        self._pending_stop = PendingStop(hand)
+        self._goals = GoalRunner(hand, lost=lambda axes: self._pending_stop.schedule(lambda: hand.hold(axes)))
         self._calls: set[asyncio.Task[str]] = set()
         self._stopping = 0
         self._took_commands = False
@@ -91,7 +91,7 @@ class Connection:
         except RobotiqError as error:
             Log(self.hand.name).error("no halt, the fingers MAY STILL MOVE: %s", error)
             if isinstance(error, RobotiqConnectionError):
-                self._owed.owe(self.hand.halt)
+                self._pending_stop.schedule(self.hand.halt)
             return False
         return True
 
@@ -106,7 +106,7 @@ class Connection:
         try:
             await self.hand.stop(halt=self._took_commands)
         finally:
-            await self._owed.end()
+            await self._pending_stop.cancel()
 
     # -- commands --------------------------------------------------------------------------------------
 
@@ -213,5 +213,5 @@ class Connection:
     def _check_standing(self) -> None:
         if self._stopping:
             raise RefusedError("a halt is under way")
-        if self._owed.is_owed:
+        if self._pending_stop.is_pending:
             raise RefusedError("the fingers are not stopped yet: the link was down when they were to be")

@@ -24,7 +24,6 @@ class Bridge:
     """
 
     def __init__(self, loop: asyncio.AbstractEventLoop, executor: Executor) -> None:
-        """Connect a running loop with an executor of another thread."""
         self._loop = loop
         self._executor = executor
         self._is_closed = False

@@ -16,7 +16,6 @@ class NodeHandler(logging.Handler):
     """Hands records to the logger of a node."""
 
     def __init__(self, logger: RcutilsLogger) -> None:
-        """Hand them to this one."""
         super().__init__()
         self._logger = logger
 

@@ -25,7 +25,6 @@ class JointStates:
     """Joint states of one hand. Belongs to the event loop."""
 
     def __init__(self, clock: ROSClock, prefix: str, frame_id: str) -> None:
-        """Keep what is the same in every message."""
         self._clock = clock
         self._names = joint_names(prefix)
         self._frame_id = frame_id

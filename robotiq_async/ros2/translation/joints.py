@@ -97,7 +97,6 @@ class Motion:
     """Positions and velocities of the joints from one status to the next."""
 
     def __init__(self) -> None:
-        """Begin with nothing to compare with."""
         self._seen: deque[tuple[float, Sequence[float]]] = deque()
 
     def of(self, status: RobotiqStatus) -> tuple[Sequence[float], Sequence[float]]:

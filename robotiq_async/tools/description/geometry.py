@@ -25,7 +25,6 @@ class Pose:
     rotation: Matrix = UNTURNED
 
     def __matmul__(self, inner: Pose) -> Pose:
-        """What is at ``inner`` in this frame, as seen from where this frame is seen."""
         columns = tuple(zip(*inner.rotation, strict=True))
         rows = [tuple(_dot(row, column) for column in columns) for row in self.rotation]
         return Pose(self.apply(inner.position), (_vector(rows[0]), _vector(rows[1]), _vector(rows[2])))

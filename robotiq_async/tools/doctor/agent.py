@@ -65,7 +65,6 @@ class Asker:
     """Asks an agent, under no lease."""
 
     def __init__(self, name: GripperName, bus: Bus) -> None:
-        """Ask about a gripper."""
         self._name = name
         self._bus = bus
         self._client = secrets.token_hex(8)
@@ -108,7 +107,6 @@ class Listener:
     """
 
     def __init__(self, name: GripperName) -> None:
-        """Nothing yet."""
         self._mark = name.mark
         self.statuses: list[StatusMessage] = []
         self.misrouted = 0

@@ -17,7 +17,6 @@ class CsvFile:
     """Makes the bytes of a CSV file of messages."""
 
     def __init__(self, write: Callable[[bytes], object]) -> None:
-        """Write the header; ``write`` takes the bytes."""
         self._write = write
         self._table = Table("status")
         self._line(COLUMNS["status"])

@@ -40,7 +40,6 @@ class Table:
     """The rows of one table, made of messages in the order in which they happened."""
 
     def __init__(self, kind: str) -> None:
-        """Make rows of "status", "command" or "event"."""
         self._kind = kind
         self._names = COLUMNS[kind]
         self._state = ""

@@ -24,7 +24,6 @@ class Scrubber:
     """Takes out of texts what tells where a gripper is: addresses, ports of this machine, users, hosts."""
 
     def __init__(self, address: Address) -> None:
-        """Know the address."""
         names = [str(address), f"{address.host}:{address.port}" if address.port else "", address.host]
         names += [platform.node(), os.path.expanduser("~")]
         self._secrets = sorted({name for name in names if len(name) > 1}, key=len, reverse=True)

@@ -43,9 +43,11 @@ def _known(report: Report) -> str:
 
 
 def _to_report(report: Report) -> str:
-    names = ", ".join(check.name for check in report.differing)
+    names = [check.name for check in report.differing]
     if names:
-        return f"Please send the folder with an issue: {names} differ from what the library assumes."
+        differ = "differs" if len(names) == 1 else "differ"
+        found = f"{', '.join(names)} {differ} from what the library assumes"
+        return f"Please send the folder with an issue: {found}."
     return "Please send the folder with an issue all the same: that a gripper is as assumed is news."
 
 

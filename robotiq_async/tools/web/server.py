@@ -114,7 +114,6 @@ class PageServer:
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Hold what pages have set in motion, and end the process; within 3 s, also when cancelled."""
         await wait_shielded(asyncio.ensure_future(self._close()))
 
     async def seen(self) -> None:

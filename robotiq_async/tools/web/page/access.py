@@ -89,7 +89,7 @@ class Access:
         if head.path.startswith(f"{self.settings.folder}/") and self._has_cookie(head):
             return Verdict.SERVE
         if head.path == "/" and head.method in ("GET", "POST"):
-            return self._at_the_door(head)
+            return self._login(head)
         return Verdict.NO_TOKEN
 
     def knows(self, password: str) -> bool:
@@ -107,7 +107,7 @@ class Access:
         path = self.settings.folder
         return f"{COOKIE}={self._session}; Path={path}; HttpOnly; SameSite=Lax{secure}"
 
-    def _at_the_door(self, head: Head) -> Verdict:
+    def _login(self, head: Head) -> Verdict:
         if self.settings.password:
             return Verdict.ASK
         token = parse_qs(head.query).get("token", [""])[0]

@@ -57,7 +57,6 @@ class Guard:
         """By address: whoever tries many holds up nobody who sits elsewhere."""
 
     async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
-        """Pass on, or answer."""
         if scope["type"] == "lifespan":
             await self.app(scope, receive, send)
             return

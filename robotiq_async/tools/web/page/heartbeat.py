@@ -53,7 +53,6 @@ class Heartbeat:
     """
 
     def __init__(self) -> None:
-        """In touch, for now: it has just asked for the page."""
         self.is_lost = False
         self._newest = monotonic()
         self._has_been_here = False

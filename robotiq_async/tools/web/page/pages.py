@@ -67,7 +67,6 @@ class Visits:
     """Who looks: counts the browsers, notices when one is gone, and tells one that came back all anew."""
 
     def __init__(self, mirror: Mirror) -> None:
-        """Nobody does yet."""
         self._mirror = mirror
         self._present: set[str] = set()
 

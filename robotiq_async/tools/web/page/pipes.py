@@ -14,7 +14,6 @@ class Pipes:
     """The two pipes to the process that has the hands."""
 
     def __init__(self) -> None:
-        """Keep standard output to ourselves: whatever a library prints goes to the errors."""
         self._out: BinaryIO = os.fdopen(os.dup(1), "wb", buffering=0)
         os.dup2(2, 1)
         self._in = sys.stdin.buffer

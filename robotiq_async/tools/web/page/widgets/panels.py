@@ -23,7 +23,6 @@ class StatePanel:
     """State and fault in words."""
 
     def __init__(self) -> None:
-        """Build it where the page is being built."""
         self._state = ui.badge("", color="grey").classes("text-base px-3 py-1").props("data-testid=state")
         self._fault = ui.label("").classes("text-sm").props("data-testid=fault")
 
@@ -81,7 +80,6 @@ class Curves:
     """Positions and currents of the last half minute."""
 
     def __init__(self) -> None:
-        """Build it where the page is being built."""
         self._drawn_at = 0.0
         self._positions = ui.echart(_options("position / counts", 255, 51)).classes("w-full h-40")
         self._currents = ui.echart(_options("current / mA", CURRENT_MAX, 200)).classes("w-full h-40")
@@ -158,7 +156,6 @@ class Events:
     """What has happened, the newest last."""
 
     def __init__(self) -> None:
-        """Build it where the page is being built."""
         ui.label("events").classes("text-xs font-bold opacity-60 -mb-2")
         self._log = ui.log(max_lines=100).classes("w-full h-32 text-xs").props("data-testid=events")
         self._shown = -1
@@ -182,7 +179,6 @@ class StatisticsPanel:
     """How the polling goes."""
 
     def __init__(self) -> None:
-        """Build it where the page is being built."""
         self._label = ui.label("").classes("text-xs opacity-70").props("data-testid=statistics")
 
     def show(self, hand: HandMirror) -> None:

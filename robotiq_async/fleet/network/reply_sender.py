@@ -1,7 +1,7 @@
-"""Replier: sends answers from a thread of its own.
+"""ReplySender: sends replies from a thread of its own.
 
-An answer goes out with the urgency and the patience that its query came with, which a stranger chooses:
-where nobody reads, sending one may take until the link is given up. The event loop must not wait for that.
+A reply takes the priority and the congestion control of its query, which the client chooses. Sending one to
+a client that does not read can block until the connection is closed; the event loop must not wait for that.
 """
 
 from __future__ import annotations
@@ -12,27 +12,26 @@ from collections.abc import Callable
 from typing import Final
 
 MOST: Final = 1000
-"""At most this many answers may wait; the query of any more is dropped, in the thread as well: that, too,
-is told to whoever asked, and may take as long. They ask again, or give up."""
+"""Replies that may wait. Beyond it the query is dropped, which happens in the thread too: zenoh tells the
+client of it, so it can block as long. Clients repeat their requests."""
 
 
-class Replier:
+class ReplySender:
     """One thread, started with the first answer."""
 
     def __init__(self) -> None:
-        """Nothing to send yet."""
         self._waiting: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
         self._thread: threading.Thread | None = None
 
     def put(self, send: Callable[[], None], drop: Callable[[], None]) -> None:
-        """Have an answer sent after those before it, or its query dropped where too many wait."""
+        """Send a reply after those before it, or drop its query if too many wait."""
         if self._thread is None:
             self._thread = threading.Thread(target=self._run, name="robotiq_async fleet", daemon=True)
             self._thread.start()
         self._waiting.put(send if self._waiting.qsize() < MOST else drop)
 
     def close(self) -> None:
-        """Send what waits, and nothing after it."""
+        """Send what waits, then end the thread."""
         self._waiting.put(None)
 
     def join(self, timeout: float) -> None:

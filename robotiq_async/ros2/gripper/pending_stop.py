@@ -1,4 +1,4 @@
-"""A stop that a lost link has kept from the gripper."""
+"""A stop that a lost link kept from the gripper: sent when the link is back."""
 
 from __future__ import annotations
 
@@ -18,49 +18,48 @@ from ...values.errors import (
     StateTimeoutError,
 )
 
-OWED_S: Final = 60.0
-"""Later nothing can move any more that was moving when the link was lost: the longest is a release."""
-AGAIN_S: Final = 0.05
-"""From an attempt that failed to the next one."""
+PENDING_S: Final = 60.0
+"""By then every motion has ended that ran when the link was lost; the longest is an automatic release."""
+RETRY_S: Final = 0.05
+"""Between two attempts."""
 _REACHED: Final = tuple(set(State) - {State.DISCONNECTED, State.DO_SHUTDOWN, State.SHUTDOWN})
 
 
-class OwedStop:
-    """Makes the stop good as soon as the link is back. A stop is no motion: it may come late."""
+class PendingStop:
+    """Sends the stop as soon as the link is back. A stop moves nothing, so it may come late."""
 
     def __init__(self, hand: Hand) -> None:
-        """Owe nothing."""
         self._hand = hand
-        self._making_good: set[asyncio.Task[None]] = set()
+        self._tasks: set[asyncio.Task[None]] = set()
 
     @property
-    def is_owed(self) -> bool:
-        """Whether something may move that is to stand."""
-        return bool(self._making_good)
+    def is_pending(self) -> bool:
+        """Whether a stop still has to reach the gripper."""
+        return bool(self._tasks)
 
-    def owe(self, stop: Callable[[], Awaitable[None]]) -> None:
-        """Stop what moves when the link is back, if that is soon enough.
+    def schedule(self, stop: Callable[[], Awaitable[None]]) -> None:
+        """Await a stop when the link is back, within PENDING_S.
 
         Args:
-            stop: does it; raises RobotiqConnectionError if the link is down again.
+            stop: raises RobotiqConnectionError if the link is down again.
         """
-        task = asyncio.ensure_future(self._make_good(stop, now() + OWED_S))
-        self._making_good.add(task)
-        task.add_done_callback(self._making_good.discard)
+        task = asyncio.ensure_future(self._send(stop, now() + PENDING_S))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
 
-    async def end(self) -> None:
-        """Owe nothing any more: the hand is stopped."""
-        for task in self._making_good:
+    async def cancel(self) -> None:
+        """Give the stop up: the hand itself has been stopped."""
+        for task in self._tasks:
             task.cancel()
-        await asyncio.gather(*self._making_good, return_exceptions=True)
+        await asyncio.gather(*self._tasks, return_exceptions=True)
 
-    async def _make_good(self, stop: Callable[[], Awaitable[None]], until: float) -> None:
+    async def _send(self, stop: Callable[[], Awaitable[None]], until: float) -> None:
         while (left := until - now()) > 0:
             try:
                 await self._hand.wait_for_state(*_REACHED, timeout=left)
                 await stop()
             except RobotiqConnectionError:
-                await asyncio.sleep(AGAIN_S)
+                await asyncio.sleep(RETRY_S)
             except (NotStartedError, StateTimeoutError, ControlLostError):
                 return  # the end of the hand stops it, as does the end of a lease; or it is too late
             except RobotiqError as error:
