@@ -14,9 +14,10 @@ import pytest
 from robotiq_async import Finger, State
 from robotiq_async.fleet.fleet import Fleet
 from robotiq_async.fleet.remote.persistence import until_answered
+from robotiq_async.fleet.remote.requests import NoAnswerError
 from robotiq_async.fleet.wire.envelope import Call
 from robotiq_async.fleet.wire.names import GripperName
-from robotiq_async.values.errors import NotAllStoppedError, RobotiqStateError
+from robotiq_async.values.errors import NotAllowedError, NotAllStoppedError, RobotiqStateError
 from tests.fleet.by_hand import LEFT, ask, move_slowly
 from tests.fleet.cell import told
 from tests.fleet.world import motions, world
@@ -165,3 +166,17 @@ async def test_two_answers_in_one_turn_leave_no_exception_behind() -> None:
     assert asked == 2
     gc.collect()
     assert not loop.complaints
+
+
+@virtual
+async def test_a_halt_that_was_denied_is_not_called_lost_because_the_last_attempt_had_no_time() -> None:
+    """On a busy machine a reader's halt ended as a lost connection: the last attempt had 9 ms."""
+
+    async def attempt(left: float) -> None:
+        if left > 0.2:
+            raise NotAllowedError("access denied")
+        await asyncio.sleep(left)
+        raise NoAnswerError("no answer in time")
+
+    with pytest.raises(NotAllowedError):
+        await until_answered(attempt, 2.0)

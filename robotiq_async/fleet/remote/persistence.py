@@ -1,4 +1,4 @@
-"""Asking until there is an answer, for what must be heard: halts."""
+"""until_answered: repeats a request that must get through, a halt, until it is answered."""
 
 from __future__ import annotations
 
@@ -11,27 +11,28 @@ from ...values.errors import AgentError, NotAllowedError, ProtocolError
 from .requests import NoAnswerError
 
 HALT_S: Final = 2.0
-"""How long a halt is asked for, in seconds."""
+"""Seconds for which a halt is repeated."""
 ATTEMPT_S: Final = 0.3
-"""From one attempt to the next."""
-AGAIN_S: Final = 0.05
-"""The same, when none is under way: it ended at once, as nobody was there."""
-_NO_ANSWER: Final = (NoAnswerError, NotAllowedError, AgentError, ProtocolError)
-"""None, or one to something else: the next attempt may get through."""
+"""Seconds from one attempt to the next."""
+RETRY_S: Final = 0.05
+"""The same after an attempt that failed at once, as no agent was reached."""
+_RETRIED: Final = (NoAnswerError, NotAllowedError, AgentError, ProtocolError)
+"""No answer, or one to another request: the next attempt may get through."""
 T = TypeVar("T")
 
 
 async def until_answered(attempt: Callable[[float], Awaitable[T]], limit: float) -> T:
-    """Make one attempt after the other, and return what the first one that succeeds returns.
+    """Repeat an attempt; return the result of the first that succeeds.
 
-    The earlier ones go on: on a slow link every answer may take longer than the time between two attempts.
+    Earlier attempts stay open: on a slow link each answer may take longer than the time between two attempts.
 
     Args:
-        attempt: asks once; takes the seconds that are left.
+        attempt: asks once; its argument is the seconds that are left.
         limit: seconds.
 
     Raises:
-        RobotiqError: what the agent answered; or, when the time is over, why there was no answer.
+        NotAllowedError: access was denied, and no attempt succeeded.
+        RobotiqError: the agent's answer; or, when the time is over, why there was none.
     """
     begun, deadline = now(), now() + limit
     under_way: set[asyncio.Future[T]] = set()
@@ -49,10 +50,10 @@ async def until_answered(attempt: Callable[[float], Awaitable[T]], limit: float)
                 for each in done:
                     try:
                         return each.result()
-                    except _NO_ANSWER as error:
-                        failure = error
+                    except _RETRIED as error:
+                        failure = _more_telling(failure, error)
             if not under_way:
-                await asyncio.sleep(max(0.0, min(begun + AGAIN_S, deadline) - now()))
+                await asyncio.sleep(max(0.0, min(begun + RETRY_S, deadline) - now()))
             begun = now()
         return await _last(under_way, failure)
     finally:
@@ -62,13 +63,18 @@ async def until_answered(attempt: Callable[[float], Awaitable[T]], limit: float)
 
 
 async def _last(under_way: set[asyncio.Future[T]], failure: Exception | None) -> T:
-    """What those that are under way at the end come to: their time is over too."""
+    # The time of those that are still open is over as well.
     for each in await asyncio.gather(*under_way, return_exceptions=True):
         if not isinstance(each, BaseException):
             return each
         if isinstance(each, Exception):
-            failure = each
+            failure = _more_telling(failure, each)
     raise failure or NoAnswerError("no answer in time")
+
+
+def _more_telling(failure: Exception | None, later: Exception) -> Exception:
+    # The last attempt has little time, so it may end without an answer where all before it were denied.
+    return failure if isinstance(failure, NotAllowedError) and isinstance(later, NoAnswerError) else later
 
 
 async def _ended(futures: set[asyncio.Future[Any]]) -> None:
