@@ -1,4 +1,4 @@
-"""Asyncio-native client for the Robotiq 3-Finger gripper (S-Model).
+"""Asyncio-native client for the Robotiq 3-Finger gripper (S-Model) and its siblings 2F-85, 2F-140 and Hand-E.
 
 What a program needs is imported from here. Where it comes from, and what stands around it::
 
@@ -28,6 +28,7 @@ from .values.enums import (
     CLOSED,
     FORCE_MAX,
     FORCE_MIN,
+    JAW,
     OPEN,
     SPEED_MAX,
     SPEED_MIN,
@@ -58,10 +59,12 @@ from .values.errors import (
     RobotiqError,
     RobotiqStateError,
     StateTimeoutError,
+    WrongModelError,
 )
 from .values.events import SentRequest, Transition
 from .values.grasp_result import GraspResult
 from .values.grip_event import GripChange, GripEvent
+from .values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model
 from .values.move_result import MoveResult
 from .values.statistics import Statistics
 from .values.status import RobotiqStatus
@@ -71,9 +74,14 @@ __all__ = [
     "CLOSED",
     "FORCE_MAX",
     "FORCE_MIN",
+    "HAND_E",
+    "JAW",
     "OPEN",
     "SPEED_MAX",
     "SPEED_MIN",
+    "THREE_FINGER",
+    "TWO_FINGER_85",
+    "TWO_FINGER_140",
     "WIDTH_NORMAL",
     "WIDTH_PINCH",
     "WIDTH_WIDE",
@@ -89,6 +97,7 @@ __all__ = [
     "Initialization",
     "InvalidStateError",
     "Mode",
+    "Model",
     "MoveResult",
     "MoveSupersededError",
     "MoveTimeoutError",
@@ -113,6 +122,7 @@ __all__ = [
     "Transport",
     "Trigger",
     "Units",
+    "WrongModelError",
 ]
 
 

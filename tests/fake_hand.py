@@ -28,7 +28,8 @@ from robotiq_async import (
 from robotiq_async.hand import Hand
 from robotiq_async.values import registers as reg
 from robotiq_async.values.calibration import Units
-from robotiq_async.values.enums import AXES, ObjectStatus
+from robotiq_async.values.enums import ObjectStatus
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 
 
@@ -40,7 +41,7 @@ class FakeHand(Hand):
     """
 
     def __init__(self, name: str = "") -> None:
-        super().__init__("fake://hand", name=name, units=Units())
+        super().__init__("fake://hand", name=name, units=lambda _: Units())
         self.obstacle = 256
         self._state = State.DISCONNECTED
         self._request = Request(activate=True, go=True, axes=(AxisRequest(speed=128, force=64),) * 4)
@@ -70,7 +71,7 @@ class FakeHand(Hand):
     def _apply(self, axes: Finger, changes: dict[str, int | None]) -> None:
         self._check_running()
         wanted: dict[str, Any] = {name: value for name, value in changes.items() if value is not None}
-        each = zip(AXES, self._request.axes, strict=True)
+        each = zip(THREE_FINGER.axes, self._request.axes, strict=True)
         self._enter(State.RUNNING_CC, Trigger.ASK_COMMAND)
         self._write(axes=tuple(replace(old, **wanted) if axis & axes else old for axis, old in each))
         self._enter(State.RUNNING_IDLE, Trigger.DELIVERED)

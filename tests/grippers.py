@@ -30,6 +30,7 @@ def active_gripper(speedup: float = 4.0, **options: Any) -> SimulatedGripper:
 
 async def activate_beforehand(gripper: SimulatedGripper) -> None:
     """Leave a gripper active and open, as another client would; in a virtual loop that takes no time."""
-    for image in (ACTIVATION, OPENING):
-        gripper.write(0, image)
+    axes = _OPEN[: len(gripper.model.axes)]
+    for go in (False, True):
+        gripper.write(0, Request(activate=True, go=go, axes=axes, model=gripper.model).registers)
         await asyncio.sleep(_ACTIVATION_S)

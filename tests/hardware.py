@@ -20,7 +20,7 @@ from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.simulator.physics.habits import Habits
 from robotiq_async.tools.recording.recordings import read_recording
 from robotiq_async.values import registers as reg
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
 
@@ -145,12 +145,12 @@ def _from(shown: list[tuple[float, reg.Registers]], first: int) -> Iterator[tupl
 
 def _bring(gripper: SimulatedGripper, moment: list[float], status: RobotiqStatus, until: float) -> None:
     """Let the gripper stand where a recorded one stood."""
-    asked = tuple(AxisRequest(status.requested_position(axis), 255) for axis in AXES)
-    here = tuple(AxisRequest(status.position(axis), 255) for axis in AXES)
+    asked = tuple(AxisRequest(status.requested_position(axis), 255) for axis in THREE_FINGER.axes)
+    here = tuple(AxisRequest(status.position(axis), 255) for axis in THREE_FINGER.axes)
     if status.activation_echo:
         gripper.write(0, Request(activate=True, mode=status.mode).registers)
         moment[0] += EARLIER_S / 2
-        if any(abs(gripper.position(axis) - status.position(axis)) > COUNTS for axis in AXES):
+        if any(abs(gripper.position(axis) - status.position(axis)) > COUNTS for axis in THREE_FINGER.axes):
             gripper.write(0, Request(activate=True, go=True, mode=status.mode, axes=here).registers)
             moment[0] += EARLIER_S / 4
     image = Request(activate=status.activation_echo, go=status.go_echo, mode=status.mode, axes=asked)

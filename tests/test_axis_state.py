@@ -14,7 +14,7 @@ from robotiq_async.ros2.translation.diagnosis import diagnose, status_text
 from robotiq_async.tools.recording.payloads import reading_fields
 from robotiq_async.tools.web.page.mirror import HandMirror
 from robotiq_async.tools.web.page.widgets.words import axis_words
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER
 from tests.fake_hand import FakeHand
 from tests.register_words import status_of
 
@@ -31,14 +31,14 @@ def hand_with(status: RobotiqStatus) -> FakeHand:
 
 def on_the_page(status: RobotiqStatus) -> str:
     hand = HandMirror(0, "sim://", State.RUNNING_IDLE, status)
-    return " ".join(axis_words(hand, axis) for axis in AXES)
+    return " ".join(axis_words(hand, axis) for axis in THREE_FINGER.axes)
 
 
 def on_the_screen(status: RobotiqStatus) -> str:
-    axes = Axes()
+    axes = Axes(THREE_FINGER)
     for _ in range(STILL + 1):
-        axes.show(status, dict.fromkeys(AXES, 0))
-    return " ".join(str(axes._does(axis)) for axis in AXES)
+        axes.show(status, dict.fromkeys(THREE_FINGER.axes, 0))
+    return " ".join(str(axes._does(axis)) for axis in THREE_FINGER.axes)
 
 
 READ: dict[str, Callable[[RobotiqStatus], str]] = {

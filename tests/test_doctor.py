@@ -158,7 +158,7 @@ def registers_at(function: int, address: bytes) -> Callable[[bytes], bytes]:
 
     def answer(request: bytes) -> bytes:
         if request[7] == function and request[8:10] == address:
-            return registers_in(request, bytes(4) + b"\x06" + bytes(11))
+            return registers_in(request, bytes((0, 0, 0, *(0, 6, 0) * 3, 0, 137, 0, 0)))
         return reply(request, bytes((request[7] | 0x80, 2)))
 
     return answer

@@ -28,6 +28,7 @@ TREE: dict[str, tuple[str, ...]] = {
     "ProtocolError": ("RobotiqConnectionError",),
     # What a user may tell from other time-outs.
     "MoveIgnoredError": ("MoveTimeoutError",),
+    "WrongModelError": ("ProtocolError",),
     # Around a hand; not among the names of the package.
     "RecordingError": ("RobotiqError",),
     "ViewerError": ("RobotiqError",),
@@ -101,6 +102,7 @@ def test_time_outs_and_lost_links_are_caught_by_the_names_python_has_for_them() 
     assert connection == {
         "RobotiqConnectionError",
         "ConnectFailedError",
+        "WrongModelError",
         "ConnectionLostError",
         "ResponseTimeoutError",
         "ProtocolError",

@@ -17,7 +17,7 @@ import pytest
 
 import robotiq_async
 from robotiq_async import fleet, simulator, sync
-from robotiq_async.values import enums
+from robotiq_async.values import enums, model
 
 CONTRACT = {
     # The hand and what it hands out.
@@ -71,6 +71,13 @@ EXTRAS = {
     "SentRequest": "what RobotiqHand.requests() gives",
     "Transport": "what may be passed in place of an address",
     "ReconnectPolicy": "what may be passed as reconnect",
+    "Model": "type of RobotiqHand.model",
+    "THREE_FINGER": "what may be passed as model",
+    "TWO_FINGER_85": "what may be passed as model",
+    "TWO_FINGER_140": "what may be passed as model",
+    "HAND_E": "what may be passed as model",
+    "JAW": "the axis of a 2F or a Hand-E",
+    "WrongModelError": "what a start with another model raises",
 }
 """What is exported beyond it, with the reason."""
 
@@ -115,8 +122,12 @@ def test_no_name_is_exported_twice() -> None:
 
 def test_the_exports_are_sorted_constants_first() -> None:
     assert list(robotiq_async.__all__) == sorted(
-        robotiq_async.__all__, key=lambda name: (not name.isupper(), name)
+        robotiq_async.__all__, key=lambda name: (not name.isupper(), _natural(name))
     )
+
+
+def _natural(name: str) -> list[object]:
+    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
 
 
 def test_every_exported_name_exists() -> None:
@@ -154,7 +165,8 @@ def test_every_exported_class_has_a_docstring_of_its_own(name: str) -> None:
 
 
 def test_every_exported_constant_is_described_where_it_is_defined() -> None:
-    body = ast.parse(Path(enums.__file__).read_text(encoding="utf-8")).body
+    files = [Path(str(each.__file__)) for each in (enums, model)]
+    body = [node for file in files for node in ast.parse(file.read_text(encoding="utf-8")).body]
     described = {
         node.target.id
         for node, following in itertools.pairwise(body)
@@ -191,6 +203,8 @@ def test_every_attribute_of_a_value_object_is_described(name: str) -> None:
     value = getattr(robotiq_async, name)
     fields = getattr(value, "__dataclass_fields__", {})
     for field in fields:
+        if field.startswith("_"):
+            continue
         assert f"{field}:" in value.__doc__, f"{name}.{field} is not in its docstring"
 
 

@@ -16,6 +16,7 @@ from robotiq_async.cli.arguments import USUAL, Link
 from robotiq_async.fleet.agent.agent_file import AgentFileError, read_agent_file
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_parameter, check_settings
 from robotiq_async.session.options import OPTIONS, HandOptions, Option, Place, offered
+from robotiq_async.values.model import Model
 
 make: Final[Any] = HandOptions
 NUMBERS = {name: option for name, option in OPTIONS.items() if option.high}
@@ -66,11 +67,13 @@ def test_the_keys_of_a_gripper_in_the_agent_file(tmp_path: Path) -> None:
         if name == "address":
             continue
         value = option.low if option.default is None else str(option.default).lower()
+        value = f'"{option.choices[1]}"' if option.choices else value
         path.write_text(
             f'site = "lab"\n[grippers.left]\naddress = "127.0.0.1"\n{name} = {value}\n', encoding="utf-8"
         )
         if Place.FILE in option.places:
-            assert str(getattr(read_agent_file(path).grippers["left"], name)).lower() == str(value)
+            given = getattr(read_agent_file(path).grippers["left"], name)
+            assert (given.name if isinstance(given, Model) else str(given).lower()) == str(value).strip('"')
         else:
             with pytest.raises(AgentFileError, match=f"'{name}'"):
                 read_agent_file(path)

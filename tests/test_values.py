@@ -60,6 +60,7 @@ from robotiq_async.values.calibration import ForceCalibration, SpeedCalibration
 from robotiq_async.values.calibration.csv_tables import SPEED, TableError
 from robotiq_async.values.errors import MoveIgnoredError
 from robotiq_async.values.frozen_mapping import FrozenMapping
+from robotiq_async.values.model import HAND_E
 from robotiq_async.values.registers import TCP_REGISTERS, gDT
 from robotiq_async.values.request import AxisRequest, Request
 from tests.register_words import status_of
@@ -113,6 +114,10 @@ VALUES: list[object] = [
     GripEvent(GripChange.SLIPPED, A, 5, A | B, status_of(0xB9, 0xEA, at=12.5, sequence=7)),
     Request(activate=True, mode=Mode.PINCH),
     parse_address("tcp://gripper"),
+    HAND_E.stroke,
+    HAND_E.faults[0x0A],
+    Request(model=HAND_E),
+    RobotiqStatus((0,) * 8, model=HAND_E),
     parse_address("sim://?speedup=10&object=150").simulation,
     TCP_REGISTERS,
     gDT[0],
@@ -237,6 +242,7 @@ NO_VALUES = {
     "Thing": "what is drawn between the fingers",
     "Service": "what may be asked by name, with the function that does it",
     "Topic": "bytes on their way",
+    "Model": "four constants, compared by identity",
     "Assumption": "a row of the catalogue of verify",
     "Bench": "what the stages of verify share",
     "Check": "a result of verify, which report.json holds",

@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 from ..values.enums import NO_AXES, Finger, ObjectStatus
+from ..values.model import Model
 from ..values.request import Request
 from ..values.status import RobotiqStatus
 
-TOLERANCE: Final = 2
-"""Counts between a request and the position reached (manual: within 1-2)."""
-OPEN_READING_MAX: Final = 7
-"""An open finger reads 6-7 after a request of 0."""
-CLOSED_READING_MIN: Final = 240
-"""A closed finger reads 240 or more after a request of 255."""
 
-
-def agrees(request: int, what: ObjectStatus, position: int, direction: int) -> bool:
+def agrees(model: Model, request: int, what: ObjectStatus, position: int, direction: int) -> bool:
     """Whether what an axis shows can result from this request.
 
     Args:
+        model: of the gripper.
         request: position request in counts.
         what: the object status of the axis.
         position: where it is, in counts.
@@ -32,11 +25,7 @@ def agrees(request: int, what: ObjectStatus, position: int, direction: int) -> b
             return request < position
         case ObjectStatus.IN_MOTION:
             return request != position and (direction == 0 or (request > position) == (direction > 0))
-    if request <= OPEN_READING_MAX:
-        return position <= OPEN_READING_MAX + TOLERANCE
-    if request >= CLOSED_READING_MIN:
-        return position >= CLOSED_READING_MIN - TOLERANCE
-    return abs(request - position) <= TOLERANCE
+    return model.has_reached(request, position)
 
 
 def drifts(
@@ -62,4 +51,4 @@ def drifts(
     what, position, request = status.finger_status(axis), status.position(axis), base.position(axis)
     if what is ObjectStatus.AT_POSITION and axis not in arrived:
         return request != position
-    return what is ObjectStatus.IN_MOTION or not agrees(request, what, position, direction=0)
+    return what is ObjectStatus.IN_MOTION or not agrees(status.model, request, what, position, direction=0)

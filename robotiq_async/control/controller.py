@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from ..values.enums import AXES, NO_AXES, Finger, Severity, State
+from ..values.enums import NO_AXES, Finger, Severity, State
 from ..values.errors import (
     ConnectionLostError,
     GripperFaultError,
@@ -22,6 +22,7 @@ from ..values.errors import (
     NotStartedError,
     RobotiqError,
 )
+from ..values.model import THREE_FINGER, Model
 from ..values.request import Request
 from ..values.status import RobotiqStatus
 from ..values.trigger import Trigger
@@ -56,6 +57,7 @@ class Controller:
         closing_time: gives the seconds of a full closing at a speed; default timeouts of moves come from it.
         write_spacing: seconds from the acknowledgement of a write to the next one: a gripper may acknowledge
             one that comes sooner and forget it. A stop does not wait; it is repeated.
+        model: of the gripper.
 
     Attributes:
         status: the newest status; None before the first.
@@ -71,6 +73,7 @@ class Controller:
         force: int,
         closing_time: Callable[[int], float],
         write_spacing: float = 0.0,
+        model: Model = THREE_FINGER,
     ) -> None:
         self.machine = machine
         self.status: RobotiqStatus | None = None
@@ -82,7 +85,7 @@ class Controller:
         """The newest status, without 0x09 until that has lasted: decisions use this one."""
         self._warned = NEVER
         self._closing_time = closing_time
-        self._shadow = RequestShadow(speed, force, log=machine.log)
+        self._shadow = RequestShadow(speed, force, model, log=machine.log)
         self._requests = OpenRequests()
         self._first_motion = FirstMotion()
         self._step = 0
@@ -121,7 +124,7 @@ class Controller:
         self.command(Command(move.axes, move.position, speed, force))
         self._requests.moves.add(move)
         assert self.status is not None, "the hand takes commands, so a status has been read"
-        written = {axis: asked.speed for axis, asked in zip(AXES, self._shadow.base.axes, strict=True)}
+        written = {axis: asked.speed for axis, asked in self._shadow.base.by_axis}
         speeds = written | self._requests.pending.speeds
         return move.default_timeout(self.status, speeds, self._closing_time)
 

@@ -10,10 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from ..values.enums import AXES, NO_AXES, Finger, ObjectStatus
+from ..values.enums import NO_AXES, Finger
+from ..values.model import TOLERANCE
 from ..values.request import Request
 from ..values.status import RobotiqStatus
-from .contact import TOLERANCE, agrees
+from .contact import agrees
 from .requests.limits import NEAR_PINCH
 from .requests.standstill import LAG_READS, Moment
 
@@ -55,7 +56,7 @@ class FirstMotion:
         if not self._is_due or not moved:
             return
         if not self.is_watched:
-            self._from = {axis: status.position(axis) for axis in AXES}
+            self._from = {axis: status.position(axis) for axis in status.model.axes}
             self._moved, self._since = NO_AXES, None
         self.is_watched, self._number = True, number
         self._moved |= moved
@@ -73,7 +74,7 @@ class FirstMotion:
         if self._since is None:
             self._since = now if acts(self._number) else None
             return self._moved, False
-        still = Finger(sum(axis for axis in AXES if axis in self._moved and _should_move(axis, status, base)))
+        still = Finger(sum(axis for axis in self._moved if _should_move(axis, status, base)))
         if not still:
             self.is_watched = False  # this one asked for no motion: the next one is the first
             return NO_AXES, False
@@ -86,15 +87,15 @@ class FirstMotion:
 def _should_move(axis: Finger, status: RobotiqStatus, base: Request) -> bool:
     """Whether an axis is asked to be elsewhere, and no known contact or limit keeps it where it is."""
     what, position, request = status.finger_status(axis), status.position(axis), base.position(axis)
-    if what.is_contact and agrees(request, what, position, direction=0):
+    if what.is_contact and agrees(status.model, request, what, position, direction=0):
         return False
-    return not agrees(request, ObjectStatus.AT_POSITION, position, direction=0) and not _may_be_limited(
-        axis, request, status
-    )
+    return not status.model.has_reached(request, position) and not _may_be_limited(axis, request, status)
 
 
 def _may_be_limited(axis: Finger, request: int, status: RobotiqStatus) -> bool:
     """Whether a software limit may keep an axis where it is. The gripper reports that as arrived."""
+    if Finger.SCISSOR not in status.model.all_axes:
+        return False
     position = status.position(axis)
     low, high = NEAR_AN_END
     if axis is Finger.SCISSOR:

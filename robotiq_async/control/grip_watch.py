@@ -8,6 +8,7 @@ from typing import Final
 from ..values.checks import check_int, check_mask
 from ..values.enums import Finger, ObjectStatus
 from ..values.grip_event import GripChange, GripEvent
+from ..values.model import Model
 from ..values.status import RobotiqStatus
 from .contact import agrees
 from .passing_fault import PassingFault
@@ -39,9 +40,9 @@ class _Grip:
     was_pressed: bool = False
     is_slipping: bool = False
 
-    def is_pressed(self, request: int) -> bool:
+    def is_pressed(self, model: Model, request: int) -> bool:
         """Whether a request lies beyond the contact, so that the axis presses."""
-        return agrees(request, self.contact, self.touched, direction=0)
+        return agrees(model, request, self.contact, self.touched, direction=0)
 
     def is_left(self, moved: int) -> bool:
         """Whether an axis that has moved by this many counts has left the part."""
@@ -70,7 +71,7 @@ class GripWatch:
         since: RobotiqStatus | None = None,
         slip: int = SLIP_COUNTS,
     ) -> None:
-        self._axes = tuple(check_mask(fingers))
+        self._axes = check_mask(fingers)
         self._slip = check_int("slip", slip, 1, 255)
         if since is not None and not isinstance(since, RobotiqStatus):
             raise TypeError(f"since must be None or a RobotiqStatus, got {since!r}")
@@ -98,7 +99,8 @@ class GripWatch:
         judged = status
         if self._passing_fault.reads or status.fault.is_serious:
             judged = self._passing_fault.see(status, status.timestamp)
-        changes = [(axis, *change) for axis in self._axes for change in self._changes(axis, judged)]
+        axes = self._axes & status.model.all_axes
+        changes = [(axis, *change) for axis in axes for change in self._changes(axis, judged)]
         if last is None:
             return []
         return [GripEvent(change, axis, moved, self.holds, status) for axis, change, moved in changes]
@@ -111,7 +113,7 @@ class GripWatch:
         is_touching = _contact(axis, status) is grip.contact
         if is_touching and grip.is_slipping:
             return self._gain(axis, status)
-        is_pressed = grip.is_pressed(status.requested_position(axis))
+        is_pressed = grip.is_pressed(status.model, status.requested_position(axis))
         grip.was_pressed |= is_pressed
         lets_go = not is_pressed and _follows_requests(status)
         moved = status.position(axis) - grip.position
@@ -132,7 +134,7 @@ class GripWatch:
         if contact is None:
             return []
         self._grips[axis] = grip = _Grip(contact, position, position)
-        grip.was_pressed = grip.is_pressed(status.requested_position(axis))
+        grip.was_pressed = grip.is_pressed(status.model, status.requested_position(axis))
         return [(GripChange.GAINED, 0)]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from ..values.enums import AXES, STROKE_COUNTS, Finger
+from ..values.enums import Finger
 from ..values.errors import ConnectionLostError, RobotiqError
 from ..values.move_result import MoveResult
 from ..values.status import RobotiqStatus
@@ -34,7 +34,7 @@ class Move:
         """The number of its write; None before that."""
         self._started = now
         self._waiter = waiter
-        self._peak = dict.fromkeys((axis for axis in AXES if axis in axes), 0)
+        self._peak = dict.fromkeys(axes, 0)
 
     def default_timeout(
         self, status: RobotiqStatus, speeds: Mapping[Finger, int], closing_time: Callable[[int], float]
@@ -44,7 +44,8 @@ class Move:
         ``closing_time`` gives the seconds of a full stroke at a speed. No time is published for the scissor:
         it counts as a finger.
         """
-        strokes = {axis: abs(self.position - status.position(axis)) / STROKE_COUNTS for axis in self._peak}
+        full = status.model.stroke.counts
+        strokes = {axis: abs(self.position - status.position(axis)) / full for axis in self._peak}
         return 2 * max(stroke * closing_time(speeds[axis]) for axis, stroke in strokes.items()) + MARGIN_S
 
     def see(self, status: RobotiqStatus) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 from ..values.enums import Fault, Initialization
+from ..values.model import Model
 from ..values.status import RobotiqStatus
 from ..values.trigger import Trigger
 
@@ -16,13 +17,13 @@ def classify(status: RobotiqStatus) -> Trigger:
     """
     # Only gACT, gIMC and gFLT decide. They rarely change and this runs at every poll, so it is cached.
     first, second = status.registers[:2]
-    return _classify(first >> 8, second >> 8 & 0x0F)
+    return _classify(first >> 8, second >> 8 & 0x0F, status.model)
 
 
 @cache
-def _classify(activation: int, fault: int) -> Trigger:
+def _classify(activation: int, fault: int, model: Model) -> Trigger:
     """``activation`` is the byte with gACT and gIMC, ``fault`` is gFLT."""
-    status = RobotiqStatus((activation << 8, fault << 8, 0, 0, 0, 0, 0, 0))
+    status = RobotiqStatus((activation << 8, fault << 8, 0, 0, 0, 0, 0, 0), model=model)
     if status.fault is Fault.AUTOMATIC_RELEASE_DONE:
         return Trigger.SEEN_RELEASED
     if status.fault.is_serious:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from types import TracebackType
 from typing import TYPE_CHECKING, Final, Literal, Self, TypeVar
 
@@ -18,7 +18,6 @@ from ..values.checks import (
     check_byte,
     check_flag,
     check_int,
-    check_mask,
     check_optional_byte,
     check_seconds,
     check_timeout,
@@ -28,10 +27,11 @@ from ..values.errors import ConnectionLostError, NotStartedError
 from ..values.events import SentRequest, Transition
 from ..values.grasp_result import GraspResult, check_at_least
 from ..values.grip_event import GripEvent
+from ..values.model import THREE_FINGER, Model
 from ..values.move_result import MoveResult
 from ..values.statistics import Statistics
 from ..values.status import RobotiqStatus
-from .run import NamesErrors, Run
+from .run import NamesErrors, Run, refuse_with
 
 T = TypeVar("T")
 LONGEST_BUFFER: Final = 1_000_000  # items: over an hour of statuses at 200 Hz
@@ -48,6 +48,7 @@ class Hand(ABC):
     Many calls take the same arguments. Any other value raises TypeError or ValueError, and nothing is sent:
 
     * ``fingers``: the axes, a :class:`Finger` mask or the same integer, 1..15. The others stay as they are.
+      ``Finger.ABC`` are the fingers of the model, ``Finger.ALL`` its axes; others that it lacks are refused.
     * ``position``: the target in counts, 0 (open) .. 255 (closed). Any object with ``__index__`` is an
       integer, except a bool.
     * ``speed``: 0 (22 mm/s nominal) .. 255 (110 mm/s nominal); None leaves the speed of these axes.
@@ -56,24 +57,33 @@ class Hand(ABC):
 
     Timestamps are monotonic seconds of this process, wherever the gripper is. No motion is ever sent twice.
 
-    Every public call is in this class, which documents it and checks its arguments. To add a kind of hand,
-    supply the methods below "for subclasses".
+    To add a kind of hand, supply the methods below "for subclasses".
 
     Args:
         address: which gripper; no two hands of a process have the same one.
         name: what the log, errors and metrics call the hand; empty for its address.
-        units: what positions, speeds and forces mean.
+        units: what positions, speeds and forces mean on a model.
         keep_grip: whether :meth:`stop` keeps a grip by default.
+        model: of the gripper.
     """
 
     _session: Run | None = None
     """The present run, or the last one; None before the first start."""
 
-    def __init__(self, address: str, *, units: Units, name: str = "", keep_grip: bool = False) -> None:
+    def __init__(
+        self,
+        address: str,
+        *,
+        units: Callable[[Model], Units],
+        name: str = "",
+        keep_grip: bool = False,
+        model: Model = THREE_FINGER,
+    ) -> None:
         self._address = address
         self._given_name = name
         self._units = units
         self._keep_grip = keep_grip
+        self._model = model
         self._channels = Channels(Log(name or address))
         self._naming = NamesErrors(name)
 
@@ -93,14 +103,7 @@ class Hand(ABC):
         await self.stop()
 
     if not TYPE_CHECKING:  # type checkers report the mistake themselves
-
-        def __enter__(self) -> None:
-            kind = type(self).__name__
-            raise TypeError(
-                f"a {kind} is used with 'async with'; for 'with' use robotiq_async.sync.RobotiqHand"
-            )
-
-        __exit__ = __enter__  # Python looks for both before it calls the first
+        __enter__ = __exit__ = refuse_with  # Python looks for both before it calls the first
 
     async def start(self, activate: bool = True, *, wait: float = 0.0) -> None:
         """Connect, read the status, activate a gripper that is reset, and poll from then on.
@@ -179,19 +182,19 @@ class Hand(ABC):
             RobotiqError: the hand takes no commands now, or the link went down before the acknowledgement.
                 The request is not sent again, and may have been carried out.
         """
-        axes = check_mask(fingers)
+        axes = self.model.mask(fingers)
         with self._naming:
             await self._set("position", check_byte("value", value), axes)
 
     async def set_speed(self, value: int, fingers: Finger | int = Finger.ALL) -> None:
         """Set the speed of axes, as :meth:`set_position`, also of a motion under way; never starts one."""
-        axes = check_mask(fingers)
+        axes = self.model.mask(fingers)
         with self._naming:
             await self._set("speed", check_byte("value", value), axes)
 
     async def set_force(self, value: int, fingers: Finger | int = Finger.ALL) -> None:
         """Set the force of axes, as :meth:`set_position`; never starts a motion. More tightens a grip."""
-        axes = check_mask(fingers)
+        axes = self.model.mask(fingers)
         with self._naming:
             await self._set("force", check_byte("value", value), axes)
 
@@ -212,7 +215,7 @@ class Hand(ABC):
             ValueError: also if position, speed and force are all None.
             RobotiqError: the hand takes no commands now.
         """
-        axes = check_mask(fingers)
+        axes = self.model.mask(fingers)
         if position is None and speed is None and force is None:
             raise ValueError("command() needs at least one of position, speed and force in 0..255, got none")
         position = check_optional_byte("position", position)
@@ -229,13 +232,11 @@ class Hand(ABC):
         force: int | None = None,
         timeout: float | None = None,
     ) -> MoveResult:
-        """Move axes and return when every one of them has stopped: at the target, or against something.
+        """Move axes; when all have stopped, return how each ended: at the target, or against something.
 
-        When the call is cancelled (by a task, ``asyncio.timeout`` or an anyio scope) or times out, those of
-        its axes that still move are held where they are; an axis in contact keeps its request and its grip.
-
-        Returns:
-            How each axis ended. A contact is a result, not an error.
+        A contact is a result, not an error. When the call is cancelled (by a task, ``asyncio.timeout`` or an
+        anyio scope) or times out, those of its axes that still move are held where they are; an axis in
+        contact keeps its request and its grip.
 
         Raises:
             MoveTimeoutError: an axis still moved when the time was over; as MoveIgnoredError, the first
@@ -246,7 +247,7 @@ class Hand(ABC):
             ConnectionLostError: the link went down; the gripper may still be moving.
             RobotiqStateError: the hand takes no commands now, or was stopped.
         """
-        axes = check_mask(fingers)
+        axes = self.model.mask(fingers)
         target = check_byte("position", position)
         speed, force = check_optional_byte("speed", speed), check_optional_byte("force", force)
         limit = check_timeout("timeout", timeout)
@@ -294,7 +295,7 @@ class Hand(ABC):
         object between fingertips. A contact latches: a finger that was in contact before still counts when
         the part has been taken out meanwhile. Open first, or ask for more force.
         """
-        axes = check_mask(fingers)
+        axes = self.model.mask(fingers)
         needed = check_at_least(at_least, axes)
         return GraspResult(await self.close(axes, speed=speed, force=force, timeout=timeout), needed)
 
@@ -312,7 +313,7 @@ class Hand(ABC):
             NotActivatedError: the gripper lost its activation before it was sent.
             RobotiqError: not connected, or the link went down before the acknowledgement.
         """
-        axes = check_mask(fingers)
+        axes = self.model.mask(fingers)
         with self._naming:
             await self._hold(axes)
 
@@ -409,9 +410,15 @@ class Hand(ABC):
         return self._address
 
     @property
+    def model(self) -> Model:
+        """The model of the gripper. A remote hand knows it once it is started."""
+        newest = self._newest_status
+        return self._model if newest is None else newest.model
+
+    @property
     def units(self) -> Units:
         """Converts mm, mm/s, seconds and newton labels to values and back, by the hand's calibrations."""
-        return self._units
+        return self._units(self.model)
 
     @property
     @abstractmethod
@@ -421,11 +428,10 @@ class Hand(ABC):
     @property
     def status(self) -> RobotiqStatus:
         """The newest status, however old its timestamp says it is; NotStartedError before the first."""
-        status = self._newest_status
-        if status is None:
-            with self._naming:
-                raise NotStartedError("no status has been read yet: start the hand first")
-        return status
+        if (status := self._newest_status) is not None:
+            return status
+        with self._naming:
+            raise NotStartedError("no status has been read yet: start the hand first")
 
     @property
     def is_activated(self) -> bool:
@@ -435,8 +441,7 @@ class Hand(ABC):
     @property
     def is_reset(self) -> bool:
         """Whether the gripper is reset (gACT = 0 and gIMC = 0); raises as :attr:`is_moving`."""
-        status = self._current_status()
-        return status.is_reset and not status.activation_echo
+        return (status := self._current_status()).is_reset and not status.activation_echo
 
     @property
     def is_moving(self) -> bool:
@@ -489,7 +494,7 @@ class Hand(ABC):
             since: the status to begin with, ``result.status`` of a grasp or a move; None for the newest one.
             slip: counts that an axis in contact may move without an event, 1..255.
         """
-        watch = GripWatch(fingers, since=since, slip=slip)
+        watch = GripWatch(self.model.mask(fingers), since=since, slip=slip)
         self._check_may_listen()
         if since is None and self._newest_status is not None:
             watch.see(self._newest_status)

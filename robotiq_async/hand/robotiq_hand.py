@@ -37,6 +37,7 @@ from ..values.errors import (
     StateTimeoutError,
 )
 from ..values.events import SentRequest, Transition
+from ..values.model import Model
 from ..values.move_result import MoveResult
 from ..values.statistics import Statistics
 from ..values.status import RobotiqStatus
@@ -54,7 +55,7 @@ RESETS: Final = 2
 
 
 class RobotiqHand(Hand):
-    """A Robotiq 3-Finger gripper behind Modbus TCP, a serial line, or simulated.
+    """A Robotiq 3-Finger gripper, 2F or Hand-E behind Modbus TCP, a serial line, or simulated.
 
     Use it as ``async with RobotiqHand(address) as hand:``, or call :meth:`start` and :meth:`stop`. One task
     polls the gripper; every call hands its request to that task and never blocks the loop. The calls may come
@@ -101,6 +102,9 @@ class RobotiqHand(Hand):
         keep_grip: what :meth:`stop` does by default, and leaving the block does always: False stops the
             fingers for certain (rGTO = 0), True holds axes that move and keeps a grip in force. A gripper
             that is not polled afterwards may lose its activation, and with it the grip.
+        model: a :class:`Model`, or its name: ``3f``, ``2f85``, ``2f140``, ``hand-e``. None for the model that
+            the address names (``rtu:///dev/ttyUSB0?model=2f85``), and else the 3-Finger. A gripper whose
+            registers show another one is refused.
 
     Raises:
         TypeError: an option of the wrong type.
@@ -129,6 +133,7 @@ class RobotiqHand(Hand):
         calibration: SpeedCalibration | None = None,
         force_calibration: ForceCalibration | None = None,
         keep_grip: bool = False,
+        model: Model | str | None = None,
     ) -> None:
         self._options = options = HandOptions(
             address,
@@ -148,9 +153,14 @@ class RobotiqHand(Hand):
             calibration=calibration,
             force_calibration=force_calibration,
             keep_grip=keep_grip,
+            model=model,  # type: ignore[arg-type]  # a name becomes its model there
         )
         super().__init__(
-            options.link.address, units=options.units, name=options.given_name, keep_grip=options.keep_grip
+            options.link.address,
+            units=lambda _: options.units,
+            name=options.given_name,
+            keep_grip=options.keep_grip,
+            model=options.model,
         )
         self._machine = StateMachine(log=options.log)
 

@@ -41,3 +41,13 @@ class NamesErrors:
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if self._name and isinstance(error, RobotiqError):
             error.hand = self._name
+
+
+def refuse_with(hand: object) -> None:
+    """Say what to use in place of ``with`` on an async hand.
+
+    Raises:
+        TypeError: always.
+    """
+    kind = type(hand).__name__
+    raise TypeError(f"a {kind} is used with 'async with'; for 'with' use robotiq_async.sync.RobotiqHand")

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from ipaddress import IPv4Address, IPv6Address
 from typing import Final, Literal
 
+from ..values.model import Model, model_of
 from .simulation import NOTHING_SPECIAL, Simulation, parse_simulation
 
 TCP_PORT: Final = 502
@@ -16,7 +17,8 @@ FORMS: Final = (
     "tcp://HOST[:PORT] (or bare HOST or HOST:PORT), "
     "rtu:///dev/ttyUSB0 (a serial port; rtu://COM3 on Windows), "
     "rtu+tcp://HOST:PORT (a serial line behind a TCP socket), sim:// (or sim://?speedup=10&object=150), "
-    "zenoh://SITE/HOST/GRIPPER (on another host: for robotiq_async.fleet.RemoteHand and for commands)"
+    "zenoh://SITE/HOST/GRIPPER (on another host: for robotiq_async.fleet.RemoteHand and for commands); "
+    "?model=2f85, 2f140 or hand-e at the end for a sibling of the 3-Finger"
 )
 
 
@@ -29,12 +31,14 @@ class Address:
         host: host name or IP address (tcp, rtu+tcp), device of the serial port (rtu), empty (sim).
         port: TCP port; 0 for the others.
         simulation: what the gripper is like (sim); nothing special for the others.
+        model: of the gripper; None if the address does not name it.
     """
 
     kind: Literal["tcp", "rtu", "rtu+tcp", "sim"]
     host: str = ""
     port: int = 0
     simulation: Simulation = NOTHING_SPECIAL
+    model: Model | None = None
 
     @property
     def is_rtu(self) -> bool:
@@ -47,10 +51,13 @@ class Address:
         return self.kind in ("tcp", "rtu+tcp")
 
     def __str__(self) -> str:
+        query = str(self.simulation)
+        if self.model is not None:
+            query += f"{'&' if query else '?'}model={self.model.name}"
         if self.is_socket:
             host = f"[{self.host}]" if ":" in self.host else self.host
-            return f"{self.kind}://{host}:{self.port}"
-        return f"{self.kind}://{self.host}{self.simulation}"
+            return f"{self.kind}://{host}:{self.port}{query}"
+        return f"{self.kind}://{self.host}{query}"
 
 
 def parse_address(address: object) -> Address:
@@ -66,13 +73,14 @@ def parse_address(address: object) -> Address:
     scheme = scheme.lower()
     if not separator:
         scheme, rest = "tcp", address
-    if scheme == "sim" and rest[:1] in ("", "?"):
-        try:
-            return Address("sim", simulation=parse_simulation(rest))
-        except ValueError as error:
-            raise ValueError(f"malformed address {address!r}: {error}; accepted: {FORMS}") from None
+    try:
+        rest, model = _without_model(rest)
+        if scheme == "sim" and rest[:1] in ("", "?"):
+            return Address("sim", simulation=parse_simulation(rest), model=model)
+    except ValueError as error:
+        raise ValueError(f"malformed address {address!r}: {error}; accepted: {FORMS}") from None
     if scheme == "rtu" and rest.strip("/") and rest == rest.strip() and "\0" not in rest:
-        return Address("rtu", rest)
+        return Address("rtu", rest, model=model)
     if scheme in ("tcp", "rtu+tcp"):
         # Serial servers have no usual port, so one must be given.
         host, port = _host_and_port(rest, TCP_PORT if scheme == "tcp" else None)
@@ -80,12 +88,29 @@ def parse_address(address: object) -> Address:
             what = f"{host} is not an IPv4 address: four numbers in 0..255, without leading zeros"
             raise ValueError(f"malformed address {address!r}: {what}; accepted: {FORMS}")
         if host and port is not None:
-            return Address("tcp" if scheme == "tcp" else "rtu+tcp", host, port)
+            return Address("tcp" if scheme == "tcp" else "rtu+tcp", host, port, model=model)
     if scheme == "zenoh":
         raise ValueError(
             f"{address!r} is a gripper on another host: use robotiq_async.fleet.RemoteHand; accepted: {FORMS}"
         )
     raise ValueError(f"malformed address {address!r}; accepted: {FORMS}")
+
+
+def _without_model(text: str) -> tuple[str, Model | None]:
+    """Take ``model=NAME`` out of the options after a question mark.
+
+    Raises:
+        ValueError: no such model, or more than one.
+    """
+    place, _, query = text.partition("?")
+    options = query.split("&") if query else []
+    names = [option.removeprefix("model=") for option in options if option.startswith("model=")]
+    if not names:
+        return text, None
+    if len(names) > 1:
+        raise ValueError("model must be given once, as model=NAME")
+    others = "&".join(option for option in options if not option.startswith("model="))
+    return place + (f"?{others}" if others else ""), model_of(names[0])
 
 
 def _host_and_port(text: str, usual: int | None) -> tuple[str, int | None]:

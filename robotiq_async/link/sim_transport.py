@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..values.enums import Finger
 from ..values.errors import ConnectFailedError
+from ..values.model import THREE_FINGER, Model
 from ..values.registers import RegisterMap, Registers
 from .address import parse_address
 from .modbus import ModbusTransport
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from ..simulator import SimulatedGripper
 
 
-def new_gripper(simulation: Simulation) -> SimulatedGripper:
+def new_gripper(simulation: Simulation, model: Model = THREE_FINGER) -> SimulatedGripper:
     """The gripper that a ``sim://`` address describes.
 
     Imports the simulator, which takes tens of milliseconds: only for sim://, and when the hand is made,
@@ -24,7 +25,7 @@ def new_gripper(simulation: Simulation) -> SimulatedGripper:
     """
     from ..simulator import SimulatedGripper  # noqa: PLC0415
 
-    gripper = SimulatedGripper(speedup=simulation.speedup)
+    gripper = SimulatedGripper(speedup=simulation.speedup, model=model)
     if simulation.object is not None:
         gripper.place_object(Finger.ABC, simulation.object)
     return gripper

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
@@ -15,7 +15,8 @@ from ..link.sim_transport import SimulatedTransport, new_gripper
 from ..link.transport import Link, Transport
 from ..runtime.log import Log
 from ..values.checks import check_int
-from ..values.registers import REGISTER_COUNT, RTU_REGISTERS, TCP_REGISTERS, RegisterMap
+from ..values.model import THREE_FINGER, Model, model_of
+from ..values.registers import REGISTER_COUNT, RegisterMap
 from .claims import Gripper
 
 LAST_BLOCK: Final = 0x10000 - REGISTER_COUNT
@@ -33,35 +34,56 @@ class GripperLink:
         gripper: identifies the gripper at the time of the call: a serial port may have been plugged in since.
         make: makes a transport for one start of the hand, from ``connect_timeout`` and ``response_timeout``.
         is_rtu: whether frames go over a serial line, which is slower.
+        model: of the gripper.
     """
 
     address: str
     gripper: Callable[[], Gripper]
     make: Callable[..., Link]
     is_rtu: bool = False
+    model: Model = THREE_FINGER
 
 
-def gripper_link(address: object, registers: Mapping[str, object], name: str = "") -> GripperLink:
+def gripper_link(
+    address: object, registers: Mapping[str, object], name: str = "", model: object = None
+) -> GripperLink:
     """The way to the gripper at an address. Opens nothing.
 
     Args:
         address: a string or a transport object.
         registers: the options that :func:`registers_of` takes; a transport object has no use for them.
         name: of the hand, for the log; empty for the address.
+        model: a Model or its name; None for that of the address.
 
     Raises:
-        TypeError: neither a string nor a Transport, or an option that is no int.
-        ValueError: a malformed address, or an option outside its range.
+        TypeError: neither a string nor a Transport, or an option of the wrong type.
+        ValueError: a malformed address, an option outside its range, or another model than the address names.
     """
     if isinstance(address, str):
         parsed = parse_address(address)
         names_unit = registers["device_id"] is not None
+        parsed = with_model(parsed, model)
         return _over_modbus(parsed, registers_of(parsed, **registers), names_unit, name)
     if isinstance(address, Transport):
         shown = f"<{type(address).__name__} at {id(address):#x}>"
         guarded = partial(GuardedTransport, address, shown, log=Log(name or shown))
-        return GripperLink(shown, partial(Gripper, shown), guarded)
+        return GripperLink(shown, partial(Gripper, shown), guarded, model=model_of(model))
     raise TypeError(f"address must be a string or a Transport, got {address!r}")
+
+
+def with_model(address: Address, model: object) -> Address:
+    """An address with the model of its gripper; None leaves it as it is.
+
+    Raises:
+        TypeError: neither a Model nor a text.
+        ValueError: no such model, or another one than the address names.
+    """
+    if model is None:
+        return address
+    found = model_of(model)
+    if address.model not in (None, found):
+        raise ValueError(f"model {found.name} contradicts the address {address}")
+    return address if found is THREE_FINGER else replace(address, model=found)
 
 
 def registers_of(
@@ -78,7 +100,8 @@ def registers_of(
         TypeError: an option is no int.
         ValueError: an option is outside its range.
     """
-    usual = RTU_REGISTERS if address.is_rtu else TCP_REGISTERS
+    model = model_of(address.model)
+    usual = model.rtu if address.is_rtu else model.tcp
     # On a serial line 0 is a broadcast, which no device answers, and ids above 247 are reserved. Over TCP
     # grippers in the field answer to any id, and drivers have used 0 and 255.
     units = (1, 247) if address.is_rtu else (0, 255)
@@ -95,10 +118,12 @@ def _int_or(name: str, value: object, low: int, high: int, usual: int) -> int:
 
 
 def _over_modbus(address: Address, registers: RegisterMap, names_unit: bool, name: str) -> GripperLink:
+    model = model_of(address.model)
     if address.kind == "sim":
-        simulated = new_gripper(address.simulation)
+        simulated = new_gripper(address.simulation, model)
         shown = f"{address}#{id(simulated):x}"  # every sim:// is a gripper of its own
-        return GripperLink(shown, partial(Gripper, shown), partial(SimulatedTransport, simulated, registers))
+        make = partial(SimulatedTransport, simulated, registers)
+        return GripperLink(shown, partial(Gripper, shown), make, model=model)
     # A gateway takes several connections. On a serial line replies carry no number, so every program that has
     # it open gets part of what arrives: there the unit id tells no two grippers apart.
     unit = registers.device_id if names_unit and not address.is_rtu else None
@@ -108,4 +133,5 @@ def _over_modbus(address: Address, registers: RegisterMap, names_unit: bool, nam
         lambda: Gripper(canonical_address(address), unit, hint),
         partial(ModbusTransport, address, registers, log=Log(name or str(address))),
         address.is_rtu,
+        model,
     )

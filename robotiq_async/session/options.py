@@ -19,6 +19,7 @@ from ..runtime.log import Log
 from ..values.calibration import ForceCalibration, SpeedCalibration, Units
 from ..values.checks import check_byte, check_flag, check_int, check_seconds
 from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ..values.model import MODELS, THREE_FINGER, Model, model_of
 from ..values.registers import RTU_REGISTERS, TCP_REGISTERS
 from .gripper_link import LAST_BLOCK, GripperLink, gripper_link
 from .reconnecting import ReconnectPolicy
@@ -61,7 +62,6 @@ LONGEST_NAME: Final = 64
 
 # Read when this is imported: a hand may be made in a running loop, which must not wait for a disk.
 _THESIS: Final = SpeedCalibration.thesis()
-_NOMINAL: Final = ForceCalibration.nominal()
 
 
 class Place(Flag):
@@ -89,6 +89,7 @@ class Option:
         tcp: what None stands for over TCP.
         rtu: what None stands for on a serial line.
         default: what counts unless another value is given; None where it depends on the link.
+        choices: the names that it can be, for one that is a name.
     """
 
     help: str
@@ -99,6 +100,7 @@ class Option:
     tcp: int | None = None
     rtu: int | None = None
     default: object = None
+    choices: tuple[str, ...] = ()
 
 
 def _seconds(help: str, low: float, high: float, places: Place = Place.FILE) -> Option:
@@ -121,6 +123,10 @@ def _by_link(help: str, register: str, low: int, high: int, places: Place = Plac
 
 def _check_address(_: str, value: object) -> object:
     return value  # gripper_link() has parsed it
+
+
+def _check_model(name: str, model: object) -> Model:
+    return model_of(model, name)
 
 
 def _check_name(_: str, name: object) -> str | None:
@@ -221,6 +227,15 @@ class HandOptions:
         ForceCalibration | None, Option("Labels of the force values", _check_forces)
     ] = None
     keep_grip: Annotated[bool, Option("Whether a stop keeps a grip in force", check_flag, Place.FILE)] = False
+    model: Annotated[
+        Model,
+        Option(
+            f"Model of the gripper: {', '.join(MODELS)}",
+            _check_model,
+            Place.FILE | Place.COMMAND_LINE,
+            choices=tuple(MODELS),
+        ),
+    ] = None  # type: ignore[assignment]  # that of the address; a name becomes its model
 
     link: GripperLink = field(default=None, repr=False, compare=False)  # type: ignore[assignment]
     """How the gripper is reached; made from the address."""
@@ -233,13 +248,14 @@ class HandOptions:
         self._keep("name", _check_name("name", self.name))  # the log of the link begins with it
         if self.link is None:
             registers = {name: getattr(self, name) for name, each in OPTIONS.items() if each.tcp is not None}
-            self._keep("link", gripper_link(self.address, registers, self.given_name))
+            self._keep("link", gripper_link(self.address, registers, self.given_name, self.model))
+        self._keep("model", self.link.model)
         on_purpose = not isinstance(self.poll_interval, Usual)
         for name, option in OPTIONS.items():
             self._keep(name, option.check(name, getattr(self, name)))
         if self.link.is_rtu and not on_purpose:
             self._keep("poll_interval", SERIAL_POLL_INTERVAL_S)
-        self._keep("units", units_of(self.calibration, self.force_calibration))
+        self._keep("units", units_of(self.calibration, self.force_calibration, self.model))
         self._keep("log", Log(self.given_name or self.link.address))
 
     def _keep(self, name: str, value: object) -> None:
@@ -280,8 +296,8 @@ def offered(place: Place) -> dict[str, Option]:
     return {name: option for name, option in OPTIONS.items() if place in option.places}
 
 
-def units_of(calibration: object, force_calibration: object) -> Units:
-    """What the values of a hand mean; None for the thesis's speeds, and for the manual's forces.
+def units_of(calibration: object, force_calibration: object, model: Model = THREE_FINGER) -> Units:
+    """What the values of a hand mean; None for the usual speeds of its model, and for the manual's forces.
 
     Raises:
         TypeError: not a calibration of its kind.
@@ -289,4 +305,5 @@ def units_of(calibration: object, force_calibration: object) -> Units:
     """
     speeds = _check_speeds("calibration", calibration)
     forces = _check_forces("force_calibration", force_calibration)
-    return Units(speeds or _THESIS, forces or _NOMINAL)
+    usual = _THESIS if model is THREE_FINGER else SpeedCalibration.usual(model)
+    return Units(speeds or usual, forces or ForceCalibration.nominal(model))

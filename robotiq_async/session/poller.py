@@ -25,8 +25,10 @@ from ..values.errors import (
     NotStartedError,
     ResponseTimeoutError,
     RobotiqConnectionError,
+    WrongModelError,
 )
 from ..values.events import SentRequest
+from ..values.model import names_that_fit
 from ..values.registers import Registers
 from ..values.request import Request
 from ..values.status import RobotiqStatus
@@ -97,6 +99,7 @@ class Poller:
         self._counters = counters
         self._channels = channels
         self._options = options
+        self._model = options.model
         self._log = options.log
         self._loop = asyncio.get_running_loop()
         self.connected: asyncio.Future[None] = self._loop.create_future()
@@ -190,7 +193,7 @@ class Poller:
         """Open the link and see the first status, or what it takes to decide about one."""
         await self._transport.open()
         self._last_poll = 0.0  # the time without a link counts as no period
-        await self._poll_once()
+        await self._poll_once(is_first=True)
         while self._controller.is_undecided:  # the silence before may show as a fault, once
             await asyncio.sleep(self._options.poll_interval)
             await self._poll_once()
@@ -283,13 +286,17 @@ class Poller:
         self._decided = request, now
         return request.registers
 
-    async def _poll_once(self) -> None:
+    async def _poll_once(self, *, is_first: bool = False) -> None:
         tick, counters = self._tick, self._counters
         tick.late = 0.0
         asked = tick.time()
         registers = await self._transport.read()
         answered = tick.time()
-        status = RobotiqStatus(registers, answered, next(self._channels.numbers))
+        if is_first and (why := self._model.contradiction(registers)):
+            raise WrongModelError(
+                f"this is no {self._model.title}: its registers show {why}; {names_that_fit(registers)}"
+            )
+        status = RobotiqStatus(registers, answered, next(self._channels.numbers), self._model)
         counters.polls += 1
         counters.round_trips.append(answered - asked)
         if self._last_poll:

@@ -78,7 +78,12 @@ class Session:
         machine.why_down = None
         self._claim()
         self.controller = Controller(
-            machine, options.speed, options.force, options.units.closing_s, options.write_spacing
+            machine,
+            options.speed,
+            options.force,
+            options.units.closing_s,
+            options.write_spacing,
+            options.model,
         )
         self.controller.activates = activate
         self.counters = Counters()

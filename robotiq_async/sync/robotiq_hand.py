@@ -23,6 +23,7 @@ from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED, Finger, State
 from ..values.events import SentRequest, Transition
 from ..values.grasp_result import GraspResult
 from ..values.grip_event import GripEvent
+from ..values.model import Model
 from ..values.move_result import MoveResult
 from ..values.statistics import Statistics
 from ..values.status import RobotiqStatus
@@ -82,6 +83,7 @@ class RobotiqHand:
         calibration: SpeedCalibration | None = None,
         force_calibration: ForceCalibration | None = None,
         keep_grip: bool = False,
+        model: Model | str | None = None,
     ) -> None:
         self._hand = AsyncRobotiqHand(
             address,
@@ -101,6 +103,7 @@ class RobotiqHand:
             calibration=calibration,
             force_calibration=force_calibration,
             keep_grip=keep_grip,
+            model=model,
         )
         self._caller = Caller(self._hand)
 
@@ -233,6 +236,10 @@ class RobotiqHand:
     @property
     def address(self) -> str:
         return self._inner.address
+
+    @property
+    def model(self) -> Model:
+        return self._inner.model
 
     @property
     def units(self) -> Units:

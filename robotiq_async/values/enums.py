@@ -8,9 +8,10 @@ from typing import Final
 
 
 class Finger(IntFlag):
-    """The four axes of the gripper, and masks of them.
+    """The axes of a gripper, and masks of them.
 
-    ``A`` is the single finger that closes between ``B`` and ``C``; ``SCISSOR`` spreads ``B`` and ``C``.
+    ``A`` is the single finger that closes between ``B`` and ``C``; ``SCISSOR`` spreads ``B`` and ``C``. A 2F
+    or a Hand-E has ``A`` alone, its jaw (:data:`JAW`).
     """
 
     A = 1
@@ -24,17 +25,16 @@ class Finger(IntFlag):
         return "|".join(str(axis.name) for axis in self) or "none"
 
 
-AXES: Final = (Finger.A, Finger.B, Finger.C, Finger.SCISSOR)
-"""The four axes in the order of their registers."""
+JAW: Final = Finger.A
+"""The one axis of a 2F or a Hand-E."""
+NO_AXES: Final = Finger(0)
+"""The empty mask."""
 
 
 def names_of(axes: Finger) -> list[str]:
     """The names of the axes of a mask, in the order of their registers."""
-    return [str(axis.name) for axis in AXES if axis in axes]
+    return [str(axis.name) for axis in axes]
 
-
-NO_AXES: Final = Finger(0)
-"""The empty mask."""
 
 OPEN: Final = 0
 """Position request of a fully open finger (it reads 6-7 there)."""
@@ -59,13 +59,6 @@ DEFAULT_SPEED: Final = 128
 """Used until ``set_speed()``, ``set_force()`` or an argument says otherwise."""
 DEFAULT_FORCE: Final = 64
 """Used until ``set_speed()``, ``set_force()`` or an argument says otherwise."""
-
-OPEN_READING: Final = 6
-"""Position, in counts, that a fully open finger reads."""
-CLOSED_READING: Final = 241
-"""Position, in counts, that a fully closed finger reads (real ones read 240 or more)."""
-STROKE_COUNTS: Final = CLOSED_READING - OPEN_READING
-"""Counts between the two: a full closing."""
 
 
 class Code(IntEnum):
@@ -132,11 +125,35 @@ class Severity(Enum):
     """Needs a reset and a new activation."""
 
 
-class Fault(Code):
-    """gFLT: the fault codes of the thesis's table 4.
+_FAULTS: Final[dict[str, tuple[Severity, str]]] = {
+    "NONE": (Severity.NONE, "no fault"),
+    "ACTIVATION_PENDING": (Severity.PRIORITY, "the action waits until the activation has finished"),
+    "MODE_CHANGE_PENDING": (Severity.PRIORITY, "the action waits until the mode change has finished"),
+    "NOT_ACTIVATED": (Severity.PRIORITY, "the action waits until the gripper is activated"),
+    "OVER_TEMPERATURE": (Severity.MINOR, "the gripper is too hot: let it cool down"),
+    "COMMUNICATION_NOT_READY": (Severity.MINOR, "the communication chip is not ready, it may be booting"),
+    "SCISSOR_INTERFERENCE": (Severity.MINOR, "interference on the scissor for less than 20 s"),
+    "UNDER_VOLTAGE": (Severity.MAJOR, "the supply voltage is too low"),
+    "AUTOMATIC_RELEASE": (Severity.MINOR, "an automatic release is in progress"),
+    "INTERNAL_FAULT": (Severity.MAJOR, "an internal fault of the gripper"),
+    "ACTIVATION_FAULT": (Severity.MAJOR, "the activation failed: interference or another error"),
+    "SCISSOR_BLOCKED": (Severity.MAJOR, "interference on the scissor for more than 20 s"),
+    "OVER_CURRENT": (Severity.MAJOR, "a motor drew too much current"),
+    "AUTOMATIC_RELEASE_DONE": (Severity.MAJOR, "an automatic release has been completed"),
+}
+_ADAPTIVE: Final = "2F"
+"""Marks the values of faults that only the 2F and the Hand-E have."""
+_SHARED: Final = frozenset({0x00, 0x05, 0x07, 0x09, 0x0B, 0x0D, 0x0F})
+"""The codes that mean the same on all models."""
 
-    A code that is missing in the table becomes a member of its own, ``Fault(0x0C).name == "UNKNOWN_0x0C"``,
-    with severity MAJOR: an unknown fault is never reported as no fault.
+
+class Fault(Code):
+    """gFLT: the fault codes of the thesis's table 4, and those of the 2F and the Hand-E.
+
+    Some codes mean one thing on a 3-Finger and another on its siblings; a status decodes them by its model,
+    and ``Fault(code)`` is that of the 3-Finger. A code that is missing in a table becomes a member of its
+    own, ``Fault(0x0C).name == "UNKNOWN_0x0C"``, with severity MAJOR: an unknown fault is never reported as no
+    fault. Two faults are equal if they are the same; compared with a number, the code counts.
     """
 
     NONE = 0x00
@@ -144,65 +161,84 @@ class Fault(Code):
     MODE_CHANGE_PENDING = 0x06
     NOT_ACTIVATED = 0x07
     COMMUNICATION_NOT_READY = 0x09
+    """On a 2F or a Hand-E also: a second without a message, shown once (see passing faults)."""
     SCISSOR_INTERFERENCE = 0x0A
     AUTOMATIC_RELEASE = 0x0B
     ACTIVATION_FAULT = 0x0D
     SCISSOR_BLOCKED = 0x0E
     AUTOMATIC_RELEASE_DONE = 0x0F
+    # Of the 2F and the Hand-E alone (their manuals, fault codes).
+    OVER_TEMPERATURE = 0x08, _ADAPTIVE
+    UNDER_VOLTAGE = 0x0A, _ADAPTIVE
+    INTERNAL_FAULT = 0x0C, _ADAPTIVE
+    OVER_CURRENT = 0x0E, _ADAPTIVE
+
+    def __new__(cls, code: int, family: str = "") -> Fault:
+        member = int.__new__(cls, code)
+        member._value_ = (code, family) if family else code  # type: ignore[assignment]  # so it is no alias
+        return member
+
+    @classmethod
+    def adaptive(cls, code: int) -> Fault:
+        """The fault of a code, 0..15, on a 2F or a Hand-E."""
+        return cls(code if code in _SHARED else (code, _ADAPTIVE))  # type: ignore[arg-type]
 
     @classmethod
     def _missing_(cls, value: object) -> Fault | None:
-        if isinstance(value, bool):
+        code, *family = value if isinstance(value, tuple) else (value,)
+        if isinstance(code, bool) or family not in ([], [_ADAPTIVE]):
             return None
         try:
-            code = int(operator.index(value))  # type: ignore[arg-type]  # TypeError: not a code
+            number = int(operator.index(code))
         except TypeError:
             return None
-        if not 0 <= code <= 15:
+        if not 0 <= number <= 15:
             return None
-        if code in cls._value2member_map_:
-            return cls(code)
+        key: object = (number, *family) if family else number
+        if key in cls._value2member_map_:
+            return cls(key)  # type: ignore[arg-type]
         # IntEnum's constructor refuses new values. Make and register the member here, so that
         # Fault(12) is Fault(12) and hashes, compares and prints like the others.
-        member = int.__new__(cls, code)
-        member._name_ = f"UNKNOWN_0x{code:02X}"
-        member._value_ = code
-        cls._value2member_map_[code] = member
+        member = int.__new__(cls, number)
+        member._name_ = f"UNKNOWN_0x{number:02X}"
+        member._value_ = key  # type: ignore[assignment]
+        cls._value2member_map_[key] = member
         return member
 
-    def __reduce_ex__(self, protocol: object) -> tuple[type[Fault], tuple[int]]:
-        return Fault, (int(self),)
+    def __eq__(self, other: object) -> bool:
+        return self is other if isinstance(other, Fault) else int(self) == other
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    __hash__ = int.__hash__
+
+    # Enum would show the value, which is a pair for some.
+    def __format__(self, spec: str) -> str:
+        return format(int(self), spec) if spec else self.name
+
+    def __repr__(self) -> str:
+        return f"<Fault.{self.name}: {int(self)}>"
+
+    def __reduce_ex__(self, protocol: object) -> tuple[type[Fault], tuple[object]]:
+        return Fault, (self._value_,)
 
     @property
     def severity(self) -> Severity:
         """The class of the fault; an unknown code counts as MAJOR."""
-        return _FAULTS[int(self)][0] if int(self) in _FAULTS else Severity.MAJOR
+        return _FAULTS[self._name_][0] if self._name_ in _FAULTS else Severity.MAJOR
 
     @property
     def description(self) -> str:
         """What is wrong, in one sentence."""
-        if int(self) in _FAULTS:
-            return _FAULTS[int(self)][1]
+        if self._name_ in _FAULTS:
+            return _FAULTS[self._name_][1]
         return f"fault code 0x{int(self):02X}, which the manual does not assign"
 
     @property
     def is_serious(self) -> bool:
         """Whether the fault is MINOR or MAJOR, and so ends a move."""
         return self.severity in (Severity.MINOR, Severity.MAJOR)
-
-
-_FAULTS: Final[dict[int, tuple[Severity, str]]] = {
-    0x00: (Severity.NONE, "no fault"),
-    0x05: (Severity.PRIORITY, "the action waits until the activation has finished"),
-    0x06: (Severity.PRIORITY, "the action waits until the mode change has finished"),
-    0x07: (Severity.PRIORITY, "the action waits until the gripper is activated"),
-    0x09: (Severity.MINOR, "the communication chip is not ready, it may be booting"),
-    0x0A: (Severity.MINOR, "interference on the scissor for less than 20 s"),
-    0x0B: (Severity.MINOR, "an automatic release is in progress"),
-    0x0D: (Severity.MAJOR, "the activation failed: interference or another error"),
-    0x0E: (Severity.MAJOR, "interference on the scissor for more than 20 s"),
-    0x0F: (Severity.MAJOR, "an automatic release has been completed"),
-}
 
 
 class State(Enum):

@@ -20,6 +20,7 @@
     |   +-- ConnectionLostError
     |   +-- ResponseTimeoutError (TimeoutError)
     |   +-- ProtocolError                       exception reply, wrong function, length or echo
+    |   |   +-- WrongModelError                 a gripper of another model answers
     |   +-- AgentError                          the agent of another host did not carry it out
     +-- RecordingError                          a recording that cannot be written, or read
     +-- ViewerError                             a viewer that cannot be served
@@ -188,6 +189,10 @@ class ResponseTimeoutError(RobotiqConnectionError, TimeoutError):
 
 class ProtocolError(RobotiqConnectionError):
     """The reply does not answer the request: an exception, a wrong function, length, echo or transaction."""
+
+
+class WrongModelError(ProtocolError):
+    """The registers show a gripper of another model. Nothing was written to it."""
 
 
 class AgentError(RobotiqConnectionError):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from .enums import AXES, State
+from .enums import State
 from .request import Request
 from .trigger import Trigger
 
@@ -66,5 +66,5 @@ class SentRequest:
             "mode": request.mode.name,
             "individual_fingers": request.individual_fingers,
             "individual_scissor": request.individual_scissor,
-            **{str(axis.name): asdict(asked) for axis, asked in zip(AXES, request.axes, strict=True)},
+            **{str(axis.name): asdict(asked) for axis, asked in request.by_axis},
         }

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from .enums import AXES, Finger, ObjectStatus, names_of
+from .enums import Finger, ObjectStatus, names_of
 from .frozen_mapping import FrozenMapping
 from .status import RobotiqStatus
 
@@ -57,8 +57,7 @@ class MoveResult:
                     "position": self.positions[axis],
                     "peak_current_ma": self.peak_current_ma[axis],
                 }
-                for axis in AXES
-                if axis in self.outcomes
+                for axis in self.outcomes
             },
             "status": self.status.as_dict(),
         }

@@ -19,8 +19,8 @@ REGISTER_COUNT: Final = 8
 
 Registers = tuple[int, ...]
 """Eight registers of 16 bits."""
-Echo = tuple[bool, bool, int, int, int, int]
-"""What a status repeats of a request: activation, go, and the positions of A, B, C and the scissor."""
+Echo = tuple[int, ...]
+"""What a status repeats of a request: activation, go, and the position of each axis."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +71,7 @@ rACT: Final = Field(0, 0, 1, "activate; 0 resets the gripper and its faults")
 rMOD: Final = Field(0, 1, 2, "mode of simple control: basic, pinch, wide, scissor; ignored while rICS = 1")
 rGTO: Final = Field(0, 3, 1, "go to the requested positions; 0 stops")
 rATR: Final = Field(0, 4, 1, "automatic release")
+rARD: Final = Field(0, 5, 1, "automatic release opens; 0 closes (2F and Hand-E alone)")
 rICF: Final = Field(1, 2, 1, "fingers A, B, C take their own registers")
 rICS: Final = Field(1, 3, 1, "the scissor takes its own registers; mode selection is off")
 rPR: Final = tuple(Field(3 + 3 * n, doc=f"position request of {name}") for n, name in enumerate("ABCS"))
@@ -87,6 +88,7 @@ gDT: Final = tuple(
     Field(1, 2 * n, 2, f"{name}: 0 moving, 1 contact opening, 2 contact closing, 3 at position")
     for n, name in enumerate("ABCS")
 )
+gOBJ: Final = Field(0, 6, 2, "as gDT, of a 2F or a Hand-E: in place of gSTA and gDT")
 gFLT: Final = Field(2, 0, 4, "fault code; the high nibble is not part of it")
 gPR: Final = tuple(Field(3 + 3 * n, doc=f"echo of the position of {name}") for n, name in enumerate("ABCS"))
 gPO: Final = tuple(Field(4 + 3 * n, doc=f"position of {name}") for n, name in enumerate("ABCS"))

@@ -5,11 +5,12 @@ Every write carries all eight: a partial write of register 0 alone could change 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from . import registers as reg
-from .enums import AXES, Finger, Mode
+from .enums import Finger, Mode
+from .model import THREE_FINGER, Model
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,9 +28,6 @@ class AxisRequest:
     force: int = 0
 
 
-_REST = (AxisRequest(),) * len(AXES)
-
-
 @dataclass(frozen=True, slots=True)
 class Request:
     """One image of the request block.
@@ -38,10 +36,12 @@ class Request:
         activate: rACT.
         go: rGTO.
         release: rATR.
+        release_opens: rARD: the direction of a release. A 3-Finger always opens.
         mode: rMOD; kept as found, for it is ignored while the scissor has its own registers.
         individual_fingers: rICF.
         individual_scissor: rICS.
-        axes: what A, B, C and the scissor are asked, in this order.
+        axes: what each axis is asked, in the order of the model's axes; by default all zeros.
+        model: of the gripper. One without modes has neither the mode nor the two bits of individual control.
     """
 
     activate: bool = False
@@ -50,7 +50,13 @@ class Request:
     mode: Mode = Mode.BASIC
     individual_fingers: bool = True
     individual_scissor: bool = True
-    axes: tuple[AxisRequest, ...] = _REST
+    axes: tuple[AxisRequest, ...] = ()
+    model: Model = THREE_FINGER
+    release_opens: bool = True
+
+    def __post_init__(self) -> None:
+        if not self.axes:
+            object.__setattr__(self, "axes", (AxisRequest(),) * len(self.model.axes))
 
     @property
     def registers(self) -> reg.Registers:
@@ -61,11 +67,14 @@ class Request:
         """
         block = [0] * reg.REGISTER_COUNT
         reg.rACT.write(block, self.activate)
-        reg.rMOD.write(block, self.mode)
         reg.rGTO.write(block, self.go)
         reg.rATR.write(block, self.release)
-        reg.rICF.write(block, self.individual_fingers)
-        reg.rICS.write(block, self.individual_scissor)
+        if self.model.has_modes:
+            reg.rMOD.write(block, self.mode)
+            reg.rICF.write(block, self.individual_fingers)
+            reg.rICS.write(block, self.individual_scissor)
+        else:
+            reg.rARD.write(block, self.release and self.release_opens)
         for index, axis in enumerate(self.axes):
             reg.rPR[index].write(block, axis.position)
             reg.rSP[index].write(block, axis.speed)
@@ -73,7 +82,7 @@ class Request:
         return tuple(block)
 
     @classmethod
-    def from_registers(cls, registers: Sequence[int]) -> Request:
+    def from_registers(cls, registers: Sequence[int], model: Model = THREE_FINGER) -> Request:
         """The image in a block of eight registers.
 
         Raises:
@@ -85,13 +94,15 @@ class Request:
             activate=bool(reg.rACT.read(block)),
             go=bool(reg.rGTO.read(block)),
             release=bool(reg.rATR.read(block)),
-            mode=Mode(reg.rMOD.read(block)),
-            individual_fingers=bool(reg.rICF.read(block)),
-            individual_scissor=bool(reg.rICS.read(block)),
+            mode=Mode(reg.rMOD.read(block)) if model.has_modes else Mode.BASIC,
+            individual_fingers=bool(reg.rICF.read(block)) or not model.has_modes,
+            individual_scissor=bool(reg.rICS.read(block)) or not model.has_modes,
             axes=tuple(
                 AxisRequest(reg.rPR[n].read(block), reg.rSP[n].read(block), reg.rFR[n].read(block))
-                for n in range(len(AXES))
+                for n in range(len(model.axes))
             ),
+            model=model,
+            release_opens=model.has_modes or bool(reg.rARD.read(block)) or not reg.rATR.read(block),
         )
 
     @property
@@ -101,12 +112,16 @@ class Request:
         Speed and force have no echo. rMOD is left out: it means nothing while the scissor has its own
         registers.
         """
-        a, b, c, s = (axis.position for axis in self.axes)
-        return self.activate, self.go, a, b, c, s
+        return self.activate, self.go, *(axis.position for axis in self.axes)
+
+    @property
+    def by_axis(self) -> Iterable[tuple[Finger, AxisRequest]]:
+        """Each axis with what it is asked."""
+        return zip(self.model.axes, self.axes, strict=True)
 
     def position(self, axis: Finger) -> int:
         """The position request of one axis."""
-        return self.axes[AXES.index(axis)].position
+        return self.axes[self.model.index(axis)].position
 
     def with_positions(self, positions: Mapping[Finger, int]) -> Request:
         """The same image with other position requests for some axes."""
@@ -114,6 +129,6 @@ class Request:
             self,
             axes=tuple(
                 replace(request, position=positions.get(axis, request.position))
-                for axis, request in zip(AXES, self.axes, strict=True)
+                for axis, request in self.by_axis
             ),
         )

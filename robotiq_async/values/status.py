@@ -3,38 +3,18 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Final
 
 from . import registers as reg
-from .checks import check_axis, check_int, check_seconds
-from .enums import AXES, Fault, Finger, Initialization, Mode, ObjectStatus, names_of
+from .checks import check_int, check_seconds
+from .enums import Fault, Finger, Initialization, Mode, ObjectStatus, names_of
+from .model import THREE_FINGER, Model
 
 NO_REQUEST: Final = "NO_REQUEST"
 """What :meth:`RobotiqStatus.axis_state` says of an axis whose gDT of 0 does not mean motion."""
 
 _set = object.__setattr__
-_INDEX = {axis: index for index, axis in enumerate(AXES)}
-_NAMES = names_of(Finger.ALL)
-
-
-def _masks(wanted: Callable[[ObjectStatus], bool]) -> tuple[Finger, ...]:
-    """For each value of the byte with the four gDT: the axes whose gDT fits."""
-    return tuple(
-        Finger(
-            sum(
-                axis
-                for axis, field in zip(AXES, reg.gDT, strict=True)
-                if wanted(ObjectStatus(field.read([byte])))
-            )
-        )
-        for byte in range(256)
-    )
-
-
-_MOVING = _masks(lambda what: what is ObjectStatus.IN_MOTION)
-_CONTACTS = _masks(lambda what: what.is_contact)
-_CONTACT_NAMES = tuple(names_of(axes) for axes in _CONTACTS)
 _STATES = tuple(what.name for what in ObjectStatus)
 _STATES_WITHOUT_REQUEST = (NO_REQUEST, *_STATES[1:])
 
@@ -48,24 +28,38 @@ class RobotiqStatus:
         registers: the eight registers as they came.
         timestamp: monotonic seconds at which the reply arrived.
         sequence: counts every poll of a hand, from 0.
+        model: of the gripper.
     """
 
-    __slots__ = ("_registers", "_sequence", "_timestamp")
+    __slots__ = ("_model", "_registers", "_sequence", "_timestamp")
     _registers: reg.Registers
     _timestamp: float
     _sequence: int
+    _model: Model
 
     # The hand makes one of these 200 times a second: it keeps the registers and nothing else.
-    def __init__(self, registers: reg.Registers, timestamp: float = 0.0, sequence: int = 0) -> None:
+    def __init__(
+        self,
+        registers: reg.Registers,
+        timestamp: float = 0.0,
+        sequence: int = 0,
+        model: Model = THREE_FINGER,
+    ) -> None:
         if hasattr(self, "_sequence"):
             raise AttributeError("RobotiqStatus is immutable: it is made once")
         _set(self, "_registers", registers)
         _set(self, "_timestamp", timestamp)
         _set(self, "_sequence", sequence)
+        _set(self, "_model", model)
 
     @classmethod
     def from_registers(
-        cls, registers: Sequence[int], *, timestamp: float = 0.0, sequence: int = 0
+        cls,
+        registers: Sequence[int],
+        *,
+        timestamp: float = 0.0,
+        sequence: int = 0,
+        model: Model = THREE_FINGER,
     ) -> RobotiqStatus:
         """A status from eight registers.
 
@@ -75,7 +69,8 @@ class RobotiqStatus:
                 sequence below 0.
         """
         at = check_seconds("timestamp", timestamp, -sys.float_info.max, sys.float_info.max)
-        return cls(reg.check_registers(registers), at, check_int("sequence", sequence, 0, sys.maxsize))
+        number = check_int("sequence", sequence, 0, sys.maxsize)
+        return cls(reg.check_registers(registers), at, number, model)
 
     @property
     def registers(self) -> reg.Registers:
@@ -92,7 +87,12 @@ class RobotiqStatus:
         """Counts every poll of the hand since its first start."""
         return self._sequence
 
-    # One axis. Each takes one Finger member; a mask of several is a ValueError.
+    @property
+    def model(self) -> Model:
+        """The model of the gripper."""
+        return self._model
+
+    # One axis. Each takes one Finger member; several, or one that the model lacks, is a ValueError.
 
     def finger_status(self, finger: Finger | int) -> ObjectStatus:
         """Whether the axis moves, touches something or has arrived (gDT), as the gripper says it.
@@ -103,7 +103,7 @@ class RobotiqStatus:
             TypeError: not a Finger or an int.
             ValueError: not exactly one axis.
         """
-        return ObjectStatus(reg.gDT[_INDEX[check_axis(finger)]].read(self._registers))
+        return ObjectStatus(self._object_status(finger))
 
     def axis_state(self, finger: Finger | int) -> str:
         """What the axis does, in a word for people and files: the name of its :meth:`finger_status`.
@@ -115,19 +115,23 @@ class RobotiqStatus:
         Raises:
             TypeError, ValueError: as :meth:`finger_status`.
         """
-        return self._states[reg.gDT[_INDEX[check_axis(finger)]].read(self._registers)]
+        return self._states[self._object_status(finger)]
+
+    def _object_status(self, finger: Finger | int) -> int:
+        model = self._model
+        return model.object_status[model.index(finger)].read(self._registers)
 
     def position(self, finger: Finger | int) -> int:
-        """Position in counts, 0..255: open reads 6-7, closed 240 or more (gPO)."""
-        return reg.gPO[_INDEX[check_axis(finger)]].read(self._registers)
+        """Position in counts, 0..255 (gPO). Open reads 6-7 on a 3-Finger, closed 240 or more."""
+        return reg.gPO[self._model.index(finger)].read(self._registers)
 
     def requested_position(self, finger: Finger | int) -> int:
         """Echo of the position request, 0..255 (gPR)."""
-        return reg.gPR[_INDEX[check_axis(finger)]].read(self._registers)
+        return reg.gPR[self._model.index(finger)].read(self._registers)
 
     def current(self, finger: Finger | int) -> int:
         """Motor current in counts, 0..255 (gCU)."""
-        return reg.gCU[_INDEX[check_axis(finger)]].read(self._registers)
+        return reg.gCU[self._model.index(finger)].read(self._registers)
 
     def current_ma(self, finger: Finger | int) -> int:
         """Motor current in milliampere, 10 a count."""
@@ -137,8 +141,8 @@ class RobotiqStatus:
 
     @property
     def fault(self) -> Fault:
-        """The fault code (gFLT); an unassigned code keeps its number."""
-        return Fault(reg.gFLT.read(self._registers))
+        """The fault code (gFLT), as the model means it; an unassigned code keeps its number."""
+        return self._model.faults[reg.gFLT.read(self._registers)]
 
     @property
     def activation_echo(self) -> bool:
@@ -152,21 +156,15 @@ class RobotiqStatus:
 
     @property
     def echo(self) -> reg.Echo:
-        """The echo of the request in force: gACT, gGTO, the positions of A, B, C and the scissor."""
+        """The echo of the request in force: gACT, gGTO, and the position of each axis."""
         # By hand for speed: this runs at every poll.
         word = self._registers
-        return (
-            bool(word[0] & 0x0100),
-            bool(word[0] & 0x0800),
-            word[1] & 0xFF,
-            word[3] >> 8,
-            word[4] & 0xFF,
-            word[6] >> 8,
-        )
+        first = bool(word[0] & 0x0100), bool(word[0] & 0x0800), word[1] & 0xFF
+        return first if len(self._model.axes) == 1 else (*first, word[3] >> 8, word[4] & 0xFF, word[6] >> 8)
 
     @property
     def mode(self) -> Mode:
-        """Echo of the mode (gMOD)."""
+        """Echo of the mode (gMOD); BASIC on a model without modes."""
         return Mode(reg.gMOD.read(self._registers))
 
     @property
@@ -176,7 +174,13 @@ class RobotiqStatus:
 
     @property
     def motion(self) -> int:
-        """The motion summary of the three fingers, 0..3, as the gripper gives it (gSTA)."""
+        """The motion summary of the three fingers, 0..3, as the gripper gives it (gSTA).
+
+        Raises:
+            ValueError: the model has one axis, and no summary.
+        """
+        if len(self._model.axes) == 1:
+            raise ValueError(f"a {self._model.title} has no motion summary: use finger_status()")
         return reg.gSTA.read(self._registers)
 
     @property
@@ -201,7 +205,8 @@ class RobotiqStatus:
     @property
     def moving(self) -> Finger:
         """The axes that move (empty when none does)."""
-        return _MOVING[self._registers[0] & 0xFF] if self._is_under_request else Finger(0)
+        model = self._model
+        return model.moving[model.object_byte(self._registers)] if self._is_under_request else Finger(0)
 
     @property
     def _is_under_request(self) -> bool:
@@ -215,17 +220,18 @@ class RobotiqStatus:
     @property
     def contacts(self) -> Finger:
         """The axes stopped by a contact (empty when none is)."""
-        return _CONTACTS[self._registers[0] & 0xFF]
+        model = self._model
+        return model.contacts[model.object_byte(self._registers)]
 
     def as_dict(self) -> dict[str, Any]:
         """The status in types for JSON and pandas, by attribute name.
 
         Enumerations become their names, masks become lists of axis names. Values of one axis are below its
         name (``A``, ``B``, ``C``, ``SCISSOR``), and ``fault_code`` is the number of the fault.
-        :meth:`from_registers` makes the status again from the first three.
+        :meth:`from_registers` makes the status again from the first three, and the model.
         """
         # A recorder calls this at every poll: read registers and not the many properties.
-        words, fault, states = self._registers, self.fault, self._states
+        words, fault, states, model = self._registers, self.fault, self._states, self._model
         return {
             "registers": list(words),
             "timestamp": self._timestamp,
@@ -239,15 +245,15 @@ class RobotiqStatus:
             "mode": self.mode.name,
             "activation_echo": self.activation_echo,
             "go_echo": self.go_echo,
-            "contacts": list(_CONTACT_NAMES[words[0] & 0xFF]),
+            "contacts": names_of(self.contacts),
             **{
-                name: {
+                str(axis.name): {
                     "position": reg.gPO[n].read(words),
                     "requested_position": reg.gPR[n].read(words),
                     "current_ma": reg.gCU[n].read(words) * reg.MILLIAMPERE_PER_COUNT,
-                    "axis_state": states[reg.gDT[n].read(words)],
+                    "axis_state": states[model.object_status[n].read(words)],
                 }
-                for n, name in enumerate(_NAMES)
+                for n, axis in enumerate(model.axes)
             },
         }
 
@@ -259,7 +265,7 @@ class RobotiqStatus:
     def __hash__(self) -> int:
         return hash(self._key())
 
-    def __reduce__(self) -> tuple[type[RobotiqStatus], tuple[reg.Registers, float, int]]:
+    def __reduce__(self) -> tuple[type[RobotiqStatus], tuple[reg.Registers, float, int, Model]]:
         return RobotiqStatus, self._key()
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -269,12 +275,12 @@ class RobotiqStatus:
         axes = ", ".join(
             f"{axis.name}={self.position(axis)}->{self.requested_position(axis)} "
             f"{self.axis_state(axis)} {self.current_ma(axis)}mA"
-            for axis in AXES
+            for axis in self._model.axes
         )
         return (
             f"<RobotiqStatus #{self._sequence} {self.initialization.name} go={int(self.go_echo)} "
             f"fault={self.fault.name} {axes}>"
         )
 
-    def _key(self) -> tuple[reg.Registers, float, int]:
-        return self._registers, self._timestamp, self._sequence
+    def _key(self) -> tuple[reg.Registers, float, int, Model]:
+        return self._registers, self._timestamp, self._sequence, self._model

@@ -14,7 +14,7 @@ from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.session.stall_watch import STALLED_S
 from robotiq_async.simulator import parse_troubles
 from robotiq_async.simulator.troubles.trouble import KINDS
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.registers import Registers
 from tests.adversity.phases import TARGET, Call, Phase
 from tests.adversity.world import World
@@ -169,7 +169,7 @@ def _check_motions(world: World, before: Before, phase: Phase, kind: str, told: 
 
 def _check_travel(world: World, before: dict[Finger, float], addressed: Finger) -> None:
     after = world.travels()
-    moved = {axis: after[axis] - before[axis] for axis in AXES if axis not in addressed}
+    moved = {axis: after[axis] - before[axis] for axis in THREE_FINGER.axes if axis not in addressed}
     assert not any(moved.values()), f"axes moved that nobody addressed: {moved}"
 
 

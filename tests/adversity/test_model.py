@@ -18,7 +18,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 from robotiq_async import Fault, Finger, MoveResult, ObjectStatus, RobotiqError, State
 from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.simulator import Trouble
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import Request
 from tests.adversity.world import World, world
 from tests.register_words import only_holds
@@ -281,7 +281,7 @@ class LiveUse(RuleBasedStateMachine):
         """The hand knows what the gripper really is, and has no wrong idea of others."""
         status = self.hand.status
         assert self.world.loop.time() - status.timestamp < 0.1
-        for axis in AXES:
+        for axis in THREE_FINGER.axes:
             assert status.position(axis) == self.gripper.position(axis)
         if self.hand.state is State.RUNNING_IDLE:
             assert not self.hand.is_moving
@@ -294,7 +294,7 @@ class LiveUse(RuleBasedStateMachine):
     @invariant()
     def only_axes_with_a_reason_have_moved(self) -> None:
         if hasattr(self, "world"):
-            for axis in AXES:
+            for axis in THREE_FINGER.axes:
                 if axis not in self.may_move:
                     assert self.gripper.travel(axis) == self.travels[axis], f"{axis!r} moved"
 

@@ -8,8 +8,7 @@ import selectors
 import time
 from collections.abc import Iterator
 
-from robotiq_async.control.contact import agrees
-from robotiq_async.values.enums import AXES, ObjectStatus
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 from tests.adversity.world import LONGEST_HOLD_S, World
 from tests.virtual import HoldWatch
@@ -71,8 +70,8 @@ class WriteWatch:
 
     def forget(self) -> None:
         """Somebody else has written, or everything is at rest: begin anew."""
-        self._past = [set() for _ in AXES]
-        self._last: list[AxisRequest | None] = [None] * len(AXES)
+        self._past = [set() for _ in THREE_FINGER.axes]
+        self._last: list[AxisRequest | None] = [None] * len(THREE_FINGER.axes)
 
     def check(self, world: World) -> Iterator[str]:
         """What was wrong with the writes since the last look."""
@@ -81,15 +80,16 @@ class WriteWatch:
             image = Request.from_registers(registers)
             if not image.go:
                 # Nobody is asked to move; and what comes after must not be what was halted.
-                self._last = [None] * len(AXES)
+                self._last = [None] * len(THREE_FINGER.axes)
                 continue
             for at, (request, position) in enumerate(zip(image.axes, positions, strict=True)):
                 if request == self._last[at]:
                     continue
                 # To be asked to stay is no motion, however often.
-                stays = agrees(request.position, ObjectStatus.AT_POSITION, position, direction=0)
+                stays = THREE_FINGER.has_reached(request.position, position)
                 if request in self._past[at] and not stays:
-                    yield f"{AXES[at]!r}, at {position}, was asked again for what it was before: {request}"
+                    axis = THREE_FINGER.axes[at]
+                    yield f"{axis!r}, at {position}, was asked again for what it was before: {request}"
                 self._past[at].add(request)
                 self._last[at] = request
 

@@ -16,7 +16,7 @@ from robotiq_async import Finger, RobotiqConnectionError, RobotiqHand, RobotiqSt
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, parse_troubles
 from robotiq_async.simulator.server.framing import Frame
 from robotiq_async.simulator.troubles.fault_injector import FaultInjector
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import Request
 from tests.grippers import activate_beforehand
@@ -56,7 +56,7 @@ class StampedGripper(SimulatedGripper):
 
     def write(self, address_offset: int, registers: Sequence[int]) -> None:
         super().write(address_offset, registers)
-        self.images.append((self.request_registers, tuple(self.position(axis) for axis in AXES)))
+        self.images.append((self.request_registers, tuple(self.position(axis) for axis in THREE_FINGER.axes)))
 
 
 class Heard:
@@ -124,7 +124,7 @@ class World:
         await self.hand.wait_for_state(state, timeout=30)
 
     def travels(self) -> dict[Finger, float]:
-        return {axis: self.gripper.travel(axis) for axis in AXES}
+        return {axis: self.gripper.travel(axis) for axis in THREE_FINGER.axes}
 
     async def nothing_moves_for(self, seconds: float, tolerance: float = 0.0) -> None:
         before = self.travels()

@@ -12,14 +12,10 @@ import pytest
 
 from robotiq_async import Finger, MoveTimeoutError, RobotiqHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.values.calibration import (
-    ForceCalibration,
-    SpeedCalibration,
-    opening_mm,
-    position_of_opening,
-)
+from robotiq_async.values.calibration import ForceCalibration, SpeedCalibration
 from robotiq_async.values.calibration.closing_time import closing_time
 from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, TableError, thesis_table, write_table
+from robotiq_async.values.model import THREE_FINGER
 from tests.virtual import virtual
 
 # -- positions ---------------------------------------------------------------------------------------------
@@ -29,18 +25,18 @@ from tests.virtual import virtual
     ("counts", "millimetres"), [(0, 155), (6, 155), (241, 0), (255, 0), (124, pytest.approx(77.2, abs=0.1))]
 )
 def test_opening(counts: int, millimetres: float) -> None:
-    assert opening_mm(counts) == millimetres
+    assert THREE_FINGER.stroke.opening_mm(counts) == millimetres
 
 
 def test_counts_and_millimetres_go_both_ways() -> None:
     for counts in range(6, 242):
-        assert position_of_opening(opening_mm(counts)) == counts
+        assert THREE_FINGER.stroke.position_of(THREE_FINGER.stroke.opening_mm(counts)) == counts
 
 
 @pytest.mark.parametrize("millimetres", [-0.1, 155.1, float("nan"), float("inf")])
 def test_an_opening_that_there_is_not_is_refused(millimetres: float) -> None:
     with pytest.raises(ValueError, match=r"millimetres must be a number in 0\.0\.\.155\.0"):
-        position_of_opening(millimetres)
+        THREE_FINGER.stroke.position_of(millimetres)
 
 
 # -- speeds ------------------------------------------------------------------------------------------------

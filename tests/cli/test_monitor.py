@@ -29,7 +29,7 @@ from robotiq_async.control.state_machine import refusal
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import Operator
 from robotiq_async.tools.wording import refusal_words
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.trigger import Trigger
 from tests.grippers import active_gripper
 
@@ -172,7 +172,7 @@ async def test_of_the_currents_between_two_paints_the_highest_is_shown(active: O
         assert isinstance(pilot.app, Monitor)
         still = active.hand.status.registers
         strong = RobotiqStatus((*still[:2], still[2] & 0xFF00 | 9, *still[3:]))
-        peaks = [strong.current_ma(axis) for axis in AXES]
+        peaks = [strong.current_ma(axis) for axis in THREE_FINGER.axes]
         assert max(peaks) == 90
         pilot.app._see([strong, active.hand.status])
         assert "   90 mA" in pilot.app.query_one(Axes).render().plain
@@ -320,7 +320,7 @@ async def test_any_axes_are_sent_to_any_position(active: Operator) -> None:
         await until(pilot, lambda: "SCISSOR to 9: SCISSOR at" in log(pilot))
         await pilot.press("p", "a", "c", "6", "0", "enter")
         await until(pilot, lambda: "A|C to 60: A at 60, C at 60" in log(pilot))
-        positions = [hand.status.requested_position(axis) for axis in AXES]
+        positions = [hand.status.requested_position(axis) for axis in THREE_FINGER.axes]
         assert positions == [60, 137, 60, 9]
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from robotiq_async import Fault, RobotiqHand, State
 from robotiq_async.simulator.troubles.trouble import KINDS
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER
 from tests.cli.conftest import Outcome
 from tests.serial_line import SerialLine
 
@@ -206,7 +206,7 @@ async def test_troubles_of_several_options(shell: Shell) -> None:
     try:
         async with asyncio.timeout(30):
             async for status in hand.statuses():
-                if [status.requested_position(axis) for axis in AXES] == [200] * 4:
+                if [status.requested_position(axis) for axis in THREE_FINGER.axes] == [200] * 4:
                     break
     finally:
         await hand.stop()

@@ -15,16 +15,18 @@ import pytest
 from robotiq_async import Finger, RobotiqHand, State
 from robotiq_async.hand import Hand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER, Model
 from robotiq_async.values.request import Request
 from tests.fleet.lab import SPEEDUP, Lab, lab
 from tests.grippers import activate_beforehand
 from tests.virtual import virtual
 
 LOCAL, REMOTE = "local", "remote"
-A, B, C, S = AXES
+A, B, C, S = THREE_FINGER.axes
 HABIT: ContextVar[tuple[Trouble | None, Mapping[str, Any]]] = ContextVar("habit", default=(None, {}))
 """What is otherwise with the gripper of a hand of this process, and the options of that hand."""
+MODEL: ContextVar[Model] = ContextVar("model", default=THREE_FINGER)
+"""What the gripper is."""
 LIMIT_S = 1000.0
 """Of virtual time: what takes longer hangs."""
 
@@ -49,11 +51,11 @@ class Bench:
 
     @property
     def last_write(self) -> Request:
-        return Request.from_registers(self.gripper.writes[-1].registers)
+        return Request.from_registers(self.gripper.writes[-1].registers, self.gripper.model)
 
     @property
     def travels(self) -> list[float]:
-        return [self.gripper.travel(axis) for axis in AXES]
+        return [self.gripper.travel(axis) for axis in self.gripper.model.axes]
 
     async def moves(self) -> None:
         """Wait until the gripper moves."""
@@ -64,20 +66,21 @@ class Bench:
 async def bench(where: str, *, active: bool = True) -> AsyncIterator[Bench]:
     """A gripper that is active, or reset, and a way to make hands on it."""
     if where == REMOTE:
-        async with lab(active=active) as here:
+        async with lab(active=active, model=MODEL.get()) as here:
             await connected(here)
             names = iter(range(1000))
             yield Bench(here.gripper, here.server, lambda: here.client(f"client {next(names)}"), here)
         return
     loop = asyncio.get_running_loop()
-    gripper = SimulatedGripper(loop.time, speedup=SPEEDUP, device_cycle=0.005 * SPEEDUP, spread=False)
+    cycle, model = 0.005 * SPEEDUP, MODEL.get()
+    gripper = SimulatedGripper(loop.time, speedup=SPEEDUP, device_cycle=cycle, spread=False, model=model)
     async with SimulatorServer(gripper) as server:
         if active:
             await activate_beforehand(gripper)
         habit, options = HABIT.get()
         if habit is not None:
             await server.fault_injector.begin(habit)
-        yield Bench(gripper, server, lambda: RobotiqHand(server.address, **options))
+        yield Bench(gripper, server, lambda: RobotiqHand(server.address, model=gripper.model, **options))
 
 
 async def connected(here: Lab) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from robotiq_async.values.enums import AXES, Finger, State
+from robotiq_async.values.enums import Finger, State
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 from tests.control.scan import Scan
 
@@ -18,7 +19,7 @@ def image(
         go=go,
         individual_fingers=individual,
         individual_scissor=individual,
-        axes=tuple(AxisRequest(positions.get(axis, 0), speed, 100) for axis in AXES),
+        axes=tuple(AxisRequest(positions.get(axis, 0), speed, 100) for axis in THREE_FINGER.axes),
     ).registers
 
 

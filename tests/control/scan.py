@@ -16,7 +16,7 @@ from robotiq_async.control.requests.pending import Command
 from robotiq_async.control.state_machine import StateMachine
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values.calibration.closing_time import closing_time
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import Request
 from robotiq_async.values.trigger import Trigger
@@ -171,11 +171,11 @@ class Scan:
         return Request.from_registers(self.written[-1])
 
     def travels(self) -> dict[Finger, float]:
-        return {axis: self.gripper.travel(axis) for axis in AXES}
+        return {axis: self.gripper.travel(axis) for axis in THREE_FINGER.axes}
 
     def positions(self) -> dict[Finger, int]:
         status = self.status()
-        return {axis: status.position(axis) for axis in AXES}
+        return {axis: status.position(axis) for axis in THREE_FINGER.axes}
 
 
 def started(device_cycle: float = 0.005, *, lag: int = LAG) -> Scan:

@@ -8,12 +8,13 @@ from hypothesis import strategies as st
 
 from robotiq_async.control.requests.adoption import DIRECTION_WAIT_S, Adoption
 from robotiq_async.control.requests.standstill import LAG_READS, LAG_S, Moment
-from robotiq_async.values.enums import AXES, Finger, Mode, ObjectStatus
+from robotiq_async.values.enums import Finger, Mode, ObjectStatus
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
 from tests.register_words import status_of
 
-A, B, C, S = AXES
+A, B, C, S = THREE_FINGER.axes
 MOVING, OPENING, CLOSING, THERE = ObjectStatus
 GO, HALTED = 0x39, 0x31
 SETTINGS = tuple(AxisRequest(0, 10 * n, 20 * n) for n in range(1, 5))
@@ -40,7 +41,7 @@ def adopted(*statuses: RobotiqStatus) -> Request:
 
 
 def positions(request: Request) -> list[int]:
-    return [request.position(axis) for axis in AXES]
+    return [request.position(axis) for axis in THREE_FINGER.axes]
 
 
 # -- the rules, in their order -----------------------------------------------------------------------------
@@ -225,7 +226,7 @@ def test_an_adopted_gripper_neither_turns_round_nor_lets_go(
         gripper(*whats, byte_0=byte_0, echo=echo, position=now, at=DIRECTION_WAIT_S),
     )
     assert request.go == go
-    for axis, what, first, position in zip(AXES, whats, before, now, strict=True):
+    for axis, what, first, position in zip(THREE_FINGER.axes, whats, before, now, strict=True):
         asked = request.position(axis)
         if not go:
             assert asked == position
@@ -247,7 +248,7 @@ def test_a_request_is_an_echo_an_end_or_where_the_axis_is(
     whats: tuple[ObjectStatus, ...], echo: tuple[int, ...], position: tuple[int, ...]
 ) -> None:
     request = adopted(gripper(*whats, echo=echo, position=position))
-    for number, axis in enumerate(AXES):
+    for number, axis in enumerate(THREE_FINGER.axes):
         possible = {echo[number], position[number], 0, 255}
         if axis in Finger.B | Finger.C:
             possible.add(echo[0])

@@ -5,11 +5,12 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async.control.contact import agrees, drifts
-from robotiq_async.values.enums import AXES, Finger, ObjectStatus
+from robotiq_async.values.enums import Finger, ObjectStatus
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 from tests.register_words import status_of
 
-A, B, C, S = AXES
+A, B, C, S = THREE_FINGER.axes
 MOVING, OPENING, CLOSING, THERE = ObjectStatus
 
 
@@ -51,7 +52,7 @@ MOVING, OPENING, CLOSING, THERE = ObjectStatus
 def test_a_request_agrees_with_what_an_axis_does(
     request_: int, what: ObjectStatus, position: int, direction: int, expected: bool
 ) -> None:
-    assert agrees(request_, what, position, direction) is expected
+    assert agrees(THREE_FINGER, request_, what, position, direction) is expected
 
 
 # -- whether an axis has to be asked to stay ---------------------------------------------------------------

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async import Fault, Finger, MoveSupersededError, State
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER
 from tests.control.other_client import image, moved_by_another, used_by_another
 from tests.control.scan import Scan
 
@@ -70,7 +70,7 @@ def test_halt_in_reset_has_nothing_to_do() -> None:
 
 def test_a_halt_does_not_wait_for_an_axis_to_show_its_direction() -> None:
     scan = used_by_another()
-    scan.gripper.write(0, image(dict.fromkeys(AXES, 220), speed=0))
+    scan.gripper.write(0, image(dict.fromkeys(THREE_FINGER.axes, 220), speed=0))
     scan.now += 1.0
     scan.connect()
     halted = scan.halt()

@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 
 from robotiq_async import Finger, MoveResult, MoveSupersededError, ObjectStatus
 from robotiq_async.control.requests.standstill import LAG_READS, LAG_S, LONG_AGO, Moment, Standstill
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER
 from tests.control.other_client import image
 from tests.control.outcome import Outcome
 from tests.control.scan import POLL_S, Scan, started
 
-A, B, C, S = AXES
+A, B, C, S = THREE_FINGER.axes
 ABC = Finger.ABC
 MOVING, OPENING, CLOSING, THERE = ObjectStatus
 LAGS = pytest.mark.parametrize("lag", [0, 1, 2, 4, 8])
@@ -24,7 +24,7 @@ FEW_POLLS_S = 6 * POLL_S
 def ended(scan: Scan, told: Outcome) -> MoveResult:
     """The result of a move, and what it says is so: the hand is not moving, and stays where it is."""
     scan.until(lambda: told.is_told)
-    result, moves = told.result, [axis for axis in AXES if axis in scan.controller.status.moving]  # type: ignore[union-attr]
+    result, moves = told.result, [axis for axis in THREE_FINGER.axes if axis in scan.controller.status.moving]  # type: ignore[union-attr]
     axes = list(result.outcomes)
     travels = scan.travels()
     assert not set(axes) & set(moves)
@@ -155,7 +155,7 @@ def test_who_was_sent_away_from_a_part_and_back_is_stopped_by_a_hold(
     scan.run(3.0)
     after = scan.travels()
     if was_moving:
-        assert all(after[axis] - travels[axis] <= 2 for axis in AXES), "it went on after a hold"
+        assert all(after[axis] - travels[axis] <= 2 for axis in THREE_FINGER.axes), "it went on after a hold"
 
 
 @LAGS
@@ -316,7 +316,7 @@ class Axis(Standstill):
     """One that is asked something at a moment; everything acts at once."""
 
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__(THREE_FINGER)
         self.now = Moment(10.0, 1000)
 
     def after(self, seconds: float, reads: int) -> Axis:

@@ -9,13 +9,13 @@ import pytest
 from robotiq_async import Finger, MoveSupersededError, ObjectStatus, RobotiqStatus
 from robotiq_async.control.requests.limits import ALONE_S, Limits
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.registers import Registers, gPR
 from robotiq_async.values.request import AxisRequest, Request
 from tests.control.scan import Scan
 from tests.register_words import status_of
 
-A, B, C, S = AXES
+A, B, C, S = THREE_FINGER.axes
 ABC = Finger.ABC
 LOW, HIGH = 20, 220
 CYCLES = pytest.mark.parametrize("device_cycle", [0.0, 0.005, 0.03, 0.2])

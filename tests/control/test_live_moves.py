@@ -5,12 +5,13 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async.control.motion import LiveMoves, Move
-from robotiq_async.values.enums import AXES, Finger
+from robotiq_async.values.enums import Finger
 from robotiq_async.values.errors import MoveSupersededError
+from robotiq_async.values.model import THREE_FINGER
 from tests.control.outcome import Outcome
 from tests.register_words import status_of
 
-A, B, C, S = AXES
+A, B, C, S = THREE_FINGER.axes
 ABC = Finger.ABC
 
 ARRIVED = status_of(0xF9, 0xFF, echo=255, current=7)

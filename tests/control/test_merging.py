@@ -10,14 +10,15 @@ from hypothesis import strategies as st
 
 from robotiq_async.control.requests.merging import merged
 from robotiq_async.control.requests.pending import Command, PendingCommand
-from robotiq_async.values.enums import AXES, NO_AXES, Finger, Mode
+from robotiq_async.values.enums import NO_AXES, Finger, Mode
 from robotiq_async.values.errors import MoveSupersededError
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
 from tests.control.outcome import Outcome
 from tests.register_words import status_of
 
-A, B, C, S = AXES
+A, B, C, S = THREE_FINGER.axes
 AT = (101, 102, 103, 104)
 GOING = Request(
     activate=True,
@@ -200,7 +201,7 @@ def test_whatever_is_asked_an_axis_that_nobody_addresses_is_asked_nothing_new_or
     assert not image.release
     assert not (image.activate and not (base.activate and status.activation_echo))
     assert image.go == (base.go or bool(pending.positions))
-    for axis, before, now in zip(AXES, base.axes, image.axes, strict=True):
+    for axis, before, now in zip(THREE_FINGER.axes, base.axes, image.axes, strict=True):
         assert now.speed == pending.speeds.get(axis, before.speed)
         assert now.force == pending.forces.get(axis, before.force)
         if axis in pending.positions:

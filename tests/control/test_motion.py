@@ -10,14 +10,15 @@ from hypothesis import strategies as st
 
 from robotiq_async.control.motion import MARGIN_S, Move
 from robotiq_async.values.calibration.closing_time import closing_time
-from robotiq_async.values.enums import AXES, Finger, ObjectStatus
+from robotiq_async.values.enums import Finger, ObjectStatus
 from robotiq_async.values.errors import ConnectionLostError, MoveSupersededError, RobotiqError
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.move_result import MoveResult
 from robotiq_async.values.status import RobotiqStatus
 from tests.control.outcome import Outcome
 from tests.register_words import status_of
 
-A, B, C, S = AXES
+A, B, C, S = THREE_FINGER.axes
 ABC = Finger.ABC
 
 
@@ -188,7 +189,7 @@ SLOWEST_S, FASTEST_S = 10.021, (2097 + 2122 + 2137) / 3000
 
 
 def timeout(position: int, axes: Finger, at: int | tuple[int, ...], speed: int | tuple[int, ...]) -> float:
-    speeds = dict(zip(AXES, speed if isinstance(speed, tuple) else (speed,) * 4, strict=True))
+    speeds = dict(zip(THREE_FINGER.axes, speed if isinstance(speed, tuple) else (speed,) * 4, strict=True))
     move = Move(position, axes, 0.0, Outcome())
     return move.default_timeout(status_of(0x31, position=at), speeds, closing_time)
 

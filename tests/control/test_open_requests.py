@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from robotiq_async.control.open_requests import OpenRequests
 from robotiq_async.control.requests.pending import Command
-from robotiq_async.values.enums import AXES, Fault, Finger
+from robotiq_async.values.enums import Fault, Finger
 from robotiq_async.values.errors import ConnectionLostError, GripperFaultError
+from robotiq_async.values.model import THREE_FINGER
 from tests.control.outcome import Outcome
 
-A, B, C, S = AXES
+A, B, C, S = THREE_FINGER.axes
 NONE = Finger(0)
 
 

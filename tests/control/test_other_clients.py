@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async import Finger, MoveSupersededError, NotActivatedError, RobotiqStatus, State
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import Request
 from tests.control.other_client import image, used_by_another
 from tests.control.scan import POLL_S, Scan
@@ -34,7 +34,7 @@ def test_the_first_command_leaves_the_other_axes_what_they_do(
     for each in (scan, undisturbed):
         if objects:
             each.gripper.place_object(objects, 120)
-        positions = dict.fromkeys(AXES, 220) if individual else {A: 220}
+        positions = dict.fromkeys(THREE_FINGER.axes, 220) if individual else {A: 220}
         each.gripper.write(0, image(positions, individual=individual, speed=speed))
         each.now += 0.01 + into_motion
     scan.connect()
@@ -50,9 +50,9 @@ def test_the_first_command_leaves_the_other_axes_what_they_do(
 
 def test_a_halted_gripper_is_adopted_where_it_stands() -> None:
     scan = used_by_another()
-    scan.gripper.write(0, image(dict.fromkeys(AXES, 255)))
+    scan.gripper.write(0, image(dict.fromkeys(THREE_FINGER.axes, 255)))
     scan.now += 0.5
-    scan.gripper.write(0, image(dict.fromkeys(AXES, 255), go=False))
+    scan.gripper.write(0, image(dict.fromkeys(THREE_FINGER.axes, 255), go=False))
     scan.now += 0.1
     before = scan.travels()
     scan.connect()

@@ -9,11 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async.control.requests.pending import Command, PendingCommand
-from robotiq_async.values.enums import AXES, Finger
+from robotiq_async.values.enums import Finger
 from robotiq_async.values.errors import ConnectionLostError, MoveSupersededError
+from robotiq_async.values.model import THREE_FINGER
 from tests.control.outcome import Outcome
 
-A, B, C, S = AXES
+A, B, C, S = THREE_FINGER.axes
 ABC, ALL = Finger.ABC, Finger.ALL
 SUPERSEDED = MoveSupersededError("halt")
 LOST = ConnectionLostError("gone")
@@ -80,7 +81,7 @@ def test_any_commands_leave_the_last_value_of_each_axis_and_field(
     for axes, position, speed, force in commands:
         pending.merge(Command(axes, position, speed, force))
     for field, merged in enumerate((pending.positions, pending.speeds, pending.forces)):
-        for axis in AXES:
+        for axis in THREE_FINGER.axes:
             values = [
                 values[field] for axes, *values in commands if axis in axes and values[field] is not None
             ]

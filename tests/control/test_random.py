@@ -7,10 +7,9 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from robotiq_async import Finger, MoveResult, ObjectStatus, State
-from robotiq_async.control.contact import TOLERANCE
 from robotiq_async.control.motion import Move
 from robotiq_async.control.state_machine import RUNNING
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER, TOLERANCE
 from robotiq_async.values.request import Request
 from tests.control.outcome import Outcome
 from tests.control.scan import Scan
@@ -29,7 +28,7 @@ class RandomUse(RuleBasedStateMachine):
         self.scan.start()
         self.asked: set[Finger] = set()
         """Axes that were ever addressed by a position since the last activation."""
-        self.travel = {axis: self.scan.gripper.travel(axis) for axis in AXES}
+        self.travel = {axis: self.scan.gripper.travel(axis) for axis in THREE_FINGER.axes}
         self.told: list[tuple[Move | None, Outcome]] = []
 
     def teardown(self) -> None:
@@ -47,14 +46,14 @@ class RandomUse(RuleBasedStateMachine):
     @rule(axes=masks, position=values, speed=st.none() | values)
     @precondition(lambda self: self.running)
     def move(self, axes: Finger, position: int, speed: int | None) -> None:
-        self.asked |= {axis for axis in AXES if axis in axes}
+        self.asked |= {axis for axis in THREE_FINGER.axes if axis in axes}
         self.told.append(self.scan.move(position, axes, speed=speed))
 
     @rule(axes=masks, position=st.none() | values, force=values)
     @precondition(lambda self: self.running)
     def command(self, axes: Finger, position: int | None, force: int) -> None:
         if position is not None:
-            self.asked |= {axis for axis in AXES if axis in axes}
+            self.asked |= {axis for axis in THREE_FINGER.axes if axis in axes}
         self.told.append((None, self.scan.command(axes, position=position, force=force)))
 
     @rule(which=st.integers(0, 1000))
@@ -105,12 +104,12 @@ class RandomUse(RuleBasedStateMachine):
         assert self.scan.state is State.FAULT
         self.scan.run(1.0)
         assert all(told.is_told for _, told in self.told), "somebody waits for ever"
-        at = {axis: self.scan.gripper.position(axis) for axis in AXES}
+        at = {axis: self.scan.gripper.position(axis) for axis in THREE_FINGER.axes}
         contacts = self.scan.latest.contacts
         self.scan.gripper.clear_faults()
         self.scan.run(1.0)
         assert self.scan.state is State.RUNNING_IDLE
-        for axis in AXES:
+        for axis in THREE_FINGER.axes:
             if axis not in contacts:
                 # One that close to where it was asked to go has arrived, and keeps its request.
                 assert abs(self.scan.gripper.position(axis) - at[axis]) <= TOLERANCE, f"{axis!r} resumed"
@@ -131,7 +130,7 @@ class RandomUse(RuleBasedStateMachine):
     def only_addressed_axes_have_moved(self) -> None:
         if not hasattr(self, "asked"):
             return
-        for axis in AXES:
+        for axis in THREE_FINGER.axes:
             if axis not in self.asked:
                 assert self.scan.gripper.travel(axis) == self.travel[axis], f"{axis!r} moved"
 

@@ -5,16 +5,17 @@ from __future__ import annotations
 from robotiq_async.control.requests.adoption import DIRECTION_WAIT_S
 from robotiq_async.control.requests.shadow import RequestShadow
 from robotiq_async.control.requests.writes import SILENT_S, WINDOW_S
-from robotiq_async.values.enums import AXES, NO_AXES, Finger
+from robotiq_async.values.enums import NO_AXES, Finger
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 from tests.control.histories import EPSILON, Shadow, image, shows
 from tests.register_words import status_of
 
-A, B, C, S = AXES
+A, B, C, S = THREE_FINGER.axes
 
 
 def positions(request: Request) -> list[int]:
-    return [request.position(axis) for axis in AXES]
+    return [request.position(axis) for axis in THREE_FINGER.axes]
 
 
 # -- before anything was written ---------------------------------------------------------------------------

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from robotiq_async.values.enums import AXES, NO_AXES, Finger
+from robotiq_async.values.enums import NO_AXES, Finger
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.status import RobotiqStatus
 from tests.control.histories import Shadow, image, shows
 from tests.register_words import status_of
 
-A, B, C, S = AXES
+A, B, C, S = THREE_FINGER.axes
 
 GRIP = status_of(0x39, 0b10_11_10_10, echo=200, position=(150, 150, 200, 150))
 """A, B and the scissor touch something."""

@@ -30,8 +30,7 @@ def test_every_state_has_its_row(page: str) -> None:
 def test_every_fault_has_its_row(page: str) -> None:
     text = (DOCS / page).read_text(encoding="utf-8")
     for fault in Fault:
-        (row,) = re.findall(rf"^\| 0x{int(fault):02X} \|.*$", text, re.MULTILINE)
-        assert fault.name in row
+        (row,) = re.findall(rf"^\| 0x{int(fault):02X} \| `{fault.name}` \|.*$", text, re.MULTILINE)
         assert f"| {fault.severity.value} |" in row
 
 

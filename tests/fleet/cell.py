@@ -9,8 +9,8 @@ from itertools import pairwise
 from typing import Any
 
 from robotiq_async import Finger, RobotiqConnectionError, RobotiqError, State
-from robotiq_async.values.enums import AXES
 from robotiq_async.values.errors import ControlLostError
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import Request
 from tests.fleet.troubles import Trouble
 from tests.fleet.world import PROMPT_S, WINDOW_S, World, motions
@@ -189,7 +189,7 @@ def commands(doing: Doing) -> list[tuple[float, tuple[int, int]]]:
 
 
 def check_travel(world: World, addressed: Finger) -> None:
-    moved = {axis: world.moved(axis) for axis in AXES if axis not in addressed}
+    moved = {axis: world.moved(axis) for axis in THREE_FINGER.axes if axis not in addressed}
     assert not any(moved.values()), f"axes moved that nobody addressed: {moved}"
 
 

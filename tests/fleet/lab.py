@@ -13,6 +13,7 @@ from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire import status_message
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.values.model import THREE_FINGER, Model
 from tests.fleet.network import MemoryBus, Network
 from tests.grippers import activate_beforehand
 
@@ -60,15 +61,16 @@ async def lab(
     active: bool = True,
     kind: type[SimulatedGripper] = SimulatedGripper,
     keep_grip: bool = False,
+    model: Model = THREE_FINGER,
 ) -> AsyncIterator[Lab]:
     """An agent that serves zenoh://lab/cell/left, and a network named by the buses "agent" and "client"."""
     loop = asyncio.get_running_loop()
     network = Network()
-    gripper = kind(loop.time, speedup=SPEEDUP, device_cycle=0.005 * SPEEDUP, spread=False)
+    gripper = kind(loop.time, speedup=SPEEDUP, device_cycle=0.005 * SPEEDUP, spread=False, model=model)
     async with SimulatorServer(gripper) as server:
         if active:
             await activate_beforehand(gripper)
-        hand = RobotiqHand(server.address, keep_grip=keep_grip)
+        hand = RobotiqHand(server.address, keep_grip=keep_grip, model=model)
         agent = Agent("lab", "cell", {"left": hand}, network.bus("agent"), window=window)
         ready = asyncio.Event()
         serving = asyncio.create_task(agent.run(ready.set))

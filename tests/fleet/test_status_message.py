@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from robotiq_async import State
 from robotiq_async.fleet.wire.status_message import SIZE, StatusMessage, unpack
 from robotiq_async.values.errors import ProtocolError
+from robotiq_async.values.model import MODELS
 
 U32, U64 = st.integers(0, 2**32 - 1), st.integers(0, 2**64 - 1)
 TIME = st.floats(allow_nan=False, allow_infinity=False, width=64)
@@ -28,6 +29,7 @@ MESSAGES = st.builds(
     sequence=U64,
     age=st.floats(allow_nan=False, allow_infinity=False, width=32),
     registers=st.none() | st.tuples(*[st.integers(0, 65535)] * 8),
+    model=st.sampled_from([*MODELS.values()]),
 )
 
 
@@ -59,7 +61,7 @@ def test_any_bytes_of_the_right_size_are_a_message_or_refused(data: bytes) -> No
 
 
 def is_one(data: bytes) -> bool:
-    if len(data) != SIZE or data[0] != 1 or data[1] >= len(State):
+    if len(data) != SIZE or data[0] != 1 or data[1] >= len(State) or data[3] >= len(MODELS):
         return False
     return all(map(math.isfinite, struct.unpack("<df", data[32:44])))
 

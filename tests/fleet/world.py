@@ -15,7 +15,7 @@ from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.simulator import SimulatorServer
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import Request
 from tests.adversity.world import StampedGripper
 from tests.fleet.hosts import Host
@@ -114,7 +114,7 @@ class World:
                     self.network.part(host.name, bus.name)
 
     def travels(self, name: str = "left") -> dict[Finger, float]:
-        return {axis: self.grippers[name].travel(axis) for axis in AXES}
+        return {axis: self.grippers[name].travel(axis) for axis in THREE_FINGER.axes}
 
     def moved(self, axis: Finger, name: str = "left") -> float:
         """How far an axis has moved since :meth:`settle`."""
@@ -126,7 +126,7 @@ class World:
 
     def check(self) -> None:
         """What is promised whatever happens."""
-        assert not any(self.moved(axis, "right") for axis in AXES), "the wrong gripper moved"
+        assert not any(self.moved(axis, "right") for axis in THREE_FINGER.axes), "the wrong gripper moved"
         for client in self.clients:
             client.check()
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async import Finger, GraspResult, MoveResult, ObjectStatus
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER
 from tests.register_words import status_of
 
-A, B, C, S = AXES
+A, B, C, S = THREE_FINGER.axes
 _, OPENING, CLOSING, REACHED = ObjectStatus
 
 

@@ -11,14 +11,15 @@ from hypothesis import strategies as st
 
 from robotiq_async.control.grip_watch import SLIP_COUNTS, GripWatch
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.values.enums import AXES, Finger, ObjectStatus
+from robotiq_async.values.enums import Finger, ObjectStatus
 from robotiq_async.values.grip_event import GripChange, GripEvent
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
 from tests.register_words import status_of, with_object_status
 
-A, B, C, S = AXES
+A, B, C, S = THREE_FINGER.axes
 GAINED, SLIPPED, LOST, RELEASED = GripChange
 MOVING, OPENING, CLOSING, REACHED = ObjectStatus
 FAULT = 0x0E

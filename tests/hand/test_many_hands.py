@@ -13,13 +13,13 @@ import pytest
 
 from robotiq_async import ConnectionLostError, Finger, MoveSupersededError, RobotiqError, RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import Request
 from tests.conftest import Clock
 
 pytestmark = pytest.mark.virtual_time
 
-A, B, C, S = AXES
+A, B, C, S = THREE_FINGER.axes
 
 Work = Callable[[], Coroutine[Any, Any, Any]]
 
@@ -86,7 +86,7 @@ async def test_around_the_group_the_other_is_held_and_goes_on(cell: Cell, group:
         assert left.state in (State.RUNNING_IDLE, State.RUNNING_CC)
         async for status in left.statuses():
             if left.state is State.RUNNING_IDLE and not left.is_moving:
-                assert all(6 < status.position(axis) < 200 for axis in AXES[:3])
+                assert all(6 < status.position(axis) < 200 for axis in THREE_FINGER.axes[:3])
                 break
         assert cell.last_write.go, "held, and not halted"
         await right.wait_for_state(State.SHUTDOWN)
@@ -116,7 +116,7 @@ async def test_what_is_caught_inside_its_task_concerns_nobody_else(cell: Cell, g
     async def work(hand: RobotiqHand) -> None:
         try:
             async with hand:
-                told.append(f"{hand.name}: {(await hand.close(speed=0)).positions[AXES[0]]}")
+                told.append(f"{hand.name}: {(await hand.close(speed=0)).positions[THREE_FINGER.axes[0]]}")
         except RobotiqError as error:
             told.append(error.hand)
 

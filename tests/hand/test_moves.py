@@ -18,12 +18,12 @@ from robotiq_async import (
     State,
 )
 from robotiq_async.simulator import SimulatorServer
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER
 from tests.hand.watching import last_write
 
 pytestmark = pytest.mark.virtual_time
 
-A, B, C, S = AXES
+A, B, C, S = THREE_FINGER.axes
 
 
 async def test_set_speed_and_force(hand: RobotiqHand, server: SimulatorServer) -> None:

@@ -14,12 +14,12 @@ from robotiq_async import (
     State,
 )
 from robotiq_async.simulator import SimulatorServer
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER
 from tests.hand.watching import last_write, travels
 
 pytestmark = pytest.mark.virtual_time
 
-A, B, C, S = AXES
+A, B, C, S = THREE_FINGER.axes
 
 
 def test_constructing_opens_nothing_and_needs_no_loop() -> None:

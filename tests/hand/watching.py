@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from robotiq_async import Finger, RobotiqHand, State
 from robotiq_async.simulator import SerialSimulatorServer, SimulatorServer
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import Request
 
 
@@ -13,7 +13,7 @@ def last_write(server: SimulatorServer) -> Request:
 
 
 def travels(server: SimulatorServer) -> dict[Finger, float]:
-    return {axis: server.gripper.travel(axis) for axis in AXES}
+    return {axis: server.gripper.travel(axis) for axis in THREE_FINGER.axes}
 
 
 async def settled(hand: RobotiqHand) -> None:

@@ -18,7 +18,7 @@ from robotiq_async.tools.measure.plots import (
     plot_recording,
 )
 from robotiq_async.tools.recording.recordings import Entry
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER
 
 
 def words(picture: Path) -> list[str]:
@@ -52,7 +52,7 @@ def test_currents_over_time_are_drawn_near_the_usual_force_values(
 
 def test_what_happens_is_written_above_the_curves(tmp_path: Path) -> None:
     axis = {"position": 6, "requested_position": 0, "current_ma": 0}
-    status = {str(each.name): axis for each in AXES}
+    status = {str(each.name): axis for each in THREE_FINGER.axes}
     long = "X" * 2 * LONGEST
     events = [{"kind": "state", "target": name} for name in ("FIRST", "SECOND", long)]
     messages = [("/gripper/status", status), *(("/gripper/event", each) for each in events)]

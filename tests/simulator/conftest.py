@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.values.enums import AXES, Fault, Finger, Initialization, Mode, ObjectStatus
+from robotiq_async.values.enums import Fault, Finger, Initialization, Mode, ObjectStatus
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
 
@@ -45,10 +46,10 @@ class Bench:
         **changes: Any,
     ) -> None:
         """Request positions with rGTO = 1: one for all registers, or some axes' own."""
-        wanted = dict.fromkeys(AXES, positions) if isinstance(positions, int) else positions
+        wanted = dict.fromkeys(THREE_FINGER.axes, positions) if isinstance(positions, int) else positions
         axes = tuple(
             AxisRequest(wanted[axis], speed, force) if axis in wanted else before
-            for axis, before in zip(AXES, self.request.axes, strict=True)
+            for axis, before in zip(THREE_FINGER.axes, self.request.axes, strict=True)
         )
         self.write(go=True, axes=axes, **changes)
 
@@ -60,7 +61,7 @@ class Bench:
     def activate_individually(self) -> None:
         """Active, every axis with its own register, told to stay where it is."""
         self.activate(individual_fingers=True, individual_scissor=True)
-        self.go({axis: self.gripper.position(axis) for axis in AXES})
+        self.go({axis: self.gripper.position(axis) for axis in THREE_FINGER.axes})
 
     def settle(self, limit: float = 60.0) -> None:
         """Let time pass until nothing moves, and no activation is under way."""
@@ -94,11 +95,11 @@ class Bench:
 
     @property
     def positions(self) -> tuple[int, ...]:
-        return tuple(self.gripper.position(axis) for axis in AXES)
+        return tuple(self.gripper.position(axis) for axis in THREE_FINGER.axes)
 
     @property
     def outcomes(self) -> tuple[ObjectStatus, ...]:
-        return tuple(self.status.finger_status(axis) for axis in AXES)
+        return tuple(self.status.finger_status(axis) for axis in THREE_FINGER.axes)
 
 
 @pytest.fixture(scope="session")

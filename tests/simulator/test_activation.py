@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.values.enums import AXES, Fault, Finger, Initialization, Mode, ObjectStatus
+from robotiq_async.values.enums import Fault, Finger, Initialization, Mode, ObjectStatus
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 
 if TYPE_CHECKING:
@@ -259,11 +260,14 @@ def test_inspection_takes_one_axis(bench: Bench) -> None:
 
 def test_the_first_command_after_activation_moves_the_addressed_axis_only(bench: Bench) -> None:
     bench.activate(individual_fingers=True, individual_scissor=True)
-    here = {axis: bench.gripper.travel(axis) for axis in AXES}
+    here = {axis: bench.gripper.travel(axis) for axis in THREE_FINGER.axes}
     bench.write(
         go=True,
-        axes=tuple(AxisRequest(90 if axis is Finger.C else bench.gripper.position(axis)) for axis in AXES),
+        axes=tuple(
+            AxisRequest(90 if axis is Finger.C else bench.gripper.position(axis))
+            for axis in THREE_FINGER.axes
+        ),
     )
     bench.settle()
-    assert [axis for axis in AXES if bench.gripper.travel(axis) != here[axis]] == [Finger.C]
+    assert [axis for axis in THREE_FINGER.axes if bench.gripper.travel(axis) != here[axis]] == [Finger.C]
     assert set(bench.outcomes) == {ObjectStatus.AT_POSITION}

@@ -8,7 +8,8 @@ import pytest
 
 from robotiq_async.simulator import Habits
 from robotiq_async.simulator.physics.mechanics.axis import PRESSING
-from robotiq_async.values.enums import AXES, NO_AXES, Fault, Finger, Initialization, Mode, ObjectStatus
+from robotiq_async.values.enums import NO_AXES, Fault, Finger, Initialization, Mode, ObjectStatus
+from robotiq_async.values.model import THREE_FINGER
 from tests.simulator.conftest import CYCLE
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ def test_a_contact_stops_only_its_axis(individual: Bench) -> None:
     assert individual.outcomes == (ARRIVED, CLOSING, ARRIVED, ARRIVED)
 
 
-@pytest.mark.parametrize("axis", AXES)
+@pytest.mark.parametrize("axis", THREE_FINGER.axes)
 def test_every_axis_feels_both_directions(individual: Bench, axis: Finger) -> None:
     individual.gripper.place_object(axis, 180)
     individual.gripper.place_object(axis, 60, opening=True)

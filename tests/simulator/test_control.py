@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.values.enums import AXES, Fault, Finger, Initialization, Mode, ObjectStatus
+from robotiq_async.values.enums import Fault, Finger, Initialization, Mode, ObjectStatus
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def test_the_echoes_of_simple_control_are_the_own_registers(active: Bench) -> No
     """The trap: B and C stand at 200 and echo what nobody drives them to."""
     active.go({Finger.A: 200, Finger.B: 30, Finger.C: 40, Finger.SCISSOR: 50})
     active.settle()
-    assert [active.status.requested_position(axis) for axis in AXES] == [200, 30, 40, 50]
+    assert [active.status.requested_position(axis) for axis in THREE_FINGER.axes] == [200, 30, 40, 50]
 
 
 def test_simple_control_uses_speed_and_force_of_a(active: Bench) -> None:
@@ -72,11 +73,11 @@ def test_raising_individual_control_under_go_hands_over_at_once(active: Bench) -
 def test_raising_individual_control_with_loaded_registers_moves_nothing(active: Bench) -> None:
     active.go(200)
     active.settle()
-    active.write(axes=tuple(AxisRequest(active.gripper.position(axis)) for axis in AXES))
-    before = [active.gripper.travel(axis) for axis in AXES]
+    active.write(axes=tuple(AxisRequest(active.gripper.position(axis)) for axis in THREE_FINGER.axes))
+    before = [active.gripper.travel(axis) for axis in THREE_FINGER.axes]
     active.write(individual_fingers=True, individual_scissor=True)
     active.wait(5)
-    assert [active.gripper.travel(axis) for axis in AXES] == before
+    assert [active.gripper.travel(axis) for axis in THREE_FINGER.axes] == before
 
 
 def test_individual_axes_go_their_own_ways(individual: Bench) -> None:
@@ -150,13 +151,13 @@ def test_a_contact_outlasts_the_limit_of_the_pinch_mode(active: Bench) -> None:
 def test_scissor_mode_grips_with_the_scissor_alone(active: Bench) -> None:
     active.write(mode=Mode.SCISSOR)
     active.settle()
-    fingers = [active.gripper.travel(axis) for axis in AXES[:3]]
+    fingers = [active.gripper.travel(axis) for axis in THREE_FINGER.axes[:3]]
     active.close()
     assert active.positions == (6, 6, 6, 232)
     assert active.outcomes == (ObjectStatus.AT_POSITION,) * 4
     active.close(0)
     assert active.positions == (6, 6, 6, 15)
-    assert [active.gripper.travel(axis) for axis in AXES[:3]] == fingers
+    assert [active.gripper.travel(axis) for axis in THREE_FINGER.axes[:3]] == fingers
 
 
 def test_scissor_mode_leaves_the_fingers_where_they_are_also_under_individual_control(active: Bench) -> None:

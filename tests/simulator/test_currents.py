@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from robotiq_async.values.enums import AXES, Finger
+from robotiq_async.values.enums import Finger
+from robotiq_async.values.model import THREE_FINGER
 from tests.simulator.conftest import CYCLE
 
 if TYPE_CHECKING:
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 def currents(bench: Bench) -> list[int]:
     """Of all axes, in counts."""
-    return [bench.status.current(axis) for axis in AXES]
+    return [bench.status.current(axis) for axis in THREE_FINGER.axes]
 
 
 def course(bench: Bench, axis: Finger) -> list[int]:

@@ -17,7 +17,8 @@ from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, Sim
 from robotiq_async.simulator import parse_troubles as plan_of
 from robotiq_async.simulator.server.endpoint import SimulatorEndpoint
 from robotiq_async.simulator.troubles.trouble import KINDS
-from robotiq_async.values.enums import AXES, Fault, Mode
+from robotiq_async.values.enums import Fault, Mode
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
 from tests.simulator.test_server import RawClient, raw_client
@@ -415,7 +416,7 @@ async def test_another_client_sends_all_axes_somewhere(value: int | None, positi
         assert image.go
         assert image.axes == tuple(replace(axis, position=position) for axis in AXES_ASKED)
         await asyncio.sleep(60)
-        reached = [server.gripper.position(axis) for axis in AXES]
+        reached = [server.gripper.position(axis) for axis in THREE_FINGER.axes]
         assert reached == [max(position, 6)] * 3 + [max(position, 15)]
 
 

@@ -8,11 +8,13 @@ import pytest
 
 from robotiq_async.values.calibration.closing_time import closing_time
 from robotiq_async.values.enums import Fault, Finger, Initialization, ObjectStatus, Severity
+from robotiq_async.values.model import THREE_FINGER
 
 if TYPE_CHECKING:
     from tests.simulator.conftest import Bench
 
-SERIOUS = [fault for fault in Fault if fault.is_serious and fault is not Fault.SCISSOR_INTERFERENCE]
+SERIOUS = [fault for fault in Fault if fault.is_serious and fault is THREE_FINGER.faults[int(fault)]]
+SERIOUS.remove(Fault.SCISSOR_INTERFERENCE)
 PRIORITY = [fault for fault in Fault if fault.severity is Severity.PRIORITY]
 
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from robotiq_async.simulator import Habits
-from robotiq_async.values.enums import AXES, Fault, Finger, Initialization, Mode, ObjectStatus
+from robotiq_async.values.enums import Fault, Finger, Initialization, Mode, ObjectStatus
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest
 
 if TYPE_CHECKING:
@@ -217,7 +218,7 @@ def test_a_limit_is_echoed_in_place_of_the_request(individual: Bench) -> None:
 def test_what_is_a_stop_and_no_limit_is_echoed_as_asked(individual: Bench) -> None:
     individual.gripper.habits = Habits(echoes_limits=True)
     individual.close()
-    assert [individual.status.requested_position(axis) for axis in AXES] == [255, 255, 255, 232]
+    assert [individual.status.requested_position(axis) for axis in THREE_FINGER.axes] == [255, 255, 255, 232]
     individual.write(activate=False, go=False)
     assert individual.status.requested_position(Finger.SCISSOR) == 255, "no request is looked at while reset"
 
@@ -227,7 +228,7 @@ def test_the_limit_of_the_pinch_mode_is_one(bench: Bench) -> None:
     bench.activate(mode=Mode.PINCH)
     bench.close()
     assert bench.positions == (113, 113, 113, 219)
-    echoes = [bench.status.requested_position(axis) for axis in AXES]
+    echoes = [bench.status.requested_position(axis) for axis in THREE_FINGER.axes]
     assert echoes == [113, 113, 113, 255], "the register of the scissor is not used"
 
 

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robotiq_async.simulator import Habits, SimulatedGripper
-from robotiq_async.values.enums import AXES, Fault, Initialization, Mode
+from robotiq_async.values.enums import Fault, Initialization, Mode
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
 
@@ -26,7 +27,7 @@ _REQUEST = st.builds(
     mode=st.sampled_from(Mode),
     individual_fingers=st.booleans(),
     individual_scissor=st.booleans(),
-    axes=st.tuples(*(st.builds(AxisRequest, _BYTE, _BYTE, _BYTE) for _ in AXES)),
+    axes=st.tuples(*(st.builds(AxisRequest, _BYTE, _BYTE, _BYTE) for _ in THREE_FINGER.axes)),
 )
 Action = tuple[str, tuple[object, ...]]
 _IMAGE = st.builds(lambda request: request.registers, _REQUEST)
@@ -86,7 +87,7 @@ def _run(
             name, arguments = event.action
             getattr(gripper, name)(*arguments)
     now = 70.0
-    return gripper.status_registers(), *(gripper.travel(axis) for axis in AXES)
+    return gripper.status_registers(), *(gripper.travel(axis) for axis in THREE_FINGER.axes)
 
 
 @settings(deadline=None, max_examples=200)
@@ -108,9 +109,9 @@ def test_every_status_makes_sense(events: list[Event], looks: list[float]) -> No
         status = RobotiqStatus.from_registers(gripper.status_registers())
         if not gripper.is_powered:
             return
-        for finger in AXES[:3]:
+        for finger in THREE_FINGER.axes[:3]:
             assert 6 <= status.position(finger) <= 242
-        assert 6 <= status.position(AXES[3]) <= 232
+        assert 6 <= status.position(THREE_FINGER.axes[3]) <= 232
         assert status.activation_echo or status.is_reset
         if status.initialization is Initialization.COMPLETE and gripper.is_moving:
             assert status.is_moving

@@ -12,7 +12,8 @@ import pytest
 
 import robotiq_async
 from robotiq_async.values.calibration.closing_time import closing_time
-from robotiq_async.values.enums import AXES, CLOSED_READING, OPEN_READING, STROKE_COUNTS, Finger, ObjectStatus
+from robotiq_async.values.enums import Finger, ObjectStatus
+from robotiq_async.values.model import THREE_FINGER
 from tests.simulator.conftest import CYCLE
 
 if TYPE_CHECKING:
@@ -64,7 +65,11 @@ def test_closing_time_range(speed: int) -> None:
 
 
 def test_stroke() -> None:
-    assert STROKE_COUNTS == CLOSED_READING - OPEN_READING == 235
+    assert (
+        THREE_FINGER.stroke.counts
+        == THREE_FINGER.stroke.closed_reading - THREE_FINGER.stroke.open_reading
+        == 235
+    )
 
 
 @pytest.mark.parametrize(
@@ -120,7 +125,7 @@ def test_a_new_speed_on_the_way_counts_from_there(individual: Bench) -> None:
     way_left = 241 - individual.gripper.position(Finger.A)
     individual.go({Finger.A: 241}, speed=255)
     individual.settle()
-    expected = 2 + way_left / STROKE_COUNTS * closing_time(255)
+    expected = 2 + way_left / THREE_FINGER.stroke.counts * closing_time(255)
     assert individual.now - began == pytest.approx(expected, abs=0.1)
 
 
@@ -151,18 +156,18 @@ def test_retargeting_to_the_reading_moves_nothing(individual: Bench) -> None:
     individual.go(200)
     individual.wait(0.777)
     individual.write(go=False)
-    before = [individual.gripper.travel(axis) for axis in AXES]
-    individual.go({axis: individual.gripper.position(axis) for axis in AXES})
+    before = [individual.gripper.travel(axis) for axis in THREE_FINGER.axes]
+    individual.go({axis: individual.gripper.position(axis) for axis in THREE_FINGER.axes})
     individual.wait(5)
-    assert [individual.gripper.travel(axis) for axis in AXES] == before
+    assert [individual.gripper.travel(axis) for axis in THREE_FINGER.axes] == before
     assert set(individual.outcomes) == {ObjectStatus.AT_POSITION}
 
 
 def test_only_the_commanded_axis_moves(individual: Bench) -> None:
-    before = {axis: individual.gripper.travel(axis) for axis in AXES}
+    before = {axis: individual.gripper.travel(axis) for axis in THREE_FINGER.axes}
     individual.go({Finger.B: 100})
     individual.settle()
-    moved = {axis for axis in AXES if individual.gripper.travel(axis) != before[axis]}
+    moved = {axis for axis in THREE_FINGER.axes if individual.gripper.travel(axis) != before[axis]}
     assert moved == {Finger.B}
     assert individual.gripper.travel(Finger.B) == before[Finger.B] + 94
 

@@ -8,7 +8,8 @@ import pytest
 
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values.calibration.closing_time import closing_time
-from robotiq_async.values.enums import AXES, Finger, Mode, ObjectStatus
+from robotiq_async.values.enums import Finger, Mode, ObjectStatus
+from robotiq_async.values.model import THREE_FINGER
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from tests.simulator.conftest import Bench
 
 SEEDS = range(20)
-FINGERS = AXES[:3]
+FINGERS = THREE_FINGER.axes[:3]
 
 
 @pytest.fixture
@@ -49,7 +50,7 @@ def test_open_and_closed_read_what_real_ones_read(make_bench: Callable[..., Benc
     assert closed == {240, 241, 242}
 
 
-@pytest.mark.parametrize("axis", AXES)
+@pytest.mark.parametrize("axis", THREE_FINGER.axes)
 def test_who_waits_for_the_position_that_was_asked_for_may_wait_for_ever(real: Bench, axis: Finger) -> None:
     """111 was asked and 112 reached, 208 and 210 (TAMS): past it, by up to two (manual); some it meets."""
     beside = set()
@@ -77,13 +78,13 @@ def test_what_is_done_again_ends_in_the_same_way(make_bench: Callable[..., Bench
 def test_what_is_asked_to_stay_stays(real: Bench) -> None:
     """A hand tells axes that it does not address to stay at their reading; it must not make them creep."""
     real.close(111)
-    before = [real.gripper.travel(axis) for axis in AXES]
+    before = [real.gripper.travel(axis) for axis in THREE_FINGER.axes]
     for _ in range(3):
-        real.go({axis: real.gripper.position(axis) for axis in AXES})
+        real.go({axis: real.gripper.position(axis) for axis in THREE_FINGER.axes})
         real.write(go=False)
         real.go(111)
         real.write(go=False)
-    assert [real.gripper.travel(axis) for axis in AXES] == before
+    assert [real.gripper.travel(axis) for axis in THREE_FINGER.axes] == before
     assert set(real.outcomes) == {ObjectStatus.AT_POSITION}
 
 

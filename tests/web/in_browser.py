@@ -26,7 +26,8 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.description import hand_model
 from robotiq_async.tools.description.kinematics import JOINTS, joint_angles
 from robotiq_async.tools.web.server import PageServer
-from robotiq_async.values.enums import AXES, DEFAULT_SPEED
+from robotiq_async.values.enums import DEFAULT_SPEED
+from robotiq_async.values.model import THREE_FINGER
 from tests.conftest import watched
 from tests.fake_hand import FakeHand
 from tests.virtual import HoldWatch
@@ -300,7 +301,7 @@ async def test_each_axis_is_sent_where_its_slider_was_let_go(
     name: str, axes: Finger, browser: Browser, hand: RobotiqHand
 ) -> None:
     """The slider alone moves nothing, and one that is not touched shows where its axis stands."""
-    first = next(axis for axis in AXES if axis in axes)
+    first = next(axis for axis in THREE_FINGER.axes if axis in axes)
     await browser.until(lambda: place_of(browser, name) == hand.status.position(first))
     target, before = place_of(browser, name) + 30, hand.status
     for _ in range(10):  # a busy machine may take a press for one that is too old
@@ -312,8 +313,10 @@ async def test_each_axis_is_sent_where_its_slider_was_let_go(
         await browser.click(f"move-{name}")
         if f"{first.name} at" in await browser.until(partial(outcome_of, browser, "move")):
             break
-    asked = [hand.status.requested_position(axis) for axis in AXES]
-    assert asked == [target if axis in axes else before.requested_position(axis) for axis in AXES]
+    asked = [hand.status.requested_position(axis) for axis in THREE_FINGER.axes]
+    assert asked == [
+        target if axis in axes else before.requested_position(axis) for axis in THREE_FINGER.axes
+    ]
     await browser.until(lambda: place_of(browser, name) == hand.status.position(first))
 
 

@@ -24,7 +24,8 @@ from robotiq_async.values.checks import (
     check_seconds,
     check_timeout,
 )
-from robotiq_async.values.enums import AXES, Finger
+from robotiq_async.values.enums import Finger
+from robotiq_async.values.model import THREE_FINGER
 
 
 class Index:
@@ -146,7 +147,7 @@ def test_what_is_not_a_mask_is_a_type_error(mask: object) -> None:
     assert repr(mask) in str(caught.value)
 
 
-@pytest.mark.parametrize("axis", AXES)
+@pytest.mark.parametrize("axis", THREE_FINGER.axes)
 def test_every_axis_passes_as_a_finger_or_as_an_integer(axis: Finger) -> None:
     assert check_axis(axis) is axis
     assert check_axis(int(axis)) is axis

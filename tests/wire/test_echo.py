@@ -5,7 +5,8 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.values.enums import AXES, Mode
+from robotiq_async.values.enums import Mode
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
 from tests.register_words import status_of
@@ -26,7 +27,7 @@ def test_what_a_status_echoes_is_what_its_properties_say(block: tuple[int, ...])
     assert status.echo == (
         status.activation_echo,
         status.go_echo,
-        *(status.requested_position(axis) for axis in AXES),
+        *(status.requested_position(axis) for axis in THREE_FINGER.axes),
     )
 
 

@@ -62,7 +62,7 @@ def test_a_field_lies_where_the_manual_says(name: str, place: object) -> None:
 
 def test_no_other_fields_are_defined() -> None:
     names = {name for name in vars(reg) if re.fullmatch(r"[rg][A-Z]+", name)}
-    assert names == {*REQUEST, *STATUS}
+    assert names == {*REQUEST, *STATUS, "rARD", "gOBJ"}  # these two are the siblings'
 
 
 @pytest.mark.parametrize("table", [REQUEST, STATUS], ids=["request", "status"])

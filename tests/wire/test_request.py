@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.values.enums import AXES, Finger, Mode
+from robotiq_async.values.enums import Finger, Mode
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 from tests.register_words import REQUEST_RESERVED, bytes_of, registers_of
 
@@ -150,14 +151,14 @@ def test_what_is_not_eight_registers_is_refused(registers: list[int]) -> None:
 # -- positions ---------------------------------------------------------------------------------------------
 
 
-@given(REQUESTS, st.dictionaries(st.sampled_from(AXES), BYTES))
+@given(REQUESTS, st.dictionaries(st.sampled_from(THREE_FINGER.axes), BYTES))
 def test_new_positions_change_the_positions_of_their_axes_and_nothing_else(
     before: Request, positions: dict[Finger, int]
 ) -> None:
     after = before.with_positions(positions)
     expected = bytes_of(before.registers)
     for axis, position in positions.items():
-        expected[3 + 3 * AXES.index(axis)] = position
+        expected[3 + 3 * THREE_FINGER.axes.index(axis)] = position
         assert after.position(axis) == position
     assert bytes_of(after.registers) == expected
 

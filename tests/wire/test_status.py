@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async import Fault, Finger, Initialization, Mode, ObjectStatus, RobotiqStatus
-from robotiq_async.values.enums import AXES
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.status import NO_REQUEST
 from tests.register_words import bytes_of, registers_of, status_of
 
-A, B, C, S = AXES
+A, B, C, S = THREE_FINGER.axes
 BLOCKS = st.tuples(*[st.integers(0, 0xFFFF)] * 8)
 
 PER_AXIS: list[Callable[[RobotiqStatus, Finger], object]] = [
@@ -47,12 +47,12 @@ def test_a_ready_gripper_that_was_never_told_to_go_does_not_move_although_every_
     assert status.is_activated
     assert not status.go_echo
     assert status.motion == 0
-    assert [status.finger_status(axis) for axis in AXES] == [ObjectStatus.IN_MOTION] * 4
+    assert [status.finger_status(axis) for axis in THREE_FINGER.axes] == [ObjectStatus.IN_MOTION] * 4
     assert not status.is_moving
     assert status.moving == Finger(0)
 
 
-@given(BLOCKS, st.sampled_from(AXES))
+@given(BLOCKS, st.sampled_from(THREE_FINGER.axes))
 def test_an_axis_is_in_motion_exactly_when_it_moves(block: tuple[int, ...], axis: Finger) -> None:
     status = RobotiqStatus.from_registers(block)
     state, reported = status.axis_state(axis), status.finger_status(axis)
@@ -81,7 +81,7 @@ def test_a_held_object_is_a_contact_while_closing_of_all_three_fingers() -> None
 
 def test_a_reached_position_is_no_contact() -> None:
     status = status_of(0xF9, 0xFF)
-    assert [status.finger_status(axis) for axis in AXES] == [ObjectStatus.AT_POSITION] * 4
+    assert [status.finger_status(axis) for axis in THREE_FINGER.axes] == [ObjectStatus.AT_POSITION] * 4
     assert status.contacts == Finger(0)
     assert not status.is_moving
     assert status.motion == 3
@@ -107,8 +107,8 @@ def test_one_is_a_contact_while_opening_and_two_a_contact_while_closing() -> Non
 
 def test_a_current_of_fifteen_counts_is_150_milliampere() -> None:
     status = status_of(0x39, current=(0x0F, 0, 1, 0xFF))
-    assert [status.current(axis) for axis in AXES] == [15, 0, 1, 255]
-    assert [status.current_ma(axis) for axis in AXES] == [150, 0, 10, 2550]
+    assert [status.current(axis) for axis in THREE_FINGER.axes] == [15, 0, 1, 255]
+    assert [status.current_ma(axis) for axis in THREE_FINGER.axes] == [150, 0, 10, 2550]
 
 
 @pytest.mark.parametrize("mode", range(4))
@@ -139,7 +139,7 @@ def test_a_contact_stays_visible_when_the_go_bit_is_cleared() -> None:
 def test_any_eight_registers_are_a_status_that_answers_everything(block: tuple[int, ...]) -> None:
     status = RobotiqStatus.from_registers(block)
     content = bytes_of(block)
-    for number, axis in enumerate(AXES):
+    for number, axis in enumerate(THREE_FINGER.axes):
         assert status.requested_position(axis) == content[3 + 3 * number]
         assert status.position(axis) == content[4 + 3 * number]
         assert status.current(axis) == content[5 + 3 * number]
@@ -274,10 +274,14 @@ def test_what_is_not_an_integer_is_a_type_error(
         read(status_of(0x31), axis)
 
 
-@pytest.mark.parametrize("axis", AXES)
+@pytest.mark.parametrize("axis", THREE_FINGER.axes)
 def test_an_axis_may_be_given_as_its_number(axis: Finger) -> None:
     status = status_of(0x31, echo=(1, 2, 3, 4))
-    assert status.requested_position(int(axis)) == status.requested_position(axis) == AXES.index(axis) + 1
+    assert (
+        status.requested_position(int(axis))
+        == status.requested_position(axis)
+        == THREE_FINGER.axes.index(axis) + 1
+    )
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from ...values.enums import AXES, CLOSED, OPEN, Finger, ObjectStatus
+from ...values.enums import CLOSED, OPEN, Finger, ObjectStatus
 from ...values.request import AxisRequest, Request
 from ...values.status import RobotiqStatus
 from ..contact import agrees
@@ -51,7 +51,7 @@ class Adoption:
         its echo; if it does not, its gDT may be from before that request, and gets time to come.
         """
         has_time = self._now.time - self.since.time < DIRECTION_WAIT_S
-        if has_time and not all(self._direction(axis) for axis in AXES if axis in self._latest.moving):
+        if has_time and not all(self._direction(axis) for axis in self._latest.moving):
             return False
         return self.since.is_lag_over(self._now) or not self._is_late
 
@@ -60,7 +60,9 @@ class Adoption:
         """Whether an axis at rest contradicts its echo. Under simple control some always do."""
         status = self._latest
         return status.go_echo and not all(
-            self._agrees(axis, status.requested_position(axis)) for axis in AXES if axis not in status.moving
+            self._agrees(axis, status.requested_position(axis))
+            for axis in status.model.axes
+            if axis not in status.moving
         )
 
     def request(self, settings: Sequence[AxisRequest]) -> Request:
@@ -72,8 +74,9 @@ class Adoption:
             mode=status.mode,
             axes=tuple(
                 AxisRequest(self._position(axis), setting.speed, setting.force)
-                for axis, setting in zip(AXES, settings, strict=True)
+                for axis, setting in zip(status.model.axes, settings, strict=True)
             ),
+            model=status.model,
         )
 
     def _position(self, axis: Finger) -> int:
@@ -101,7 +104,9 @@ class Adoption:
 
     def _agrees(self, axis: Finger, request: int) -> bool:
         status = self._latest
-        return agrees(request, status.finger_status(axis), status.position(axis), self._direction(axis))
+        return agrees(
+            status.model, request, status.finger_status(axis), status.position(axis), self._direction(axis)
+        )
 
     def _direction(self, axis: Finger) -> int:
         """Counts the axis has moved since the first status: above 0 closing, below 0 opening, 0 unknown."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from ...runtime.log import Log
-from ...values.enums import AXES, NO_AXES, Finger, ObjectStatus
+from ...values.enums import NO_AXES, Finger, ObjectStatus
+from ...values.model import Model
 from ...values.request import Request
 from ...values.status import RobotiqStatus
 from .standstill import Moment, Standstill
@@ -16,23 +17,23 @@ class Arrivals:
     """Follows each axis from the write that asks it for something to the status that shows it at rest.
 
     Attributes:
-        axes: those that are known to rest. The others move, or are about to, or the object status that they
-            show may be from before the write.
+        axes: those that are known to rest, and those that the model lacks. The others move, or are about to,
+            or the object status that they show may be from before the write.
         limited: what the gripper shows in place of requests that lie beyond a software limit.
     """
 
-    def __init__(self, writes: WriteHistory, log: Log) -> None:
-        self.axes = Finger.ALL
+    def __init__(self, model: Model, writes: WriteHistory, log: Log) -> None:
+        self.axes: Finger = Finger.ALL
         self.limited: dict[Finger, int] = {}
         self._writes: Final = writes
         self._log: Final = log
-        self._standstill = {axis: Standstill() for axis in AXES}
+        self._standstill = {axis: Standstill(model) for axis in model.axes}
 
     def ask(self, number: int, before: Request, image: Request, moved: Finger) -> None:
         """A write replaces ``before`` by ``image``, which gives the axes in ``moved`` a position."""
         self.limited = {axis: at for axis, at in self.limited.items() if axis not in moved}
         raised = image.go and not before.go
-        for axis, old, new in zip(AXES, before.axes, image.axes, strict=True):
+        for axis, old, new in zip(image.model.axes, before.axes, image.axes, strict=True):
             # More force lets an axis in contact try again; one that moves goes on as it did.
             pressed = new.force > old.force
             is_new = image.go is not before.go or new.position != old.position
@@ -62,8 +63,8 @@ class Arrivals:
         """Take in a status that shows rGTO set: without it the object status says nothing."""
         if self.axes is Finger.ALL:
             return  # the usual case
-        for axis in AXES:
-            if axis not in self.axes:
+        for axis in self._standstill:
+            if not axis & self.axes:
                 standstill, what = self._seen(axis, status, now), status.finger_status(axis)
                 if standstill.is_known(what, status.position(axis)):
                     self.axes |= axis
@@ -72,7 +73,7 @@ class Arrivals:
     def doubtful(self, status: RobotiqStatus, now: Moment) -> Finger:
         """The axes that may move, or be about to, although the status shows them at rest."""
         doubtful = NO_AXES
-        for axis in AXES:
+        for axis in self._standstill:
             standstill = self._seen(axis, status, now)
             if standstill.is_doubtful(status.finger_status(axis), status.position(axis)):
                 doubtful |= axis

@@ -5,10 +5,11 @@ from __future__ import annotations
 from functools import reduce
 from operator import or_
 
-from ...values.enums import AXES, NO_AXES, Finger, ObjectStatus
+from ...values.enums import NO_AXES, Finger, ObjectStatus
+from ...values.model import TOLERANCE
 from ...values.request import Request
 from ...values.status import RobotiqStatus
-from ..contact import TOLERANCE, agrees
+from ..contact import agrees
 
 
 class Grips:
@@ -22,9 +23,7 @@ class Grips:
 
     def see(self, status: RobotiqStatus, contacts: Finger) -> None:
         """Remember the axes that are in contact in a status that shows rGTO set."""
-        self._contacts = {
-            axis: (status.finger_status(axis), status.position(axis)) for axis in AXES if axis in contacts
-        }
+        self._contacts = {axis: (status.finger_status(axis), status.position(axis)) for axis in contacts}
 
     def forget(self, axes: Finger = Finger.ALL) -> None:
         """Forget the grips of some axes, which are asked to move or let go."""
@@ -36,6 +35,6 @@ class Grips:
             axis
             for axis, (what, at) in self._contacts.items()
             if abs(status.position(axis) - at) <= TOLERANCE
-            and agrees(base.position(axis), what, at, direction=0)
+            and agrees(status.model, base.position(axis), what, at, direction=0)
         )
         return reduce(or_, held, NO_AXES)

@@ -19,11 +19,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from ...values.enums import AXES, Finger
+from ...values.enums import Finger
+from ...values.model import TOLERANCE
 from ...values.registers import Echo
 from ...values.request import Request
 from ...values.status import RobotiqStatus
-from ..contact import TOLERANCE
 
 ALONE_S: Final = 10.0
 """If another client was seen within this time, it explains the echo better than a limit."""
@@ -68,13 +68,13 @@ class Limits:
         if echo[:FIRST_POSITION] != image.echo[:FIRST_POSITION] or not image.go:
             return False
         found: dict[tuple[Finger, bool], int] = {}
-        for axis, shown in zip(AXES, echo[FIRST_POSITION:], strict=True):
+        for axis, shown in zip(image.model.axes, echo[FIRST_POSITION:], strict=True):
             request = image.position(axis)
             if shown == request:
                 continue
-            if request == before.position(axis) or not _may_be_limit(axis, request, int(shown), status):
+            if request == before.position(axis) or not _may_be_limit(axis, request, shown, status):
                 return False
-            found[axis, request > shown] = int(shown)
+            found[axis, request > shown] = shown
         self._known |= found
         self._proven -= set(found)
         return bool(found)
@@ -104,4 +104,6 @@ def _may_be_limit(axis: Finger, request: int, shown: int, status: RobotiqStatus)
     is_on_the_way = shown >= position - TOLERANCE if closing else shown <= position + TOLERANCE
     if axis is Finger.SCISSOR:
         return is_on_the_way
+    if Finger.SCISSOR not in status.model.all_axes:
+        return False
     return is_on_the_way and closing and status.position(Finger.SCISSOR) >= NEAR_PINCH

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ...values.enums import AXES, NO_AXES, Finger
+from ...values.enums import NO_AXES, Finger
 from ...values.request import AxisRequest, Request
 from ...values.status import RobotiqStatus
 from ..contact import drifts
@@ -38,10 +38,12 @@ def merged(
     if pending.positions and not base.go:
         # rGTO starts every axis: ask each for where it is. An axis that gripped keeps its request, or it
         # would lose its grip.
-        base = base.with_positions({axis: status.position(axis) for axis in AXES if axis not in gripping})
+        base = base.with_positions(
+            {axis: status.position(axis) for axis in status.model.axes if axis not in gripping}
+        )
     held = {
         axis: status.position(axis)
-        for axis in AXES
+        for axis in status.model.axes
         if axis in pending.hold and drifts(axis, base, status, arrived, doubtful)
     }
     positions = held | pending.positions
@@ -54,6 +56,6 @@ def merged(
                 pending.speeds.get(axis, old.speed),
                 pending.forces.get(axis, old.force),
             )
-            for axis, old in zip(AXES, base.axes, strict=True)
+            for axis, old in base.by_axis
         ),
     )

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import reduce
 from operator import or_
 
-from ...values.enums import AXES, NO_AXES, Finger
+from ...values.enums import NO_AXES, Finger
 from ...values.errors import RobotiqError
 from ..waiters import Waiter, fail
 
@@ -76,7 +76,7 @@ class PendingCommand:
         values = (new.position, new.speed, new.force)
         for changes, value in zip((self.positions, self.speeds, self.forces), values, strict=True):
             if value is not None:
-                changes.update(dict.fromkeys((axis for axis in AXES if axis in new.axes), value))
+                changes.update(dict.fromkeys(new.axes, value))
         if waiter is not None:
             self.asking.append((NO_AXES if new.position is None else new.axes, waiter))
 

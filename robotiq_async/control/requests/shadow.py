@@ -15,7 +15,8 @@ from operator import or_
 from typing import Final
 
 from ...runtime.log import Log, log
-from ...values.enums import AXES, NO_AXES, Finger
+from ...values.enums import NO_AXES, Finger
+from ...values.model import THREE_FINGER, Model
 from ...values.request import AxisRequest, Request
 from ...values.status import RobotiqStatus
 from .adoption import Adoption
@@ -45,6 +46,7 @@ class RequestShadow:
     Args:
         speed: what every axis gets until set otherwise, 0..255.
         force: what every axis gets until set otherwise, 0..255.
+        model: of the gripper.
         log: of the hand.
 
     Attributes:
@@ -54,8 +56,8 @@ class RequestShadow:
             loop reads the reply; so the age of a write is measured by this.
     """
 
-    def __init__(self, speed: int, force: int, *, log: Log = log) -> None:
-        self._image = Request(axes=(AxisRequest(0, speed, force),) * len(AXES))
+    def __init__(self, speed: int, force: int, model: Model = THREE_FINGER, *, log: Log = log) -> None:
+        self._image = Request(axes=(AxisRequest(0, speed, force),) * len(model.axes), model=model)
         """The last image written, or the one that the gripper shows after a reconnect."""
         self._adoption: Adoption | None = None
         """From an adoption to the next write: makes the base of that write."""
@@ -67,7 +69,7 @@ class RequestShadow:
         self._moved = NO_AXES
         """The axes that we have given a position since the gripper was found."""
         self.grips: Final = Grips()
-        self.arrivals: Final = Arrivals(self._writes, log)
+        self.arrivals: Final = Arrivals(model, self._writes, log)
         self.now = Moment(0.0, 0)
         self._others_at = NEVER
         """When another client was last seen."""
@@ -85,7 +87,8 @@ class RequestShadow:
 
     def at_rest(self, status: RobotiqStatus) -> Request:
         """The base with rGTO clear and every axis asked to be where it is, so that no axis starts."""
-        return replace(self.base, go=False).with_positions({axis: status.position(axis) for axis in AXES})
+        here = {axis: status.position(axis) for axis in status.model.axes}
+        return replace(self.base, go=False).with_positions(here)
 
     def stop_image(self, status: RobotiqStatus) -> Request | None:
         """The image that leaves the gripper stopped; None when rGTO is clear, and no write may set it."""
@@ -149,7 +152,7 @@ class RequestShadow:
         if self._adoption is None:
             return Finger.ALL
         adopted, image = self._adopted, self._image
-        unchanged = (axis for axis in AXES if adopted.position(axis) == image.position(axis))
+        unchanged = (axis for axis, asked in image.by_axis if adopted.position(axis) == asked.position)
         return self._moved & reduce(or_, unchanged, NO_AXES)
 
     def acts(self, number: int) -> bool:

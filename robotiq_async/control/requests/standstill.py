@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from ...values.enums import ObjectStatus
+from ...values.model import Model
 from ..contact import agrees
 
 LAG_S: Final = 0.25
@@ -46,12 +47,14 @@ class _Asked:
     """One request of an axis.
 
     Attributes:
+        model: of the gripper.
         number: of its write.
         position: in counts; None while rGTO is clear.
         again: whether it makes an axis in contact try again: it sets rGTO or raises the force.
         shown: the first status that showed that it acts.
     """
 
+    model: Model
     number: int
     position: int | None
     again: bool
@@ -59,13 +62,14 @@ class _Asked:
 
     def fits(self, what: ObjectStatus, position: int) -> bool:
         """Whether an axis can rest like this under it. While rGTO is clear gDT says nothing."""
-        return self.position is None or agrees(self.position, what, position, direction=0)
+        return self.position is None or agrees(self.model, self.position, what, position, direction=0)
 
 
 class Standstill:
     """The requests of one axis within the lag, and whether it rests under the last of them."""
 
-    def __init__(self) -> None:
+    def __init__(self, model: Model) -> None:
+        self._model = model
         self._asked: deque[_Asked] = deque()
         self._rested = False
         """Whether the axis was known to rest under the first of these, and did not show motion since."""
@@ -86,9 +90,9 @@ class Standstill:
         if rested:
             self._asked.clear()
         if not self._asked:
-            self._asked.append(_Asked(0, before, again=False, shown=LONG_AGO))
+            self._asked.append(_Asked(self._model, 0, before, again=False, shown=LONG_AGO))
             self._rested = rested
-        self._asked.append(_Asked(number, position, again))
+        self._asked.append(_Asked(self._model, number, position, again))
 
     def limit(self, position: int) -> None:
         """The last request was replaced by a software limit."""

@@ -1,4 +1,4 @@
-"""What a request asks of the four axes, and the fixed sequences: activation, mode change, automatic release.
+"""What a request asks of the axes, and the fixed sequences: activation, mode change, automatic release.
 
 All of it is data: a :data:`Goals` tuple says where each axis goes, a sequence is a tuple of them.
 """
@@ -7,23 +7,23 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from robotiq_async.values.calibration.closing_time import closing_time
 from robotiq_async.values.checks import check_int
 from robotiq_async.values.enums import (
     CLOSED,
     OPEN,
-    OPEN_READING,
     SPEED_MAX,
     SPEED_MIN,
     WIDTH_WIDE,
     Mode,
 )
+from robotiq_async.values.model import THREE_FINGER
 
 from .mechanics.goal import Goal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from robotiq_async.values.calibration.scales import SpeedCalibration
     from robotiq_async.values.request import AxisRequest, Request
 
 
@@ -52,7 +52,7 @@ def check_scissor_limit(limit: tuple[int, int]) -> tuple[int, int]:
         TypeError: an end of it is not an int.
         ValueError: it is not a range within 6..232.
     """
-    low = check_int("scissor_limit", limit[0], OPEN_READING, SCISSOR_HIGH)
+    low = check_int("scissor_limit", limit[0], THREE_FINGER.stroke.open_reading, SCISSOR_HIGH)
     return low, check_int("scissor_limit", limit[1], low, SCISSOR_HIGH)
 
 
@@ -68,6 +68,8 @@ def requested(request: Request, readings: Sequence[int]) -> Goals:
     scissor alone while the fingers stay at their readings, rICF = 1 or not (manual).
     """
     own = tuple(_asked(axis) for axis in request.axes)
+    if not request.model.has_modes:
+        return own
     grip = own[0]
     scissor_grips = not request.individual_scissor and request.mode is Mode.SCISSOR
     if scissor_grips:
@@ -81,14 +83,15 @@ def requested(request: Request, readings: Sequence[int]) -> Goals:
     return *fingers, grip if scissor_grips else _on_its_own(MODE_POSITION[request.mode])
 
 
-def activation(mode: Mode | None, seconds: float) -> tuple[Goals, ...]:
+def activation(mode: Mode | None, seconds: float, speeds: SpeedCalibration) -> tuple[Goals, ...]:
     """Fingers close, then open, each in half the time; the scissor goes to its mode meanwhile.
 
     Args:
         mode: the mode; None for none, which is as basic.
         seconds: how long it is to take; it is never faster than the gripper.
+        speeds: of the gripper.
     """
-    stroke_time = max(seconds / 2, closing_time(_SEQUENCE_SPEED))
+    stroke_time = max(seconds / 2, speeds.closing_time(_SEQUENCE_SPEED))
     close, open_, scissor = (
         _on_its_own(position)._replace(stroke_time=stroke_time, clears=True)
         for position in (CLOSED, OPEN, MODE_POSITION[Mode.BASIC if mode is None else mode])
@@ -102,10 +105,10 @@ def mode_change(mode: Mode) -> tuple[Goals, ...]:
     return (open_, open_, open_, None), (None, None, None, _on_its_own(MODE_POSITION[mode]))
 
 
-def release() -> tuple[Goals, ...]:
-    """Every axis opens slowly."""
-    open_ = Goal(OPEN, _RELEASE_SPEED, _SEQUENCE_FORCE)
-    return ((open_, open_, open_, Goal(WIDTH_WIDE, _RELEASE_SPEED, _SEQUENCE_FORCE)),)
+def release(request: Request) -> tuple[Goals, ...]:
+    """Every axis opens slowly; a jaw closes if it is asked to."""
+    finger = Goal(OPEN if request.release_opens else CLOSED, _RELEASE_SPEED, _SEQUENCE_FORCE)
+    return ((finger, finger, finger, Goal(WIDTH_WIDE, _RELEASE_SPEED, _SEQUENCE_FORCE)),)
 
 
 def _asked(request: AxisRequest) -> Goal:

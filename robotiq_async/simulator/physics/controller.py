@@ -1,4 +1,4 @@
-"""The gripper's firmware: turns requests and events into motion of the four axes.
+"""The gripper's firmware: turns requests and events into motion of the axes.
 
 It knows no clock. Its caller must call :meth:`Controller.update` at exactly :attr:`Controller.next_event`
 before doing anything later; all times are simulated seconds.
@@ -9,41 +9,39 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
+from robotiq_async.values.calibration.scales import SpeedCalibration
 from robotiq_async.values.enums import (
-    AXES,
-    CLOSED_READING,
-    OPEN_READING,
     Fault,
     Finger,
     Initialization,
     Mode,
     ObjectStatus,
 )
+from robotiq_async.values.request import Request
 
 from . import control_modes as control
 from .emergency_stop import EmergencyStop
 from .faults import PresentFaults
-from .inbox import REST
+from .inbox import ZEROS
 from .mechanics.axis import Axis
 from .mechanics.motor import MOTORS, Motor
 from .mechanics.spread import Spread
-from .status_trail import NOTHING, Statuses, StatusTrail
+from .status_trail import Statuses, StatusTrail
 
 if TYPE_CHECKING:
-    from robotiq_async.values.request import Request
+    from robotiq_async.values.model import Model
 
     from .habits import Habits
 
-_NOWHERE: Final[control.Goals] = (None,) * len(AXES)
-
 
 class Controller:
-    """The four axes and the logic that moves them.
+    """The axes and the logic that moves them.
 
     Attributes:
-        axes: A, B, C and the scissor.
+        model: of the gripper.
+        axes: in the order of the model.
         habits: how it does what the manual leaves open.
         request: the image in force.
         progress: what gIMC says.
@@ -52,14 +50,21 @@ class Controller:
         is_asleep: the next image with rACT = 1 wakes the gripper, and moves nothing.
     """
 
-    def __init__(self, scissor_limit: tuple[int, int], seed: int | None, habits: Habits) -> None:
-        *fingers, scissor = (Spread(seed, axis) for axis in AXES)
-        self.axes = (
-            *(_finger(motor, spread) for motor, spread in zip(MOTORS[:3], fingers, strict=True)),
-            Axis(control.MODE_POSITION[Mode.BASIC], *scissor_limit, MOTORS[3], scissor),
+    def __init__(
+        self, model: Model, scissor_limit: tuple[int, int], seed: int | None, habits: Habits
+    ) -> None:
+        self.model = model
+        self._speeds = SpeedCalibration.usual(model)
+        self.axes = tuple(
+            self._scissor(scissor_limit, seed) if axis is Finger.SCISSOR else self._finger(motor, axis, seed)
+            for axis, motor in zip(model.axes, MOTORS, strict=False)
         )
+        self._nothing = (ObjectStatus.IN_MOTION,) * len(model.axes)
+        """What gDT says when it says nothing: zeros."""
+        self._nowhere: control.Goals = (None,) * len(model.axes)
         self.habits = habits
-        self.request = self._obeyed = REST
+        self._at_rest = Request.from_registers(ZEROS, model)
+        self.request = self._obeyed = self._at_rest
         self.progress = Initialization.RESET
         self.faults = PresentFaults()
         self.fail_activation = False
@@ -69,14 +74,13 @@ class Controller:
         self._mode: Mode | None = None
         self._steps: deque[control.Goals] = deque()
         self._step_lasts_until = -math.inf
-        self._trail = StatusTrail()
+        self._trail = StatusTrail(self._nothing)
 
     @property
     def next_event(self) -> float:
         """The time of the next event without a request; infinite if there is none."""
-        a, b, c, scissor = self.axes
         step_ends = self._step_lasts_until if self._steps and self._is_done(self._steps[0]) else math.inf
-        return min(self.faults.changes_at, a.ends_at, b.ends_at, c.ends_at, scissor.ends_at, step_ends)
+        return min(self.faults.changes_at, step_ends, *(axis.ends_at for axis in self.axes))
 
     def update(self, time: float) -> None:
         """Let happen what happens at this time, and drive the axes accordingly."""
@@ -96,7 +100,7 @@ class Controller:
             self.reset(time)
         elif request.activate and not was_active:
             self._set_mode(time, self._requested_mode)
-            steps = control.activation(self._mode, self.habits.activation_time)
+            steps = control.activation(self._mode, self.habits.activation_time, self._speeds)
             self._begin(time, Initialization.ACTIVATING, steps)
         if request.release:
             self.release(time)
@@ -105,7 +109,7 @@ class Controller:
 
     def power_off(self, time: float) -> None:
         """Forget the request and everything that came of it; the axes stay where they are."""
-        self.request = self._obeyed = REST
+        self.request = self._obeyed = self._at_rest
         self.is_asleep = False
         self._stop.forget()
         self.reset(time)
@@ -121,7 +125,7 @@ class Controller:
         """Begin the automatic release; without effect while reset or when it has begun already."""
         if self.request.activate and self._release is Fault.NONE:
             self._release = Fault.AUTOMATIC_RELEASE
-            self._begin(time, Initialization.RESET, control.release())
+            self._begin(time, Initialization.RESET, control.release(self.request))
             self._drive(time)
 
     def stop(self, time: float, resets: int) -> None:
@@ -137,7 +141,10 @@ class Controller:
     @property
     def echoes(self) -> tuple[int, ...]:
         """What gPR says of each axis: its own register, even where simple control drives it by another."""
-        *fingers, scissor = (axis.position for axis in self.request.axes)
+        positions = tuple(axis.position for axis in self.request.axes)
+        if not self.model.has_modes:
+            return positions
+        *fingers, scissor = positions
         if self.habits.echoes_limits and self.progress is Initialization.COMPLETE:
             if (limit := control.finger_limit(self._mode)) is not None:
                 fingers = [min(limit, position) for position in fingers]
@@ -148,7 +155,7 @@ class Controller:
     def shown_statuses(self, time: float) -> Statuses:
         """What gDT says of each axis."""
         if self.progress is not Initialization.COMPLETE:
-            return NOTHING
+            return self._nothing
         return self._trail.at(time - self.habits.status_lag)
 
     @property
@@ -201,12 +208,13 @@ class Controller:
 
     def _set_mode(self, time: float, mode: Mode | None) -> None:
         self._mode = mode
-        for finger in self.axes[:3]:
-            finger.confine(time, control.finger_limit(mode))
+        for name, axis in zip(self.model.axes, self.axes, strict=True):
+            if name is not Finger.SCISSOR:
+                axis.confine(time, control.finger_limit(mode))
 
     def _begin(self, time: float, progress: Initialization, steps: tuple[control.Goals, ...]) -> None:
         self.progress = progress
-        self._steps = deque(steps)
+        self._steps = deque(step[: len(self.axes)] for step in steps)
         self._clear_axes(time)
         self._begin_step(time)
         self._note(time)
@@ -244,10 +252,10 @@ class Controller:
             return self._steps[0]
         if self.progress is Initialization.COMPLETE and self._obeyed.go:
             return control.requested(self._obeyed, [round(axis.position(time)) for axis in self.axes])
-        return _NOWHERE
+        return self._nowhere
 
     def _command(self, time: float, goals: control.Goals) -> None:
-        for name, axis, goal in zip(AXES, self.axes, goals, strict=True):
+        for name, axis, goal in zip(self.model.axes, self.axes, goals, strict=True):
             if goal is None or self._is_stopped(name):
                 axis.hold(time, locks=not self.habits.lets_go_on_halt)
             else:
@@ -265,7 +273,7 @@ class Controller:
         """Whether every axis of the step has arrived or touched something, and may go on."""
         return all(
             goal is None or (axis.status is not ObjectStatus.IN_MOTION and not self._is_stopped(name))
-            for name, axis, goal in zip(AXES, self.axes, step, strict=True)
+            for name, axis, goal in zip(self.model.axes, self.axes, step, strict=True)
         )
 
     def _finish(self, time: float) -> None:
@@ -283,14 +291,18 @@ class Controller:
         """Let the trail know what gDT is from now on."""
         statuses = tuple(axis.status for axis in self.axes)
         if self.progress is not Initialization.COMPLETE or self._is_silent_on_halt:
-            statuses = NOTHING
+            statuses = self._nothing
         self._trail.note(time, statuses, self.habits.status_lag)
 
     @property
     def _is_silent_on_halt(self) -> bool:
         return not (self.request.go or self.habits.keeps_status_on_halt)
 
+    def _finger(self, motor: Motor, axis: Finger, seed: int | None) -> Axis:
+        spread, stroke = Spread(seed, axis), self.model.stroke
+        low, high = stroke.open_reading + spread.open_reading, stroke.closed_reading + spread.closed_reading
+        return Axis(low, low, high, motor, spread, self._speeds)
 
-def _finger(motor: Motor, spread: Spread) -> Axis:
-    low = OPEN_READING + spread.open_reading
-    return Axis(low, low, CLOSED_READING + spread.closed_reading, motor, spread)
+    def _scissor(self, limit: tuple[int, int], seed: int | None) -> Axis:
+        spread = Spread(seed, Finger.SCISSOR)
+        return Axis(control.MODE_POSITION[Mode.BASIC], *limit, MOTORS[3], spread, self._speeds)

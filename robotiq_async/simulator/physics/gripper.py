@@ -10,8 +10,9 @@ from operator import or_
 from typing import TYPE_CHECKING, Final
 
 from robotiq_async.values import registers as reg
-from robotiq_async.values.checks import check_axis, check_int, check_seconds
-from robotiq_async.values.enums import AXES, NO_AXES, Fault, Finger
+from robotiq_async.values.checks import check_int, check_seconds
+from robotiq_async.values.enums import NO_AXES, Fault, Finger
+from robotiq_async.values.model import THREE_FINGER, Model
 
 from .clock import Clock
 from .control_modes import SCISSOR_HIGH, SCISSOR_LOW, check_scissor_limit
@@ -31,7 +32,7 @@ _LONGEST: Final = 1e9
 
 
 class SimulatedGripper(Surroundings):
-    """A 3-Finger gripper that behaves like the real one as far as public sources tell.
+    """A gripper that behaves like the real one as far as public sources tell: a 3-Finger, or a sibling.
 
     Nothing runs in the background: the gripper catches up with its clock whenever it is read, written or
     changed. Motions, contacts, faults and delayed requests happen at their exact times, so a result does not
@@ -51,6 +52,7 @@ class SimulatedGripper(Surroundings):
     * A minor or major fault stops the axes where they are, with gDT 0; interference below 20 s stops the
       scissor only. When a minor fault ends, a request with rGTO = 1 resumes.
     * The scissor takes its requests as counts, within 15..232.
+    * A sibling moves with the nominal speeds of its manual; its motor draws what finger A of a 3-Finger does.
     """
 
     def __init__(
@@ -64,6 +66,7 @@ class SimulatedGripper(Surroundings):
         spread: bool = True,
         seed: int = SEED,
         habits: Habits | None = None,
+        model: Model = THREE_FINGER,
     ) -> None:
         """A gripper that was just switched on: open, reset, all registers 0.
 
@@ -78,6 +81,7 @@ class SimulatedGripper(Surroundings):
                 early or late. Without it they are exact: an open finger reads 6, a closed one 241.
             seed: which gripper it is, 0 or more: another seed, other counts; the same seed, the same.
             habits: how it does what the manual leaves open; None for the usual ones.
+            model: what it is a gripper of.
 
         Raises:
             TypeError: an argument is of the wrong type.
@@ -87,13 +91,15 @@ class SimulatedGripper(Surroundings):
         self._cycle = check_seconds("device_cycle", device_cycle, 0, _LONGEST)
         number = check_int("seed", seed, 0, sys.maxsize)
         super().__init__(
-            Controller(check_scissor_limit(scissor_limit), number if spread else None, habits or Habits())
+            Controller(
+                model, check_scissor_limit(scissor_limit), number if spread else None, habits or Habits()
+            )
         )
         self._clock = clock
         self._own_clock = Clock(clock, speedup)
         self._off_until = -math.inf if powered else math.inf
         self._heard_at = 0.0
-        self._inbox = Inbox()
+        self._inbox = Inbox(model)
 
     # The bus side.
 
@@ -162,6 +168,11 @@ class SimulatedGripper(Surroundings):
     # Inspection.
 
     @property
+    def model(self) -> Model:
+        """What it is a gripper of."""
+        return self._controller.model
+
+    @property
     def habits(self) -> Habits:
         """How it does what the manual leaves open; may be replaced at any time."""
         return self._controller.habits
@@ -218,7 +229,7 @@ class SimulatedGripper(Surroundings):
         return self._those(lambda axis: axis.holds)
 
     def _those(self, wanted: Callable[[Axis], bool]) -> Finger:
-        named = zip(AXES, self._controller.axes, strict=True)
+        named = zip(self.model.axes, self._controller.axes, strict=True)
         return reduce(or_, (name for name, axis in named if wanted(axis)), NO_AXES)
 
     def position(self, finger: Finger | int) -> int:
@@ -254,7 +265,7 @@ class SimulatedGripper(Surroundings):
         return tuple(self._inbox.writes)
 
     def _axis(self, finger: Finger | int) -> Axis:
-        index = AXES.index(check_axis(finger))
+        index = self.model.index(finger)
         self._catch_up()
         return self._controller.axes[index]
 

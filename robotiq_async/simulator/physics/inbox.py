@@ -12,8 +12,10 @@ from robotiq_async.values.request import Request
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-REST: Final = Request.from_registers((0,) * reg.REGISTER_COUNT)
-"""The image of a gripper that was just switched on: all zero."""
+    from robotiq_async.values.model import Model
+
+ZEROS: Final = (0,) * reg.REGISTER_COUNT
+"""The image of a gripper that was just switched on."""
 _HISTORY: Final = 10_000
 _ROUNDING: Final = 1e-9
 
@@ -39,8 +41,9 @@ class Inbox:
         writes: the last writes that were kept, oldest first.
     """
 
-    def __init__(self) -> None:
-        self.image: reg.Registers = REST.registers
+    def __init__(self, model: Model) -> None:
+        self._model = model
+        self.image: reg.Registers = ZEROS
         self.pending: deque[tuple[float, Request]] = deque()
         self.writes: deque[Write] = deque(maxlen=_HISTORY)
         self._kept_at: float | None = None
@@ -69,10 +72,10 @@ class Inbox:
         self.writes.append(write)
         # Keep their order, even if the device cycle was shortened meanwhile.
         due = max(time + cycle, self.pending[-1][0] if self.pending else 0.0)
-        self.pending.append((due, Request.from_registers(write.registers)))
+        self.pending.append((due, Request.from_registers(write.registers, self._model)))
 
     def clear(self) -> None:
         """The power went."""
-        self.image = REST.registers
+        self.image = ZEROS
         self.pending.clear()
         self._kept_at = None

@@ -25,9 +25,8 @@ def status_registers(controller: Controller, time: float, fault: Fault) -> reg.R
     does not mean motion.
     """
     block = [0] * reg.REGISTER_COUNT
-    request, statuses = controller.request, controller.shown_statuses(time)
+    model, request, statuses = controller.model, controller.request, controller.shown_statuses(time)
     reg.gACT.write(block, request.activate)
-    reg.gMOD.write(block, request.mode)
     reg.gGTO.write(block, request.go)
     reg.gIMC.write(block, controller.progress)
     reg.gFLT.write(block, fault)
@@ -35,8 +34,10 @@ def status_registers(controller: Controller, time: float, fault: Fault) -> reg.R
         reg.gPR[index].write(block, echo)
         reg.gPO[index].write(block, round(axis.position(time)))
         reg.gCU[index].write(block, axis.current(time))
-        reg.gDT[index].write(block, statuses[index])
-    reg.gSTA.write(block, _summary(statuses[:3]))
+        model.object_status[index].write(block, statuses[index])
+    if model.has_modes:
+        reg.gMOD.write(block, request.mode)
+        reg.gSTA.write(block, _summary(statuses[:3]))
     return tuple(block)
 
 

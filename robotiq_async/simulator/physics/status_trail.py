@@ -6,10 +6,7 @@ import math
 from collections import deque
 from typing import NamedTuple
 
-from robotiq_async.values.enums import AXES, ObjectStatus
-
-NOTHING = (ObjectStatus.IN_MOTION,) * len(AXES)
-"""What gDT says of four axes when it says nothing: zeros."""
+from robotiq_async.values.enums import ObjectStatus
 
 Statuses = tuple[ObjectStatus, ...]
 
@@ -20,10 +17,10 @@ class _Entry(NamedTuple):
 
 
 class StatusTrail:
-    """The object status of the four axes over time. Times are simulated seconds and never decrease."""
+    """The object status of each axis over time. Times are simulated seconds and never decrease."""
 
-    def __init__(self) -> None:
-        self._entries = deque([_Entry(-math.inf, NOTHING)])
+    def __init__(self, first: Statuses) -> None:
+        self._entries = deque([_Entry(-math.inf, first)])
 
     def note(self, time: float, statuses: Statuses, lag: float) -> None:
         """Add the present value, and drop values older than the lag."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Final
 
-from robotiq_async.values.checks import check_byte, check_int, check_mask, check_seconds
-from robotiq_async.values.enums import AXES, Fault, Finger
+from robotiq_async.values.checks import check_byte, check_int, check_seconds
+from robotiq_async.values.enums import Fault, Finger
 
 from .mechanics.axis import Axis, Obstacle
 
@@ -59,7 +59,7 @@ class Surroundings(ABC):
         """
         met = Obstacle(check_byte("position", position), check_byte("soft", soft), fixed)
         obstacle = None if thin else met
-        for axis in self._axes(check_mask(fingers)):
+        for axis in self._axes(self._controller.model.mask(fingers)):
             if opening:
                 axis.in_opening = obstacle
             else:
@@ -76,7 +76,7 @@ class Surroundings(ABC):
             TypeError: fingers is not an int.
             ValueError: fingers is not a mask of axes.
         """
-        for axis in self._axes(check_mask(fingers)):
+        for axis in self._axes(self._controller.model.mask(fingers)):
             axis.in_closing = axis.in_opening = None
             axis.look_again(self._time)
 
@@ -91,7 +91,8 @@ class Surroundings(ABC):
             TypeError: duration is not a number.
             ValueError: no such fault, or duration is negative.
         """
-        fault = Fault(fault)
+        if not isinstance(fault, Fault):
+            fault = self._controller.model.fault(fault)
         if fault is Fault.NONE:
             raise ValueError("fault must be a code in 1..15, got 0; clear_faults() ends faults")
         lasts = None if duration is None else check_seconds("duration", duration, 0, _LONGEST)
@@ -107,8 +108,9 @@ class Surroundings(ABC):
 
         Raises:
             TypeError: duration is not a number.
-            ValueError: duration is negative.
+            ValueError: duration is negative, or the model has no scissor.
         """
+        self._controller.model.index(Finger.SCISSOR)
         self.inject_fault(Fault.SCISSOR_INTERFERENCE, duration)
 
     def emergency_stop(self, resets: int = 1) -> None:
@@ -168,4 +170,8 @@ class Surroundings(ABC):
 
     def _axes(self, fingers: Finger) -> list[Axis]:
         self._catch_up()
-        return [axis for name, axis in zip(AXES, self._controller.axes, strict=True) if name in fingers]
+        return [
+            axis
+            for name, axis in zip(self._controller.model.axes, self._controller.axes, strict=True)
+            if name in fingers
+        ]

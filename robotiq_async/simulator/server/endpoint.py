@@ -7,6 +7,8 @@ from abc import ABC, abstractmethod
 from collections import deque
 from typing import TYPE_CHECKING, ClassVar, Final, Self
 
+from robotiq_async.values.model import THREE_FINGER
+
 from ..functions import READ_INPUT
 from ..physics.gripper import SimulatedGripper
 from ..troubles.corruption import ReplyPolicy, unchanged
@@ -67,6 +69,12 @@ class SimulatorEndpoint(ABC):
     @abstractmethod
     def address(self) -> str:
         """What a client is given to find this gripper."""
+
+    @property
+    def _query(self) -> str:
+        """The end of the address, which names another model than the 3-Finger."""
+        model = self.gripper.model
+        return "" if model is THREE_FINGER else f"?model={model.name}"
 
     async def start(self) -> None:
         """Begin to answer.

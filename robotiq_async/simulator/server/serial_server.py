@@ -80,7 +80,7 @@ class SerialSimulatorServer(SimulatorEndpoint):
     @property
     def address(self) -> str:
         """The serial port as an address. A client needs the other end of the line, not this one."""
-        return f"rtu://{self._port}"
+        return f"rtu://{self._port}{self._query}"
 
     async def start(self) -> None:
         """Begin to answer.

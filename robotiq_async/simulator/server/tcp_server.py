@@ -72,7 +72,7 @@ class SimulatorServer(SimulatorEndpoint):
     @property
     def address(self) -> str:
         """The address for :class:`~robotiq_async.RobotiqHand`."""
-        return f"tcp://{self._host}:{self._port}"
+        return f"tcp://{self._host}:{self._port}{self._query}"
 
     def cut(self, *, reset: bool = False) -> None:
         """Drop all connections now; new ones are welcome.

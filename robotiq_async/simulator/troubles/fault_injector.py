@@ -207,7 +207,7 @@ class FaultInjector:
                 if trouble.kind == "power-cut":
                     gripper.power_off()
             case "foreign":
-                image = Request.from_registers(gripper.request_registers)
+                image = Request.from_registers(gripper.request_registers, gripper.model)
                 axes = tuple(AxisRequest(int(amount), axis.speed, axis.force) for axis in image.axes)
                 image = replace(image, individual_fingers=True, individual_scissor=True)
                 gripper.write(0, replace(image, go=True, axes=axes).registers)

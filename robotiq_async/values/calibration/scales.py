@@ -18,17 +18,11 @@ from pathlib import Path
 from typing import Final
 
 from ..checks import check_byte, check_number
-from ..enums import CLOSED_READING, OPEN_READING, STROKE_COUNTS
+from ..model import THREE_FINGER, Model, Stroke
 from .csv_tables import FORCE, SPEED, Layout, Table, TableError, read_table, thesis_table
 
-STROKE_MM: Final = 155.0
-"""Opening between the fingertips of an open gripper (manual, specifications)."""
 GRAVITY: Final = 9.81
 """m/s2, the thesis's value."""
-NOMINAL_SPEEDS_MM_S: Final = (22.0, 110.0)
-"""Finger speed at the values 0 and 255 (manual, specifications)."""
-NOMINAL_FORCES_N: Final = (15.0, 60.0)
-"""Grip force at the values 0 and 255 (manual, specifications)."""
 
 LONGEST_S: Final = 600.0
 """Longest closing time that a table may contain."""
@@ -38,37 +32,6 @@ STRONGEST_N: Final = 1000.0
 Points = tuple[tuple[int, float], ...]
 
 
-def opening_mm(position: int) -> float:
-    """The opening at a position: 155 mm at the open reading 6 and below, 0 from the closed reading 241 on.
-
-    Nominal: the manual's stroke, treated as linear in counts although a real finger rotates.
-
-    Args:
-        position: counts, 0..255.
-
-    Raises:
-        TypeError: position is not an int.
-        ValueError: position is outside 0..255.
-    """
-    # Requests beyond the end stops are legal; the finger ends at the stop.
-    reached = min(max(check_byte("position", position), OPEN_READING), CLOSED_READING)
-    return STROKE_MM * (CLOSED_READING - reached) / STROKE_COUNTS
-
-
-def position_of_opening(millimetres: float) -> int:
-    """The position, in counts, closest to an opening.
-
-    Args:
-        millimetres: 0 (closed) .. 155 (open).
-
-    Raises:
-        TypeError: not a number.
-        ValueError: outside 0..155.
-    """
-    opening = check_number("millimetres", millimetres, 0.0, STROKE_MM)
-    return round(CLOSED_READING - opening / STROKE_MM * STROKE_COUNTS)
-
-
 @dataclass(frozen=True, slots=True)
 class SpeedCalibration:
     """What speed values mean.
@@ -76,10 +39,12 @@ class SpeedCalibration:
     Attributes:
         source: where the figures come from, for people.
         points: rising speed values, each with the seconds of a full closing.
+        stroke: of the gripper.
     """
 
     source: str
     points: Points
+    stroke: Stroke = THREE_FINGER.stroke
 
     def __post_init__(self) -> None:
         """Check the points.
@@ -93,11 +58,16 @@ class SpeedCalibration:
             raise ValueError("points: a closing time must be above 0 s")
 
     @classmethod
-    def nominal(cls) -> SpeedCalibration:
-        """The manual's figures, linear in between: 22 mm/s at 0 and 110 mm/s at 255, over 155 mm."""
-        slow, fast = NOMINAL_SPEEDS_MM_S
-        points = ((value, STROKE_MM / (slow + (fast - slow) * value / 255)) for value in range(256))
-        return cls("nominal (manual)", tuple(points))
+    def nominal(cls, model: Model = THREE_FINGER) -> SpeedCalibration:
+        """The manual's figures, linear in between; of a 3-Finger 22 mm/s at 0 and 110 mm/s at 255."""
+        slow, fast = model.speeds_mm_s
+        times = ((value, model.stroke.mm / (slow + (fast - slow) * value / 255)) for value in range(256))
+        return cls("nominal (manual)", tuple(times), model.stroke)
+
+    @classmethod
+    def usual(cls, model: Model) -> SpeedCalibration:
+        """What moves are timed by: of a 3-Finger the thesis's figures, of another model its manual's."""
+        return cls.thesis() if model is THREE_FINGER else cls.nominal(model)
 
     @classmethod
     @cache
@@ -123,7 +93,7 @@ class SpeedCalibration:
         return cls(source, tuple((value, mean(table[value]) / 1000) for value in sorted(table)))
 
     def closing_time(self, speed: int) -> float:
-        """Seconds of a full closing, 235 counts; linear between the points.
+        """Seconds of a full closing; linear between the points.
 
         Raises:
             TypeError: speed is not an int.
@@ -138,7 +108,7 @@ class SpeedCalibration:
             TypeError: an argument is not an int.
             ValueError: an argument is outside 0..255, or the speed outside what was measured.
         """
-        return check_byte("counts", counts) / STROKE_COUNTS * self.closing_time(speed)
+        return check_byte("counts", counts) / self.stroke.counts * self.closing_time(speed)
 
     def mm_per_s(self, speed: int) -> float:
         """Millimetres of opening a second.
@@ -147,7 +117,7 @@ class SpeedCalibration:
             TypeError: speed is not an int.
             ValueError: speed is outside 0..255, or outside what was measured.
         """
-        return STROKE_MM / self.closing_time(speed)
+        return self.stroke.mm / self.closing_time(speed)
 
     def speed_value(self, mm_per_s: float) -> int:
         """The speed value closest to a speed.
@@ -183,9 +153,10 @@ class ForceCalibration:
         object.__setattr__(self, "points", checked_points(self.points, STRONGEST_N))
 
     @classmethod
-    def nominal(cls) -> ForceCalibration:
+    def nominal(cls, model: Model = THREE_FINGER) -> ForceCalibration:
         """The manual's two figures joined by a straight line, although it calls the curve not linear."""
-        return cls("nominal (manual)", ((0, NOMINAL_FORCES_N[0]), (255, NOMINAL_FORCES_N[1])))
+        weakest, strongest = model.forces_n
+        return cls("nominal (manual)", ((0, weakest), (255, strongest)))
 
     @classmethod
     def thesis(cls, surface: str) -> ForceCalibration:

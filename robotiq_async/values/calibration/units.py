@@ -10,13 +10,10 @@ from typing import overload
 
 from ..checks import check_number
 from .scales import (
-    STROKE_MM,
     ForceCalibration,
     SpeedCalibration,
     covered,
     nearest,
-    opening_mm,
-    position_of_opening,
 )
 
 
@@ -61,7 +58,8 @@ class Units:
             TypeError: not a number.
             ValueError: outside 0..155 mm.
         """
-        return position_of_opening(check_number("mm", mm, 0.0, STROKE_MM, "millimetres"))
+        stroke = self.speeds.stroke
+        return stroke.position_of(check_number("mm", mm, 0.0, stroke.mm, "millimetres"))
 
     @overload
     def speed(self, *, mm_per_s: float) -> int: ...
@@ -110,7 +108,7 @@ class Units:
             TypeError: not an int.
             ValueError: outside 0..255.
         """
-        return opening_mm(position)
+        return self.speeds.stroke.opening_mm(position)
 
     def mm_per_s(self, speed: int) -> float:
         """Millimetres of opening a second, at a speed value.
@@ -141,7 +139,7 @@ class Units:
 
     def __repr__(self) -> str:
         return (
-            f"<Units 0..{STROKE_MM:g} mm (nominal), "
+            f"<Units 0..{self.speeds.stroke.mm:g} mm (nominal), "
             f"{_words(_mm_per_s(self.speeds))} mm/s ({self.speeds.source}), "
             f"labels {_words(_labels(self.forces))} N ({self.forces.source})>"
         )

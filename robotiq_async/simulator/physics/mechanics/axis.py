@@ -9,11 +9,13 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from robotiq_async.values.enums import ObjectStatus
+from robotiq_async.values.enums import SPEED_MAX, ObjectStatus
 
 from .motor import Motor, peak
 
 if TYPE_CHECKING:
+    from robotiq_async.values.calibration.scales import SpeedCalibration
+
     from .goal import Goal
     from .spread import Spread
 
@@ -59,7 +61,9 @@ class Axis:
         in_opening: the obstacle met while opening, if there is one.
     """
 
-    def __init__(self, position: int, low: int, high: int, motor: Motor, spread: Spread) -> None:
+    def __init__(
+        self, position: int, low: int, high: int, motor: Motor, spread: Spread, speeds: SpeedCalibration
+    ) -> None:
         self.low = low
         self.high = high
         self.status = ObjectStatus.IN_MOTION
@@ -68,6 +72,8 @@ class Axis:
         self.in_opening: Obstacle | None = None
         self._motor = motor
         self._spread = spread
+        self._speeds = speeds
+        self._full_rate = speeds.stroke.counts / speeds.closing_time(SPEED_MAX)
         self._closed = high
         self._goal: Goal | None = None
         self._is_locked = False
@@ -170,8 +176,8 @@ class Axis:
             self.status = ObjectStatus.AT_POSITION
             return
         self.status = ObjectStatus.IN_MOTION
-        self._rate = self._goal.rate
-        self._running = self._motor.running(self._rate, closing=self._path.end > here)
+        self._rate = self._goal.rate(self._speeds)
+        self._running = self._motor.running(self._rate / self._full_rate, closing=self._path.end > here)
         self._peak = peak(self._goal.force)
         self.ends_at = time + abs(self._path.end - here) / self._rate
         if self._path.outcome.is_contact:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from robotiq_async.values.calibration.closing_time import closing_time
-from robotiq_async.values.enums import STROKE_COUNTS
+from robotiq_async.values.calibration.scales import SpeedCalibration
 
 
 class Goal(NamedTuple):
@@ -27,7 +26,6 @@ class Goal(NamedTuple):
     stroke_time: float = 0.0
     clears: bool = False
 
-    @property
-    def rate(self) -> float:
+    def rate(self, speeds: SpeedCalibration) -> float:
         """Counts a second."""
-        return STROKE_COUNTS / (self.stroke_time or closing_time(self.speed))
+        return speeds.stroke.counts / (self.stroke_time or speeds.closing_time(self.speed))

@@ -14,10 +14,6 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from robotiq_async.values.calibration.closing_time import closing_time
-from robotiq_async.values.enums import SPEED_MAX, STROKE_COUNTS
-
-_FULL_RATE: Final = STROKE_COUNTS / closing_time(SPEED_MAX)
 _SHARE_OF_FRICTION: Final = 0.5
 # Above what the fastest motion draws, or it would stop itself; three fingers at once stay within the 1.5 A
 # that the manual lets the whole gripper take.
@@ -36,10 +32,10 @@ class Motor(NamedTuple):
     closing: int
     opening: int
 
-    def running(self, rate: float, *, closing: bool) -> float:
-        """Current in free motion, at a rate in counts a second."""
+    def running(self, share: float, *, closing: bool) -> float:
+        """Current in free motion, at a share of the full speed."""
         full = self.closing if closing else self.opening
-        return full * (_SHARE_OF_FRICTION + (1 - _SHARE_OF_FRICTION) * rate / _FULL_RATE)
+        return full * (_SHARE_OF_FRICTION + (1 - _SHARE_OF_FRICTION) * share)
 
 
 MOTORS: Final = (Motor(15, 11), Motor(16, 14), Motor(15, 11), Motor(15, 11))

@@ -1,0 +1,305 @@
+"""Model: what one gripper of the family has, as data.
+
+All models have the registers of one finger. A 2F or a Hand-E is finger A of a 3-Finger whose object status
+lies in byte 0 in place of byte 1 (manuals of the 2F-85/2F-140 and of the Hand-E, chapter on registers).
+Nothing of this has run on real hardware yet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Final
+
+from . import registers as reg
+from .checks import check_axis, check_byte, check_int, check_mask, check_number
+from .enums import Fault, Finger, ObjectStatus
+from .registers import Field, RegisterMap, Registers
+
+TOLERANCE: Final = 2
+"""Counts between a request and the position reached (manual: within 1-2)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stroke:
+    """From open to closed. Openings are nominal: linear in counts, although a real finger may rotate.
+
+    Attributes:
+        mm: the opening of an open gripper, in millimetres.
+        open_reading: position, in counts, that an open finger reads.
+        closed_reading: position, in counts, that a closed finger reads.
+    """
+
+    mm: float
+    open_reading: int
+    closed_reading: int
+
+    @property
+    def counts(self) -> int:
+        """Counts of a full closing."""
+        return self.closed_reading - self.open_reading
+
+    def opening_mm(self, position: int) -> float:
+        """The opening at a position: all of it at the open reading and below, 0 from the closed reading on.
+
+        Raises:
+            TypeError: position is not an int.
+            ValueError: position is outside 0..255.
+        """
+        # Requests beyond the end stops are legal; the finger ends at the stop.
+        reached = min(max(check_byte("position", position), self.open_reading), self.closed_reading)
+        return self.mm * (self.closed_reading - reached) / self.counts
+
+    def position_of(self, millimetres: float) -> int:
+        """The position, in counts, closest to an opening.
+
+        Raises:
+            TypeError: not a number.
+            ValueError: outside 0 (closed) .. ``mm`` (open).
+        """
+        opening = check_number("millimetres", millimetres, 0.0, self.mm)
+        return round(self.closed_reading - opening / self.mm * self.counts)
+
+
+def _masks(
+    fields: tuple[Field, ...], axes: tuple[Finger, ...], wanted: set[ObjectStatus]
+) -> tuple[Finger, ...]:
+    """For each value of the byte with the object status: the axes that show one of the wanted."""
+    return tuple(
+        Finger(
+            sum(
+                axis
+                for axis, field in zip(axes, fields, strict=True)
+                if ObjectStatus(byte >> field.shift & 3) in wanted
+            )
+        )
+        for byte in range(256)
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Model:
+    """A model of gripper. The four of them are constants; compare them with ``is``.
+
+    Attributes:
+        name: in addresses, files and on the command line: ``3f``, ``2f85``, ``2f140``, ``hand-e``.
+        title: for people.
+        axes: its axes, in the order of their registers.
+        object_status: where the object status of each axis lies.
+        faults: the fault of each code, 0..15.
+        tcp: registers over Modbus TCP.
+        rtu: registers on a serial line.
+        stroke: of the fingers.
+        open_reading_max: the most, in counts, that an open finger reads.
+        closed_reading_min: the least, in counts, that a closed finger reads.
+        speeds_mm_s: nominal speeds at the values 0 and 255.
+        forces_n: nominal forces at the values 0 and 255.
+        has_modes: whether it has grasping modes, and request bits that choose individual control.
+        all_axes: its axes, as a mask.
+        moving: for each value of the byte with the object status, the axes that move.
+        contacts: the same for the axes that a contact stopped.
+    """
+
+    name: str
+    title: str
+    axes: tuple[Finger, ...]
+    object_status: tuple[Field, ...]
+    faults: tuple[Fault, ...]
+    tcp: RegisterMap
+    rtu: RegisterMap
+    stroke: Stroke
+    open_reading_max: int
+    closed_reading_min: int
+    speeds_mm_s: tuple[float, float]
+    forces_n: tuple[float, float]
+    has_modes: bool = False
+    # Worked out once: statuses are decoded at every poll.
+    all_axes: Finger = field(init=False)
+    moving: tuple[Finger, ...] = field(init=False)
+    contacts: tuple[Finger, ...] = field(init=False)
+    _index: dict[Finger, int] = field(init=False)
+    _shift: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        keep = object.__setattr__
+        contact = {what for what in ObjectStatus if what.is_contact}
+        keep(self, "all_axes", Finger(sum(self.axes)))
+        keep(self, "moving", _masks(self.object_status, self.axes, {ObjectStatus.IN_MOTION}))
+        keep(self, "contacts", _masks(self.object_status, self.axes, contact))
+        keep(self, "_index", {axis: index for index, axis in enumerate(self.axes)})
+        keep(self, "_shift", 0 if self.object_status[0].byte else 8)
+
+    def __repr__(self) -> str:
+        return self.title
+
+    def __reduce__(self) -> tuple[object, tuple[str]]:
+        return model_of, (self.name,)
+
+    def object_byte(self, registers: Registers) -> int:
+        """The byte with the object status: the index into ``moving`` and ``contacts``."""
+        return registers[0] >> self._shift & 0xFF
+
+    def index(self, finger: object) -> int:
+        """The place of one axis among the registers.
+
+        Raises:
+            TypeError: not a Finger or an int.
+            ValueError: not exactly one axis, or one that the model does not have.
+        """
+        index = self._index.get(finger) if type(finger) is Finger else None
+        if index is None:
+            axis = check_axis(finger)
+            index = self._index.get(axis)
+            if index is None:
+                raise ValueError(f"finger must be an axis of a {self.title} ({self.axes_text}), got {axis}")
+        return index
+
+    def fault(self, code: object) -> Fault:
+        """The fault of a code.
+
+        Raises:
+            TypeError: not an int.
+            ValueError: outside 0..15.
+        """
+        return self.faults[check_int("fault", code, 0, 15)]
+
+    def mask(self, fingers: object) -> Finger:
+        """A mask of axes of this model. ``Finger.ABC`` are its fingers and ``Finger.ALL`` its axes.
+
+        Raises:
+            TypeError: not a Finger or an int.
+            ValueError: not a mask, or an axis that the model does not have.
+        """
+        mask = check_mask(fingers)
+        if mask in (Finger.ABC, Finger.ALL):
+            return mask & self.all_axes
+        if missing := mask & ~self.all_axes:
+            raise ValueError(f"fingers must be axes of a {self.title} ({self.axes_text}), got {missing}")
+        return mask
+
+    def has_reached(self, request: int, position: int) -> bool:
+        """Whether an axis that rests at a position, in counts, can have reached a request."""
+        if request <= self.open_reading_max:
+            return position <= self.open_reading_max + TOLERANCE
+        if request >= self.closed_reading_min:
+            return position >= self.closed_reading_min - TOLERANCE
+        return abs(request - position) <= TOLERANCE
+
+    def contradiction(self, registers: Registers) -> str:
+        """What in the status registers only another model can show; empty for nothing.
+
+        A sibling leaves byte 1 and bytes 6 to 14 at 0. On a 3-Finger the positions of B, C and the scissor
+        lie there, which are never 0 together. All zeros say nothing: a gateway may show them before its
+        gripper answers.
+        """
+        has_one = not registers[0] & 0xFF and not any(registers[3:7]) and not registers[7] >> 8
+        if has_one and len(self.axes) > 1 and registers[2] >> 8:
+            return "one axis alone, as a 2F or a Hand-E: bytes 1 and 6 to 14 are 0"
+        if not has_one and len(self.axes) == 1:
+            return "more than one axis, as a 3-Finger: bytes 1 and 6 to 14 are not all 0"
+        return ""
+
+    @property
+    def axes_text(self) -> str:
+        """The names of its axes, for messages."""
+        return ", ".join(str(axis.name) for axis in self.axes)
+
+
+THREE_FINGER: Final = Model(
+    name="3f",
+    title="3-Finger",
+    axes=(Finger.A, Finger.B, Finger.C, Finger.SCISSOR),
+    object_status=reg.gDT,
+    faults=tuple(Fault(code) for code in range(16)),
+    tcp=reg.TCP_REGISTERS,
+    rtu=reg.RTU_REGISTERS,
+    # Manual of the 3-Finger, specifications: stroke, speed, force. Readings: the manual's worked example.
+    stroke=Stroke(155.0, open_reading=6, closed_reading=241),
+    open_reading_max=7,
+    closed_reading_min=240,
+    speeds_mm_s=(22.0, 110.0),
+    forces_n=(15.0, 60.0),
+    has_modes=True,
+)
+"""The 3-Finger gripper (S-Model): the default everywhere."""
+
+_JAW: Final = (Finger.A,)
+_ADAPTIVE_FAULTS: Final = tuple(Fault.adaptive(code) for code in range(16))
+# No model of these speaks Modbus TCP (but for the retired universal controller): a gateway passes on the
+# registers of the serial line. The vendor's software reads with function 3, newer manuals list 4 and 23.
+_GATEWAY: Final = RegisterMap(request=0x03E8, status=0x07D0, read_function=3, device_id=9)
+
+TWO_FINGER_85: Final = Model(
+    name="2f85",
+    title="2F-85",
+    axes=_JAW,
+    object_status=(reg.gOBJ,),
+    faults=_ADAPTIVE_FAULTS,
+    tcp=_GATEWAY,
+    rtu=_GATEWAY,
+    # Manual of the 2F-85 and 2F-140, specifications. Open reads 3, closed 227 to 230 (PickNik's driver).
+    stroke=Stroke(85.0, open_reading=3, closed_reading=228),
+    open_reading_max=6,
+    closed_reading_min=226,
+    speeds_mm_s=(20.0, 150.0),
+    forces_n=(20.0, 235.0),
+)
+"""The 2F-85."""
+TWO_FINGER_140: Final = Model(
+    name="2f140",
+    title="2F-140",
+    axes=_JAW,
+    object_status=(reg.gOBJ,),
+    faults=_ADAPTIVE_FAULTS,
+    tcp=_GATEWAY,
+    rtu=_GATEWAY,
+    # The same manual; readings as for the 2F-85: no other source gives them.
+    stroke=Stroke(140.0, open_reading=3, closed_reading=228),
+    open_reading_max=6,
+    closed_reading_min=226,
+    speeds_mm_s=(30.0, 250.0),
+    forces_n=(10.0, 125.0),
+)
+"""The 2F-140."""
+HAND_E: Final = Model(
+    name="hand-e",
+    title="Hand-E",
+    axes=_JAW,
+    object_status=(reg.gOBJ,),
+    faults=_ADAPTIVE_FAULTS,
+    tcp=_GATEWAY,
+    rtu=_GATEWAY,
+    # Manual of the Hand-E, specifications; the 130 N are those of its example.
+    stroke=Stroke(50.0, open_reading=3, closed_reading=228),
+    open_reading_max=6,
+    closed_reading_min=226,
+    speeds_mm_s=(20.0, 150.0),
+    forces_n=(20.0, 130.0),
+)
+"""The Hand-E."""
+
+MODELS: Final = {model.name: model for model in (THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, HAND_E)}
+"""The models by name."""
+
+
+def model_of(value: object, name: str = "model") -> Model:
+    """A model, or the one with this name; None is the 3-Finger.
+
+    Raises:
+        TypeError: neither a Model nor a text.
+        ValueError: no model has this name.
+    """
+    if value is None:
+        return THREE_FINGER
+    if isinstance(value, Model):
+        return value
+    if not isinstance(value, str):
+        raise TypeError(f"{name} must be a Model or one of {', '.join(MODELS)}, got {value!r}")
+    if value.lower() not in MODELS:
+        raise ValueError(f"{name} must be one of {', '.join(MODELS)}, got {value!r:.100}")
+    return MODELS[value.lower()]
+
+
+def names_that_fit(registers: Registers) -> str:
+    """How to name a model that status registers do not contradict, for messages."""
+    fitting = [model.name for model in MODELS.values() if not model.contradiction(registers)]
+    return f"name its model: {' or '.join(f'?model={name}' for name in fitting)} at the end of the address"
