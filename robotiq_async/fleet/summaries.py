@@ -7,7 +7,8 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..values.enums import Fault, State
+from ..values.enums import State
+from ..values.model import model_of
 from .remote.mirror import AgentClock
 from .wire.names import GripperName
 from .wire.values import reading, words
@@ -46,7 +47,7 @@ class Summaries:
                 raise ValueError(f"no time: {stamp}, {age}")
             what = {
                 "state": State(told["state"]),
-                "fault": None if fault is None else Fault(fault),
+                "fault": None if fault is None else model_of(told.get("model")).fault(fault),
                 "is_moving": bool(told["is_moving"]),
                 "holder": None if told["holder"] is None else words(told["holder"]),
                 "problem": words(told["problem"]),

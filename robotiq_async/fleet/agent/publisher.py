@@ -96,6 +96,7 @@ class HandPublisher:
             sequence=0 if status is None else status.sequence,
             age=0.0 if status is None else stamp - status.timestamp,
             registers=None if status is None else status.registers,
+            model=self._hand.model,
         ).pack()
 
     def send_summary(self) -> None:
@@ -111,6 +112,7 @@ class HandPublisher:
             "stamp": stamp,
             "age": None if status is None else stamp - status.timestamp,
             "address": self._hand.address,
+            "model": self._hand.model.name,
             "state": self._hand.state.value,
             "fault": None if status is None else int(status.fault),
             "is_moving": self._is_moving(),

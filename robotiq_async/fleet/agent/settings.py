@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ...hand.robotiq_hand import RobotiqHand
-from ...values.enums import AXES
 from ...values.errors import RobotiqError
 from ...values.events import SentRequest
 from ..wire.settings import Setting
@@ -20,7 +19,8 @@ class RestoredSettings:
 
     def restore(self, settings: Mapping[Setting, int]) -> None:
         """Send these with the next command."""
-        self._missing.update(settings)
+        has = self._hand.model.all_axes
+        self._missing.update({each: value for each, value in settings.items() if each[0] in has})
 
     def merge(self, renewed: Mapping[Setting, int]) -> None:
         """Merge them into the command of this turn, which sets some of them anew."""
@@ -36,6 +36,6 @@ class RestoredSettings:
     def observe(self, what: object) -> None:
         """Forget them when an image with all of them is acknowledged."""
         if self._missing and isinstance(what, SentRequest) and what.acknowledged:
-            axes = dict(zip(AXES, what.request.axes, strict=True))
+            axes = dict(what.request.by_axis)
             if all(getattr(axes[axis], name) == value for (axis, name), value in self._missing.items()):
                 self._missing.clear()

@@ -219,7 +219,7 @@ class Mirror:
 
     def renumbered(self, status: RobotiqStatus) -> RobotiqStatus:
         """A status that came within an answer, numbered as ours are."""
-        return RobotiqStatus(status.registers, status.timestamp, self._base + status.sequence)
+        return RobotiqStatus(status.registers, status.timestamp, self._base + status.sequence, status.model)
 
     def begin(self, at: float) -> None:
         """The run begins: nothing is heard yet."""
@@ -275,7 +275,7 @@ class Mirror:
         for other in (self._pushed, newest):
             if other is not None:
                 at = max(at, other.timestamp) if other.sequence < sequence else min(at, other.timestamp)
-        return RobotiqStatus(message.registers, at, sequence)
+        return RobotiqStatus(message.registers, at, sequence, message.model)
 
     def _hand_on(self, event: Fields) -> None:
         with reading("an event"):

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, Final
 
-from ...values.enums import AXES, Finger
+from ...values.enums import Finger
 from ...values.errors import ControlLostError, NotStartedError, RobotiqError
 from ..network.bus import Urgency
 from ..wire.envelope import Call
@@ -41,9 +41,8 @@ class Outbox:
         if self._asked is None or not self._is_under_this_lease(self._asked):
             self.clear()
             self._asked = self._session.call()
-        for axis in AXES:
-            if axis in axes:
-                self._waiting.setdefault(axis, {}).update(changes)
+        for axis in axes:
+            self._waiting.setdefault(axis, {}).update(changes)
         self._send_next()
 
     def clear(self) -> None:

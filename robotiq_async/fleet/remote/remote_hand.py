@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Collection
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 from typing import Final, Literal
 
 from ...control.state_machine import RUNNING, refusal
@@ -23,6 +24,7 @@ from ...values.errors import (
     RobotiqConnectionError,
     StateTimeoutError,
 )
+from ...values.model import THREE_FINGER
 from ...values.move_result import MoveResult
 from ...values.statistics import Statistics
 from ...values.status import RobotiqStatus
@@ -104,7 +106,8 @@ class RemoteHand(Hand):
         self._gripper, self._route = parse_remote_address(address)
         self._connect_timeout = check_seconds("connect_timeout", connect_timeout, 0.1, 60.0)
         self._control = control
-        units = units_of(calibration, force_calibration)
+        units = partial(units_of, calibration, force_calibration)
+        units(THREE_FINGER)  # checks the calibrations
         super().__init__(str(self._gripper), units=units, keep_grip=check_flag("keep_grip", keep_grip))
         if bus is None:
             self._route.configuration()  # a malformed or unprotected route fails here, not at the start

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from ...values.checks import check_byte, check_mask
-from ...values.enums import AXES, Finger
+from ...values.enums import Finger
 from .values import Fields
 
 SETTINGS: Final = ("speed", "force")
@@ -46,7 +46,7 @@ def _by_axis(changed: Mapping[str, Any]) -> Iterator[tuple[Setting, int]]:
         for what in SETTINGS:
             if changes.get(what) is not None:
                 value = check_byte(what, changes[what])
-                yield from (((axis, what), value) for axis in AXES if axis in fingers)
+                yield from (((axis, what), value) for axis in fingers)
 
 
 def settings_fields(settings: Mapping[Setting, int]) -> Fields:

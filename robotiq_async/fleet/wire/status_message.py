@@ -5,7 +5,7 @@
 | B | version of the layout |
 | B | state, by its place in ``State`` |
 | B | flags: 1 a status was read, 2 the axes move, 4 somebody holds the lease |
-| x | |
+| B | model of the gripper, by its place in ``MODELS``: 0 is the 3-Finger |
 | I | which gripper: the CRC-32 of its base key |
 | I | number of the lease |
 | I | number of the newest event |
@@ -24,12 +24,14 @@ from typing import Final, NamedTuple
 
 from ...values.enums import State
 from ...values.errors import ProtocolError
+from ...values.model import MODELS, THREE_FINGER, Model
 from ...values.registers import Registers
 
-_LAYOUT: Final = struct.Struct("<BBBxIIIQQdf8H")
+_LAYOUT: Final = struct.Struct("<BBBBIIIQQdf8H")
 VERSION: Final = 1
 SIZE: Final = _LAYOUT.size
 _STATES: Final = tuple(State)
+_MODELS: Final = tuple(MODELS.values())
 _PLACES: Final = {state: place for place, state in enumerate(_STATES)}
 _READ, _MOVES, _HELD = 1, 2, 4
 _NO_REGISTERS: Final = (0,) * 8
@@ -50,6 +52,7 @@ class StatusMessage(NamedTuple):
         sequence: of the status, as the agent's hand counts; meaningless without registers.
         age: seconds from the gripper's reply to ``stamp``.
         registers: the status; None if none has been read yet.
+        model: of the gripper.
     """
 
     mark: int
@@ -63,15 +66,17 @@ class StatusMessage(NamedTuple):
     sequence: int
     age: float
     registers: Registers | None
+    model: Model = THREE_FINGER
 
     def pack(self) -> bytes:
         """The message as bytes."""
-        mark, epoch, stamp, state, lease, is_held, events, is_moving, sequence, age, registers = self
+        mark, epoch, stamp, state, lease, is_held, events, is_moving, sequence, age, registers, model = self
         flags = _READ * (registers is not None) | _MOVES * is_moving | _HELD * is_held
         return _LAYOUT.pack(
             VERSION,
             _PLACES[state],
             flags,
+            _MODELS.index(model),
             mark,
             lease,
             events,
@@ -91,9 +96,13 @@ def unpack(data: bytes) -> StatusMessage:
     """
     if len(data) != SIZE or data[0] != VERSION:
         raise ProtocolError(f"not a status of version {VERSION}: {data[:8].hex()} ({len(data)} bytes)")
-    _, place, flags, mark, lease, events, epoch, sequence, stamp, age, *registers = _LAYOUT.unpack(data)
+    _, place, flags, model, mark, lease, events, epoch, sequence, stamp, age, *registers = _LAYOUT.unpack(
+        data
+    )
     if place >= len(_STATES):
         raise ProtocolError(f"a status in a state that does not exist: {place}")
+    if model >= len(_MODELS):
+        raise ProtocolError(f"a status of a model that does not exist: {model}")
     if not (isfinite(stamp) and isfinite(age)):
         # What has been heard is told back with every request, and no older one counts after it.
         raise ProtocolError(f"a status at no time: {stamp}, {age} s old")
@@ -109,4 +118,5 @@ def unpack(data: bytes) -> StatusMessage:
         sequence=sequence,
         age=age,
         registers=tuple(registers) if flags & _READ else None,
+        model=_MODELS[model],
     )

@@ -20,6 +20,7 @@ from ...values.errors import (
     RobotiqError,
 )
 from ...values.events import SentRequest, Transition
+from ...values.model import model_of
 from ...values.move_result import MoveResult
 from ...values.request import Request
 from ...values.statistics import Statistics
@@ -68,7 +69,12 @@ def words(text: object) -> str:
 
 def status_fields(status: RobotiqStatus) -> Fields:
     """The object for a status."""
-    return {"registers": status.registers, "timestamp": status.timestamp, "sequence": status.sequence}
+    return {
+        "registers": status.registers,
+        "timestamp": status.timestamp,
+        "sequence": status.sequence,
+        "model": status.model.name,
+    }
 
 
 def read_status(fields: Mapping[str, Any], clock: Clock) -> RobotiqStatus:
@@ -78,7 +84,10 @@ def read_status(fields: Mapping[str, Any], clock: Clock) -> RobotiqStatus:
         KeyError, TypeError, ValueError: there is none.
     """
     return RobotiqStatus.from_registers(
-        fields["registers"], timestamp=clock(fields["timestamp"]), sequence=fields["sequence"]
+        fields["registers"],
+        timestamp=clock(fields["timestamp"]),
+        sequence=fields["sequence"],
+        model=model_of(fields.get("model")),
     )
 
 
@@ -98,7 +107,7 @@ def error_fields(error: Exception) -> Fields:
         allowed = getattr(error, "allowed", frozenset[State]())
         fields |= {"state": state.value, "allowed": sorted(each.value for each in allowed)}
     if fault is not None:
-        fields["fault"] = int(fault)
+        fields["fault"] = fault.value
     if status is not None:
         fields["status"] = status_fields(status)
     for name in _WORDS:
@@ -127,7 +136,8 @@ def _error(fields: Fields, clock: Clock) -> Exception:
         known["state"] = State(fields["state"])
         known["allowed"] = frozenset(map(State, fields["allowed"]))
     if issubclass(kind, GripperFaultError):
-        known["fault"] = Fault(fields["fault"])
+        value = fields["fault"]
+        known["fault"] = Fault(tuple(value) if isinstance(value, list) else value)  # type: ignore[arg-type]
     if issubclass(kind, MoveTimeoutError):
         known["status"] = read_status(fields["status"], clock)
     if issubclass(kind, ConnectFailedError):
@@ -204,6 +214,7 @@ def request_fields(sent: SentRequest) -> Fields:
     return {
         "kind": "request",
         "registers": sent.request.registers,
+        "model": sent.request.model.name,
         "timestamp": sent.timestamp,
         "acknowledged": sent.acknowledged,
     }
@@ -216,7 +227,7 @@ def read_request(fields: Mapping[str, Any], clock: Clock) -> SentRequest:
         KeyError, TypeError, ValueError: there is none.
     """
     return SentRequest(
-        request=Request.from_registers(fields["registers"]),
+        request=Request.from_registers(fields["registers"], model_of(fields.get("model"))),
         timestamp=clock(fields["timestamp"]),
         acknowledged=bool(fields["acknowledged"]),
     )
