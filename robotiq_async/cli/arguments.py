@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, make_dataclass
 from importlib.util import find_spec
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal
 
 from cyclopts import Parameter, Token
 
@@ -77,6 +77,11 @@ Fingers = Annotated[
 def _argument(option: Option) -> object:
     """The type of an argument that is an option of the hand."""
     low, high = option.low, option.high
+    if option.choices:
+        return Annotated[
+            Literal[option.choices] | None,
+            Parameter(help=f"{option.help} (default: that of the address, or {option.choices[0]})."),
+        ]
     if option.default is not None:
         return Annotated[float, Parameter(metavar="SECONDS", help=f"{option.help}, {low:g}..{high:g}.")]
     convert = _integer("the value", int(low), int(high))

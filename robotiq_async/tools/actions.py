@@ -13,7 +13,6 @@ from ..hand import Hand
 from ..runtime.clock import now
 from ..values.checks import check_byte
 from ..values.enums import (
-    AXES,
     DEFAULT_FORCE,
     DEFAULT_SPEED,
     FORCE_MAX,
@@ -26,7 +25,7 @@ from ..values.enums import (
     Initialization,
     State,
 )
-from ..values.errors import MoveSupersededError, NotStartedError
+from ..values.errors import MoveSupersededError, NotStartedError, RobotiqStateError
 from ..values.move_result import MoveResult
 
 CANCELS_RECOVERY: Final = frozenset({"halt", "reset", "release"})
@@ -214,10 +213,9 @@ class Operator:
 def describe(result: MoveResult) -> str:
     """Describe how a move ended: ``A at 241, B in contact at 130, C at 241; 2.31 s``."""
     ends = []
-    for axis in AXES:
-        if axis in result.outcomes:
-            how = " in contact" if axis in result.contacts else ""
-            ends.append(f"{axis.name}{how} at {result.positions[axis]}")
+    for axis, position in result.positions.items():
+        how = " in contact" if axis in result.contacts else ""
+        ends.append(f"{axis.name}{how} at {position}")
     return f"{', '.join(ends)}; {result.duration:.2f} s"
 
 
@@ -231,6 +229,8 @@ async def _close(hand: Hand) -> str:
 
 def _width(position: int) -> Callable[[Hand], Awaitable[str]]:
     async def run(hand: Hand) -> str:
+        if Finger.SCISSOR not in hand.model.all_axes:
+            raise RobotiqStateError(f"a {hand.model.title} has no scissor")
         return describe(await hand.move(position, Finger.SCISSOR))
 
     return run

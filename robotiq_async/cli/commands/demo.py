@@ -11,6 +11,7 @@ from types import ModuleType
 from typing import Final
 
 from ...hand import Hand
+from ..addresses import check_three_finger
 from ..arguments import Address, Flag, Yes, need
 from ..browser import opened
 from ..consent import consent
@@ -39,6 +40,7 @@ def demo(
         yes: Do not ask.
         show: Show the hand on a page in the browser while it moves; it only looks.
     """
+    check_three_finger(address)
     program = _program()
     if show:
         need("nicegui", "web")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -11,6 +11,7 @@ from ...link.serial_ports import why_no_port
 from ...runtime.sockets import is_loopback
 from ...values.enums import Finger
 from ...values.errors import RobotiqError
+from ...values.model import model_of
 from ...values.registers import RTU_REGISTERS
 from ..arguments import Byte, Flag, Host, Port, Unit
 from ..failures import usage
@@ -24,6 +25,7 @@ async def simulate(
     *,
     port: Port = 5020,
     host: Host = "127.0.0.1",
+    model: Literal["3f", "2f85", "2f140", "hand-e"] = "3f",
     speedup: Annotated[float, Parameter(metavar="FACTOR")] = 1.0,
     like_hardware: Annotated[bool, Parameter(negative="--plain", show_default=False)] = True,
     exact: Flag = False,
@@ -60,6 +62,7 @@ async def simulate(
         robotiq-async simulate
         robotiq-async simulate --port 5021 --speedup 10 --object 150
         robotiq-async simulate --plain
+        robotiq-async simulate --model 2f85 --rtu-over-tcp
         robotiq-async simulate --serial /dev/pts/3
         robotiq-async simulate --serial /dev/pts/3 --device-id 12
         robotiq-async simulate --rtu-over-tcp --port 54321
@@ -69,6 +72,7 @@ async def simulate(
     Args:
         port: TCP port; 0 takes a free one.
         host: Interface to listen on. Modbus knows no password: whoever reaches the port is in command.
+        model: Which gripper: a 3-Finger, 2F-85, 2F-140 or Hand-E.
         speedup: How many times faster than the clock the simulated time runs.
         like_hardware: Have the habits of real grippers (the default), or with --plain none.
         exact: Stop exactly where it is told to, which no real gripper does.
@@ -96,7 +100,10 @@ async def simulate(
     with usage():
         plan = parse_troubles("\n".join(trouble or ()))
         gripper = SimulatedGripper(
-            speedup=speedup, spread=not exact, habits=OWN_HABITS if like_hardware else None
+            speedup=speedup,
+            spread=not exact,
+            habits=OWN_HABITS if like_hardware else None,
+            model=model_of(model),
         )
         _place(gripper, object_, fixed=fixed)
         if serial is not None and rtu_over_tcp:

@@ -15,7 +15,7 @@ from ...fleet.network.route import is_remote
 from ...link.address import parse_address
 from ...link.simulation import Simulation
 from ...runtime.concurrency import wait_shielded
-from ..addresses import gripper_words
+from ..addresses import check_three_finger, gripper_words
 from ..arguments import Address, Stage, need
 from ..failures import CommandError, UsageError, usage
 from ..keyboard import Keyboard, has_terminal, wrapped
@@ -79,6 +79,7 @@ async def verify(
         raise UsageError(
             "without a terminal to ask at, and to stop at, this needs --up-to and --yes-to, both at most 2"
         )
+    check_three_finger(address)
     with usage():
         parsed = parse_address(address)
     need("mcap", "record")

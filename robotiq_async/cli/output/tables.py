@@ -9,7 +9,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from ...values.enums import AXES, Fault, Finger
+from ...values.enums import Fault, Finger
 from .text import axis_words
 
 if TYPE_CHECKING:
@@ -30,9 +30,9 @@ def print_status(hand: Hand) -> None:
             axis_words(last.axis_state(axis)),
             last.current_ma(axis),
         )
-        for axis in AXES
+        for axis in last.model.axes
     ]
-    _print_table(("position", "requested", "state", "mA"), AXES, rows)
+    _print_table(("position", "requested", "state", "mA"), last.model.axes, rows)
 
 
 def _activation(status: RobotiqStatus) -> str:
@@ -43,7 +43,7 @@ def _activation(status: RobotiqStatus) -> str:
 
 def print_outcomes(result: MoveResult) -> None:
     """Print a row for every axis of the move, then how long it took."""
-    axes = [axis for axis in AXES if axis in result.outcomes]
+    axes = list(result.outcomes)
     rows = [
         (result.positions[axis], result.outcomes[axis].name, result.peak_current_ma[axis]) for axis in axes
     ]

@@ -7,13 +7,13 @@ from datetime import datetime
 from typing import Any, Final
 
 from ...tools.recording.payloads import Fields
-from ...values.enums import AXES, State
+from ...values.enums import Finger, State
 from ...values.status import NO_REQUEST
 from ...values.trigger import Trigger
 
 NOTHING: Final = "-"
 """Stands for what means nothing."""
-_NAMES: Final = [str(axis.name) for axis in AXES]
+_NAMES: Final = [str(axis.name) for axis in Finger.ALL]
 
 
 def clock(seconds: float) -> str:
@@ -21,9 +21,13 @@ def clock(seconds: float) -> str:
     return f"{datetime.fromtimestamp(seconds).astimezone():%H:%M:%S.%f}"[:-3]
 
 
+def _axes_in(fields: Fields) -> list[str]:
+    return [name for name in _NAMES if name in fields]
+
+
 def status_line(fields: Fields) -> str:
     """The line for a status: where every axis is, and what it does."""
-    axes = (f"{n}={fields[n]['position']} {axis_words(fields[n]['axis_state'])}" for n in _NAMES)
+    axes = (f"{n}={fields[n]['position']} {axis_words(fields[n]['axis_state'])}" for n in _axes_in(fields))
     return f"status   {' '.join(axes)}"
 
 
@@ -34,7 +38,9 @@ def axis_words(state: str) -> str:
 
 def command_line(fields: Fields) -> str:
     """The line for a request that was written."""
-    axes = (f"{n}={fields[n]['position']}@{fields[n]['speed']}/{fields[n]['force']}" for n in _NAMES)
+    axes = (
+        f"{n}={fields[n]['position']}@{fields[n]['speed']}/{fields[n]['force']}" for n in _axes_in(fields)
+    )
     bits = f"act={fields['activate']:d} go={fields['go']:d} release={fields['release']:d}"
     return f"command  {bits} {' '.join(axes)}{'' if fields['acknowledged'] else ' NOT ACKNOWLEDGED'}"
 

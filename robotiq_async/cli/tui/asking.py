@@ -12,7 +12,7 @@ from typing import Final, Protocol
 from rich.text import Text
 
 from ...runtime.clock import now
-from ...values.enums import AXES, CLOSED, Finger
+from ...values.enums import CLOSED, Finger
 
 READING_S: Final = 0.3
 """A yes counts only after this time: it may have been typed before the question could be read."""
@@ -85,7 +85,7 @@ class Target:
     def text(self) -> Text:
         """What has been chosen so far, and the keys."""
         text = Text("move axes to a position\n\naxes     ", "bold")
-        for axis in AXES:
+        for axis in Finger.ALL:
             text.append(str(axis.name), "reverse" if axis in self._axes else "dim not bold")
             text.append(" ")
         text.append(f"\nposition {self._digits}", "bold")

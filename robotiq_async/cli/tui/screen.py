@@ -20,7 +20,7 @@ from ...runtime.clock import now
 from ...tools.actions import ACTIONS, Operator
 from ...tools.recording.payloads import fault_fields, title
 from ...tools.wording import refusal_words
-from ...values.enums import AXES, Fault, Finger, State
+from ...values.enums import Fault, Finger, State
 from ...values.errors import RobotiqError
 from ...values.status import RobotiqStatus
 from ..output.text import clock, event_line
@@ -96,7 +96,7 @@ class Monitor(App[None]):
         self._fault = Fault.NONE
         # Held here and not looked up: a paint may come when the screen is already being taken down.
         self._top = Line(id="state")
-        self._axes = Axes()
+        self._axes = Axes(operator.hand.model)
         self._figures = Line(id="link")
         self._question = Static(id="question")
         self.asking: Asking | None = None
@@ -149,10 +149,10 @@ class Monitor(App[None]):
         self._paint_state()
 
     def _see(self, statuses: Iterable[RobotiqStatus]) -> None:
-        peaks = dict.fromkeys(AXES, -1)
+        peaks = dict.fromkeys(self._hand.model.axes, -1)
         for status in statuses:
             self._newest = status
-            for axis in AXES:
+            for axis in peaks:
                 peaks[axis] = max(peaks[axis], status.current_ma(axis))
             if status.fault != self._fault:
                 self._fault = status.fault

@@ -11,7 +11,8 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from ...tools.wording import STATE_WORDS
-from ...values.enums import AXES, Fault, Finger, ObjectStatus, Severity, State
+from ...values.enums import Fault, Finger, ObjectStatus, Severity, State
+from ...values.model import Model
 from ...values.statistics import Statistics
 from ...values.status import NO_REQUEST, RobotiqStatus
 from ..output.text import NOTHING
@@ -55,17 +56,17 @@ class Axes(Widget):
     paints is the one that polls.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, model: Model) -> None:
         super().__init__(id="axes")
-        self._status = RobotiqStatus((0,) * 8)
-        self._currents = {axis: deque([0] * HISTORY, maxlen=HISTORY) for axis in AXES}
-        self._still = dict.fromkeys(AXES, STILL)
+        self._status = RobotiqStatus((0,) * 8, model=model)
+        self._currents = {axis: deque([0] * HISTORY, maxlen=HISTORY) for axis in model.axes}
+        self._still = dict.fromkeys(model.axes, STILL)
         """Number of paints since the position of an axis changed."""
         self._stale = False
 
     def show(self, status: RobotiqStatus, peaks_ma: Mapping[Finger, int]) -> None:
         """Show a status, and the highest currents since the last paint; -1 where there was no status."""
-        for axis in AXES:
+        for axis in status.model.axes:
             self._currents[axis].append(peaks_ma[axis])
             same = status.position(axis) == self._status.position(axis)
             self._still[axis] = self._still[axis] + 1 if same else 0
@@ -84,7 +85,7 @@ class Axes(Widget):
         bar = max((self.size.width - FIXED) // 2, 8)
         where, current = (f"{words:{bar}.{bar}}" for words in ("is █, asked ▼", "current, 5 s"))
         head = Text(f"axis     {where}   counts   {'':15} {current}      now", "dim")
-        lines = [head, *(self._line(axis, bar) for axis in AXES)]
+        lines = [head, *(self._line(axis, bar) for axis in self._status.model.axes)]
         text = Text("\n", no_wrap=True, overflow="crop").join(lines)
         if self._stale:
             text.stylize("dim")

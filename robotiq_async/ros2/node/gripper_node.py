@@ -18,6 +18,7 @@ from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
 from ...values.errors import RobotiqError
+from ...values.model import THREE_FINGER
 from ..gripper.connection import COMMANDS, Connection, RefusedError
 from ..gripper.hands import make_hand
 from ..translation.description import robot_description
@@ -147,6 +148,8 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
     async def _connect(self, connection: Connection, joints: JointStates, rate: float) -> None:
         try:
             await connection.open()
+            if (model := connection.hand.model) is not THREE_FINGER:
+                raise RobotiqError(f"this is a {model.title}: the node has the joints of the 3-Finger")
             await self._publishing.start(connection, joints, rate)
         except BaseException:
             await self._disconnect(connection, "the configuration failed")

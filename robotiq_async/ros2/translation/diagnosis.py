@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 from ...hand import Hand
-from ...values.enums import AXES, Severity
+from ...values.enums import Severity
 from ...values.errors import NotStartedError
 from ...values.status import RobotiqStatus
 from .readiness import is_connected
@@ -81,7 +81,7 @@ def _gripper(hand: Hand) -> Diagnosis:
     if status is None or not is_connected(hand):
         return Diagnosis("gripper", Level.STALE, "unknown: the link is down")
     values = {"state": hand.state.name, "fault": f"0x{int(status.fault):02X}"}
-    for axis in AXES:
+    for axis in status.model.axes:
         values[f"{axis.name} position"] = str(status.position(axis))
         values[f"{axis.name} state"] = status.axis_state(axis)
         values[f"{axis.name} current [mA]"] = str(status.current_ma(axis))

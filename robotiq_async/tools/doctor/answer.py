@@ -21,6 +21,7 @@ from ...values.errors import (
     ResponseTimeoutError,
     RobotiqConnectionError,
 )
+from ...values.model import model_of
 from ...values.registers import RTU_REGISTERS, STATUS_RESERVED, TCP_REGISTERS, RegisterMap
 from ...values.status import RobotiqStatus
 from .findings import Finding, GiveUpError, Level, Report
@@ -132,7 +133,7 @@ async def _other_frames(address: Address) -> str:
 
 def _link(address: Address, registers: RegisterMap, patience: float) -> Link:
     if address.kind == "sim":
-        gripper = new_gripper(address.simulation)
+        gripper = new_gripper(address.simulation, model_of(address.model))
         return SimulatedTransport(gripper, registers, connect_timeout=REACH_S, response_timeout=patience)
     return ModbusTransport(address, registers, connect_timeout=REACH_S, response_timeout=patience)
 

@@ -20,6 +20,8 @@ from ...session.options import (
 )
 from ...values.enums import Severity
 from ...values.errors import ConnectionLostError, RobotiqConnectionError
+from ...values.model import Model, model_of, names_that_fit
+from ...values.registers import Registers
 from ...values.statistics import percentile
 from ...values.status import RobotiqStatus
 from .answer import REACH_S, find_gripper, long_enough
@@ -45,7 +47,7 @@ async def examine(address: Address, report: Report, *, device_id: int | None = N
     Raises:
         ValueError: a unit id that no unit on such a link can have.
     """
-    registers = registers_of(address, device_id=device_id)
+    registers, model = registers_of(address, device_id=device_id), model_of(address.model)
     try:
         if address.is_socket:
             await _resolve(address, report)
@@ -54,7 +56,8 @@ async def examine(address: Address, report: Report, *, device_id: int | None = N
             if address.kind == "rtu":
                 report_adapter(address, report)
             await _timing(link, SERIAL_POLL_INTERVAL_S if address.is_rtu else POLL_INTERVAL_S, report)
-            report_state(RobotiqStatus.from_registers(await link.read()), report)
+            _check_model(model, await link.read(), report)
+            report_state(RobotiqStatus.from_registers(await link.read(), model=model), report)
             await _others(link, report)
         finally:
             await link.close()
@@ -65,6 +68,19 @@ async def examine(address: Address, report: Report, *, device_id: int | None = N
         if isinstance(error, ConnectionLostError):
             advice = "It hung up: it may serve one client at a time, and another has come. Or it lost power."
         report(Finding(Level.BAD, "link", f"lost during the examination: {error}", advice))
+
+
+def _check_model(model: Model, registers: Registers, report: Report) -> None:
+    """Report registers that only another model can show.
+
+    Raises:
+        GiveUpError: they are such: what they mean cannot be told.
+    """
+    if not (why := model.contradiction(registers)):
+        return
+    advice = f"{names_that_fit(registers).capitalize()}."
+    report(Finding(Level.BAD, "model", f"this is no {model.title}: its registers show {why}", advice))
+    raise GiveUpError
 
 
 async def _resolve(address: Address, report: Report) -> None:

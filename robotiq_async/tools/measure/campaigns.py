@@ -31,6 +31,7 @@ from ...values.calibration.csv_tables import (
 )
 from ...values.enums import Finger
 from ...values.errors import MeasuringError
+from ...values.model import THREE_FINGER
 
 REST_S: Final = 0.3
 """Between two runs, in the gripper's time: a finger that has just stopped may still swing."""
@@ -38,9 +39,8 @@ ATTEMPTS: Final = 20
 """Attempts at a run: one in which the event loop was blocked is repeated."""
 TOLERATED: Final = 0.01
 """Share of a run for which it may have been blocked, apart from two polls."""
-OPEN_BELOW: Final = 12
-CLOSED_ABOVE: Final = 234
-"""Limits, in counts, of a full closing; open reads 6-7, closed 240 or more."""
+SLACK: Final = 5
+"""Counts by which the readings of a full closing may miss those that the manual gives."""
 GRASP_S: Final = 1.0
 """How long a grasp is recorded after the fingers have stopped, in the gripper's time."""
 CURRENT_MA: Final = 2550
@@ -89,6 +89,7 @@ async def time_closing(hand: Hand, speed: int, fingers: Finger, speedup: float =
     """
     if Finger.SCISSOR in fingers:
         raise ValueError("fingers must be A, B and C only, got the scissor: it has a different stroke")
+    open_below, closed_above = hand.model.open_reading_max + SLACK, hand.model.closed_reading_min - SLACK
     for _ in range(ATTEMPTS):
         opened = await hand.open(fingers, speed=255)
         await asyncio.sleep(REST_S / speedup)
@@ -98,7 +99,7 @@ async def time_closing(hand: Hand, speed: int, fingers: Finger, speedup: float =
             if result.object_detected:
                 what = f"the fingers met something ({result.contacts!r})"
                 raise MeasuringError(f"{what}: nothing may be in their way")
-        if max(opened.positions.values()) > OPEN_BELOW or min(closed.positions.values()) < CLOSED_ABOVE:
+        if max(opened.positions.values()) > open_below or min(closed.positions.values()) < closed_above:
             raise MeasuringError(
                 f"no full closing: from {dict(opened.positions)} to {dict(closed.positions)}"
             )
@@ -152,6 +153,9 @@ def _watching(
 ) -> Iterator[None]:
     """Sample the currents at every poll of a block."""
     statuses = hand.statuses(buffer=10_000)
+
+    if hand.model is not THREE_FINGER:
+        raise MeasuringError(f"this measures three fingers, and a {hand.model.title} has one axis")
 
     async def watch() -> None:
         async for status in statuses:

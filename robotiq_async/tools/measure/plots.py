@@ -160,6 +160,8 @@ def plot_recording(path: Path, entries: Iterable[Entry]) -> list[Path]:
 
     def take(status: dict[str, Any]) -> None:
         for axis, columns in drawn.items():
+            if axis != "A" and axis not in status:
+                continue  # of a sibling of the 3-Finger, which has the one
             for what, column in columns.items():
                 column.append(status[axis][what])
 
@@ -181,6 +183,8 @@ def plot_recording(path: Path, entries: Iterable[Entry]) -> list[Path]:
         for (name, width), colour in zip(WIDTHS.items(), (*COLOURS, "0.5"), strict=True):
             line: Any = {"color": colour, "lw": width}
             dotted: Any = {"color": colour, "lw": 0.8, "ls": ":", "drawstyle": "steps"}
+            if not drawn[name]["position"]:
+                continue
             positions.plot(seconds, drawn[name]["position"], label=name, **line)
             positions.plot(seconds, drawn[name]["requested_position"], **dotted)
             currents.plot(seconds, drawn[name]["current_ma"], **line)

@@ -20,6 +20,7 @@ from ...session.streams import Stream
 from ...values.enums import Fault
 from ...values.errors import RobotiqConnectionError
 from ...values.events import SentRequest, Transition
+from ...values.model import THREE_FINGER
 from ...values.status import RobotiqStatus
 from ..description.joint_states import SCHEMA, SCHEMA_NAME, JointStateEncoder
 from ..description.kinematics import joint_angles, joint_velocities
@@ -189,7 +190,8 @@ class Feed:
     def _publish_status(self, status: RobotiqStatus) -> None:
         stamp, data = self.nanoseconds(status.timestamp), compact(status.as_dict())
         self._publish(Message(STATUS, stamp, data, status.sequence))
-        self._publish_joints(status)
+        if status.model is THREE_FINGER:  # the joints of its siblings have no description yet
+            self._publish_joints(status)
         if status.fault != self._fault:
             self._fault = status.fault
             self._publish_json(EVENT, status.timestamp, fault_fields(status))

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from ...hand import Hand
-from ...values.enums import AXES, Fault, Finger, State
+from ...values.enums import Fault, Finger, State
 from ...values.errors import NotStartedError
 from ...values.events import Transition
 from ...values.status import RobotiqStatus
@@ -28,7 +28,7 @@ def _object(**properties: object) -> dict[str, object]:
 
 
 def _for_each_axis(**properties: object) -> dict[str, object]:
-    return {str(axis.name): _object(**properties) for axis in AXES}
+    return {str(axis.name): _object(**properties) for axis in Finger.ALL}
 
 
 _FAULT: Final = {

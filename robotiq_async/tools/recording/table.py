@@ -16,6 +16,8 @@ from .payloads import SCHEMAS, Fields
 _SECOND: Final = 10**9
 _FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
 """A spreadsheet takes a text that begins so for a formula."""
+_MAY_LACK: Final = ("B", "C", "SCISSOR")
+"""The axes that a sibling of the 3-Finger does not have."""
 STATE: Final = "state"
 """The column of a status that is not in its JSON: the state of the hand as of the last event."""
 
@@ -74,6 +76,8 @@ def _value(fields: Fields, name: str, kind: str) -> Any:  # noqa: ANN401  # as J
     axis, _, key = name.rpartition(".")
     if kind == "event":
         return fields.get(name)
+    if axis not in fields and axis in _MAY_LACK:
+        return None
     return fields[axis][key] if axis else fields[name]
 
 

@@ -9,6 +9,7 @@ from typing import Final
 from ...link.address import Address
 from ...link.modbus import ModbusTransport
 from ...session.options import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S, SERIAL_POLL_INTERVAL_S
+from ...values.model import Model, model_of
 from ...values.registers import RegisterMap
 from ...values.status import RobotiqStatus
 from .catalogue import CATALOGUE, NO_OPTIONS, Check, EndError, Figure, Options, Verdict
@@ -68,6 +69,11 @@ class Bench:
     found: RobotiqStatus | None = None
     spacing: float = SPACING_S
     is_active: bool = False
+
+    @property
+    def model(self) -> Model:
+        """The model that the address names."""
+        return model_of(self.address.model)
 
     @property
     def interval(self) -> float:

@@ -6,7 +6,7 @@ import asyncio
 from typing import Final
 
 from ...session.gripper_link import registers_of
-from ...values.enums import AXES, Fault
+from ...values.enums import Fault
 from ...values.registers import STATUS_RESERVED
 from ...values.status import RobotiqStatus
 from ..doctor.answer import find_gripper
@@ -55,8 +55,9 @@ def why_no_gripper(status: RobotiqStatus) -> str:
         return f"a fault code that the manual does not assign: {words}"
     if not status.activation_echo and not status.is_reset:
         return f"gIMC says active or activating while gACT is 0: {words}"
+    axes = status.model.axes
     if (
-        len({status.position(axis) for axis in AXES} | {status.requested_position(axis) for axis in AXES})
+        len({status.position(axis) for axis in axes} | {status.requested_position(axis) for axis in axes})
         == 1
     ):
         return f"every position and every request read the same: {words}"
@@ -81,7 +82,7 @@ async def see_that_it_may_be_written_to(bench: Bench) -> RobotiqStatus:
             raise EndError(
                 "refused", "another client commands the gripper: its requests change. Stop that one."
             )
-        if any(abs(last.position(axis) - first.position(axis)) > STILL_COUNTS for axis in AXES):
+        if any(abs(last.position(axis) - first.position(axis)) > STILL_COUNTS for axis in last.model.axes):
             raise EndError("refused", "the fingers move: wait until they stand, and find out who moves them")
         not_ready = not_ready + 1 if last.fault is Fault.COMMUNICATION_NOT_READY else 0
     bench.link.expect(last.echo)

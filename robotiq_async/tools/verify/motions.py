@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
-from ...values.enums import AXES, Finger
+from ...values.enums import Finger
 from ...values.request import AxisRequest, Request
 from ...values.status import RobotiqStatus
 from .catalogue import EndError
@@ -23,20 +23,20 @@ ACTIVATION_S: Final = 60.0
 
 def standing(status: RobotiqStatus, *, speed: int = 0, force: int = 0, go: bool = False) -> Request:
     """The image that asks every axis to be where it is."""
-    axes = tuple(AxisRequest(status.position(axis), speed, force) for axis in AXES)
-    return Request(activate=True, go=go, mode=status.mode, axes=axes)
+    axes = tuple(AxisRequest(status.position(axis), speed, force) for axis in status.model.axes)
+    return Request(activate=True, go=go, mode=status.mode, axes=axes, model=status.model)
 
 
 def as_found(status: RobotiqStatus) -> Request:
     """The image nearest to what is in force, with rGTO = 0: speeds and forces cannot be read back."""
-    axes = tuple(AxisRequest(status.requested_position(axis)) for axis in AXES)
-    return Request(activate=status.activation_echo, mode=status.mode, axes=axes)
+    axes = tuple(AxisRequest(status.requested_position(axis)) for axis in status.model.axes)
+    return Request(activate=status.activation_echo, mode=status.mode, axes=axes, model=status.model)
 
 
 def way(status: RobotiqStatus, targets: Mapping[Finger, int]) -> dict[Finger, tuple[int, int]]:
     """The envelope of a motion from a status to targets; the other axes stay."""
     envelope = {}
-    for axis in AXES:
+    for axis in status.model.axes:
         now = status.position(axis)
         target = targets.get(axis, now)
         aside = MARGIN if axis in targets else ASIDE

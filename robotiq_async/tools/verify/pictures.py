@@ -14,7 +14,7 @@ except ModuleNotFoundError as error:
 
     raise ImportError(f"pictures need matplotlib: {install('plot')}") from error
 
-from ...values.enums import AXES, CLOSED, Finger, ObjectStatus
+from ...values.enums import CLOSED, Finger, ObjectStatus
 from ...values.request import Request
 from ...values.status import RobotiqStatus
 from .recording import Segment, segments
@@ -98,7 +98,7 @@ def _activation(axes: tuple[Axes, ...], segment: Segment) -> bool:
 
 
 def _positions(axis: Axes, times: list[float], shown: list[RobotiqStatus]) -> None:
-    for each in AXES:
+    for each in shown[0].model.axes if shown else ():
         axis.plot(times, [status.position(each) for status in shown], lw=1, label=each.name)
     axis.set_ylabel("position, counts")
     axis.legend()
@@ -138,7 +138,7 @@ def _motion_from_rest(segment: Segment) -> tuple[float, Finger] | None:
     for sent, request in segment.commands:
         before = [status for seconds, status in segment.statuses if seconds < sent][-1:]
         for status in before if request.go else []:
-            for axis in AXES:
+            for axis in status.model.axes:
                 if abs(request.position(axis) - status.position(axis)) > FAR:
                     if status.go_echo and status.finger_status(axis) is ObjectStatus.AT_POSITION:
                         return sent, axis

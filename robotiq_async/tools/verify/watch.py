@@ -9,7 +9,7 @@ import asyncio
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from ...values.enums import AXES, Fault, Finger
+from ...values.enums import Fault, Finger
 from ...values.request import Request
 from ...values.status import RobotiqStatus
 from .catalogue import EndError
@@ -19,7 +19,7 @@ from .recorded_link import RecordedLink
 Envelope = Mapping[Finger, tuple[int, int]]
 """The lowest and the highest position that each axis may have."""
 
-ANYWHERE: Final[Envelope] = dict.fromkeys(AXES, (0, 255))
+ANYWHERE: Final[Envelope] = dict.fromkeys(Finger.ALL, (0, 255))
 LASTING: Final = 3
 """Reads in which 0x09 must be seen to be a fault: siblings show it once after a second of silence."""
 SLICE_S: Final = 0.05
@@ -122,7 +122,7 @@ class Watch:
 
         def stands(status: RobotiqStatus) -> bool:
             nonlocal positions, since
-            now = [status.position(axis) for axis in AXES]
+            now = [status.position(axis) for axis in status.model.axes]
             if now != positions:
                 positions, since = now, self._loop.time()
             return self._loop.time() - since >= STILL_S
@@ -204,6 +204,6 @@ def words_of(status: RobotiqStatus) -> str:
     else:
         words = "activating or changing its mode" if status.activation_echo else "not active"
     go = "rGTO is set" if status.go_echo else "rGTO is clear"
-    where = ", ".join(f"{axis.name} {status.position(axis)}" for axis in AXES)
+    where = ", ".join(f"{axis.name} {status.position(axis)}" for axis in status.model.axes)
     fault = "" if status.fault is Fault.NONE else f", fault 0x{int(status.fault):02X}"
     return f"{words}{fault}, {go}, positions {where}"

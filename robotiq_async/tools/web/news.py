@@ -10,7 +10,7 @@ from typing import Final
 from ...hand import Hand
 from ...runtime.clock import now
 from ...session.streams import Stream
-from ...values.enums import AXES, Fault, State
+from ...values.enums import Fault, State
 from ...values.errors import NotStartedError
 from ...values.events import Transition
 from ...values.status import RobotiqStatus
@@ -37,7 +37,7 @@ class HandNews:
         self._statuses: Stream[RobotiqStatus]
         self._transitions: Stream[Transition]
         self._events: deque[Fields] = deque(maxlen=EVENTS)
-        self._peaks = [0] * len(AXES)
+        self._peaks = [0] * len(hand.model.axes)
         self._fault = Fault.NONE
         self._counted_at = 0.0
         self.open()
@@ -50,9 +50,8 @@ class HandNews:
     def gather(self) -> None:
         """Take in what has happened; to be called often."""
         for status in self._statuses.drain():
-            self._peaks = [
-                max(peak, status.current_ma(axis)) for peak, axis in zip(self._peaks, AXES, strict=True)
-            ]
+            currents = [status.current_ma(axis) for axis in status.model.axes]
+            self._peaks = [max(pair) for pair in zip(self._peaks, currents, strict=True)]
             if status.fault != self._fault:
                 self._fault = status.fault
                 self._events.append(_stamped(fault_fields(status)))
@@ -77,7 +76,7 @@ class HandNews:
             **dict(self._statistics()),
         }
         self._events.clear()
-        self._peaks = [0] * len(AXES)
+        self._peaks = [0] * len(self._peaks)
         return fields
 
     def _newest(self) -> Fields:
@@ -86,6 +85,7 @@ class HandNews:
         except NotStartedError:
             return {}
         return {
+            "model": status.model.name,
             "registers": status.registers,
             "timestamp": status.timestamp,
             "sequence": status.sequence,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from ....session.options import ACTIVATION_TIMEOUT_S
-from ....values.enums import AXES, ObjectStatus
+from ....values.enums import ObjectStatus
 from ..bench import Bench
 from ..motions import ACTIVATION_S, activate
 
@@ -30,7 +30,9 @@ async def activation(bench: Bench) -> None:
         follows = f"A hand waits {waits:g} s; others may wait less."
         bench.differs("activation.time", found, follows, options, seconds=took)
     words = f"registers {status.registers[0]:04X} {status.registers[1]:04X}"
-    if not status.go_echo and all(status.finger_status(axis) is ObjectStatus.IN_MOTION for axis in AXES):
+    if not status.go_echo and all(
+        status.finger_status(axis) is ObjectStatus.IN_MOTION for axis in status.model.axes
+    ):
         bench.as_assumed("activation.words", words)
     else:
         follows = (

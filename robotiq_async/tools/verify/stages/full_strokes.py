@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Final
 
 from ....values.calibration.closing_time import closing_time
-from ....values.enums import CLOSED, OPEN, OPEN_READING, STROKE_COUNTS, Finger, ObjectStatus
+from ....values.enums import CLOSED, OPEN, Finger, ObjectStatus
 from ....values.request import Request
 from ....values.status import RobotiqStatus
 from ..bench import Bench
@@ -24,7 +24,6 @@ READ_S: Final = 0.01
 SCISSOR_SPEED: Final = 64
 SHARE: Final = 0.2
 CLOSED_AT_LEAST: Final = 240
-OPEN_AT_MOST: Final = OPEN_READING + 1
 PART_OF_STROKE: Final = 0.9
 
 
@@ -111,14 +110,16 @@ def _judge_times(bench: Bench, times: dict[int, float]) -> None:
 
 
 def _judge_readings(bench: Bench, readings: list[list[int]]) -> None:
+    model = bench.model
     opened = sorted({each for row in readings for each in row[: len(FINGERS)]})
     closed = sorted({each for row in readings for each in row[len(FINGERS) :]})
     words = f"open {opened[0]} to {opened[-1]}, closed {closed[0]} to {closed[-1]}"
     figures: dict[str, Figure] = {"open": list(opened), "closed": list(closed)}
-    is_usual = opened[0] >= OPEN_READING and opened[-1] <= OPEN_AT_MOST and closed[0] >= CLOSED_AT_LEAST
+    is_usual = opened[0] >= model.stroke.open_reading and opened[-1] <= model.open_reading_max
+    is_usual = is_usual and closed[0] >= model.closed_reading_min
     if is_usual:
         bench.as_assumed("stroke.readings", words, **figures)
-    elif closed[0] - opened[-1] < PART_OF_STROKE * STROKE_COUNTS:
+    elif closed[0] - opened[-1] < PART_OF_STROKE * model.stroke.counts:
         bench.untold("stroke.readings", f"{words}: something was in the way, or the scissor was", **figures)
     else:
         follows = "Nothing is to be set: a hand goes by gDT and not by readings. Please report."

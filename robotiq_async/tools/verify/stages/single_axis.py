@@ -6,7 +6,7 @@ import asyncio
 from dataclasses import dataclass, field
 from typing import Final
 
-from ....values.enums import AXES, Finger, ObjectStatus
+from ....values.enums import Finger, ObjectStatus
 from ....values.request import Request
 from ....values.status import RobotiqStatus
 from ..bench import Bench
@@ -45,7 +45,7 @@ class _Found:
 async def single_axis(bench: Bench) -> None:
     """Each axis there and back; the person says which finger it was."""
     found = _Found()
-    for axis in AXES:
+    for axis in bench.model.axes:
         await _there_and_back(bench, axis, found)
         question = "Which finger has moved, there and back?"
         answer = await bench.person.chooses(question, ANSWERS)

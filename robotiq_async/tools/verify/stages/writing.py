@@ -6,7 +6,7 @@ import asyncio
 from typing import Final
 
 from ....session.options import LONGEST_SPACING_S, WRITE_SPACING_S
-from ....values.enums import AXES, Finger
+from ....values.enums import Finger
 from ....values.request import Request
 from ....values.statistics import percentile
 from ....values.status import RobotiqStatus
@@ -76,7 +76,7 @@ async def _still(bench: Bench, watch: Watch, image: Request) -> None:
     def moves(status: RobotiqStatus) -> bool:
         moved.extend(
             f"{axis.name} from {before.position(axis)} to {status.position(axis)}"
-            for axis in AXES
+            for axis in status.model.axes
             if abs(status.position(axis) - before.position(axis)) > 1
         )
         return bool(moved)

@@ -6,11 +6,12 @@ import json
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from itertools import count
+from itertools import count, zip_longest
 from time import monotonic
 from typing import Any, Final
 
-from ....values.enums import AXES, DEFAULT_FORCE, DEFAULT_SPEED, State
+from ....values.enums import DEFAULT_FORCE, DEFAULT_SPEED, State
+from ....values.model import THREE_FINGER, Model, model_of
 from ....values.status import RobotiqStatus
 
 HISTORY_S: Final = 30.0
@@ -63,9 +64,14 @@ class HandMirror:
     statistics: dict[str, Any] = field(default_factory=dict)
     samples: deque[Sample] = field(default_factory=deque)
     events: deque[tuple[int, dict[str, Any]]] = field(default_factory=lambda: deque(maxlen=EVENTS))
-    peaks: list[int] = field(default_factory=lambda: [0] * len(AXES))
+    peaks: list[int] = field(default_factory=list)
     changes: int = 0
     event_count: int = 0
+
+    @property
+    def model(self) -> Model:
+        """The model of the gripper; before the first status the 3-Finger."""
+        return THREE_FINGER if self.status is None else self.status.model
 
     @property
     def is_lost(self) -> bool:
@@ -77,14 +83,17 @@ class HandMirror:
         self.state, self.problem = State[told["state"]], told["problem"]
         if "registers" in told:
             self.status = RobotiqStatus.from_registers(
-                told["registers"], timestamp=told["timestamp"], sequence=told["sequence"]
+                told["registers"],
+                timestamp=told["timestamp"],
+                sequence=told["sequence"],
+                model=model_of(told["model"]),
             )
             self.age = told["age"]
         self.statistics = told.get("statistics", self.statistics)
         for event in told["events"]:
             self.event_count += 1
             self.events.append((self.event_count, event))
-        self.peaks = [max(pair) for pair in zip(self.peaks, told["peaks"], strict=True)]
+        self.peaks = [max(pair) for pair in zip_longest(self.peaks, told["peaks"], fillvalue=0)]
         self._sample(monotonic())
         self.changes += 1
 
@@ -95,9 +104,9 @@ class HandMirror:
         if self.samples and now - self.samples[-1].at > QUIET_S:
             self.samples.append(Sample(now - SAMPLE_S, None, tuple(self.peaks)))  # a gap, and not a line
         status = None if self.is_lost else self.status
-        positions = None if status is None else tuple(status.position(axis) for axis in AXES)
+        positions = None if status is None else tuple(status.position(axis) for axis in status.model.axes)
         self.samples.append(Sample(now, positions, tuple(self.peaks)))
-        self.peaks = [0] * len(AXES)
+        self.peaks = [0] * len(self.peaks)
         while now - self.samples[0].at > HISTORY_S:
             self.samples.popleft()
 

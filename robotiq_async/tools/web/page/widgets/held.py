@@ -18,7 +18,7 @@ from functools import lru_cache
 from math import asin, degrees, dist, radians
 from typing import Final
 
-from .....values.enums import AXES, Finger, ObjectStatus
+from .....values.enums import Finger, ObjectStatus
 from .....values.status import RobotiqStatus
 from ....description import HandModel, Pose
 from ....description.geometry import Vector
@@ -106,7 +106,7 @@ def pads(model: HandModel, poses: Mapping[str, Pose]) -> dict[Finger, Pose]:
 
 def _met_something_closing(status: RobotiqStatus) -> Finger:
     axes = Finger(0)
-    for axis in AXES:
+    for axis in status.model.axes:
         if status.finger_status(axis) is ObjectStatus.CONTACT_CLOSING:
             axes |= axis & status.contacts
     return axes

@@ -8,7 +8,6 @@ from typing import Any, Final
 
 from nicegui import ui
 
-from .....values.enums import AXES
 from ..mirror import HISTORY_S, HandMirror
 from .words import COLORS, NAMES, axis_words, event_words, fault_words, state_words, timed
 
@@ -51,14 +50,14 @@ class AxesPanel:
 
     def show(self, hand: HandMirror) -> None:
         """Draw what is newest."""
-        rows = "".join(_axis_row(hand, index) for index in range(len(AXES)))
+        rows = "".join(_axis_row(hand, index) for index in range(len(hand.model.axes)))
         if rows != self._shown:
             self._shown = rows
             self._html.set_content(f'<div class="{self._classes}">{rows}</div>')
 
 
 def _axis_row(hand: HandMirror, index: int) -> str:
-    axis, status = AXES[index], hand.status
+    axis, status = hand.model.axes[index], hand.status
     if status is None:
         return f'<div class="rq-axis"><b>{NAMES[index]}</b></div>'
     position, wanted = status.position(axis), status.requested_position(axis)
@@ -91,7 +90,7 @@ class Curves:
             return
         self._drawn_at = now
         ages = [round(sample.at - now, 2) for sample in hand.samples]
-        for index in range(len(AXES)):
+        for index in range(len(hand.model.axes)):
             # A gap, and not a line, where nothing was known.
             places = [None if each.positions is None else each.positions[index] for each in hand.samples]
             peaks = [None if each.positions is None else each.currents[index] for each in hand.samples]

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from nicegui import events, ui
 
-from .....values.enums import AXES, CLOSED, OPEN, Finger
+from .....values.enums import CLOSED, OPEN, Finger, names_of
 from ..heartbeat import PRESS, PRESS_WITH_VALUE
 from ..mirror import HandMirror
 from .slider import Slider
@@ -15,7 +15,7 @@ from .words import COLORS, NAMES
 
 ROWS: Final = (
     ("fingers", Finger.ABC, "inherit"),
-    *((name, axis, color) for name, axis, color in zip(NAMES, AXES, COLORS, strict=True)),
+    *((name, axis, color) for name, axis, color in zip(NAMES, Finger.ALL, COLORS, strict=True)),
 )
 """Name, axes and colour. All fingers together, and each axis alone."""
 
@@ -49,8 +49,9 @@ class Positions:
             return
         self._is_placing = True
         for name, axes, _ in ROWS:
-            if name not in self._touched:
-                self._targets[name] = place = status.position(next(axis for axis in AXES if axis in axes))
+            axis = next(iter(axes))
+            if name not in self._touched and axis in status.model.all_axes:
+                self._targets[name] = place = status.position(axis)
                 self._sliders[name].set_value(place)
         self._is_placing = False
 
@@ -64,7 +65,7 @@ class Positions:
             self._touched.add(name)
 
         def send(event: events.GenericEventArguments) -> None:
-            words = ",".join(str(axis.name) for axis in AXES if axis in axes)
+            words = ",".join(names_of(axes))
             self._pressed("move", {"position": self._targets.get(name), "fingers": words}, event.args)
             self._touched.discard(name)
 

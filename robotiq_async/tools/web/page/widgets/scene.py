@@ -9,7 +9,8 @@ from typing import Any, Final
 from nicegui import ui
 from nicegui.elements.scene.scene_object3d import Object3D
 
-from .....values.enums import AXES, Finger, ObjectStatus
+from .....values.enums import Finger, ObjectStatus
+from .....values.model import THREE_FINGER
 from .....values.status import RobotiqStatus
 from ....description import HandModel, Pose, Shape, hand_model
 from ....description.geometry import turned
@@ -145,6 +146,9 @@ class HandScene:
         if hand.status is None:
             self._figure.look_all(None, STALE)
             return
+        if hand.model is not THREE_FINGER:  # the drawing is of that one alone
+            self._figure.show(self._model.root, is_shown=False)
+            return
         angles, thing = grasp(self._model, hand.status)
         calls = self._figure.turn(angles)
         if self._ghost is not None:
@@ -182,7 +186,7 @@ class HandScene:
 
     def _labels(self) -> None:
         """What the gripper calls its fingers, and below it what joint states call them."""
-        for axis, color in zip(AXES, COLORS, strict=True):
+        for axis, color in zip(Finger.ALL, COLORS, strict=True):
             if axis in FINGER_NAMES:
                 with self._figure.group(f"{FINGER_NAMES[axis]}_link_3"):
                     for words, font in ((str(axis.name), LETTER), (FINGER_NAMES[axis], NAME)):
@@ -192,7 +196,7 @@ class HandScene:
 def _away(status: RobotiqStatus) -> Finger:
     """The fingers that are on their way to where they are asked to be; the scissor stands for B and C."""
     away = Finger(0)
-    for axis in AXES:
+    for axis in status.model.axes:
         # Open is 6 or 7 where 0 was asked for: what an axis itself calls reached is no difference. One that
         # has met something goes no further, and the request would be drawn within what it holds.
         if status.finger_status(axis) is ObjectStatus.IN_MOTION:

@@ -6,12 +6,12 @@ from datetime import datetime
 from time import time
 from typing import Any, Final
 
-from .....values.enums import AXES, Fault, Finger, ObjectStatus, Severity, State
+from .....values.enums import Fault, Finger, ObjectStatus, Severity, State
 from .....values.status import NO_REQUEST
 from ....wording import STATE_WORDS
 from ..mirror import HandMirror
 
-NAMES: Final = tuple("scissor" if axis is Finger.SCISSOR else str(axis.name) for axis in AXES)
+NAMES: Final = tuple("scissor" if axis is Finger.SCISSOR else str(axis.name) for axis in Finger.ALL)
 COLORS: Final = ("#3b82f6", "#22a35a", "#e8890c", "#a855f7")
 """Of A, B, C and the scissor, wherever they are drawn: to be told apart on light and on dark."""
 
