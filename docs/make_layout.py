@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from robotiq_async.tools.description import hand_model
-from robotiq_async.values.enums import AXES, Fault, Severity, State
+from robotiq_async.values.enums import Fault, Severity, State
+from robotiq_async.values.model import THREE_FINGER
 
 FILE: Final = Path(__file__).parents[1] / "robotiq_async" / "data" / "foxglove_layout.json"
 GREEN, YELLOW, RED, GREY = "#4caf50", "#ffb300", "#e53935", "#9e9e9e"
@@ -53,9 +54,13 @@ def draw() -> str:
 
 def panels() -> dict[str, Panel]:
     """Every panel by its name."""
-    names = [str(axis.name) for axis in AXES]
+    names = [str(axis.name) for axis in THREE_FINGER.axes]
     states = [(state.name, STATES.get(state, YELLOW), state.name) for state in State]
-    faults = [(str(int(fault)), COLOURS[fault.severity], fault.description) for fault in Fault]
+    faults = [
+        (str(int(fault)), COLOURS[fault.severity], fault.description)
+        for fault in Fault
+        if fault is THREE_FINGER.faults[int(fault)]
+    ]
     series = [("state", "/gripper/event.target"), *((n, f"/gripper/status.{n}.axis_state") for n in names)]
     return {
         "Indicator!state": _indicator("state", states),

@@ -34,6 +34,7 @@ from robotiq_async.values.enums import (  # noqa: E402
     Severity,
     State,
 )
+from robotiq_async.values.model import MODELS  # noqa: E402
 from robotiq_async.values.registers import RTU_REGISTERS, TCP_REGISTERS, Field  # noqa: E402
 from robotiq_async.values.trigger import Trigger  # noqa: E402
 
@@ -214,11 +215,12 @@ def faults() -> str:
         Severity.MAJOR: "FAULT, until a reset",
     }
     return table(
-        ["gFLT", "`Fault`", "severity", "meaning", "the hand is in"],
+        ["gFLT", "`Fault`", "models", "severity", "meaning", "the hand is in"],
         (
             [
                 f"0x{int(fault):02X}",
                 f"`{fault.name}`",
+                _models_with(fault),
                 fault.severity.value,
                 fault.description,
                 "ATR_DONE, until a reset" if fault is Fault.AUTOMATIC_RELEASE_DONE else state[fault.severity],
@@ -228,7 +230,43 @@ def faults() -> str:
     )
 
 
+def _models_with(fault: Fault) -> str:
+    names = [model.title for model in MODELS.values() if fault in model.faults]
+    return "all" if len(names) == len(MODELS) else ", ".join(names)
+
+
 # -- reference -----------------------------------------------------------------------------------------
+
+
+def models() -> str:
+    """The models, side by side."""
+    return table(
+        [
+            "model",
+            "name",
+            "axes",
+            "stroke",
+            "speed",
+            "force",
+            "reads open, closed",
+            "unit",
+            "tried on hardware",
+        ],
+        (
+            [
+                each.title,
+                f"`{each.name}`",
+                each.axes_text,
+                f"{each.stroke.mm:g} mm",
+                "{:g}-{:g} mm/s".format(*each.speeds_mm_s),
+                "{:g}-{:g} N".format(*each.forces_n),
+                f"{each.stroke.open_reading}, {each.stroke.closed_reading}",
+                f"{each.rtu.device_id}",
+                "no",
+            ]
+            for each in MODELS.values()
+        ),
+    )
 
 
 def options() -> str:
@@ -294,6 +332,7 @@ PAGES: Final[dict[str, dict[str, Callable[[], str]]]] = {
         "gIMC": progress_codes,
         "gFLT": faults,
     },
+    "how-to/models.md": {"models": models},
     "how-to/simulator.md": {"troubles": troubles},
     "reference.md": {"options": options, "reconnect": reconnect_policy},
 }
