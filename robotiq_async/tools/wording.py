@@ -6,8 +6,9 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
-from ..values.enums import State
+from ..values.enums import ObjectStatus, State
 from ..values.errors import GripperFaultError, InvalidStateError, NotActivatedError, RobotiqError
+from ..values.status import NO_REQUEST
 
 STATE_WORDS: Final = {
     State.DISCONNECTED: "lost",
@@ -26,6 +27,15 @@ STATE_WORDS: Final = {
     State.SHUTDOWN: "stopped",
 }
 """What a state means to a person."""
+
+AXIS_WORDS: Final = {
+    NO_REQUEST: "-",
+    ObjectStatus.IN_MOTION.name: "moving",
+    ObjectStatus.CONTACT_OPENING.name: "contact while opening",
+    ObjectStatus.CONTACT_CLOSING.name: "contact while closing",
+    ObjectStatus.AT_POSITION.name: "there",
+}
+"""What an axis does, by its ``axis_state()``."""
 
 _METHOD: Final = re.compile(r"\b([a-z_]+)\(\)")
 _ADVICE: Final = re.compile(r": [^:]*(?:\b[a-z_]+\(\)|'async with').*")

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from datetime import datetime
 from typing import Any, Final
 
-from ...tools.recording.payloads import Fields
-from ...values.enums import AXES, State
+from ...tools.recording.payloads import Fields, is_command
+from ...values.enums import AXES
 from ...values.status import NO_REQUEST
 from ...values.trigger import Trigger
 
@@ -60,9 +60,7 @@ def brief_line(fields: Fields, contacts: dict[str, Any]) -> str:
         contacts: the axes in contact and where, as of the last status; is kept up to date.
     """
     if "kind" in fields:
-        # A control loop goes to RUNNING_CC and back with every command.
-        is_command = State.RUNNING_CC.name in (fields.get("source"), fields.get("target"))
-        return "" if is_command else event_line(fields)
+        return "" if is_command(fields) else event_line(fields)
     if "contacts" not in fields:
         return ""
     now = {name: fields[name]["position"] for name in fields["contacts"]}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections import deque
-from collections.abc import Awaitable, Callable, Iterable
+from collections.abc import Awaitable, Callable
 from functools import partial
 from typing import ClassVar, Final
 
@@ -18,9 +18,10 @@ from textual.worker import Worker
 
 from ...runtime.clock import now
 from ...tools.actions import ACTIONS, Operator
-from ...tools.recording.payloads import fault_fields, title
+from ...tools.recording.payloads import title
+from ...tools.recording.timeline import Timeline
 from ...tools.wording import refusal_words
-from ...values.enums import AXES, Fault, Finger, State
+from ...values.enums import AXES, Finger, State
 from ...values.errors import RobotiqError
 from ...values.status import RobotiqStatus
 from ..output.text import clock, event_line
@@ -90,10 +91,8 @@ class Monitor(App[None]):
         self._hand = operator.hand
         self._lines: deque[tuple[float, str, str]] = deque(maxlen=LOG_LINES)
         """For the log, at the next paint: time, text, style."""
-        self._statuses = operator.hand.statuses(BUFFER)
-        self._transitions = operator.hand.transitions()
+        self._timeline = Timeline(operator.hand, BUFFER)
         self._newest = operator.hand.status
-        self._fault = Fault.NONE
         # Held here and not looked up: a paint may come when the screen is already being taken down.
         self._top = Line(id="state")
         self._axes = Axes()
@@ -106,7 +105,6 @@ class Monitor(App[None]):
         self._polls = (now(), operator.hand.statistics.polls)
 
     def compose(self) -> ComposeResult:
-        """The widgets, from top to bottom."""
         yield self._top
         yield self._axes
         yield self._figures
@@ -116,9 +114,8 @@ class Monitor(App[None]):
         yield self._question
 
     def on_mount(self) -> None:
-        """Start painting."""
         self.write_log("Watching. Nothing has been written to the gripper.", "")
-        self._see([self._newest])
+        self._look()
         self._paint_state()
         self._paint_figures()
         self.set_interval(1 / FRAMES, self._paint)
@@ -127,37 +124,32 @@ class Monitor(App[None]):
     # -- painting -------------------------------------------------------------------------------------
 
     def write_log(self, text: str, style: str = "yellow", when: float | None = None) -> None:
-        """Add a line to the log, at any time; ``when`` in monotonic seconds."""
-        self._lines.append((now() if when is None else when, text, style))
+        """Add a line to the log, at any time; ``when`` in seconds since 1970, None for now."""
+        self._lines.append((time.time() if when is None else when, text, style))
 
     def _paint(self) -> None:
-        """Show what is new since the last paint; of the statuses, the newest."""
         driver = self._driver
         if isinstance(driver, NONBLOCKING) and driver.is_behind:
             if not driver.has_caught_up:
                 return  # nobody sees it
             driver.is_behind = False
             self.refresh(layout=True)
-        self._see(self._statuses.drain())
-        for each in self._transitions.drain():
-            if words := transition_words(each):
-                self.write_log(words, "", each.timestamp)
-        epoch = time.time() - now()
+        self._look()
         for when, text, style in sorted(self._lines):
-            self._history.write(Text(f"{clock(epoch + when)} {text}", style), expand=True)
+            self._history.write(Text(f"{clock(when)} {text}", style), expand=True)
         self._lines.clear()
         self._paint_state()
 
-    def _see(self, statuses: Iterable[RobotiqStatus]) -> None:
+    def _look(self) -> None:
         peaks = dict.fromkeys(AXES, -1)
-        for status in statuses:
-            self._newest = status
-            for axis in AXES:
-                peaks[axis] = max(peaks[axis], status.current_ma(axis))
-            if status.fault != self._fault:
-                self._fault = status.fault
-                style = "bold" if status.fault else ""
-                self.write_log(event_line(fault_fields(status)), style, status.timestamp)
+        for at, each in self._timeline.new():
+            if isinstance(each, RobotiqStatus):
+                self._newest = each
+                peaks = {axis: max(peak, each.current_ma(axis)) for axis, peak in peaks.items()}
+            elif each["kind"] == "fault":
+                self.write_log(event_line(each), "bold" if each["fault_code"] else "", at)
+            elif words := transition_words(each):
+                self.write_log(words, "", at)
         self._axes.show(self._newest, peaks)
 
     def _paint_state(self) -> None:

@@ -10,11 +10,10 @@ from rich.text import Text
 from textual.widget import Widget
 from textual.widgets import Static
 
-from ...tools.wording import STATE_WORDS
+from ...tools.wording import AXIS_WORDS, STATE_WORDS
 from ...values.enums import AXES, Fault, Finger, ObjectStatus, Severity, State
 from ...values.statistics import Statistics
 from ...values.status import NO_REQUEST, RobotiqStatus
-from ..output.text import NOTHING
 from .words import HINTS
 
 HISTORY: Final = 60
@@ -27,11 +26,12 @@ STILL: Final = 4
 LEVELS: Final = "▁▂▃▄▅▆▇█"
 FIXED: Final = 47
 """Columns of a line that are neither bar nor sparkline."""
-_OBJECT: Final = {
-    ObjectStatus.IN_MOTION: ("moving", "cyan"),
-    ObjectStatus.CONTACT_OPENING: ("CONTACT opening", "bold yellow"),
-    ObjectStatus.CONTACT_CLOSING: ("CONTACT closing", "bold yellow"),
-    ObjectStatus.AT_POSITION: ("there", "green"),
+_STYLES: Final = {
+    NO_REQUEST: "dim",
+    ObjectStatus.IN_MOTION.name: "cyan",
+    ObjectStatus.CONTACT_OPENING.name: "bold yellow",
+    ObjectStatus.CONTACT_CLOSING.name: "bold yellow",
+    ObjectStatus.AT_POSITION.name: "green",
 }
 _CALM: Final = (State.RUNNING_IDLE, State.RUNNING_CC)
 
@@ -102,11 +102,12 @@ class Axes(Widget):
         return line
 
     def _does(self, axis: Finger) -> Text:
-        # In an activation and in a release axes move of which the gripper says nothing.
-        if self._status.axis_state(axis) == NO_REQUEST and self._still[axis] >= STILL:
-            return Text(f"{NOTHING:15}", "dim")
-        words, style = _OBJECT[self._status.finger_status(axis)]
-        return Text(f"{words:15}", style)
+        state = self._status.axis_state(axis)
+        if state == NO_REQUEST and self._still[axis] < STILL:
+            # The gripper does not report the motion of an activation or of a release.
+            state = ObjectStatus.IN_MOTION.name
+        words = AXIS_WORDS[state].replace("contact while", "CONTACT")  # the column is narrow
+        return Text(f"{words:15}", _STYLES[state])
 
 
 def position_bar(position: int, requested: int, width: int) -> Text:

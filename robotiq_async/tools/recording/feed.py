@@ -17,20 +17,12 @@ from ...hand import Hand
 from ...runtime.clock import now
 from ...runtime.log import Log
 from ...session.streams import Stream
-from ...values.enums import Fault
 from ...values.errors import RobotiqConnectionError
 from ...values.events import SentRequest, Transition
 from ...values.status import RobotiqStatus
 from ..description.joint_states import SCHEMA, SCHEMA_NAME, JointStateEncoder
 from ..description.kinematics import joint_angles, joint_velocities
-from .payloads import (
-    SCHEMAS,
-    Fields,
-    efforts,
-    fault_fields,
-    initial_state_fields,
-    transition_fields,
-)
+from .payloads import SCHEMAS, Fields, efforts, fault_event, initial_state_fields, transition_fields
 
 BUFFER: Final = 100_000
 """Statuses kept while the event loop is busy with something else: minutes."""
@@ -138,7 +130,6 @@ class Feed:
         self._publish = publish
         self._encoder = JointStateEncoder()
         self._before: list[RobotiqStatus] = []
-        self._fault = Fault.NONE
         self._epoch = 0.0
         self._counts = {COMMAND: 0, EVENT: 0}
         self._sources: tuple[_Source, ...] = (
@@ -189,10 +180,9 @@ class Feed:
     def _publish_status(self, status: RobotiqStatus) -> None:
         stamp, data = self.nanoseconds(status.timestamp), compact(status.as_dict())
         self._publish(Message(STATUS, stamp, data, status.sequence))
+        if event := fault_event(status, next(reversed(self._before), None)):
+            self._publish_json(EVENT, status.timestamp, event)
         self._publish_joints(status)
-        if status.fault != self._fault:
-            self._fault = status.fault
-            self._publish_json(EVENT, status.timestamp, fault_fields(status))
 
     def _publish_joints(self, status: RobotiqStatus) -> None:
         while len(self._before) > 1 and status.timestamp - self._before[1].timestamp >= VELOCITY_S:

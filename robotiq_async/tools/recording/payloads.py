@@ -120,8 +120,15 @@ def transition_fields(transition: Transition) -> Fields:
     return {"kind": "transition", **transition.as_dict()}
 
 
-def fault_fields(status: RobotiqStatus) -> Fields:
-    """The event for a fault that has appeared, or cleared (NONE); the status is the first that shows it."""
+def is_command(event: Fields) -> bool:
+    """Whether an event is the begin or the end of a command. A control loop makes hundreds a second."""
+    return State.RUNNING_CC.name in (event.get("source"), event.get("target"))
+
+
+def fault_event(status: RobotiqStatus, before: RobotiqStatus | None) -> Fields | None:
+    """The event for a fault that has appeared, or cleared (NONE), since the status before; else None."""
+    if status.fault == (Fault.NONE if before is None else before.fault):
+        return None
     return {"kind": "fault", "timestamp": status.timestamp, **_in_words(status.fault)}
 
 

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from collections.abc import Iterator
 from typing import Final
 
 from ...hand import Hand
 from ...runtime.clock import now
-from ...session.streams import Stream
-from ...values.enums import AXES, Fault, State
+from ...values.enums import AXES
 from ...values.errors import NotStartedError
-from ...values.events import Transition
 from ...values.status import RobotiqStatus
-from ..recording.payloads import Fields, fault_fields, transition_fields
+from ..recording.payloads import Fields, is_command
+from ..recording.timeline import Timeline
 
 BUFFER: Final = 64
 """Statuses between two looks, for the peaks of the currents: a third of a second."""
@@ -34,32 +32,23 @@ class HandNews:
     def __init__(self, hand: Hand) -> None:
         self.hand = hand
         self.problem = ""
-        self._statuses: Stream[RobotiqStatus]
-        self._transitions: Stream[Transition]
+        self._timeline = Timeline(hand, BUFFER)
         self._events: deque[Fields] = deque(maxlen=EVENTS)
         self._peaks = [0] * len(AXES)
-        self._fault = Fault.NONE
         self._counted_at = 0.0
-        self.open()
 
     def open(self) -> None:
         """Listen from now on: a stream ends when its hand is stopped."""
-        self._statuses = self.hand.statuses(BUFFER)
-        self._transitions = self.hand.transitions()
+        self._timeline.open()
 
     def gather(self) -> None:
         """Take in what has happened; to be called often."""
-        for status in self._statuses.drain():
-            self._peaks = [
-                max(peak, status.current_ma(axis)) for peak, axis in zip(self._peaks, AXES, strict=True)
-            ]
-            if status.fault != self._fault:
-                self._fault = status.fault
-                self._events.append(_stamped(fault_fields(status)))
-        for transition in self._transitions.drain():
-            # Every command is a transition to RUNNING_CC and back: they would drown the rest.
-            if State.RUNNING_CC not in (transition.source, transition.target):
-                self._events.append(_stamped(transition_fields(transition)))
+        for at, each in self._timeline.new():
+            if isinstance(each, RobotiqStatus):
+                currents = map(each.current_ma, AXES)
+                self._peaks = [max(pair) for pair in zip(self._peaks, currents, strict=True)]
+            elif not is_command(each):
+                self._events.append({**each, "time": at})
 
     def take(self, index: int) -> Fields:
         """Everything that is to be told now; the events are told once.
@@ -97,8 +86,3 @@ class HandNews:
         if now() - self._counted_at >= STATISTICS_S:
             self._counted_at = now()
             yield "statistics", self.hand.statistics.as_dict()
-
-
-def _stamped(fields: Fields) -> Fields:
-    """With the time of day: the clock of the hand means nothing to a person."""
-    return {**fields, "time": time.time() - max(now() - fields["timestamp"], 0.0)}

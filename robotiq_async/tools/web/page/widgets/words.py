@@ -6,22 +6,14 @@ from datetime import datetime
 from time import time
 from typing import Any, Final
 
-from .....values.enums import AXES, Fault, Finger, ObjectStatus, Severity, State
+from .....values.enums import AXES, Fault, Finger, Severity, State
 from .....values.status import NO_REQUEST
-from ....wording import STATE_WORDS
+from ....wording import AXIS_WORDS, STATE_WORDS
 from ..mirror import HandMirror
 
 NAMES: Final = tuple("scissor" if axis is Finger.SCISSOR else str(axis.name) for axis in AXES)
 COLORS: Final = ("#3b82f6", "#22a35a", "#e8890c", "#a855f7")
 """Of A, B, C and the scissor, wherever they are drawn: to be told apart on light and on dark."""
-
-_AXIS_STATES: Final = {
-    NO_REQUEST: "-",
-    ObjectStatus.IN_MOTION.name: "moving",
-    ObjectStatus.CONTACT_OPENING.name: "contact while opening",
-    ObjectStatus.CONTACT_CLOSING.name: "contact while closing",
-    ObjectStatus.AT_POSITION.name: "there",
-}
 
 
 def state_words(hand: HandMirror, *, is_quiet: bool) -> tuple[str, str]:
@@ -60,8 +52,8 @@ def axis_words(hand: HandMirror, axis: Finger) -> str:
     """What an axis does."""
     status = hand.status
     if hand.is_lost or status is None or hand.state is State.RESET:
-        return "-"
-    return _AXIS_STATES[status.axis_state(axis)]
+        return AXIS_WORDS[NO_REQUEST]
+    return AXIS_WORDS[status.axis_state(axis)]
 
 
 def event_words(event: dict[str, Any]) -> str:
