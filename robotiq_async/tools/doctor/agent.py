@@ -1,11 +1,11 @@
-"""What an agent says of a gripper: its answers, its statuses, its troubles."""
+"""What an agent says about a gripper: its description, its statuses, its troubles."""
 
 from __future__ import annotations
 
 import asyncio
 import json
 import secrets
-from typing import Any, Final
+from typing import Final
 
 from ...fleet.network.bus import Bus, Urgency
 from ...fleet.remote.pending_request import of_its_run
@@ -29,40 +29,39 @@ PROBES: Final = 100
 """Requests from which the round trip is determined."""
 WATCH_S: Final = 2.0
 """How long to listen to statuses."""
-_READ: Final = frozenset(
-    {"epoch", "stamp", "version", "window", "statistics", "problem", "state", "address", "holder"}
-)
+_READ: Final = frozenset({"version", "window", "statistics", "problem", "state", "address", "holder"})
 LOST: Final = 0.01
 """Share of statuses that may be lost on the way."""
 
 
-async def examine_agent(name: GripperName, bus: Bus, report: Report) -> Fields:
-    """Examine what an agent answers and tells; returns what it says about the gripper.
+async def examine_agent(name: GripperName, bus: Bus, report: Report) -> None:
+    """Examine the answers and the messages of an agent.
 
     Raises:
         GiveUpError: it does not answer.
     """
-    asker = Asker(name, bus)
-    info = await _describe(asker, report)
-    listener = Listener(name)
+    asker = _Asker(name, bus)
+    await _describe(asker, report)
+    report(Finding(Level.GOOD, "access", "the agent answers"))
+    listener = _Listener(name)
     undo = bus.subscribe(name.key("*"), listener.hear)
     try:
         began = now()
         times = await _round_trips(asker, began + WATCH_S)
         await asyncio.sleep(max(0.0, began + WATCH_S - now()))
-        info = await _describe(asker, report, again=True)
+        info = await _describe(asker, report)
     finally:
         undo()
     _report_version(info, report)
     _report_round_trip(times, info["window"], report)
     _report_statuses(listener, now() - began, info, report)
     _report_gripper(listener, info, report)
-    _report_holder(info, report)
-    return info
+    holder = info["holder"]
+    report(Finding(Level.GOOD, "commanded by", "nobody" if holder is None else str(holder)))
 
 
-class Asker:
-    """Asks an agent, under no lease."""
+class _Asker:
+    """Asks an agent to describe its gripper. RemoteHand's requests would not say why there is no answer."""
 
     def __init__(self, name: GripperName, bus: Bus) -> None:
         self._name = name
@@ -70,40 +69,41 @@ class Asker:
         self._client = secrets.token_hex(8)
         self._number = 0
 
-    async def ask(
-        self, verb: str, *, epoch: int = 0, seen: float = 0.0, arguments: Fields | None = None
-    ) -> Any:  # noqa: ANN401  # what each request returns
-        """What the agent answers.
+    async def info(self) -> Fields:
+        """What the agent says about the gripper.
 
         Raises:
-            NotAllowedError: nobody answers, and that was plain at once.
+            NotAllowedError: the router said at once that no answer will come.
             NoAnswerError: no answer in time.
-            AgentError: another answer came.
-            RobotiqError, TypeError, ValueError: what the agent raised.
+            AgentError: the answer is of another version.
+            RobotiqError: what the agent raised.
         """
         self._number += 1
-        call = Call(self._name.base, self._client, epoch, 0, self._number, seen, arguments or {})
-        asked, key = now(), self._name.key(verb)
+        call = Call(self._name.base, self._client, number=self._number)
+        asked, key = now(), self._name.key("info")
         reply = await self._bus.ask(
             key, call.pack(), timeout=ANSWER_S, urgency=Urgency.COMMAND, decides=of_its_run(call)
         )
         if reply is None and now() - asked < ANSWER_S / 2:
-            raise NotAllowedError(f"the agent is there, and does not answer to {verb}: access denied")
+            raise NotAllowedError("the agent is there, and does not answer to info: access denied")
         if reply is None:
-            raise NoAnswerError(f"no answer to {verb} within {ANSWER_S:g} s")
+            raise NoAnswerError(f"no answer to info within {ANSWER_S:g} s")
         answer = unpack_answer(reply.payload)
         if answer.to != self._name.base or answer.number not in (0, call.number):
-            raise AgentError(f"another answer came to {verb}")
-        return answer.outcome(lambda stamp: stamp)
+            raise AgentError("another answer came to info")
+        info = answer.outcome(lambda stamp: stamp)
+        if not isinstance(info, dict) or not info.keys() >= _READ:
+            raise AgentError(f"the agent describes the gripper in another way: {info!r:.200}")
+        return info
 
 
-class Listener:
-    """Counts what comes.
+class _Listener:
+    """Sorts the messages under the keys of a gripper.
 
     Attributes:
         statuses: about the gripper.
-        misrouted: messages about another gripper.
-        unreadable: why the last that could not be read could not; empty if all could.
+        misrouted: number of messages about another gripper.
+        unreadable: the error of the last unreadable message; empty if there was none.
     """
 
     def __init__(self, name: GripperName) -> None:
@@ -113,7 +113,6 @@ class Listener:
         self.unreadable = ""
 
     def hear(self, _key: str, payload: bytes) -> None:
-        """A message has arrived."""
         try:
             if payload[:1] == b"{":
                 self.misrouted += json.loads(payload)["mark"] != self._mark
@@ -128,26 +127,17 @@ class Listener:
             self.misrouted += 1
 
 
-async def _describe(asker: Asker, report: Report, *, again: bool = False) -> Fields:
-    """What the agent says about the gripper.
-
-    Raises:
-        GiveUpError: it does not answer.
-    """
+async def _describe(asker: _Asker, report: Report) -> Fields:
     why: RobotiqError | None = None
     for _ in range(TRIES):
         try:
-            info: Fields = _checked(await asker.ask("info"))
+            return await asker.info()
         except (NoAnswerError, NotAllowedError) as error:
             why = error
             await asyncio.sleep(0.1)
         except RobotiqError as error:
             why = error
             break
-        else:
-            if not again:
-                report(Finding(Level.GOOD, "access", "the agent answers"))
-            return info
     assert why is not None
     if isinstance(why, AgentError):
         advice = "Install the same version of robotiq_async on both hosts."
@@ -159,24 +149,12 @@ async def _describe(asker: Asker, report: Report, *, again: bool = False) -> Fie
     raise GiveUpError
 
 
-def _checked(info: object) -> Fields:
-    """What the other checks read.
-
-    Raises:
-        AgentError: something is missing.
-    """
-    if not isinstance(info, dict) or not info.keys() >= _READ:
-        raise AgentError(f"the agent describes the gripper in another way: {info!r:.200}")
-    return info
-
-
-async def _round_trips(asker: Asker, ends: float) -> list[float]:
-    """How long answers take; at least one."""
+async def _round_trips(asker: _Asker, ends: float) -> list[float]:
     times: list[float] = []
     while len(times) < PROBES and (now() < ends or not times):
         asked = now()
         try:
-            await asker.ask("info")
+            await asker.info()
         except RobotiqError:
             times.append(ANSWER_S)
         else:
@@ -205,7 +183,7 @@ def _report_round_trip(times: list[float], window: float, report: Report) -> Non
     report(Finding(level, "round trip", found, advice))
 
 
-def _report_statuses(listener: Listener, seconds: float, info: Fields, report: Report) -> None:
+def _report_statuses(listener: _Listener, seconds: float, info: Fields, report: Report) -> None:
     if listener.misrouted:
         found = f"{listener.misrouted} messages about another gripper came under this one's key; dropped"
         advice = "zenoh does that after a link has been down; clients notice. Restarting the client ends it."
@@ -233,7 +211,7 @@ def _report_statuses(listener: Listener, seconds: float, info: Fields, report: R
         report(Finding(Level.DOUBT, "statuses", found, advice))
 
 
-def _report_gripper(listener: Listener, info: Fields, report: Report) -> None:
+def _report_gripper(listener: _Listener, info: Fields, report: Report) -> None:
     problem, state = info["problem"], str(info["state"])
     if problem or state == "disconnected":
         found = f"its agent does not reach it: {problem or 'the link is down'}"
@@ -244,8 +222,3 @@ def _report_gripper(listener: Listener, info: Fields, report: Report) -> None:
     newest = listener.statuses[-1] if listener.statuses else None
     if newest is not None and newest.registers is not None:
         report_state(RobotiqStatus.from_registers(newest.registers), report)
-
-
-def _report_holder(info: Fields, report: Report) -> None:
-    holder = info["holder"]
-    report(Finding(Level.GOOD, "commanded by", "nobody" if holder is None else str(holder)))

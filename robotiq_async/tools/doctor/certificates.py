@@ -20,16 +20,13 @@ _MAY: Final = {
 _NEW: Final = "Have whoever has the authority make a new one: robotiq-async fleet keys."
 
 
-def examine_keys(folder: Path, report: Report, *, now: datetime) -> Role | None:
+def examine_keys(folder: Path, report: Report, *, now: datetime) -> None:
     """Examine a folder of keys.
 
     Args:
         folder: of a client.
         report: called with each finding.
         now: the time that its dates are compared with.
-
-    Returns:
-        What its owner may do; None if that does not stand in it.
 
     Raises:
         GiveUpError: it does not let anybody in.
@@ -45,7 +42,7 @@ def examine_keys(folder: Path, report: Report, *, now: datetime) -> Role | None:
         raise GiveUpError from error
     _report_dates(found.begins, found.ends, now, report)
     _report_mode(folder / KEY, report)
-    return _report_role(found.common_name, found.role, report)
+    _report_role(found.common_name, found.role, report)
 
 
 def _report_dates(begins: datetime, ends: datetime, now: datetime, report: Report) -> None:
@@ -74,7 +71,7 @@ def _report_mode(key: Path, report: Report) -> None:
         report(Finding(Level.DOUBT, "private key", "others on this machine may read or write it", advice))
 
 
-def _report_role(common_name: str, role: Role | None, report: Report) -> Role | None:
+def _report_role(common_name: str, role: Role | None, report: Report) -> None:
     if role in _MAY:
         assert role is not None
         report(Finding(Level.GOOD, "role", f"{common_name}: {_MAY[role]}, if the agent's list has it"))
@@ -85,4 +82,3 @@ def _report_role(common_name: str, role: Role | None, report: Report) -> Role | 
         found = f"{common_name!r}: no role stands in it, so the agent's own rules say what it may do"
         advice = "Is it of an authority of your own? The command fleet keys writes ROLE:NAME."
         report(Finding(Level.DOUBT, "role", found, advice))
-    return role
