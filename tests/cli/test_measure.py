@@ -99,7 +99,7 @@ def test_nobody_there_to_read_the_scale(call: Call, tmp_path: Path) -> None:
             *("--step", "250", "--runs", "1", "--speed", "255", "--no-plot"),
         )
     assert outcome.code == 1
-    assert "nobody answers: the input has ended" in outcome.err
+    assert "no answer: the input has ended" in outcome.err
     assert not (tmp_path / "f.csv").exists()
 
 

@@ -234,7 +234,7 @@ async def test_halt_is_one_key(key: str) -> None:
             await pilot.press("c")
             await until(pilot, lambda: hand.is_moving)
             await pilot.press(key)
-            await until(pilot, lambda: "halt: every axis stands still" in log(pilot))
+            await until(pilot, lambda: "halt: every axis has stopped" in log(pilot))
             assert not hand.is_moving
             await until(pilot, lambda: "close: " in log(pilot))
 

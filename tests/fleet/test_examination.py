@@ -302,7 +302,7 @@ async def test_nobody_listens() -> None:
         pass
     found = await findings(f"{LEFT}?connect=tcp/{where}")
     assert list(found) == ["address", "port"]
-    assert found["port"].found == f"tcp/{where}: nobody listens"
+    assert found["port"].found == f"tcp/{where}: nothing listens"
 
 
 async def test_a_name_that_does_not_exist() -> None:

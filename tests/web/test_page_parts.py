@@ -148,7 +148,7 @@ async def test_a_halt_of_a_page_that_is_gone_is_completed(hand: RobotiqHand) -> 
     pages = Pages(hand)
     pages.do("halt")
     pages.commands.gone("one")
-    assert (await pages.answer())["words"] == "every axis stands still"
+    assert (await pages.answer())["words"] == "every axis has stopped"
 
 
 async def test_a_page_that_is_ending_takes_nothing_but_a_halt(hand: RobotiqHand) -> None:
@@ -184,7 +184,7 @@ async def test_a_halt_finds_its_way_through_a_crowd() -> None:
         assert "under way already" in (await pages.answer())["words"]
         pages.do("halt")
         words = [(await pages.answer())["words"] for _ in range(MAX_COMMANDS + 1)]
-        assert "every axis stands still" in words
+        assert "every axis has stopped" in words
         await pages.commands.close()
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ...tools.web.settings import PageSettings
 
 AGAIN_S: Final = 3.0
-"""Between two attempts to reach a gripper of several."""
+"""Pause between two attempts to reach one of several grippers."""
 
 
 async def web(
@@ -45,10 +45,10 @@ async def web(
 ) -> None:
     """Show grippers on a page in the browser, the hand in three dimensions, until Ctrl-C.
 
-    What is printed is the address to open; the token in it lets in whoever has it. The
-    page only looks, unless --control is given: then it has buttons, and a halt that is
-    also on the space bar. Nothing moves until one is pressed. With several addresses
-    there is a tile for each.
+    It prints the address to open; the token in the address lets its users in. The page
+    only looks, unless --control is given: then it has buttons, and a halt that is also on
+    the space bar. Nothing moves until one is pressed. With several addresses there is a
+    tile for each.
 
     Closing the browser, or losing its connection, holds the axes that it has set in
     motion. Ending this command stops the fingers only if they were moved from here.
@@ -63,8 +63,8 @@ async def web(
         control: Let the page command the grippers.
         open_browser: Open the page in a browser.
         port: TCP port; 0 takes a free one.
-        host: Interface to listen on. All but 127.0.0.1 need a password or a certificate, as others get in.
-        password_file: File whose first line is asked of everybody, in place of the token.
+        host: Interface to listen on. All but 127.0.0.1 let others in, and need a password or a certificate.
+        password_file: File whose first line is the password, in place of the token.
         certificate: Certificate of your own in PEM, for https.
         key: Its private key in PEM.
         speed: Speed of all axes from the first command on; the present one cannot be read.
@@ -98,7 +98,7 @@ async def web(
         with forwarded_warnings(tell):
             await _show(page, operators, settings, shown, open_browser=open_browser)
     except asyncio.CancelledError:
-        pass  # Being told to stop is how this command ends well.
+        pass  # Ctrl-C is the normal end of this command.
 
 
 async def _show(
@@ -113,7 +113,7 @@ async def _show(
         try:
             await _serve(page, operators, settings, shown, stack, open_browser=open_browser)
         finally:
-            # First: nothing that concerns the page, or a gripper that cannot be reached, delays it.
+            # First, so that neither the page nor an unreachable gripper delays it.
             await _leave_all(operators, page)
 
 
@@ -144,7 +144,7 @@ async def _serve(
 async def _start(
     page: PageServer, index: int, operator: Operator, *, alone: bool, stack: AsyncExitStack
 ) -> None:
-    """Start a hand; one of several that cannot be reached is tried again and again, and shows as such."""
+    """Start a hand. One of several that cannot be reached is tried again and shown as such."""
     news = page.news[index]
     try:
         await operator.hand.start(activate=False)
@@ -178,14 +178,14 @@ async def _cancelled(task: asyncio.Task[None]) -> None:
 
 
 async def _leave_all(operators: Sequence[Operator], page: PageServer) -> None:
-    """Stop all hands at once: one whose link is dead takes 2 s, and the others would move on meanwhile."""
+    """Stop all hands at once: a dead link takes 2 s, and the others would move on meanwhile."""
     page.refuse_commands()
     await wait_shielded(asyncio.gather(*map(_leave, operators, page.news)))
 
 
 async def _leave(operator: Operator, news: HandNews) -> None:
     words = await operator.leave()
-    if not news.problem:  # of one that was never reached there is nothing to say
+    if not news.problem:  # no line for a hand that was never reached
         tell(f"{operator.hand.address}: {words}")
 
 
@@ -214,7 +214,6 @@ def _text(file: Path) -> str:
 
 
 def _refuse_doubles(addresses: Sequence[str]) -> None:
-    """A simulated hand has an address of its own; any other that comes twice is one gripper."""
     for address in addresses:
         if addresses.count(address) > 1:
             raise UsageError(f"{address} is there twice")

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ...hand import Hand
 
 BUFFER: Final = 4000
-"""Statuses kept for a slow reader: twenty seconds."""
+"""Statuses kept for a slow reader: 20 s."""
 JSON_INTERVAL_S: Final = 0.02
 WATCH_INTERVAL_S: Final = 0.1
 EVENTS: Final = ("transition", "fault", "log")
@@ -34,14 +34,14 @@ Formatter = Callable[[list[Fields]], list[str]]
 async def print_objects(hand: Hand, buffer: int = BUFFER) -> None:
     """Print every status, transition and fault as a line of JSON until the hand is stopped.
 
-    ``kind`` says what a line is about, ``time`` is in seconds since 1970. A slow reader loses the oldest
-    statuses; a line of the kind ``missed`` has their number. Warnings of the library are of the kind ``log``.
+    ``kind`` is the kind of the line, ``time`` is in seconds since 1970. A slow reader loses the oldest
+    statuses; a line of kind ``missed`` has their number. Warnings of the library have the kind ``log``.
     """
     await _print(_History(hand, buffer), _json_lines, JSON_INTERVAL_S)
 
 
 async def watch(hand: Hand) -> None:
-    """Print the state; then every transition and fault, and the newest status if it shows something new."""
+    """Print the state; then every transition and fault, and the newest status if its line has changed."""
     await in_a_thread(lambda: _write(f"{clock(time.time())} state    {hand.state.name}\n".encode()))
     await _print(_History(hand, BUFFER), _TextLines(), WATCH_INTERVAL_S)
 
@@ -50,10 +50,10 @@ async def _print(history: _History, formatter: Formatter, interval: float) -> No
     with forwarded_warnings(history.add_warning, of=history.hand.name):
         ended = False
         while not ended:
-            ended = history.hand.state is State.SHUTDOWN  # and once more for what has come with the end
+            ended = history.hand.state is State.SHUTDOWN  # and once more for the last events
             if lines := formatter(list(history.new())):
                 data = "".join(f"{line}\n" for line in lines).encode()
-                # The reader may be slow: a full pipe must not block the event loop that polls, nor the end.
+                # The reader may be slow: a full pipe must not block the event loop that polls, nor the stop.
                 await in_a_thread(lambda: _write(data))  # noqa: B023  # awaited before it changes
             await asyncio.sleep(interval)
 

@@ -1,4 +1,4 @@
-"""The monitor's screen: shows a hand, and does what keys ask. Needs the extra ``monitor`` (textual)."""
+"""The screen of the monitor: shows a hand, and carries out keys. Needs the extra ``monitor`` (textual)."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ FIGURES_S: Final = 0.5
 BUFFER: Final = 400
 """Statuses kept for the next paint: two seconds."""
 HALTING: Final = frozenset({"space", "h"})
-"""Keys that halt, whatever is asked."""
+"""Keys that halt, also during a question."""
 STEP: Final = 16
 """Change of speed or force for one press of a key."""
 LOG_LINES: Final = 2000
@@ -93,13 +93,13 @@ class Monitor(App[None]):
         """For the log, at the next paint: time, text, style."""
         self._timeline = Timeline(operator.hand, BUFFER)
         self._newest = operator.hand.status
-        # Held here and not looked up: a paint may come when the screen is already being taken down.
+        # Kept here and not looked up: a paint may come while the screen is closing.
         self._top = Line(id="state")
         self._axes = Axes()
         self._figures = Line(id="link")
         self._question = Static(id="question")
         self.asking: Asking | None = None
-        """What waits for keys; it stands on the screen."""
+        """The open question, which takes the keys."""
         self._history = RichLog(id="log", max_lines=LOG_LINES, min_width=1, wrap=True)
         self._overruns = 0
         self._polls = (now(), operator.hand.statistics.polls)
@@ -124,14 +124,14 @@ class Monitor(App[None]):
     # -- painting -------------------------------------------------------------------------------------
 
     def write_log(self, text: str, style: str = "yellow", when: float | None = None) -> None:
-        """Add a line to the log, at any time; ``when`` in seconds since 1970, None for now."""
+        """Add a line to the log; ``when`` in seconds since 1970, None for now."""
         self._lines.append((time.time() if when is None else when, text, style))
 
     def _paint(self) -> None:
         driver = self._driver
         if isinstance(driver, NONBLOCKING) and driver.is_behind:
             if not driver.has_caught_up:
-                return  # nobody sees it
+                return
             driver.is_behind = False
             self.refresh(layout=True)
         self._look()
@@ -169,14 +169,14 @@ class Monitor(App[None]):
     # -- keys -----------------------------------------------------------------------------------------
 
     async def on_event(self, event: events.Event) -> None:
-        """Give keys to what is asked, but for those that halt."""
+        """Pass keys to the open question, except those that halt."""
         if isinstance(event, events.Key) and self.asking is not None and event.key not in HALTING:
             self.ask(None if self.asking.press(event.key) else self.asking)
         else:
             await super().on_event(event)
 
     def ask(self, asking: Asking | None) -> None:
-        """Show what waits for keys from now on, above the log; None for nothing."""
+        """Open a question above the log, or close it with None."""
         self.asking = asking
         if asking is not None:
             self._question.update(asking.text)
@@ -195,7 +195,7 @@ class Monitor(App[None]):
             begin()
 
     def action_position(self) -> None:
-        """Ask which axes are to go where, and move them."""
+        """Ask for axes and a position, and move."""
 
         def begin(axes: Finger, position: int) -> None:
             self._begin(f"{axes} to {position}", partial(self._operator.move, position, axes))
@@ -203,17 +203,15 @@ class Monitor(App[None]):
         self.ask(Target(begin))
 
     def action_speed(self, by: int) -> None:
-        """Change the speed of every axis."""
         self._begin("speed", partial(self._operator.change_speed, by))
 
     def action_force(self, by: int) -> None:
-        """Change the force of every axis."""
         self._begin("force", partial(self._operator.change_force, by))
 
     def _begin(self, name: str, work: Callable[[], Awaitable[str]]) -> None:
-        # A function and not a coroutine: one that is not begun any more would complain.
+        # A function and not a coroutine: a coroutine that never runs causes a warning.
         async def carry_out() -> None:
-            # Painted with the next paint: a key that is held would paint thirty times a second.
+            # Shown with the next paint: a held key would paint thirty times a second.
             try:
                 self.write_log(f"{name}: {await work()}", "bold")
             except RobotiqError as error:

@@ -1,4 +1,4 @@
-"""What happens to a hand, for a person at the monitor: words and keys, in place of states and methods."""
+"""Texts of the monitor: keys, hints, and transitions for people who do not know the API."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ HINTS: Final = {
 
 
 def transition_words(event: Fields) -> str | None:
-    """What has become of the hand, and why; None where there is nothing to tell.
+    """The new state and its cause; None if both states have the same description.
 
-    States that a person calls the same are one: those between which a request is sent and acknowledged.
+    That drops the transitions between sending a request and its acknowledgement.
     """
     before, after = (STATE_WORDS[State[event[end]]] for end in ("source", "target"))
     return None if before == after else f"{after} ({without_methods(Trigger[event['trigger']].value)})"

@@ -24,14 +24,14 @@ from .gripper import report_state
 
 ANSWER_S: Final = 1.0
 TRIES: Final = 3
-"""An empty answer also comes just after a connection was made: it is asked again."""
+"""Attempts: just after a connection was made the first answers may be empty."""
 PROBES: Final = 100
-"""Requests from which the round trip is determined."""
+"""Requests for measuring the round trip."""
 WATCH_S: Final = 2.0
 """How long to listen to statuses."""
 _READ: Final = frozenset({"version", "window", "statistics", "problem", "state", "address", "holder"})
 LOST: Final = 0.01
-"""Share of statuses that may be lost on the way."""
+"""Accepted share of lost statuses."""
 
 
 async def examine_agent(name: GripperName, bus: Bus, report: Report) -> None:
@@ -61,7 +61,7 @@ async def examine_agent(name: GripperName, bus: Bus, report: Report) -> None:
 
 
 class _Asker:
-    """Asks an agent to describe its gripper. RemoteHand's requests would not say why there is no answer."""
+    """Asks an agent to describe its gripper. A RemoteHand would not report why there is no answer."""
 
     def __init__(self, name: GripperName, bus: Bus) -> None:
         self._name = name
@@ -70,14 +70,7 @@ class _Asker:
         self._number = 0
 
     async def info(self) -> Fields:
-        """What the agent says about the gripper.
-
-        Raises:
-            NotAllowedError: the router said at once that no answer will come.
-            NoAnswerError: no answer in time.
-            AgentError: the answer is of another version.
-            RobotiqError: what the agent raised.
-        """
+        """What the agent says about the gripper."""
         self._number += 1
         call = Call(self._name.base, self._client, number=self._number)
         asked, key = now(), self._name.key("info")
@@ -144,7 +137,7 @@ async def _describe(asker: _Asker, report: Report) -> Fields:
     elif isinstance(why, NotAllowedError):
         advice = "Is this client in the agent's access.toml, and was the agent started since?"
     else:
-        advice = "Its token is seen, so it ran a second ago. Is its host busy, or the network in between?"
+        advice = "Its liveliness token is there, so it ran a second ago. Is its host or the network busy?"
     report(Finding(Level.BAD, "access", str(why), advice))
     raise GiveUpError
 
@@ -177,9 +170,9 @@ def _report_round_trip(times: list[float], window: float, report: Report) -> Non
     if p99 < window / 5:
         report(Finding(Level.GOOD, "round trip", found))
         return
-    # A round trip of a quarter of the window is about what a lease survives.
+    # A lease survives round trips of up to about a quarter of its window.
     level = Level.BAD if p50 > window / 4 else Level.DOUBT
-    advice = f"Whoever commands may lose the lease: its window is {window:g} s (window in FLEET.toml)."
+    advice = f"A client that commands may lose the lease: its window is {window:g} s (window in FLEET.toml)."
     report(Finding(level, "round trip", found, advice))
 
 
@@ -189,7 +182,7 @@ def _report_statuses(listener: _Listener, seconds: float, info: Fields, report: 
         advice = "zenoh does that after a link has been down; clients notice. Restarting the client ends it."
         report(Finding(Level.DOUBT, "misrouted", found, advice))
     if listener.unreadable:
-        advice = "Does somebody else publish under these keys? Or update the older side."
+        advice = "Does another program publish under these keys? Otherwise update the older side."
         report(Finding(Level.DOUBT, "statuses", listener.unreadable, advice))
     if not listener.statuses:
         advice = "Answers come and statuses do not: is the client in the agent's access list, in one role?"
@@ -197,7 +190,7 @@ def _report_statuses(listener: _Listener, seconds: float, info: Fields, report: 
         return
     sequences = {each.sequence for each in listener.statuses if each.registers is not None}
     if len(sequences) < 2:
-        return  # the gripper is not polled, and that is told with its state
+        return  # the gripper is not polled; the state reports that
     lost = 1 - len(sequences) / (max(sequences) - min(sequences) + 1)
     period = 1000 * info["statistics"]["period_p99"]
     found = f"{len(sequences) / seconds:.0f} a second, {100 * lost:.1f} % lost on the way"

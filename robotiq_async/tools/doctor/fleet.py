@@ -19,18 +19,18 @@ from .endpoints import examine_way
 from .findings import Finding, GiveUpError, Level, Report
 
 LOOK_S: Final = 3.0
-"""How long an agent has to show itself."""
+"""How long to look for the agent."""
 ROUND_S: Final = 0.3
-"""One look."""
+"""Duration of one look."""
 
 
 async def examine_remote(address: str, report: Report, *, bus: Bus | None = None) -> None:
     """Examine the way to a gripper on another host; reports each finding at once.
 
     Args:
-        address: ``zenoh://SITE/HOST/GRIPPER``, with how to get there.
+        address: ``zenoh://SITE/HOST/GRIPPER``, with the route.
         report: called with each finding.
-        bus: an open session; it stays open, and the way there is not examined. None opens one.
+        bus: an open session, which stays open and is not examined; None opens one.
 
     Raises:
         TypeError, ValueError: a malformed address.
@@ -55,7 +55,7 @@ async def _examine_way_and_agent(name: GripperName, route: Route, report: Report
     try:
         configuration = route.configuration()
     except ValueError as error:
-        advice = "Keys are made by robotiq-async fleet keys; &insecure=1 is for a network that nobody is on."
+        advice = "robotiq-async fleet keys makes keys; &insecure=1 is for a network of your own."
         report(Finding(Level.BAD, "way", str(error), advice))
         raise GiveUpError from error
     await examine_way(route, report)
@@ -76,11 +76,6 @@ async def _examine(name: GripperName, bus: Bus, report: Report) -> None:
 
 
 async def _find(name: GripperName, bus: Bus, report: Report) -> None:
-    """Who says that the gripper is served.
-
-    Raises:
-        GiveUpError: nobody does.
-    """
     loop = asyncio.get_running_loop()
     ends = loop.time() + LOOK_S
     own: set[str] = set()
@@ -95,7 +90,7 @@ async def _find(name: GripperName, bus: Bus, report: Report) -> None:
         if not own:
             await asyncio.sleep(ROUND_S / 3)
     if not own:
-        found = f"nobody serves {name}"
+        found = f"no agent serves {name}"
         if others:
             found += f"; there are {', '.join(map(str, sorted(others)))}"
             advice = "Check the three names in the address."

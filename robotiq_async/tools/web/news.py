@@ -1,4 +1,4 @@
-"""What a page is told about a hand: what is newest, and the events since it was told last."""
+"""Updates for a page about a hand: the newest status, and the events since the last update."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from ..recording.payloads import Fields, is_command
 from ..recording.timeline import Timeline
 
 BUFFER: Final = 64
-"""Statuses between two looks, for the peaks of the currents: a third of a second."""
+"""Statuses between two calls of gather(), for the peaks of the currents: a third of a second."""
 EVENTS: Final = 200
-"""Kept for a page that does not listen."""
+"""Events kept for a page that does not read."""
 STATISTICS_S: Final = 1.0
 
 
 class HandNews:
-    """Gathers what happens to a hand. It only listens.
+    """Collects what happens to a hand. It only listens.
 
     Attributes:
-        hand: started before or after.
-        problem: why it could not be started; empty if it was.
+        hand: may be started later.
+        problem: why the hand could not be started; empty if it was.
     """
 
     def __init__(self, hand: Hand) -> None:
@@ -38,11 +38,11 @@ class HandNews:
         self._counted_at = 0.0
 
     def open(self) -> None:
-        """Listen from now on: a stream ends when its hand is stopped."""
+        """Listen again after a stop of the hand."""
         self._timeline.open()
 
     def gather(self) -> None:
-        """Take in what has happened; to be called often."""
+        """Collect what is new; call it often."""
         for at, each in self._timeline.new():
             if isinstance(each, RobotiqStatus):
                 currents = map(each.current_ma, AXES)
@@ -51,10 +51,10 @@ class HandNews:
                 self._events.append({**each, "time": at})
 
     def take(self, index: int) -> Fields:
-        """Everything that is to be told now; the events are told once.
+        """The next update. It contains each event once.
 
         Args:
-            index: of the hand, for the page.
+            index: number of the hand on the page.
         """
         fields: Fields = {
             "hand": index,
@@ -82,7 +82,7 @@ class HandNews:
         }
 
     def _statistics(self) -> Iterator[tuple[str, Fields]]:
-        """Now and then: percentiles are dear."""
+        # Once a second: percentiles are expensive.
         if now() - self._counted_at >= STATISTICS_S:
             self._counted_at = now()
             yield "statistics", self.hand.statistics.as_dict()

@@ -1,4 +1,4 @@
-"""``robotiq-async replay``, ``export``, ``plot`` and ``recover``: what becomes of a recording."""
+"""``robotiq-async replay``, ``export``, ``plot`` and ``recover``: the commands that use a recording."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ def replay(
     as_picture: Annotated[Flag, Parameter(name="--plot")] = False,
     overwrite: Overwrite = False,
 ) -> None:
-    """Print what a recording holds: states, faults, commands, and what the fingers did.
+    """Print the states, faults, commands and finger motions of a recording.
 
-    A line for each event and command, and one for each status in which a finger has
-    come to another position or has begun or ended a contact. With --brief a line for
-    each state, fault and contact, and a sum at the end.
+    A line for each event and command, and for each status in which a finger has another
+    position, or a contact has begun or ended. With --brief a line for each state, fault
+    and contact, and a summary at the end.
 
     For example:
 
@@ -40,7 +40,7 @@ def replay(
         robotiq-async replay --brief grasp.mcap
 
     Args:
-        file: The recording; a truncated one is read up to where it breaks off.
+        file: The recording; a truncated one is read as far as it goes.
         brief: Print states, faults and contacts only.
         as_picture: Draw a plot instead, as the command plot does.
     """
@@ -57,7 +57,6 @@ def replay(
 
 
 def _in_order(file: Path) -> Iterator[Entry]:
-    """The JSON messages of a recording by their time."""
     need("mcap", "record")
     from ....tools.recording.export import in_order
     from ....tools.recording.recordings import read_recording
@@ -107,8 +106,8 @@ def export(
 ) -> None:
     """Write a recording as a table, CSV, for spreadsheets and pandas.
 
-    A row for each poll; its time is that of the wall clock, in UTC. With --of commands
-    or events a row for each of those.
+    A row for each poll, with the time of the wall clock in UTC. With --of a row for each
+    command or event.
 
     For example:
 
@@ -141,11 +140,7 @@ def export(
 
 
 def _keep(*files: Path, overwrite: bool) -> None:
-    """Refuse to replace a file that is there.
-
-    Raises:
-        CommandError: there is one.
-    """
+    """Refuse to replace an existing file."""
     for file in files:
         if not overwrite and file.exists():
             raise CommandError(f"{file}: File exists; --overwrite replaces it")

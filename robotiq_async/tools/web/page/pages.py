@@ -1,4 +1,4 @@
-"""The pages: one hand, or a tile for each of many; and how long a browser looks at them."""
+"""The pages: one hand, or a tile for each of several; and the sessions of browsers."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from .widgets.words import timed
 
 REFRESH_S: Final = 0.05
 STAGE: Final = "h-[36vh] lg:h-[calc(100vh-13rem)] lg:sticky lg:top-16 min-h-[250px]"
-"""How large the scene is: a part of a phone, and all that is left of a wide window."""
+"""Size of the scene: part of a phone, the free height of a wide window."""
 SCENES_MAX: Final = 12
-"""Tiles with a scene: a browser takes the first ones away when there are more than some sixteen."""
+"""Tiles with a scene: with more than about sixteen, browsers drop the first ones."""
 STYLE: Final = """
 <style>
 .rq-axes { display: grid; gap: .35rem; width: 100%; }
@@ -64,14 +64,14 @@ PRESSED: Final = ", and nothing that is pressed here arrives, HALT neither"
 
 
 class Visits:
-    """Who looks: counts the browsers, notices when one is gone, and tells one that came back all anew."""
+    """Counts the browsers, notices when one is lost, and resends everything to one that returns."""
 
     def __init__(self, mirror: Mirror) -> None:
         self._mirror = mirror
         self._present: set[str] = set()
 
     def begin(self, client: Client) -> Heartbeat:
-        """A page is being made."""
+        """Start the session of a page that is being built."""
         heartbeat = Heartbeat()
         client.on_connect(lambda: self._arrive(client.id, heartbeat))
         client.on_disconnect(lambda: self._leave(client))
@@ -99,14 +99,14 @@ class Visits:
 
     def _leave(self, client: Client) -> None:
         self._mirror.gone(client.id)
-        # A browser that came back may be heard of before its old connection is found to have ended.
+        # A browser may connect again before its old connection is known to have ended.
         if not client.has_socket_connection:
             self._present.discard(client.id)
         self._mirror.count(len(self._present))
 
 
 def register(mirror: Mirror) -> None:
-    """Make the pages known to NiceGUI."""
+    """Register the pages with NiceGUI."""
     visits = Visits(mirror)
 
     @ui.page("/")
@@ -178,7 +178,7 @@ def _hand_page(mirror: Mirror, hand: HandMirror, client: Client, visits: Visits)
 
 
 def _halt_button(name: str, what: str, halt: Callable[[], None]) -> None:
-    """At the foot of the window, wherever the page is scrolled to, and above a question that is open."""
+    # At the foot of the window, however the page is scrolled, and above an open question.
     ui.on("space", halt)
     with ui.footer().classes("p-2 bg-transparent rq-foot"):
         button = ui.button(name, on_click=halt, color="red-8").classes("w-full rq-halt")
@@ -201,7 +201,7 @@ def _halt_all(mirror: Mirror, page: str) -> None:
 
 
 def _tile(mirror: Mirror, hand: HandMirror) -> Callable[[], None]:
-    # A link, so that it can be opened in another tab, and with the keyboard.
+    # A link, so that it can be opened in another tab and by keyboard.
     link = ui.link(target=f"/hand/{hand.index}").classes(replace="w-full text-inherit no-underline")
     with link.props(f"data-testid=tile-{hand.index}"), ui.card().classes("w-full"):
         ui.label(hand.address).classes("font-bold")

@@ -1,4 +1,4 @@
-"""The state of a hand in words and colours."""
+"""Descriptions and colours for the state of a hand."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from ..mirror import HandMirror
 
 NAMES: Final = tuple("scissor" if axis is Finger.SCISSOR else str(axis.name) for axis in AXES)
 COLORS: Final = ("#3b82f6", "#22a35a", "#e8890c", "#a855f7")
-"""Of A, B, C and the scissor, wherever they are drawn: to be told apart on light and on dark."""
+"""Colours of A, B, C and the scissor, for light and dark pages."""
 
 
 def state_words(hand: HandMirror, *, is_quiet: bool) -> tuple[str, str]:
-    """The state in words, and a colour of Quasar for it."""
+    """A description of the state, and a colour of Quasar."""
     if is_quiet:
         return "the program that watches the gripper is silent", "negative"
     if hand.problem:
@@ -32,7 +32,7 @@ def state_words(hand: HandMirror, *, is_quiet: bool) -> tuple[str, str]:
 
 
 def fault_words(hand: HandMirror) -> tuple[str, bool]:
-    """The fault in words, and whether it is a serious one."""
+    """A description of the fault, and whether it is serious."""
     if hand.problem:
         return hand.problem, True
     if hand.is_lost:
@@ -65,11 +65,6 @@ def event_words(event: dict[str, Any]) -> str:
 
 
 def timed(words: str, at: float | None = None) -> str:
-    """Words with the time of day before them.
-
-    Args:
-        words: what has happened.
-        at: seconds since 1970; None for now.
-    """
+    """Text after the time of day; ``at`` in seconds since 1970, None for now."""
     clock = datetime.fromtimestamp(time() if at is None else at).astimezone()
     return f"{clock:%H:%M:%S.%f}"[:-4] + f"  {words}"
