@@ -35,7 +35,7 @@ def consent(address: str, what: str, *, yes: bool) -> None:
     if screen is None:
         raise UsageError(f"this moves the gripper at {gripper}; without a terminal to ask at it needs --yes")
     forget_keys()
-    print(f"{gripper}: {what}\n{NOTE}\nGo on? [y/N] ", end="", file=screen, flush=True)
+    print(f"{gripper}: {what}\n{NOTE}\nContinue? [y/N] ", end="", file=screen, flush=True)
     if read_line().strip().lower() not in ("y", "yes"):
         raise CommandError(f"nothing was sent to the gripper at {gripper}: the answer was not yes")
 

@@ -66,7 +66,7 @@ class HandCollector(Collector):
         self._hands = list(hands)
         names = Counter(hand.name for hand in self._hands)
         if twice := [name for name, count in names.items() if count > 1]:
-            raise ValueError(f"hands must have names that tell them apart, got {twice[0]!r} twice")
+            raise ValueError(f"hands must have different names, got {twice[0]!r} twice")
         self._loop = asyncio.get_running_loop()
 
     def describe(self) -> Iterable[Metric]:

@@ -43,9 +43,9 @@ async def agent(
     on others once there are keys (robotiq-async fleet keys). The addresses are printed
     on standard output when the agent listens, one a line.
 
-    A client that commands a gripper holds a lease. WHEN A LEASE ENDS, AXES THAT STILL MOVE
-    ARE HELD, also when the agent starts. When the agent ends, the fingers stop; when it
-    is killed, they do not. It is no safety function.
+    A client that commands a gripper holds a lease. WHEN A LEASE ENDS, AND WHEN THE AGENT
+    STARTS, AXES THAT STILL MOVE ARE HELD. When the agent ends, the fingers stop; when it is
+    killed, nothing stops them. It is no safety function.
 
     A gripper that cannot be reached is tried again every second.
 

@@ -63,14 +63,14 @@ async def fleet(
         for member in seen:
             show(member)
         if not seen.members:
-            raise CommandError("no agent is heard; see robotiq-async agent --help")
+            raise CommandError("no agent found; see robotiq-async agent --help")
 
 
 async def halt(site: Site = None, /) -> None:
     """Stop every gripper of a site now, without a question. Clients that command lose the lease.
 
-    Prints the outcome for each, and exits with 1 unless all have stopped and every endpoint
-    was reached. It is no safety function: a network may be down when it is needed.
+    Prints the outcome for each, and exits with 1 unless all were seen to stop and every
+    endpoint was reached. It is no safety function: a network may be down when it is needed.
 
     For example:
 

@@ -96,7 +96,7 @@ def _check(folder: Path, subjects: list[Subject], days: int) -> None:
                 check_host(host)
         path = subject_folder(folder, subject.name, subject.role)
         if path.exists():
-            raise CommandError(f"{path} is there already: nothing was made")
+            raise CommandError(f"{path} exists already: nothing was made")
 
 
 def _make(folder: Path, subjects: list[Subject], days: int) -> None:
@@ -125,4 +125,4 @@ def _tell_lists(lists: list[Path]) -> None:
     own, *copies = lists
     print(f"{own}: who may do what")
     for copy in copies:
-        print(f"{copy}: the same; agents go by it from their next start on")
+        print(f"{copy}: a copy; agents use it from their next start on")

@@ -22,9 +22,9 @@ from ..failures import CommandError, UsageError, usage
 from ..output.notices import tell
 
 if TYPE_CHECKING:
-    from ...tools.web.news import HandNews
     from ...tools.web.server import PageServer
     from ...tools.web.settings import PageSettings
+    from ...tools.web.updates import HandUpdates
 
 AGAIN_S: Final = 3.0
 """Pause between two attempts to reach one of several grippers."""
@@ -128,48 +128,48 @@ async def _serve(
 ) -> None:
     for index, operator in enumerate(operators):
         await _start(page, index, operator, alone=len(operators) == 1, stack=stack)
-    if all(news.problem for news in page.news):
-        raise CommandError("; ".join(news.problem for news in page.news))
+    if all(updates.problem for updates in page.updates):
+        raise CommandError("; ".join(updates.problem for updates in page.updates))
     for address in shown:
         tell(gripper_words(address))
     if not settings.loopback and not settings.certificate:
-        tell("without a certificate the password goes through the network for everybody to read")
+        tell("without a certificate everyone on the network can read the password")
     print(page.url, flush=True)
     if open_browser and not await stack.enter_async_context(opened(page.url)):
         tell("no browser could be opened here: open the address above yourself")
     await page.ended()
-    raise CommandError("the process of the page has ended; what it says is above")
+    raise CommandError("the process of the page has ended; its message is above")
 
 
 async def _start(
     page: PageServer, index: int, operator: Operator, *, alone: bool, stack: AsyncExitStack
 ) -> None:
     """Start a hand. One of several that cannot be reached is tried again and shown as such."""
-    news = page.news[index]
+    updates = page.updates[index]
     try:
         await operator.hand.start(activate=False)
     except RobotiqError as error:
-        news.problem = str(error)
+        updates.problem = str(error)
         if alone:
             raise
         trying = asyncio.get_running_loop().create_task(_try_again(page, index, operator))
         stack.push_async_callback(_cancelled, trying)
-    news.open()
+    updates.open()
 
 
 async def _try_again(page: PageServer, index: int, operator: Operator) -> None:
-    news = page.news[index]
-    while news.problem:
+    updates = page.updates[index]
+    while updates.problem:
         await asyncio.sleep(AGAIN_S)
         if page.is_ending:
             return
         try:
             await operator.hand.start(activate=False)
         except RobotiqError as error:
-            news.problem = str(error)
+            updates.problem = str(error)
         else:
-            news.problem = ""
-            news.open()
+            updates.problem = ""
+            updates.open()
 
 
 async def _cancelled(task: asyncio.Task[None]) -> None:
@@ -180,12 +180,12 @@ async def _cancelled(task: asyncio.Task[None]) -> None:
 async def _leave_all(operators: Sequence[Operator], page: PageServer) -> None:
     """Stop all hands at once: a dead link takes 2 s, and the others would move on meanwhile."""
     page.refuse_commands()
-    await wait_shielded(asyncio.gather(*map(_leave, operators, page.news)))
+    await wait_shielded(asyncio.gather(*map(_leave, operators, page.updates)))
 
 
-async def _leave(operator: Operator, news: HandNews) -> None:
+async def _leave(operator: Operator, updates: HandUpdates) -> None:
     words = await operator.leave()
-    if not news.problem:  # no line for a hand that was never reached
+    if not updates.problem:  # no line for a hand that was never reached
         tell(f"{operator.hand.address}: {words}")
 
 
@@ -210,10 +210,10 @@ def _text(file: Path) -> str:
     except OSError as error:
         raise CommandError(f"{file}: {error.strerror}") from error
     except UnicodeDecodeError as error:
-        raise UsageError(f"{file} is no text") from error
+        raise UsageError(f"{file} is not a text file") from error
 
 
 def _refuse_doubles(addresses: Sequence[str]) -> None:
     for address in addresses:
         if addresses.count(address) > 1:
-            raise UsageError(f"{address} is there twice")
+            raise UsageError(f"{address} is given twice")

@@ -99,7 +99,7 @@ class HandModel:
         try:
             robot = ET.fromstring(text)
         except ET.ParseError as error:
-            raise ValueError(f"the description is no XML: {error}") from error
+            raise ValueError(f"the description is not XML: {error}") from error
         colors = {each.attrib["name"]: _color(each) for each in robot.findall("material")}
         links = {each.attrib["name"]: _link(each, colors) for each in robot.findall("link")}
         joints = [_joint(each) for each in robot.findall("joint")]
@@ -142,7 +142,7 @@ def _ordered(root: str, joints: list[Joint]) -> tuple[Joint, ...]:
     while waiting := [joint for joint in joints if joint.child not in placed]:
         ready = [joint for joint in waiting if joint.parent in placed]
         if not ready:
-            raise ValueError(f"the joint {waiting[0].name} hangs on nothing")
+            raise ValueError(f"the joint {waiting[0].name} is not connected to the root")
         ordered += ready
         placed |= {joint.child for joint in ready}
     return tuple(ordered)

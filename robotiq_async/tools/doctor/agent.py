@@ -83,10 +83,10 @@ class _Asker:
             raise NoAnswerError(f"no answer to info within {ANSWER_S:g} s")
         answer = unpack_answer(reply.payload)
         if answer.to != self._name.base or answer.number not in (0, call.number):
-            raise AgentError("another answer came to info")
+            raise AgentError("the answer to info belongs to another request")
         info = answer.outcome(lambda stamp: stamp)
         if not isinstance(info, dict) or not info.keys() >= _READ:
-            raise AgentError(f"the agent describes the gripper in another way: {info!r:.200}")
+            raise AgentError(f"the agent's description of the gripper has another format: {info!r:.200}")
         return info
 
 

@@ -210,7 +210,7 @@ class Campaign:
         self.table = read_table(self.path, self.layout)
         for runs in self.table.values():
             if len(runs) != self.runs:
-                raise TableError(self.path, None, f"holds {len(runs)} runs, asked for are {self.runs}")
+                raise TableError(self.path, None, f"has {len(runs)} runs instead of {self.runs}")
         was = read_origin(self.path)
         if was != self.origin:
             differs = ", ".join(
@@ -218,7 +218,9 @@ class Campaign:
                 for name in sorted({*was, *self.origin})
                 if was.get(name) != self.origin.get(name)
             )
-            raise TableError(self.path, None, f"was measured otherwise: {differs}; choose another file")
+            raise TableError(
+                self.path, None, f"was measured with other settings: {differs}; choose another file"
+            )
 
     @property
     def left(self) -> list[int]:
@@ -314,7 +316,7 @@ def read_currents(path: Path) -> Currents:
         time, a, b, c = sample
         runs[-1].append((time, a, b, c))
     if not currents:
-        raise TableError(path, None, "there are no currents in it")
+        raise TableError(path, None, "it contains no currents")
     return currents
 
 

@@ -33,8 +33,8 @@ LARGEST: Final = 16 * 2**20
 NOT_OURS: Final = (LookupError, TypeError, ValueError, AttributeError, OverflowError)
 """Errors of reading a message with other fields, or with fields of another type."""
 BROKEN: Final = (
-    "%s breaks off after %d messages: its program was killed, or still writes it, or it is damaged there; "
-    "robotiq-async recover makes a whole file of what is before"
+    "%s ends too early, after %d messages: its program was killed or still writes it, or it is damaged; "
+    "robotiq-async recover makes a complete file of these messages"
 )
 
 T = TypeVar("T")
@@ -231,7 +231,7 @@ class _Bounded:
 
     def read(self, size: int) -> bytes:
         if size > LARGEST:
-            raise ValueError(f"{size} bytes are no record")
+            raise ValueError(f"{size} bytes are not a record")
         return self._file.read(size)
 
 

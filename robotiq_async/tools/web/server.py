@@ -27,8 +27,8 @@ from ...values.errors import ViewerError
 from ..actions import Operator
 from ..recording.payloads import Fields
 from .commands import PageCommands
-from .news import HandNews
 from .settings import PageSettings
+from .updates import HandUpdates
 
 if find_spec("nicegui") is None:
     from ...runtime.extras import install
@@ -50,7 +50,7 @@ class PageServer:
     """The page of some hands.
 
     Attributes:
-        news: the updates, one for each hand.
+        updates: the updates, one for each hand.
         url: the address to open, once the page is served.
         pages: number of browsers that show the page.
     """
@@ -72,7 +72,7 @@ class PageServer:
             raise ValueError("operators must be those of the hands, in their order")
         if settings.control != bool(operators):
             raise ValueError("control needs operators, and operators need control")
-        self.news = [HandNews(hand) for hand in hands]
+        self.updates = [HandUpdates(hand) for hand in hands]
         self.url = ""
         self.pages = 0
         self._settings = settings
@@ -155,12 +155,12 @@ class PageServer:
     async def _tell(self) -> None:
         assert self._process.stdin is not None
         while not self._over.is_set():
-            for news in self.news:
-                news.gather()
+            for updates in self.updates:
+                updates.gather()
             if self._commands.under_way and now() - self._heard_at > SILENCE_S:
                 self._commands.all_gone()
             if self._process.stdin.transport.get_write_buffer_size() < BACKLOG:
-                hands = [news.take(index) for index, news in enumerate(self.news)]
+                hands = [updates.take(index) for index, updates in enumerate(self.updates)]
                 self._write(json.dumps({"hands": hands, "answers": self._answers}).encode() + b"\n")
                 self._answers = []
             await asyncio.sleep(UPDATE_S)

@@ -114,7 +114,7 @@ async def carry_out(
 
     done, left = len(campaign.table), campaign.left
     if done and left:
-        print(f"Going on with {campaign.path}: {done} rows are there, {len(left)} are left.", flush=True)
+        print(f"Continuing {campaign.path}: {done} rows are there, {len(left)} remain.", flush=True)
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),

@@ -36,8 +36,8 @@ async def record(
     It only looks: nothing moves and nothing is written to the gripper. The file is
     MCAP, for viewers (Foxglove, PlotJuggler), and for replay, plot and export. Tools of
     ROS 2 open only one made with --ros2. A file named .csv is a table with a row for each
-    poll, for spreadsheets and pandas; it needs no extra but cli. The file has the commands
-    of its own program, so this command records none: to record commands, use
+    poll, for spreadsheets and pandas; it needs no extra but cli. Commands are recorded only
+    in the program that sends them, so this file has none: to record yours, use
     robotiq_async.tools.recording.recorder.Recorder in your program. A killed recording
     loses at most the last second; recover repairs its file.
 

@@ -16,7 +16,7 @@ from ...output.text import FORMATTERS, brief_line, clock
 if TYPE_CHECKING:
     from ....tools.recording.recordings import Entry
 
-Overwrite = Annotated[Flag, Parameter(help="Replace a file that is there already.")]
+Overwrite = Annotated[Flag, Parameter(help="Replace an existing file.")]
 KINDS: Final = {"statuses": "status", "commands": "command", "events": "event"}
 
 
@@ -53,7 +53,7 @@ def replay(
         print(line)
         is_empty = False
     if is_empty:
-        raise CommandError(f"{file}: there is nothing in it that this command shows")
+        raise CommandError(f"{file}: it contains nothing that this command shows")
 
 
 def _in_order(file: Path) -> Iterator[Entry]:
@@ -135,7 +135,7 @@ def export(
     except OSError as error:
         raise CommandError(f"{table}: {error.strerror}") from error
     if not rows:
-        raise CommandError(f"{file}: there are no {of} in it")
+        raise CommandError(f"{file}: it contains no {of}")
     print(f"{rows} {of} in {table}")
 
 
@@ -171,7 +171,7 @@ def plot(file: Path, picture: Path | None = None, /, *, overwrite: Overwrite = F
     except OSError as error:
         raise CommandError(f"{target}: {error.strerror}") from error
     if not pictures:
-        raise CommandError(f"{file}: there is no status in it")
+        raise CommandError(f"{file}: it contains no status")
     for written in pictures:
         print(written)
 
@@ -193,5 +193,5 @@ def recover(file: Path, target: Path | None = None, /) -> None:
     whole = target or file.with_name(f"{file.stem}.recovered.mcap")
     found = save(file, whole)
     if found.is_whole:
-        print(f"{file} was whole; {whole} is a copy of it")
+        print(f"{file} was complete; {whole} is a copy of it")
     print(f"{found.messages} messages in {whole}")

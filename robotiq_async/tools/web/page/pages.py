@@ -63,7 +63,7 @@ No connection to robotiq-async: what is shown is old{}.</div>
 PRESSED: Final = ", and nothing that is pressed here arrives, HALT neither"
 
 
-class Visits:
+class PageSessions:
     """Counts the browsers, notices when one is lost, and resends everything to one that returns."""
 
     def __init__(self, mirror: Mirror) -> None:
@@ -107,19 +107,19 @@ class Visits:
 
 def register(mirror: Mirror) -> None:
     """Register the pages with NiceGUI."""
-    visits = Visits(mirror)
+    sessions = PageSessions(mirror)
 
     @ui.page("/")
     def front(client: Client) -> None:
         if len(mirror.hands) == 1:
-            _hand_page(mirror, mirror.hands[0], client, visits)
+            _hand_page(mirror, mirror.hands[0], client, sessions)
         else:
-            _tiles(mirror, client, visits)
+            _tiles(mirror, client, sessions)
 
     @ui.page("/hand/{index}")
     def one(client: Client, index: int) -> None:
         if 0 <= index < len(mirror.hands):
-            _hand_page(mirror, mirror.hands[index], client, visits)
+            _hand_page(mirror, mirror.hands[index], client, sessions)
         else:
             ui.label(f"There is no hand {index}: there are {len(mirror.hands)}.")
 
@@ -142,9 +142,9 @@ def _frame(title: str, mirror: Mirror, *, home: bool) -> None:
                 button.props(f"flat dense color=white data-testid={icon}")
 
 
-def _hand_page(mirror: Mirror, hand: HandMirror, client: Client, visits: Visits) -> None:
+def _hand_page(mirror: Mirror, hand: HandMirror, client: Client, sessions: PageSessions) -> None:
     _frame(hand.address, mirror, home=len(mirror.hands) > 1)
-    heartbeat = visits.begin(client)
+    heartbeat = sessions.begin(client)
     shown: list[Callable[[], None]] = []
     with ui.element("div").classes("grid w-full gap-3 grid-cols-1 lg:grid-cols-2"):
         with ui.column().classes("w-full gap-2"):
@@ -185,9 +185,9 @@ def _halt_button(name: str, what: str, halt: Callable[[], None]) -> None:
         button.props("data-testid=halt").tooltip(f"{what}; the space bar does it too")
 
 
-def _tiles(mirror: Mirror, client: Client, visits: Visits) -> None:
+def _tiles(mirror: Mirror, client: Client, sessions: PageSessions) -> None:
     _frame(f"{len(mirror.hands)} hands", mirror, home=False)
-    visits.begin(client)
+    sessions.begin(client)
     with ui.element("div").classes("grid w-full gap-3 grid-cols-1 sm:grid-cols-2 xl:grid-cols-3"):
         shown = [_tile(mirror, hand) for hand in mirror.hands]
     if mirror.control:

@@ -21,7 +21,7 @@ EVENTS: Final = 200
 STATISTICS_S: Final = 1.0
 
 
-class HandNews:
+class HandUpdates:
     """Collects what happens to a hand. It only listens.
 
     Attributes:
