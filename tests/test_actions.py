@@ -56,7 +56,7 @@ async def test_halt_reset_release_and_recover(operator: Operator, gripper: Simul
     await operator.act(ACTIONS["activate"])
     moving = asyncio.create_task(operator.act(ACTIONS["close"]))
     await operator.hand.wait_for_state(State.RUNNING_CC)
-    assert await operator.act(ACTIONS["halt"]) == "every axis stands still"
+    assert await operator.act(ACTIONS["halt"]) == "every axis has stopped"
     assert not operator.hand.status.go_echo
     with pytest.raises(Exception, match="halt"):
         await moving
@@ -264,7 +264,7 @@ async def test_a_recovery_does_not_go_on_after_a_halt_or_a_reset(
 async def test_a_halt_ends_an_activation_and_says_how(operator: Operator, gripper: SimulatedGripper) -> None:
     activating = asyncio.create_task(operator.act(ACTIONS["activate"]))
     await operator.hand.wait_for_state(State.WF_ACTIVATION)
-    assert await operator.act(ACTIONS["halt"]) == "every axis stands still: the gripper is reset"
+    assert await operator.act(ACTIONS["halt"]) == "every axis has stopped: the gripper is reset"
     with pytest.raises(NotActivatedError):
         await activating
     assert not gripper.is_moving

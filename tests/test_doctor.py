@@ -241,7 +241,7 @@ async def test_a_line_that_loses_bytes() -> None:
         plan.cancel()
         await asyncio.wait({plan})
     assert found["line"].level is Level.DOUBT
-    assert "had to be asked again" in found["line"].found
+    assert "had to be repeated" in found["line"].found
     assert "link" not in found
 
 
@@ -398,7 +398,7 @@ async def test_slow_replies_are_no_lost_ones() -> None:
     assert "cable" not in found["Modbus"].advice
     assert "unit id" in found, "of a slow one there is as much to say"
     assert found["rate"].level is Level.DOUBT
-    assert "No poll_interval is so long (at most 0.1 s)" in found["rate"].advice
+    assert "No poll_interval is that long (at most 0.1 s)" in found["rate"].advice
     assert "link" not in found
 
 
@@ -433,7 +433,7 @@ async def test_a_slow_gripper() -> None:
 @virtual_time
 @pytest.mark.parametrize(
     ("code", "level", "words"),
-    [(7, Level.GOOD, "a hint"), (9, Level.DOUBT, "clear by itself"), (13, Level.BAD, "DROPS")],
+    [(7, Level.GOOD, "a hint"), (9, Level.DOUBT, "clear on its own"), (13, Level.BAD, "DROPS")],
 )
 async def test_a_fault(code: int, level: Level, words: str) -> None:
     gripper = SimulatedGripper()

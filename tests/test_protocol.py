@@ -104,7 +104,7 @@ async def test_actions(hand: FakeHand) -> None:
     assert await operator.act(ACTIONS["wide"]) == "SCISSOR at 6; 0.00 s"
     assert (await operator.act(ACTIONS["close"])).startswith("A in contact at 150, B ")
     assert await operator.change_speed(16) == "144"
-    assert await operator.act(ACTIONS["halt"]) == "every axis stands still"
+    assert await operator.act(ACTIONS["halt"]) == "every axis has stopped"
     with pytest.raises(InvalidStateError):
         await operator.act(ACTIONS["release"])
     hand.fail(Fault.SCISSOR_BLOCKED)

@@ -1,13 +1,13 @@
 """The command line ``robotiq-async``; its dependencies come with the extra ``cli``.
 
-One file per sub-command, listed in :mod:`.app`, the only place that knows them all. A sub-command is a
-function, and gives a coroutine if it talks to a gripper: cyclopts makes its options and its help from
-signature and docstring, and :mod:`.run` runs it, ends it on a signal and turns its errors into exit codes.
-One that moves a gripper asks first (:mod:`.consent`)::
+There is one file per sub-command; :mod:`.app` lists them. A sub-command is a function, or a coroutine
+function if it uses a gripper. cyclopts makes options and help from its signature and docstring. :mod:`.run`
+runs it, ends it on a signal and turns its errors into exit codes. A sub-command that moves a gripper asks
+first (:mod:`.consent`)::
 
     0  success
     1  the gripper or the link failed, or the answer was not yes: one line on stderr
-    2  wrong usage; also what moves, without a terminal and without --yes
+    2  wrong usage; also a command that moves, without a terminal and without --yes
     128 + N  ended by signal N (130: Ctrl-C)
 """
 
@@ -30,7 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"robotiq-async: the command line needs cyclopts: {install('cli')}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        # Importing takes a quarter of a second, and nothing has happened yet.
+        # A Ctrl-C during the imports, which take 0.25 s.
         print("robotiq-async: interrupted", file=sys.stderr)
         return 128 + signal.SIGINT
     return run(sys.argv[1:] if arguments is None else arguments)

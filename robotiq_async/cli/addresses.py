@@ -1,4 +1,4 @@
-"""Addresses as people give them to a command; needs no extra."""
+"""Addresses of grippers as users type them; needs no extra."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .failures import UsageError, usage
 
 
 def full_address(address: str) -> str:
-    """The full form of a gripper's address, wherever it is.
+    """The full form of an address, of a local or a remote gripper.
 
     Raises:
         UsageError: malformed.
@@ -19,13 +19,13 @@ def full_address(address: str) -> str:
 
 
 def gripper_words(address: str) -> str:
-    """Which gripper an address means, for people: the first that a command says."""
+    """The first line of a command: which gripper it uses."""
     kind = "Simulated gripper" if is_simulated(address) else "Gripper"
     return f"{kind} {full_address(address)}"
 
 
 def is_simulated(address: str) -> bool:
-    """Whether the gripper is a simulated one inside the command."""
+    """Whether the gripper is simulated inside the command."""
     return full_address(address).startswith("sim:")
 
 

@@ -59,7 +59,7 @@ Nothing here has run on real hardware yet.
 
 
 def build() -> App:
-    """The command line; whatever is slow to import is imported by the sub-command that needs it."""
+    """The command line. Each sub-command imports its slow dependencies itself."""
     app = _app("robotiq-async", _HELP)
     for command in COMMANDS:
         _add(app, command)
@@ -77,7 +77,6 @@ def _add(app: App, command: Callable[..., object]) -> None:
 
 
 def _fleet() -> App:
-    """The sub-command for hands on other hosts."""
     app = _app("fleet", fleet.__doc__ or "")
     app.default(fleet)
     _add(app, halt)
@@ -86,7 +85,6 @@ def _fleet() -> App:
 
 
 def _measure() -> App:
-    """The sub-command that has sub-commands of its own."""
     app = _app("measure", "Measure what the values 0..255 mean on your own gripper. THE FINGERS MOVE.")
     _add(app, measure_speed)
     _add(app, measure_force)

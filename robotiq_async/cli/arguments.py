@@ -1,4 +1,4 @@
-"""Arguments that several sub-commands share: the address, bytes, masks of fingers."""
+"""Arguments that several sub-commands share: addresses, bytes, fingers, options of the link."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from .failures import CommandError, UsageError, usage
 
 
 def need(module: str, extra: str, instead: str = "") -> None:
-    """Refuse to go on without a module of an extra; ``instead`` names an alternative.
+    """Fail if the module of an extra is missing; ``instead`` names an alternative.
 
     Raises:
-        CommandError: it is not.
+        CommandError: the module is missing.
     """
     if find_spec(module) is None:
         raise CommandError(f"this needs {module}: {install(extra)}{instead}")
@@ -30,7 +30,7 @@ def need(module: str, extra: str, instead: str = "") -> None:
 def _integer(name: str, low: int, high: int) -> Callable[[object, Sequence[Token]], int]:
     """A converter for integers in low..high; ``name`` is for an argument that has no option name."""
 
-    # cyclopts' own converter would take 1.5 for 2.
+    # cyclopts' own converter rounds 1.5 to 2.
     def convert(_type: object, tokens: Sequence[Token]) -> int:
         text, where = tokens[0].value, tokens[0].keyword or name
         if not re.fullmatch(r"[+-]?[0-9]{1,9}", text) or not low <= int(text) <= high:
@@ -53,7 +53,7 @@ Address = Annotated[
     ),
 ]
 Flag = Annotated[bool, Parameter(negative=(), show_default=False)]
-"""Off, unless it is given: there is no --no- form, and no default to be told."""
+"""Off unless given. There is no --no- form, and the help shows no default."""
 Yes = Annotated[Flag, Parameter(name=("--yes", "-y"))]
 Host = Annotated[str, Parameter(metavar="HOST")]
 Position = Annotated[int, Parameter(converter=_integer("POSITION", 0, 255))]
@@ -75,7 +75,6 @@ Fingers = Annotated[
 
 
 def _argument(option: Option) -> object:
-    """The type of an argument that is an option of the hand."""
     low, high = option.low, option.high
     if option.choices:
         return Annotated[
@@ -100,10 +99,10 @@ _Arguments: Any = make_dataclass(
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Link(_Arguments):  # type: ignore[misc]  # made from the table of options
-    """How to reach a gripper that is not set up as usual; the command doctor finds out."""
+    """Options of the link for a gripper with unusual settings; the command doctor finds them."""
 
     def options(self) -> dict[str, Any]:
-        """They, as RobotiqHand takes them."""
+        """The options, as RobotiqHand takes them."""
         return asdict(self)
 
 

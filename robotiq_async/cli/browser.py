@@ -16,15 +16,15 @@ from typing import Final
 from ..runtime.concurrency import in_a_thread
 
 OPEN_S: Final = 1.0
-"""Some browsers return from opening a page only when they are closed."""
+"""Maximum wait for the browser: some return only when they are closed."""
 REDIRECT: Final = '<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="0; url={0}">'
 
 
 @asynccontextmanager
 async def opened(url: str, opener: Callable[[str], bool] = webbrowser.open) -> AsyncIterator[bool]:
-    """Open a page for the time of a block; yields whether a browser was started.
+    """Open a page during a block; yields whether a browser was started.
 
-    Without a screen nothing is opened: Python would start a text browser in this terminal.
+    Without a screen it opens nothing: Python would start a text browser in this terminal.
     """
     file = _redirect_file(url) if _has_screen() else None
     if file is None:
@@ -40,8 +40,8 @@ async def opened(url: str, opener: Callable[[str], bool] = webbrowser.open) -> A
 
 
 def _redirect_file(url: str) -> Path | None:
-    # The URL holds the token, and every user of the machine can read the arguments of a process. The file has
-    # a visible name in the home folder: browsers in a snap see neither hidden folders nor the temporary one.
+    # The URL contains the token, and every user of the machine can read the arguments of a process. The file
+    # is in the home folder, not hidden: browsers in a snap see neither hidden folders nor the temporary one.
     try:
         descriptor, name = mkstemp(".html", "robotiq-async-", Path.home())
     except (OSError, RuntimeError):

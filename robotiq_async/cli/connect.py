@@ -25,15 +25,15 @@ def make_hand(
     force: int = DEFAULT_FORCE,
     control: bool | None = True,
 ) -> Hand:
-    """A hand that is not started. No other place in the command line knows what kind of hand it is.
+    """A hand that is not started. Only this function knows which class an address needs.
 
     Args:
         address: the gripper.
-        link: how it is reached.
+        link: options of the link.
         poll_interval: seconds between polls.
         speed: what the axes get until set otherwise.
         force: what the axes get until set otherwise.
-        control: on another host, whether it is commanded; None for when the first command comes.
+        control: on another host, whether to take control; None for with the first command.
 
     Raises:
         UsageError: a malformed address.
@@ -72,7 +72,7 @@ async def connected(
 
     Args:
         address: the gripper.
-        link: how it is reached.
+        link: options of the link.
         halt: whether leaving stops the fingers; False for a command that only reads.
         keep_grip: whether a grip stays in force then.
 
@@ -90,13 +90,13 @@ async def connected(
 
 @asynccontextmanager
 async def operated(operator: Operator, report: Callable[[str], object]) -> AsyncIterator[None]:
-    """Start the hand of an operator; nothing is written until the operator acts.
+    """Start the hand of an operator; nothing is written before the operator acts.
 
     Leaving stops the fingers only if the operator has moved them.
 
     Args:
         operator: of the hand.
-        report: is called in the end with what became of the fingers.
+        report: called at the end with what happened to the fingers.
 
     Raises:
         RobotiqError: no gripper there, or a link that failed.

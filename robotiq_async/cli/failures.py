@@ -1,4 +1,4 @@
-"""How a command says that it does not go on."""
+"""Errors that end a command."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from contextlib import contextmanager
 
 
 class UsageError(Exception):
-    """The command line asks for something that does not exist: exit code 2."""
+    """The arguments are wrong: exit code 2."""
 
 
 class CommandError(Exception):
-    """A command cannot do what it is asked, and it is not the gripper's fault: exit code 1."""
+    """The command failed, and not because of the gripper: exit code 1."""
 
 
 @contextmanager
 def usage() -> Iterator[None]:
-    """Around the construction of library objects: a value they refuse is wrong usage.
+    """Turn errors of constructors into wrong usage.
 
     Raises:
         UsageError: in place of ValueError and TypeError.

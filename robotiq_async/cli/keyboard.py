@@ -1,8 +1,8 @@
-"""A person at a terminal: questions that one key answers, and keys that stop what moves.
+"""A person at a terminal: questions answered by one key, and keys that stop the fingers.
 
-While no question is open every key counts as a stop, from the last answer on. So the terminal passes each key
-on at once, also those that would suspend or quit the program or hold up its output: a program that stands
-still stops no fingers. Ctrl-C stays what it is everywhere else. Linux and macOS.
+While no question is open, every key counts as a stop, from the last answer on. So the terminal passes on each
+key at once, also keys that would suspend or quit the program or hold up its output: a suspended program stops
+no fingers. Ctrl-C works as everywhere else. Linux and macOS.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ ENTER: Final = "\n"
 END: Final = "q"
 PROMPT: Final = "> "
 WIDEST: Final = 100
-"""Columns that a line of text takes at most."""
-AGREE: Final = "Enter goes on; any other key ends with the report so far."
+"""Maximum width of a line in columns."""
+AGREE: Final = "Enter continues; any other key ends with the report so far."
 
 
 def has_terminal() -> bool:
-    """Whether a person can be asked, and can stop what moves."""
+    """Whether a person can answer questions and stop the fingers."""
     streams = (sys.stdin, sys.stdout)
     with suppress(ImportError):  # Windows has no such terminal
         import termios  # noqa: F401
@@ -38,7 +38,7 @@ def has_terminal() -> bool:
 
 
 def wrapped(text: str, columns: int | None = None) -> str:
-    """A text for a terminal; lines that are indented keep that when they are wrapped."""
+    """Wrap text for the terminal, keeping the indentation of each line."""
     width = min(WIDEST, columns or shutil.get_terminal_size().columns) - 1
     lines = []
     for line in text.splitlines():
@@ -85,11 +85,11 @@ class Keyboard:
 
     @property
     def has_stopped(self) -> bool:
-        """Whether a key was pressed since the last answer, or the terminal is gone."""
+        """Whether a key was pressed since the last answer, or the terminal has gone."""
         return self._was_pressed or self._is_gone
 
     def tell(self, words: str) -> None:
-        """Print; a terminal that is gone is noticed."""
+        """Print. Notices if the terminal has gone."""
         self._print(f"{wrapped(words)}\n")
 
     def _print(self, text: str) -> None:
@@ -99,7 +99,7 @@ class Keyboard:
             self._is_gone = True
 
     def alarm(self, words: str) -> None:
-        """Print from a thread: a terminal that takes nothing must not keep the loop."""
+        """Print from a thread: a terminal that does not read must not block the loop."""
         text = f"\n\a{words}\n".encode()
         in_a_thread(lambda: os.write(sys.stderr.fileno(), text))
 
@@ -109,7 +109,7 @@ class Keyboard:
         return await self._key() == ENTER
 
     async def chooses(self, question: str, answers: Mapping[str, str]) -> str | None:
-        """Ask for a key until it is one of those; ``q`` ends."""
+        """Ask for one of some keys; ``q`` ends."""
         names = {key: "Enter" if key == ENTER else key for key in answers}
         choice = "\n".join(f"  {names[key]}: {meaning}" for key, meaning in answers.items())
         self.tell(f"\n{question}\n{choice}\n  {END}: end with the report so far")
@@ -121,12 +121,11 @@ class Keyboard:
                 return None
 
     async def _key(self) -> str:
-        """The next key; empty when the terminal is gone. What was typed before counts for nothing."""
         import termios
 
         with suppress(termios.error):
             termios.tcflush(self._file, termios.TCIFLUSH)
-        self._print(PROMPT)  # after the flush: what is typed when it shows, counts
+        self._print(PROMPT)  # after the flush: keys count from now on
         if self._is_gone:
             return ""
         self._answer = self._loop.create_future()

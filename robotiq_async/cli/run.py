@@ -31,7 +31,7 @@ def run(arguments: Sequence[str]) -> int:
     _mend_streams()
     with collected_warnings() as warnings, _Signals() as signals:
         code, problem = _outcome(arguments, signals)
-    # A failure is one line, whatever it holds: it is read in logs and by scripts.
+    # A failure is always one line, for logs and scripts.
     lines = warnings if problem is None else ["; ".join((problem, *warnings))]
     try:
         for line in lines:
@@ -42,17 +42,16 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _mend_streams() -> None:
-    """Replace closed standard streams by the null device; let the others escape what they cannot encode."""
+    # Services run with closed streams, and not every terminal can show every character.
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         stream = getattr(sys, name)
-        if stream is None:  # its number is free, and no socket is to get it
+        if stream is None:  # closed: a socket must not get its file descriptor
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
         elif mode == "w" and isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
 
 
 def _outcome(arguments: Sequence[str], signals: _Signals) -> tuple[int, str | None]:
-    """The exit code, and the reason if there is one."""
     try:
         command, bound, _ = build().parse_args(arguments, print_error=False, exit_on_error=False)
         outcome = command(*bound.args, **bound.kwargs)
@@ -65,14 +64,14 @@ def _outcome(arguments: Sequence[str], signals: _Signals) -> tuple[int, str | No
     except (RobotiqError, CommandError) as error:
         return FAILURE, str(error)
     except BrokenPipeError:
-        # Whoever read the output has had enough (status | head); the flush at exit must not fail over it.
+        # The reader has closed the pipe (status | head); the flush at exit must not fail.
         forget(sys.stdout)
         return FAILURE, None
     except SystemExit:
-        # So rich ends a program whose output nobody reads; it has forgotten the stream.
+        # rich does this when the reader has closed the pipe; it has redirected the stream.
         return FAILURE, None
     except OSError as error:
-        # The environment's doing: a full disk behind standard output, say.
+        # Caused by the environment: for example a full disk behind standard output.
         return FAILURE, str(error)
     except KeyboardInterrupt:
         return SIGNALLED + (signals.received or signal.SIGINT), "interrupted"
@@ -80,14 +79,14 @@ def _outcome(arguments: Sequence[str], signals: _Signals) -> tuple[int, str | No
 
 
 class _Signals:
-    """SIGINT, SIGTERM and SIGHUP (a terminal that is closed): the first one ends what runs.
+    """The first SIGINT, SIGTERM or SIGHUP (a closed terminal) ends the command.
 
-    A second SIGINT has its ordinary effect; of the others no second one is heard, for closing a terminal
-    sends several, and none of them may keep the first from stopping the fingers.
+    A second SIGINT has its ordinary effect. A second one of the others is ignored: closing a terminal sends
+    several, and none of them may prevent the first from stopping the fingers.
 
-    In the event loop that is a cancellation, so that leaving ``async with`` stops the fingers; elsewhere
-    it is a KeyboardInterrupt. While the loop is set up the signal is only noted: asyncio could not tell
-    an exception out of nowhere from one of its own.
+    In the event loop the signal is a cancellation, so that leaving ``async with`` stops the fingers;
+    elsewhere it is a KeyboardInterrupt. While the loop is being set up the signal is only noted: asyncio
+    could not handle an exception there.
     """
 
     def __init__(self) -> None:
@@ -95,7 +94,7 @@ class _Signals:
         self._end: Callable[[], object] = _interrupt
 
     def __enter__(self) -> Self:
-        # A SIGINT that is ignored stays so: that is how a shell keeps Ctrl-C from its background jobs.
+        # An ignored SIGINT stays ignored: so a shell keeps Ctrl-C from its background jobs.
         numbers = [number for number in _ENDING if signal.getsignal(number) is not signal.SIG_IGN]
         self._previous = {number: signal.signal(number, self._handle) for number in numbers}
         return self
@@ -105,11 +104,6 @@ class _Signals:
             signal.signal(number, handler)
 
     def run(self, work: Coroutine[object, object, None]) -> None:
-        """Run to the end.
-
-        Raises:
-            KeyboardInterrupt: a signal came.
-        """
         self._end = lambda: None
         try:
             with closing(self._cancellable(work)) as main:
@@ -137,25 +131,22 @@ class _Signals:
 
     def _handle(self, number: int, _frame: FrameType | None) -> None:
         for each, before in self._previous.items():
-            signal.signal(each, before if each == signal.SIGINT else _unheard)
+            signal.signal(each, before if each == signal.SIGINT else _ignore)
         self.received = number
         self._end()
 
 
 @contextmanager
 def _awake(loop: asyncio.AbstractEventLoop) -> Iterator[None]:
-    """Let every signal wake the loop.
-
-    One that comes while the loop goes to sleep, or that the system hands to another thread, would be
-    noticed only when something else wakes it: an idle server would have to be told twice.
-    """
+    # Every signal wakes the loop. One that comes just before the loop sleeps, or that the system hands to
+    # another thread, would otherwise wait for the next event: an idle server would not end.
     reading, writing = socket.socketpair()
     with reading, writing:
         reading.setblocking(False)
         writing.setblocking(False)
         try:
             loop.add_reader(reading, reading.recv, 64)
-        except NotImplementedError:  # Windows, where a loop does not sleep so soundly
+        except NotImplementedError:  # Windows, where a loop wakes up often enough
             yield
             return
         before = signal.set_wakeup_fd(writing.fileno(), warn_on_full_buffer=False)
@@ -166,8 +157,8 @@ def _awake(loop: asyncio.AbstractEventLoop) -> Iterator[None]:
             loop.remove_reader(reading)
 
 
-def _unheard(_number: int, _frame: FrameType | None) -> None:
-    """The end has begun already."""
+def _ignore(_number: int, _frame: FrameType | None) -> None:
+    pass  # the first signal has started the end
 
 
 def _interrupt() -> None:

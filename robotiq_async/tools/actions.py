@@ -1,4 +1,4 @@
-"""What a person makes a hand do through a program: with a key of the monitor, a button of a viewer."""
+"""The actions by which a person operates a hand: with a key of the monitor or a button of the page."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ from ..values.errors import MoveSupersededError, NotStartedError, RobotiqStateEr
 from ..values.move_result import MoveResult
 
 CANCELS_RECOVERY: Final = frozenset({"halt", "reset", "release"})
-"""Actions after which no recovery may go on by itself."""
+"""Actions that cancel a recovery which waits for a fault to clear."""
 
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """Something a person can make a hand do, without arguments.
+    """An action without arguments.
 
     Attributes:
         name: one word.
-        what: what it does, in a few words.
-        run: carries it out; returns how it ended, in words.
+        what: a short description.
+        run: carries it out; returns a short description of the outcome.
         moves: whether fingers move, or may let go.
-        warning: a consequence that may surprise; a person is asked first. Empty if there is none.
+        warning: a consequence that may surprise; a person must confirm it first. Empty for none.
     """
 
     name: str
@@ -52,7 +52,7 @@ class Action:
 
 
 class Operator:
-    """A person who operates a hand; knows whether this person has moved anything.
+    """A person who operates a hand. Knows whether this person has moved anything.
 
     Attributes:
         hand: the hand.
@@ -84,15 +84,15 @@ class Operator:
 
     @property
     def has_moved(self) -> bool:
-        """Whether a request was written while a motion of this person was under way, or may be right now."""
+        """Whether a motion of this person has caused a request, or may cause one right now."""
         self._listen()
-        # A request is published only when it is known whether it was acknowledged.
+        # A request is published when its acknowledgement has come, or is overdue.
         return self._moved or self._asking > 0
 
     async def act(self, action: Action) -> str:
-        """Carry out an action; returns how it ended, in words.
+        """Carry out an action; returns a short description of the outcome.
 
-        When cancelled, a move is held; a sequence under way (activation, release, reset) goes on.
+        Cancelling holds a move; a sequence under way (activation, release, reset) continues.
 
         Raises:
             RobotiqError: it could not be carried out.
@@ -106,7 +106,7 @@ class Operator:
             return await (self._recover(action) if action.name == "recover" else action.run(self.hand))
 
     async def _recover(self, action: Action) -> str:
-        """Recover until something else is asked for: it waits for a fault to clear, then moves by itself."""
+        """Recover. While it waits for a fault to clear, another action cancels it."""
         work = asyncio.ensure_future(action.run(self.hand))
         self._recoveries.add(work)
         try:
@@ -121,7 +121,7 @@ class Operator:
     async def move(
         self, position: int, fingers: Finger, *, speed: int | None = None, force: int | None = None
     ) -> str:
-        """Move axes; returns how that ended, in words.
+        """Move axes; returns a short description of the outcome.
 
         Raises:
             TypeError, ValueError, RobotiqError: as :meth:`Hand.move`.
@@ -130,9 +130,9 @@ class Operator:
             return describe(await self.hand.move(position, fingers, speed=speed, force=force))
 
     async def leave(self) -> str:
-        """Stop the hand, and the fingers only if this person has moved them; returns what became of them.
+        """Stop the hand, and the fingers if this person has moved them; returns what happened to the fingers.
 
-        As bounded as :meth:`Hand.stop`.
+        It takes no longer than :meth:`Hand.stop`.
         """
         has_moved, rests = self.has_moved, self.hand.state in (State.RESET, State.ATR_DONE)
         began = now()
@@ -154,7 +154,7 @@ class Operator:
         return str(value)
 
     async def set_force(self, value: int) -> str:
-        """Set the force of all axes; more tightens a grip. Returns it as text.
+        """Set the force of all axes; a higher force tightens a grip. Returns it as text.
 
         Raises:
             TypeError, ValueError, RobotiqError: as :meth:`Hand.set_force`.
@@ -183,9 +183,9 @@ class Operator:
 
     @contextmanager
     def _counted(self) -> Iterator[None]:
-        """Around a motion: whatever is written meanwhile counts as caused by it."""
+        """Count the requests that are written during a motion as caused by it."""
         self._listen()
-        self._requests = self.hand.requests(1)  # the one before ends when the hand is stopped
+        self._requests = self.hand.requests(1)  # a stop ends the previous stream
         self._asking += 1
         try:
             yield
@@ -201,7 +201,7 @@ class Operator:
             self._moved |= self._asking > 0
 
     def _stands_still(self, since: float) -> bool:
-        """Whether a status since then shows that nothing moves: no go, activation or release."""
+        """Whether a status since then shows no go, activation or release bit."""
         try:
             status = self.hand.status
         except NotStartedError:
@@ -211,7 +211,7 @@ class Operator:
 
 
 def describe(result: MoveResult) -> str:
-    """Describe how a move ended: ``A at 241, B in contact at 130, C at 241; 2.31 s``."""
+    """Describe the outcome of a move: ``A at 241, B in contact at 130, C at 241; 2.31 s``."""
     ends = []
     for axis, position in result.positions.items():
         how = " in contact" if axis in result.contacts else ""
@@ -238,7 +238,7 @@ def _width(position: int) -> Callable[[Hand], Awaitable[str]]:
 
 async def _halt(hand: Hand) -> str:
     await hand.halt()
-    return "every axis stands still" + (": the gripper is reset" if hand.state is State.RESET else "")
+    return "every axis has stopped" + (": the gripper is reset" if hand.state is State.RESET else "")
 
 
 async def _activate(hand: Hand) -> str:

@@ -3,7 +3,7 @@
     async with serve_metrics(hand, port=9100):
         ...
 
-They are collected when Prometheus scrapes them and cost nothing in between. They count from the hand's last
+Prometheus collects them when it scrapes; they cost nothing in between. They count from the hand's last
 start, as :attr:`Hand.statistics` does; Prometheus expects counters that start over.
 """
 
@@ -66,15 +66,15 @@ class HandCollector(Collector):
         self._hands = list(hands)
         names = Counter(hand.name for hand in self._hands)
         if twice := [name for name, count in names.items() if count > 1]:
-            raise ValueError(f"hands must have names that tell them apart, got {twice[0]!r} twice")
+            raise ValueError(f"hands must have different names, got {twice[0]!r} twice")
         self._loop = asyncio.get_running_loop()
 
     def describe(self) -> Iterable[Metric]:
-        """Nothing: a registry would collect at once otherwise, and block the event loop that it waits for."""
+        """Nothing: otherwise a registry would collect at once and deadlock with the event loop."""
         return []
 
     def collect(self) -> Iterator[Metric]:
-        """Collect; called in a thread of the server, which has it done in the event loop."""
+        """Collect in the event loop; called in a thread of the server."""
         asking = asyncio.run_coroutine_threadsafe(self._figures(), self._loop)
         figures = asking.result(TIMEOUT_S)
         for name, meaning in _COUNTERS.items():
@@ -105,9 +105,9 @@ class HandCollector(Collector):
 async def serve_metrics(
     *hands: Hand, port: int = 9100, host: str = LOOPBACK
 ) -> AsyncIterator[tuple[str, int]]:
-    """Serve the metrics of hands over HTTP while the block runs; yields host and port.
+    """Serve the metrics of hands over HTTP during a block; yields host and port.
 
-    There is no password: on another interface than loopback, everybody there can read them.
+    There is no password: on an interface other than loopback, everyone there can read them.
 
     Args:
         hands: at least one.
@@ -127,7 +127,7 @@ async def serve_metrics(
     try:
         yield host, server.server_port
     finally:
-        # It may be answering, and wait for this loop: close it in a thread.
+        # It may be answering a scrape that waits for this loop: close it in a thread.
         await asyncio.to_thread(server.shutdown)
         server.server_close()
         thread.join()

@@ -4,7 +4,7 @@
     async with Viewer(hand), hand:
         ...
 
-In this order nothing that concerns viewers delays the stop of the hand.
+In this order a slow viewer does not delay the stop of the hand.
 
 The topics are those of a recording (:mod:`.recording.feed`); ``/gripper/state`` with state, fault and
 statistics, once a second and at every event; ``/robot_description`` and ``/tf`` for 3-D panels. Viewers only
@@ -54,15 +54,15 @@ _TRANSFORMS_SCHEMA: Final = json.dumps(TRANSFORMS_SCHEMA).encode()
 TRANSFORMS: Final = Topic("/tf", "json", TRANSFORMS_NAME, "jsonschema", _TRANSFORMS_SCHEMA)
 SHOWN: Final = (*TOPICS, STATE, DESCRIPTION, TRANSFORMS)
 TRANSFORMS_S: Final = 0.05
-"""Between two messages on ``/tf``: smooth to the eye, a tenth of the polls."""
+"""Interval of ``/tf``: smooth to the eye, a tenth of the polls."""
 STATE_S: Final = 1.0
-"""Between two messages on ``/gripper/state`` when nothing happens."""
+"""Interval of ``/gripper/state`` when nothing happens."""
 STOP_S: Final = 1.0
 """Time for the server to close its connections; a client that does not read could delay it for ever."""
 
 
 class Viewer:
-    """Serves a hand to viewers while a block runs.
+    """Serves a hand to viewers during a block.
 
     Attributes:
         host: the interface to listen on.
@@ -80,7 +80,7 @@ class Viewer:
         self._feed = Feed(hand, self._publish)
         self._server: WebSocketServer
         self._context: Context
-        """Its channels close when the last reference to it is gone."""
+        """A reference: its channels close with the last one."""
         self._channels: dict[Topic, Channel] = {}
         self._publisher: asyncio.Task[None]
         self._transformed_at = 0
@@ -146,7 +146,7 @@ class Viewer:
 
     def _publish(self, message: Message) -> None:
         self._channels[message.topic].log(message.data, log_time=message.nanoseconds)
-        # Every command goes to RUNNING_CC and back; publishing that would double the work.
+        # Every command goes to RUNNING_CC and back; publishing these would double the work.
         if message.topic is EVENT and self._hand.state not in (self._published_state, State.RUNNING_CC):
             self._publish_state()
 
@@ -156,7 +156,6 @@ class Viewer:
             self._channels[TRANSFORMS].log(data, log_time=message.nanoseconds)
 
     def _describe(self) -> None:
-        """Publish the description to a new subscriber; it never changes."""
         self._channels[DESCRIPTION].log(description_message())
 
     def _publish_state(self) -> None:
@@ -172,7 +171,7 @@ class Viewer:
 
 
 class _Listener(ServerListener):
-    """Reports subscriptions to the description, in a thread of the server."""
+    """Reports subscriptions to the description; the server calls it in a thread."""
 
     def __init__(self, describe: Callable[[], None]) -> None:
         self._describe = describe

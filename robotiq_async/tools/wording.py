@@ -1,4 +1,4 @@
-"""States and refusals in words for a person at the monitor or the page, who does not know the API."""
+"""States and refusals for a person at the monitor or the page, who does not know the API."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
-from ..values.enums import State
+from ..values.enums import ObjectStatus, State
 from ..values.errors import GripperFaultError, InvalidStateError, NotActivatedError, RobotiqError
+from ..values.status import NO_REQUEST
 
 STATE_WORDS: Final = {
     State.DISCONNECTED: "lost",
@@ -25,7 +26,16 @@ STATE_WORDS: Final = {
     State.DO_SHUTDOWN: "stopping",
     State.SHUTDOWN: "stopped",
 }
-"""What a state means to a person."""
+"""A description of each state."""
+
+AXIS_WORDS: Final = {
+    NO_REQUEST: "-",
+    ObjectStatus.IN_MOTION.name: "moving",
+    ObjectStatus.CONTACT_OPENING.name: "contact while opening",
+    ObjectStatus.CONTACT_CLOSING.name: "contact while closing",
+    ObjectStatus.AT_POSITION.name: "there",
+}
+"""A description of each ``axis_state()``."""
 
 _METHOD: Final = re.compile(r"\b([a-z_]+)\(\)")
 _ADVICE: Final = re.compile(r": [^:]*(?:\b[a-z_]+\(\)|'async with').*")
@@ -33,7 +43,7 @@ _ACTIONS: Final = {"atr": "release", "start": "the start", "stop": "the end"}
 
 
 def refusal_words(error: RobotiqError, hints: Mapping[State, str]) -> str:
-    """Why a command was refused, and what helps.
+    """Why a command was refused, and which key or button helps.
 
     Args:
         error: the error of the command.
@@ -51,10 +61,10 @@ def refusal_words(error: RobotiqError, hints: Mapping[State, str]) -> str:
 
 
 def _message(error: RobotiqError) -> str:
-    """The message without its advice for programs."""
+    # Advice for programs is cut off.
     return without_methods(_ADVICE.sub("", error.message))
 
 
 def without_methods(words: str) -> str:
-    """The text with methods replaced by the names of their actions, without parentheses."""
+    """Replace methods by the names of their actions, without parentheses."""
     return _METHOD.sub(lambda found: _ACTIONS.get(found[1], found[1]), words)

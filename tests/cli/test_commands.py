@@ -315,7 +315,7 @@ def test_doctor_fails_when_something_is_broken(call: Call) -> None:
 def test_doctor_of_an_agent_that_is_not_there(call: Call) -> None:
     outcome = call("doctor", "zenoh://lab/cell/left?connect=tcp/127.0.0.1:1")
     outcome.assert_failed(1, "zenoh://lab/cell/left: port: see above")
-    assert "FAIL  port           tcp/127.0.0.1:1: nobody listens" in outcome.out
+    assert "FAIL  port           tcp/127.0.0.1:1: nothing listens" in outcome.out
 
 
 def test_doctor_of_an_agent_takes_no_unit_id(call: Call) -> None:

@@ -108,7 +108,7 @@ async def test_at_a_terminal_nothing_happens_without_a_yes(
     server: SimulatorServer, file: Path, command: str, answer: str
 ) -> None:
     terminal = Terminal(*MOVING[command], server.address)
-    await terminal.shows(b"Go on? [y/N]")
+    await terminal.shows(b"Continue? [y/N]")
     assert server.address.encode() in terminal.out
     assert b"emergency stop" in terminal.out
     terminal.press(answer)
@@ -122,7 +122,7 @@ async def test_at_a_terminal_nothing_happens_without_a_yes(
 @pytest.mark.parametrize("answer", ["y", "Y", "yes", " YES "])
 async def test_after_a_yes_it_moves(server: SimulatorServer, answer: str) -> None:
     terminal = Terminal(*COMMAND_LINE, "move", "30", server.address)
-    await terminal.shows(b"Go on? [y/N]")
+    await terminal.shows(b"Continue? [y/N]")
     terminal.press(f"{answer}\n")
     await terminal.shows(b"AT_POSITION")
     assert await terminal.end() == 0
@@ -132,7 +132,7 @@ async def test_after_a_yes_it_moves(server: SimulatorServer, answer: str) -> Non
 async def test_what_was_typed_before_the_question_is_no_answer(server: SimulatorServer) -> None:
     terminal = Terminal(*COMMAND_LINE, "move", "30", server.address)
     terminal.press("y\n")
-    await terminal.shows(b"Go on? [y/N]")
+    await terminal.shows(b"Continue? [y/N]")
     terminal.press("n\n")
     assert await terminal.end() == 1
     assert not server.gripper.writes
@@ -140,7 +140,7 @@ async def test_what_was_typed_before_the_question_is_no_answer(server: Simulator
 
 async def test_ctrl_c_is_no_yes(server: SimulatorServer) -> None:
     terminal = Terminal(*COMMAND_LINE, "move", "30", server.address)
-    await terminal.shows(b"Go on? [y/N]")
+    await terminal.shows(b"Continue? [y/N]")
     terminal.press("\x03")
     assert await terminal.end() == 130
     assert not server.gripper.writes
@@ -149,7 +149,7 @@ async def test_ctrl_c_is_no_yes(server: SimulatorServer) -> None:
 @pytest.mark.parametrize("elsewhere", [1, 2])
 async def test_the_question_is_where_it_is_seen(server: SimulatorServer, file: Path, elsewhere: int) -> None:
     terminal = Terminal("-c", ELSEWHERE.format(str(file), elsewhere, server.address))
-    await terminal.shows(b"Go on? [y/N]")
+    await terminal.shows(b"Continue? [y/N]")
     terminal.press("y\n")
     assert await terminal.end() == 0
     assert "[y/N]" not in written(file)

@@ -78,7 +78,7 @@ def test_it_overwrites_nothing_and_makes_nothing_then(
 ) -> None:
     assert main(["fleet", "keys", str(tmp_path), "--read", "bob"]) == 0
     assert main(["fleet", "keys", str(tmp_path), "--read", "alice", "--read", "bob"]) == 1
-    assert "read-bob is there already: nothing was made" in capsys.readouterr().err
+    assert "read-bob exists already: nothing was made" in capsys.readouterr().err
     assert not (tmp_path / "read-alice").exists()
 
 

@@ -99,7 +99,7 @@ def test_nobody_there_to_read_the_scale(call: Call, tmp_path: Path) -> None:
             *("--step", "250", "--runs", "1", "--speed", "255", "--no-plot"),
         )
     assert outcome.code == 1
-    assert "nobody answers: the input has ended" in outcome.err
+    assert "no answer: the input has ended" in outcome.err
     assert not (tmp_path / "f.csv").exists()
 
 
@@ -192,7 +192,10 @@ def test_wrong_usage(arguments: list[str], words: str, capsys: pytest.CaptureFix
 
 @pytest.mark.parametrize(
     ("text", "words"),
-    [("speed_value\n", "line 1: expected the columns"), ("speed_value,run_1_ms\n0,5\n", "holds 1 runs")],
+    [
+        ("speed_value\n", "line 1: expected the columns"),
+        ("speed_value,run_1_ms\n0,5\n", "has 1 runs instead"),
+    ],
 )
 def test_a_bad_table_is_refused(
     text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -230,7 +233,7 @@ def test_what_was_measured_on_another_gripper_is_not_gone_on_with(call: Call, tm
     first.assert_succeeded()
     for options in (("10.255.255.1",), ("sim://", "--fingers", "A")):
         outcome = call("measure", "speed", *options, "--output", table, "--step", "255", *QUICK)
-        outcome.assert_failed(1, "was measured otherwise")
+        outcome.assert_failed(1, "was measured with other settings")
 
 
 @pytest.mark.usefixtures("virtually")
@@ -239,7 +242,7 @@ def test_another_surface_is_another_table(call: Call, tmp_path: Path) -> None:
     options = ("--output", table, "--step", "250", "--speed", "255", "--speedup", "30", *QUICK)
     call("measure", "force", "sim://", *options).assert_succeeded()
     outcome = call("measure", "force", "sim://", "--surface", "rigid", *options)
-    outcome.assert_failed(1, "was measured otherwise: surface foam there and rigid here")
+    outcome.assert_failed(1, "was measured with other settings: surface foam there and rigid here")
 
 
 @pytest.mark.usefixtures("virtually")

@@ -174,7 +174,9 @@ async def test_of_the_currents_between_two_paints_the_highest_is_shown(active: O
         strong = RobotiqStatus((*still[:2], still[2] & 0xFF00 | 9, *still[3:]))
         peaks = [strong.current_ma(axis) for axis in THREE_FINGER.axes]
         assert max(peaks) == 90
-        pilot.app._see([strong, active.hand.status])
+        for status in (strong, active.hand.status):
+            pilot.app._timeline._statuses.push(status)
+        pilot.app._look()
         assert "   90 mA" in pilot.app.query_one(Axes).render().plain
 
 
@@ -232,7 +234,7 @@ async def test_halt_is_one_key(key: str) -> None:
             await pilot.press("c")
             await until(pilot, lambda: hand.is_moving)
             await pilot.press(key)
-            await until(pilot, lambda: "halt: every axis stands still" in log(pilot))
+            await until(pilot, lambda: "halt: every axis has stopped" in log(pilot))
             assert not hand.is_moving
             await until(pilot, lambda: "close: " in log(pilot))
 

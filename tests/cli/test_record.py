@@ -87,7 +87,7 @@ def test_for_ros_2(call: Call, tmp_path: Path) -> None:
         assert [connection.topic for connection in reader.connections] == ["/joint_states"]
         assert f"\n{reader.message_count} polls, 0 lost" in outcome.out
     for command in ("replay", "plot"):
-        call(command, str(file)).assert_failed(1, "it.mcap: there is no")
+        call(command, str(file)).assert_failed(1, "it.mcap: it contains no")
 
 
 def test_no_gripper_no_file(call: Call, tmp_path: Path) -> None:
@@ -118,7 +118,7 @@ def test_recover_makes_a_broken_one_whole(grasp: Path, capsys: pytest.CaptureFix
     grasp.write_bytes(whole[: len(whole) // 2])
     assert main(["recover", str(grasp)]) == 0
     out = capsys.readouterr().out
-    assert "was whole" not in out
+    assert "was complete" not in out
     recovered = grasp.with_name("grasp.recovered.mcap")
     assert f"{len(list(read_recording(recovered)))} messages in {recovered}" in out
     assert main(["recover", str(grasp)]) == 1
@@ -137,7 +137,7 @@ def test_of_a_broken_one_it_is_said_that_it_is(
     out, err = capsys.readouterr()
     assert out
     assert err.count("\n") == 1
-    assert "grasp.mcap breaks off after " in err
+    assert "grasp.mcap ends too early, after " in err
     assert "robotiq-async recover" in err
 
 
@@ -361,7 +361,7 @@ def test_an_error_does_not_steer_the_terminal_either(
 
 def test_nothing_to_show_is_said(foreign: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["replay", str(foreign(b"{}", topic="/odometry"))]) == 1
-    assert "foreign.mcap: there is nothing in it that this command shows" in capsys.readouterr().err
+    assert "foreign.mcap: it contains nothing that this command shows" in capsys.readouterr().err
 
 
 def test_a_name_that_is_no_text_is_shown_all_the_same(

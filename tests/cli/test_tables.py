@@ -162,7 +162,7 @@ def test_a_recording_without_statuses_says_so(tmp_path: Path, capsys: pytest.Cap
     file = tmp_path / "foreign.mcap"
     write_foreign(file, "/gripper/event", b'{"kind": "state", "target": "RESET"}')
     assert main(["export", str(file)]) == 1
-    assert "there are no statuses in it" in capsys.readouterr().err
+    assert "it contains no statuses" in capsys.readouterr().err
     assert not file.with_suffix(".csv").exists()
 
 
@@ -253,7 +253,7 @@ def test_in_brief_nothing_to_show_is_said(tmp_path: Path, capsys: pytest.Capture
     file = tmp_path / "foreign.mcap"
     write_foreign(file, "/odometry", b"{}")
     assert main(["replay", "--brief", str(file)]) == 1
-    assert "there is nothing in it that this command shows" in capsys.readouterr().err
+    assert "it contains nothing that this command shows" in capsys.readouterr().err
 
 
 # -- what is there already ---------------------------------------------------------------------------------

@@ -76,7 +76,7 @@ async def test_of_several_grippers_one_may_be_missing(shell: Shell, server: Simu
     [
         (["tcp://127.0.0.1:1"], 1, "cannot connect to tcp://127.0.0.1:1"),
         (["tcp://127.0.0.1:1", "tcp://127.0.0.1:2"], 1, "127.0.0.1:2"),
-        (["tcp://127.0.0.1:1", "127.0.0.1:1"], 2, "is there twice"),
+        (["tcp://127.0.0.1:1", "127.0.0.1:1"], 2, "is given twice"),
         (["gripper:x"], 2, "gripper:x"),
         (["--port", "70000"], 2, "0..65535"),
         (["--host", "192.0.2.1"], 2, "lets others in: that needs a password or a certificate"),
@@ -206,7 +206,7 @@ async def test_a_hand_that_can_be_reached_again_is_not_started_once_the_page_end
         await operators[0].hand.start()
         await operators[0].move(10, Finger.A)
         page = PageServer([each.hand for each in operators], SETTINGS, operators=operators)
-        page.news[1].problem = "nobody was there"
+        page.updates[1].problem = "nobody was there"
         trying = asyncio.create_task(_try_again(page, 1, operators[1]))
         await asyncio.sleep(AGAIN_S - 0.5)
         dead.policy = lambda _: []

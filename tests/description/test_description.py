@@ -193,9 +193,9 @@ def test_an_axis_of_any_length_will_do_but_for_none() -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("<robot>", "no XML"),
-        ("<robot/>", "one link that stands on nothing"),
-        ('<robot><link name="a"/><link name="b"/></robot>', "one link that stands on nothing"),
+        ("<robot>", "not XML"),
+        ("<robot/>", "one root link"),
+        ('<robot><link name="a"/><link name="b"/></robot>', "one root link"),
         ('<robot><link name="a"><visual/></link></robot>', "a visual without geometry"),
     ],
 )

@@ -12,9 +12,9 @@ from robotiq_async import Finger
 from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.wire.envelope import Call, unpack_answer
 from robotiq_async.fleet.wire.names import GripperName
-from robotiq_async.values.errors import AgentError, ProtocolError, RobotiqError
+from robotiq_async.values.errors import AgentError, ControlLostError, ProtocolError, RobotiqError
 from tests.fleet.by_hand import LEFT, ask, move_slowly
-from tests.fleet.lab import lab
+from tests.fleet.lab import Lab, lab
 from tests.fleet.world import world
 from tests.virtual import virtual
 
@@ -38,6 +38,14 @@ STRANGE: list[tuple[str, Any]] = [
     ("lease", {"what": "steal"}),
     ("lease", {}),
 ]
+
+
+async def asked(here: Lab, verb: str, call: Call) -> Any:
+    reply = await here.network.bus("stranger").ask(
+        LEFT.key(verb), call.pack(), timeout=1.0, urgency=Urgency.COMMAND
+    )
+    assert reply is not None
+    return unpack_answer(reply.payload).outcome(lambda stamp: stamp)
 
 
 @virtual
@@ -75,6 +83,19 @@ async def test_that_are_none(verb: str, payload: bytes) -> None:
         with pytest.raises((ProtocolError, AgentError)):
             unpack_answer(reply.payload).outcome(lambda stamp: stamp)
         await hand.move(20, 1)
+
+
+@virtual
+@pytest.mark.parametrize(("later", "refusal"), [(0, ControlLostError), (1, AgentError)])
+async def test_a_command_without_a_lease_or_for_another_run(later: int, refusal: type[RobotiqError]) -> None:
+    """The arguments are valid for no command, so the refusal comes before they are read."""
+    async with lab() as here:
+        epoch = (await asked(here, "info", Call(LEFT.base, "stranger", number=1)))["epoch"]
+        call = Call(LEFT.base, "stranger", epoch + later, number=2, arguments={"fingers": 0})
+        writes = len(here.gripper.writes)
+        with pytest.raises(refusal):
+            await asked(here, "cmd/hold", call)
+        assert len(here.gripper.writes) == writes
 
 
 @virtual

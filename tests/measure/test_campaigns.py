@@ -242,7 +242,7 @@ async def test_other_runs_than_those_in_the_file_are_refused(tmp_path: Path) -> 
         return 5
 
     await force_campaign(file, step=250, runs=2).measure(measure)
-    with pytest.raises(TableError, match="holds 2 runs, asked for are 3"):
+    with pytest.raises(TableError, match="has 2 runs instead of 3"):
         force_campaign(file, step=250, runs=3)
 
 

@@ -85,7 +85,7 @@ async def test_each_hand_has_its_name() -> None:
 
 
 async def test_two_hands_of_one_name_are_refused() -> None:
-    with pytest.raises(ValueError, match="names that tell them apart, got 'left' twice"):
+    with pytest.raises(ValueError, match="different names, got 'left' twice"):
         async with serve_metrics(RobotiqHand(name="left"), RobotiqHand(name="left"), port=0):
             pass
 

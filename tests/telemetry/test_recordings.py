@@ -110,7 +110,7 @@ def test_what_stands_before_a_bomb_is_read_and_saved(file: Path) -> None:
     with pytest.raises(RecordingError):
         next(entries)
     whole = file.with_name("whole.mcap")
-    with pytest.raises(RecordingError, match=r"chunk .*; what stands before it is in .*whole\.mcap"):
+    with pytest.raises(RecordingError, match=r"chunk .*; the messages before it are in .*whole\.mcap"):
         recover(file, whole)
     assert [entry.fields for entry in read_recording(whole)] == [EVENT]
 

@@ -103,7 +103,7 @@ async def test_wrong_requests_are_refused_before_anything_is_sent(
 
 
 async def test_an_empty_request_is_one_without_arguments(operator: Operator) -> None:
-    assert await SERVICES["/gripper/halt"].call(operator, b" ") == "every axis stands still"
+    assert await SERVICES["/gripper/halt"].call(operator, b" ") == "every axis has stopped"
 
 
 def test_there_is_one_for_every_action() -> None:

@@ -252,7 +252,7 @@ async def test_halt_stops_it_and_so_does_the_space_bar(browser: Browser, stage: 
     await browser.click("halt")
     status = await seen(hand, moving=False, go=False)
     assert status.position(Finger.A) < 200
-    await browser.says("events", "halt: every axis stands still")
+    await browser.says("events", "halt: every axis has stopped")
     # While the button that was clicked has the focus: the space bar would press it again.
     await press(browser, hand, "close")
     await browser.press_keys(" ")

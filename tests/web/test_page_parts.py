@@ -1,4 +1,4 @@
-"""What the page is made of, without a browser: commands, news, the mirror, being in touch."""
+"""What the page is made of, without a browser: commands, updates, the mirror, being in touch."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from robotiq_async.control.state_machine import TABLE, Verdict, refusal
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import Operator
 from robotiq_async.tools.web.commands import BUTTONS, FRESH_S, MAX_COMMANDS, PageCommands
-from robotiq_async.tools.web.news import HandNews
 from robotiq_async.tools.web.page.heartbeat import LOST_S, Heartbeat
 from robotiq_async.tools.web.page.mirror import HISTORY_S, Mirror
 from robotiq_async.tools.web.page.widgets.words import event_words, fault_words, state_words
 from robotiq_async.tools.web.server import PageServer
 from robotiq_async.tools.web.settings import PageSettings
+from robotiq_async.tools.web.updates import HandUpdates
 from robotiq_async.tools.wording import refusal_words
 from robotiq_async.values.trigger import Trigger
 from tests.fake_hand import FakeHand
@@ -148,7 +148,7 @@ async def test_a_halt_of_a_page_that_is_gone_is_completed(hand: RobotiqHand) -> 
     pages = Pages(hand)
     pages.do("halt")
     pages.commands.gone("one")
-    assert (await pages.answer())["words"] == "every axis stands still"
+    assert (await pages.answer())["words"] == "every axis has stopped"
 
 
 async def test_a_page_that_is_ending_takes_nothing_but_a_halt(hand: RobotiqHand) -> None:
@@ -184,26 +184,26 @@ async def test_a_halt_finds_its_way_through_a_crowd() -> None:
         assert "under way already" in (await pages.answer())["words"]
         pages.do("halt")
         words = [(await pages.answer())["words"] for _ in range(MAX_COMMANDS + 1)]
-        assert "every axis stands still" in words
+        assert "every axis has stopped" in words
         await pages.commands.close()
 
 
-# -- news and mirror ---------------------------------------------------------------------------------------
+# -- updates and mirror -----------------------------------------------------------------------------------
 
 
-def mirrored(news: HandNews, mirror: Mirror) -> None:
-    news.gather()
-    mirror.hear(json.dumps({"hands": [news.take(0)], "answers": []}).encode())
+def mirrored(updates: HandUpdates, mirror: Mirror) -> None:
+    updates.gather()
+    mirror.hear(json.dumps({"hands": [updates.take(0)], "answers": []}).encode())
 
 
 async def test_the_mirror_shows_what_the_hand_is(hand: RobotiqHand, gripper: SimulatedGripper) -> None:
-    news, mirror = HandNews(hand), Mirror(("here",), control=False, say=lambda _: None)
+    updates, mirror = HandUpdates(hand), Mirror(("here",), control=False, say=lambda _: None)
     shown = mirror.hands[0]
     assert state_words(shown, is_quiet=False)[0] == "lost"
     await hand.move(90)
     gripper.inject_fault(Fault.SCISSOR_BLOCKED)
     await hand.wait_for_state(State.FAULT)
-    mirrored(news, mirror)
+    mirrored(updates, mirror)
     assert shown.status == hand.status
     assert (state_words(shown, is_quiet=False), fault_words(shown)[1]) == (("fault", "negative"), True)
     assert Fault.SCISSOR_BLOCKED.description in fault_words(shown)[0]
@@ -212,21 +212,21 @@ async def test_the_mirror_shows_what_the_hand_is(hand: RobotiqHand, gripper: Sim
     assert not any("RUNNING_CC" in line for line in lines), "every command would be two of them"
     assert shown.statistics["polls"] == pytest.approx(hand.statistics.polls, abs=20)
     assert state_words(shown, is_quiet=True)[0].endswith("silent")
-    mirrored(news, mirror)
+    mirrored(updates, mirror)
     assert len(shown.events) == len(lines), "events are told once"
 
 
 async def test_a_peak_of_the_current_is_not_lost_between_two_looks(hand: RobotiqHand) -> None:
-    news = HandNews(hand)
+    updates = HandUpdates(hand)
     peak = 0
     moving = asyncio.create_task(hand.close())
     async for status in hand.statuses():
-        news.gather()
+        updates.gather()
         peak = max(peak, status.current_ma(Finger.A))
         if moving.done():
             break
-    assert news.take(0)["peaks"][0] >= peak > 0
-    assert news.take(0)["peaks"] == [0, 0, 0, 0]
+    assert updates.take(0)["peaks"][0] >= peak > 0
+    assert updates.take(0)["peaks"] == [0, 0, 0, 0]
 
 
 def test_the_curves_are_of_the_last_half_minute() -> None:
@@ -240,8 +240,8 @@ def test_the_curves_are_of_the_last_half_minute() -> None:
 
 
 async def test_a_silence_is_a_gap_in_the_curves_and_no_line(hand: RobotiqHand) -> None:
-    news, mirror = HandNews(hand), Mirror(("here",), control=False, say=lambda _: None)
-    mirrored(news, mirror)
+    updates, mirror = HandUpdates(hand), Mirror(("here",), control=False, say=lambda _: None)
+    mirrored(updates, mirror)
     shown = mirror.hands[0]
     shown._sample(shown.samples[-1].at + 10)
     assert [sample.positions is None for sample in shown.samples] == [False, True, False]

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ...fleet.network.zenoh_bus import ZenohBus
 
 WAITING_S = 2.0
-"""Opening a session takes a tenth of that, or until there is a router."""
+"""After this time it reports that it waits for a router; otherwise opening a session takes a tenth of it."""
 
 
 async def agent(
@@ -43,9 +43,9 @@ async def agent(
     on others once there are keys (robotiq-async fleet keys). The addresses are printed
     on standard output when the agent listens, one a line.
 
-    Whoever commands a gripper holds a lease. WHAT STILL MOVES WHEN A LEASE ENDS IS HELD,
-    and so is what moves when the agent starts. When the agent ends, the fingers stop;
-    when it is killed, nobody stops them. It is no safety function.
+    A client that commands a gripper holds a lease. WHEN A LEASE ENDS, AND WHEN THE AGENT
+    STARTS, AXES THAT STILL MOVE ARE HELD. When the agent ends, the fingers stop; when it is
+    killed, nothing stops them. It is no safety function.
 
     A gripper that cannot be reached is tried again every second.
 
@@ -109,7 +109,7 @@ async def _serve(settings: AgentSettings) -> None:
         finally:
             await bus.close()
     except asyncio.CancelledError:
-        log.info("the agent was told to end")  # and that is how this command ends well
+        log.info("the agent was asked to end")  # the normal end of this command
 
 
 async def _open(configuration: dict[str, object], where: str) -> ZenohBus:
@@ -129,5 +129,5 @@ def _announce(served: Agent, settings: AgentSettings) -> None:
     try:
         for each in served.hands.values():
             print(each.name, flush=True)
-    except BrokenPipeError:  # whoever wanted to know has heard enough; the grippers are served all the same
+    except BrokenPipeError:  # the reader has gone; the agent serves all the same
         forget(sys.stdout)

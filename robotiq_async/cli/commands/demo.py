@@ -17,9 +17,9 @@ from ..browser import opened
 from ..consent import consent
 
 PATIENCE_S: Final = 60.0
-"""How long the demo waits for somebody to look."""
+"""How long the demo waits for a browser."""
 LOOK_S: Final = 2.0
-"""For the page to be drawn, and found among the windows."""
+"""Time for the user to find the window."""
 
 
 def demo(
@@ -52,7 +52,6 @@ def demo(
 
 @asynccontextmanager
 async def _shown(hand: Hand) -> AsyncIterator[None]:
-    """Show a hand on a page, and begin when somebody looks."""
     from ...tools.recording.payloads import title
     from ...tools.web.server import PageServer
     from ...tools.web.settings import PageSettings
@@ -69,13 +68,12 @@ async def _shown(hand: Hand) -> AsyncIterator[None]:
                 await page.seen()
             await asyncio.sleep(LOOK_S)
         except TimeoutError:
-            print("Nobody looks; it begins.", flush=True)
+            print("No browser has opened the page; it begins.", flush=True)
         yield
-        await asyncio.sleep(LOOK_S)  # the end is worth seeing, too
+        await asyncio.sleep(LOOK_S)  # time to see the end
 
 
 def _program() -> ModuleType:
-    """The demo program: a file of the installed package, or demo/demo.py beside it in the source tree."""
     package = Path(__file__).parents[2]
     installed, source = package / "_demo.py", package.parent / "demo" / "demo.py"
     spec = spec_from_file_location("robotiq_async._demo", installed if installed.exists() else source)

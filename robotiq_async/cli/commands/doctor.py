@@ -25,10 +25,9 @@ async def doctor(
     """Find out what is wrong with a connection. Nothing moves and nothing is written.
 
     Name, port, Modbus, unit id, register addresses, round trip and rate, activation,
-    fault, other clients: one line each, with what to do about it. Of a gripper on
-    another host: certificates, port, agent, access, round trip, statuses, the gripper,
-    who commands it, and whether commands are refused that must be. It takes some
-    seconds. Exits with 1 when something is broken.
+    fault, other clients: one line each, with advice. For a gripper on another host:
+    certificates, port, agent, access, round trip, statuses, the gripper, and who commands
+    it. It takes some seconds. Exits with 1 when something is broken.
 
     For example:
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ...fleet.fleet import Fleet, Member
 
 SETTLE_S = 1.5
-"""Every gripper is summed up once a second."""
+"""Time to collect: agents publish a summary of each gripper once a second."""
 _ROW = "{:<40} {:<14} {:<10} {:<28} {}"
 
 Site = Annotated[str | None, Parameter(help="The site's name; all sites without it.")]
@@ -63,13 +63,13 @@ async def fleet(
         for member in seen:
             show(member)
         if not seen.members:
-            raise CommandError("no agent is heard; see robotiq-async agent --help")
+            raise CommandError("no agent found; see robotiq-async agent --help")
 
 
 async def halt(site: Site = None, /) -> None:
-    """Stop every gripper of a site now. Nobody is asked, and whoever commands loses the lease.
+    """Stop every gripper of a site now, without a question. Clients that command lose the lease.
 
-    Prints how it ended for each, and exits with 1 unless all were seen to stop and every
+    Prints the outcome for each, and exits with 1 unless all were seen to stop and every
     endpoint was reached. It is no safety function: a network may be down when it is needed.
 
     For example:
@@ -103,7 +103,7 @@ async def _watch(seen: Fleet, show: object) -> None:
         async for member in changes:
             show(member)
     except asyncio.CancelledError:
-        pass  # Being told to stop is how this command ends well.
+        pass  # Ctrl-C is the normal end of this command.
 
 
 def _print_row(member: Member) -> None:

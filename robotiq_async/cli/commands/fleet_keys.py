@@ -31,12 +31,11 @@ def keys(
     operate: Names = (),
     days: Annotated[int, Parameter(metavar="N", show_default=False)] = DAYS,
 ) -> None:
-    """Make the keys by which agents and clients know each other, and who may do what.
+    """Make keys for agents and clients, and set who may do what.
 
-    The first time it makes a certificate authority in FOLDER. Everybody else gets a
-    folder in it, to be carried to that machine: agents, clients that read, clients
-    that also halt, clients that operate. Nothing is overwritten. What is in those
-    folders opens the door: carry them as you would a password.
+    The first time it makes a certificate authority in FOLDER. Every agent and every client
+    (that reads, that also halts, that operates) gets a folder in it, for you to copy to its
+    machine. Nothing is overwritten. Treat these folders as you would a password.
 
     For example:
 
@@ -45,7 +44,7 @@ def keys(
 
     Args:
         folder: The folder of the authority. It stays on your own machine.
-        agent: A host with grippers, and by what it is connected to (default: its name).
+        agent: A host with grippers, and the addresses that clients connect to (default: its name).
         read: A client that watches.
         halt: A client that watches and halts.
         operate: A client that watches, halts and commands.
@@ -66,7 +65,7 @@ def keys(
 
 @dataclass(frozen=True)
 class Subject:
-    """Who gets a certificate."""
+    """The owner of a certificate."""
 
     role: Role
     name: str
@@ -74,7 +73,6 @@ class Subject:
 
 
 def _agent(text: str) -> Subject:
-    """An agent in an argument: NAME, or NAME=HOST,HOST."""
     from ...fleet.keys.access_list import Role
 
     name, equals, hosts = text.partition("=")
@@ -82,12 +80,7 @@ def _agent(text: str) -> Subject:
 
 
 def _check(folder: Path, subjects: list[Subject], days: int) -> None:
-    """Refuse what cannot be made before anything is written.
-
-    Raises:
-        UsageError: a name, a host or the days cannot be.
-        CommandError: something would be overwritten.
-    """
+    """Check everything before anything is written."""
     from ...fleet.keys.access_list import check_subject
     from ...fleet.keys.authority import DAYS_MAX, check_host
     from ...fleet.keys.certificates import subject_folder
@@ -103,15 +96,11 @@ def _check(folder: Path, subjects: list[Subject], days: int) -> None:
                 check_host(host)
         path = subject_folder(folder, subject.name, subject.role)
         if path.exists():
-            raise CommandError(f"{path} is there already: nothing was made")
+            raise CommandError(f"{path} exists already: nothing was made")
 
 
 def _make(folder: Path, subjects: list[Subject], days: int) -> None:
-    """Make what is missing, and say of each folder where it goes.
-
-    Raises:
-        OSError, ValueError: the folder cannot be written, or is not an authority's.
-    """
+    """Make the missing files, and print for each folder where it goes."""
     from ...fleet.keys.access_list import Role
     from ...fleet.keys.certificates import AUTHORITY_KEY, access_lists, has_authority, issue, make_authority
 
@@ -133,8 +122,7 @@ def _destination(subject: Subject) -> str:
 
 
 def _tell_lists(lists: list[Path]) -> None:
-    """Where the access list is, now that it has changed."""
     own, *copies = lists
     print(f"{own}: who may do what")
     for copy in copies:
-        print(f"{copy}: the same; agents go by it from their next start on")
+        print(f"{copy}: a copy; agents use it from their next start on")

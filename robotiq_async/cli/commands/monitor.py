@@ -18,7 +18,7 @@ from ..output.log_capture import forget, forwarded_warnings
 from ..output.notices import tell
 
 SCREEN_S: Final = 1.0
-"""How long the screen may take to restore the terminal."""
+"""Maximum time for the screen to restore the terminal."""
 
 
 async def monitor(
@@ -33,9 +33,9 @@ async def monitor(
 ) -> None:
     """Show a gripper while it works, and move it by keys. Nothing moves until a key is pressed.
 
-    The screen shows the state, the fault in words, and for each axis where it is, where
-    it is asked to go, what it does and its current; how the polling goes; and a log.
-    A lost gripper is shown as lost, and comes back by itself.
+    The screen shows the state, the fault, and for each axis position, requested position,
+    what it does and its current; polling statistics; and a log. A lost gripper is shown as
+    lost until the monitor has reconnected.
 
     Keys:
 
@@ -50,7 +50,7 @@ async def monitor(
 
     Quitting stops the fingers only if they were moved from here.
 
-    Without a terminal, in a pipe say, it prints what --json prints.
+    Without a terminal, for example in a pipe, it prints what --json prints.
 
     For example:
 
@@ -73,11 +73,11 @@ async def monitor(
         need("textual", "monitor", ", or pass --watch")
         await _screen(address, link, speed, force)
     except asyncio.CancelledError:
-        pass  # Being told to stop is how this command ends well.
+        pass  # Ctrl-C is the normal end of this command.
 
 
 def _is_terminal() -> bool:
-    """Whether there is somebody to look at a screen (which is drawn on standard error) and to press keys."""
+    # All three: the screen is drawn on standard error.
     streams = (sys.stdin, sys.stdout, sys.stderr)
     return all(each is not None and each.isatty() for each in streams) and os.environ.get("TERM") != "dumb"
 
@@ -92,7 +92,7 @@ async def _look(address: str, link: Link, *, as_json: bool) -> None:
         if as_json:
             tell(gripper_words(address))
         await (print_objects if as_json else watch)(hand)
-    raise CommandError("the hand has ended; what became of it is above")
+    raise CommandError("the hand has ended; the reason is above")
 
 
 async def _screen(address: str, link: Link, speed: int, force: int) -> None:
@@ -109,14 +109,14 @@ async def _screen(address: str, link: Link, speed: int, force: int) -> None:
         with forwarded_warnings(screen.write_log, of=operator.hand.name):
             await asyncio.wait({showing})
     finally:
-        # First the fingers: a screen whose terminal is gone may take its time, or not come back at all.
+        # First the fingers: a screen whose terminal has gone may take long, or never end.
         words = await operator.leave()
         if screen is not None:
             showing.cancel()
             await asyncio.wait({showing}, timeout=SCREEN_S)
         _say(words)
     if screen.return_code:
-        raise CommandError("the screen failed; what it says is above")
+        raise CommandError("the screen failed; its message is above")
 
 
 def _say(words: str) -> None:

@@ -42,11 +42,11 @@ def move(
     success, and the table says so. Unless the gripper is that of sim:// it asks
     first; without a terminal it needs --yes.
 
-    In the end it stops every axis (rGTO = 0), also those that hold something. By
-    the vendor's word the part stays held then; no one has measured it on a
-    3-Finger. The next move does not take that grip up again. With --keep rGTO stays set if everything has
-    come to rest, Ctrl-C or not, and the next move leaves the other axes their grip.
-    Speed and force cannot be read back: the other axes get 128 and 64 then.
+    At the end it stops every axis (rGTO = 0), also those that hold something. According
+    to the vendor the part stays held then; no one has measured it on a 3-Finger. The next
+    move does not resume that grip. With --keep rGTO stays set if everything has come to
+    rest, also after Ctrl-C, and the next move leaves the other axes their grip. Speed and
+    force cannot be read back: the other axes get 128 and 64 then.
 
     For example:
 
@@ -60,7 +60,7 @@ def move(
         fingers: The axes that move: ABC, A,B, scissor, all.
         speed: 0 is the slowest (10 s for a full stroke), 255 the fastest (2 s).
         force: 0 is the weakest, 255 the strongest.
-        timeout: Give up after so many seconds; by default from distance and speed.
+        timeout: Give up after so many seconds (default: from distance and speed).
         keep: Let a grip stay in force when the command ends.
         yes: Do not ask.
     """

@@ -54,7 +54,7 @@ async def simulate(
 
         KIND [VALUE] [on read|write] [at S] [for S|for ever|once] [every S]
 
-    in seconds of the clock, counted from the start. Each is told on standard error
+    in seconds of the clock, counted from the start. A line on standard error reports each
     as it begins. --troubles lists the kinds.
 
     For example:
@@ -71,16 +71,16 @@ async def simulate(
 
     Args:
         port: TCP port; 0 takes a free one.
-        host: Interface to listen on. Modbus knows no password: whoever reaches the port is in command.
+        host: Interface to listen on. Modbus has no password: all who reach the port can command.
         model: Which gripper: a 3-Finger, 2F-85, 2F-140 or Hand-E.
         speedup: How many times faster than the clock the simulated time runs.
         like_hardware: Have the habits of real grippers (the default), or with --plain none.
-        exact: Stop exactly where it is told to, which no real gripper does.
+        exact: Stop exactly at the requested position, which no real gripper does.
         object_: Count at which the fingers A, B and C meet something when they close.
         fixed: The object stays there in an activation, which then fails with fault 0x0D.
         serial: Serve Modbus RTU on this serial device in place of TCP (extra serial).
         rtu_over_tcp: Serve Modbus RTU through a TCP socket, as serial servers and tool ports do.
-        unpaced: Let bytes of a serial line take no time; for a real serial port, which takes it itself.
+        unpaced: Do not simulate the transmission time of bytes; for a real serial port, which takes it.
         device_id: The only Modbus unit id that is answered (default: 9 for RTU, any on TCP).
         trouble: What goes wrong, and when; may be given again.
         troubles: List what can go wrong, and end.
@@ -131,11 +131,11 @@ async def simulate(
             await server.fault_injector.run(plan, _tell)
             await asyncio.Event().wait()
     except asyncio.CancelledError:
-        pass  # Being told to stop is how this command ends well.
+        pass  # Ctrl-C is the normal end of this command.
     except ImportError as error:
         raise RobotiqError(str(error)) from error
     except BrokenPipeError:
-        raise  # nobody reads the address
+        raise  # the reader of the address has gone
     except OSError as error:
         if serial is not None:
             raise RobotiqError(f"cannot listen on {serial}: {why_no_port(error)}") from error
@@ -143,7 +143,6 @@ async def simulate(
 
 
 def _place(gripper: SimulatedGripper, position: int | None, *, fixed: bool) -> None:
-    """Put something in the way of the fingers, if there is something."""
     if position is not None:
         gripper.place_object(Finger.ABC, position, fixed=fixed)
     elif fixed:
@@ -159,6 +158,6 @@ def _list_troubles() -> None:
 
     for name, kind in KINDS.items():
         usual = "" if kind.value is None else f" (VALUE: {kind.value:g} unless given)"
-        lasts = "" if kind.lasts == 0 else "; goes on unless it is said for how long"
+        lasts = "" if kind.lasts == 0 else "; lasts for ever unless a duration is given"
         link = "" if kind.link is None else f"; {kind.link} only"
         print(f"{name:19} {kind.meaning}{usual}{lasts}{link}")

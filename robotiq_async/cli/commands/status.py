@@ -20,7 +20,7 @@ async def status(
     as_json: Annotated[Flag, Parameter(name="--json")] = False,
     link: Link = USUAL,
 ) -> None:
-    """Read the gripper once and print what it says. Nothing moves and nothing is written.
+    """Read the gripper once and print its status. Nothing moves and nothing is written.
 
     For example:
 
@@ -28,7 +28,7 @@ async def status(
         robotiq-async status --json 192.168.1.11 | jq .A.position
 
     Args:
-        as_json: Print one JSON object in place of the table.
+        as_json: Print one JSON object instead of the table.
     """
     from ..connect import connected
     from ..output.tables import print_status

@@ -54,7 +54,7 @@ async def verify(
     A gripper that another client commands, or that holds something, is not written to.
 
     The folder of the report gets report.json, report.md and recording.mcap with every
-    frame (extra record). No address, host or user stands in them.
+    frame (extra record). They contain no address, host or user.
 
     For example:
 
@@ -65,10 +65,10 @@ async def verify(
 
     Args:
         up_to: The last stage, 0..9; 9 unless given.
-        from_: The stage to begin with. Who answers is looked at all the same.
-        report: Folder for the report; made, and refused if it has one.
+        from_: The stage to begin with. The gripper is identified all the same.
+        report: Folder for the report; it must not contain one yet.
         yes_to: Do not ask for the stages up to this one, at most 2.
-        label: What the report is to be called; whatever you write here is in it.
+        label: Title of the report; it appears there as you write it.
     """
     if is_remote(address):
         raise UsageError("verify the gripper on the host that its line leads to: it uses no agent")
@@ -103,7 +103,6 @@ async def verify(
 
 @asynccontextmanager
 async def _simulated(simulation: Simulation) -> AsyncIterator[str]:
-    """The address of a gripper that is simulated in here."""
     from ...link.sim_transport import new_gripper
     from ...simulator import SimulatorServer
 
@@ -126,7 +125,7 @@ async def _run(plan: Plan, person: Person, folder: Folder) -> None:
 
 
 async def _end(report: Report, folder: Folder) -> None:
-    """Write the report, and say the most of it here: also where it cannot be written."""
+    """Write the report and print a summary, also if the report cannot be written."""
     from ...tools.verify.page import lines, sentences
 
     failure = await folder.end(report)
@@ -140,27 +139,22 @@ async def _end(report: Report, folder: Folder) -> None:
 
 
 class Unattended:
-    """Nobody: for stages that were agreed to beforehand, in which nothing moves."""
+    """In place of a person, for stages that were agreed to beforehand and move nothing."""
 
     @property
     def has_stopped(self) -> bool:
-        """There is nobody to press a key."""
         return False
 
     def tell(self, words: str) -> None:
-        """Print."""
         print(words, flush=True)
 
     def alarm(self, words: str) -> None:
-        """Print."""
         print(words, flush=True)
 
     async def consents(self, words: str) -> bool:
-        """There is nobody to agree."""
         print(words, flush=True)
         return False
 
     async def chooses(self, question: str, answers: Mapping[str, str]) -> str | None:
-        """There is nobody to choose."""
         print(question, ", ".join(answers.values()), flush=True)
         return None

@@ -40,7 +40,7 @@ async def view(
 
     Args:
         port: TCP port; 0 takes a free one.
-        host: Interface to listen on. With another one than 127.0.0.1 other machines can look.
+        host: Interface to listen on. With one other than 127.0.0.1 other machines can look.
         layout: Write the matching layout to a file, for Foxglove to import, and exit.
     """
     if layout is not None:
@@ -63,7 +63,7 @@ async def view(
                 print(viewer.url, flush=True)
                 await asyncio.Event().wait()
     except asyncio.CancelledError:
-        pass  # Ctrl-C is how this command ends well.
+        pass  # Ctrl-C is the normal end of this command.
 
 
 def _write(layout: Path) -> None:

@@ -22,12 +22,12 @@ from ..failures import CommandError, UsageError, usage
 from ..output.notices import tell
 
 if TYPE_CHECKING:
-    from ...tools.web.news import HandNews
     from ...tools.web.server import PageServer
     from ...tools.web.settings import PageSettings
+    from ...tools.web.updates import HandUpdates
 
 AGAIN_S: Final = 3.0
-"""Between two attempts to reach a gripper of several."""
+"""Pause between two attempts to reach one of several grippers."""
 
 
 async def web(
@@ -45,10 +45,10 @@ async def web(
 ) -> None:
     """Show grippers on a page in the browser, the hand in three dimensions, until Ctrl-C.
 
-    What is printed is the address to open; the token in it lets in whoever has it. The
-    page only looks, unless --control is given: then it has buttons, and a halt that is
-    also on the space bar. Nothing moves until one is pressed. With several addresses
-    there is a tile for each.
+    It prints the address to open; the token in the address lets its users in. The page
+    only looks, unless --control is given: then it has buttons, and a halt that is also on
+    the space bar. Nothing moves until one is pressed. With several addresses there is a
+    tile for each.
 
     Closing the browser, or losing its connection, holds the axes that it has set in
     motion. Ending this command stops the fingers only if they were moved from here.
@@ -63,8 +63,8 @@ async def web(
         control: Let the page command the grippers.
         open_browser: Open the page in a browser.
         port: TCP port; 0 takes a free one.
-        host: Interface to listen on. All but 127.0.0.1 need a password or a certificate, as others get in.
-        password_file: File whose first line is asked of everybody, in place of the token.
+        host: Interface to listen on. All but 127.0.0.1 let others in, and need a password or a certificate.
+        password_file: File whose first line is the password, in place of the token.
         certificate: Certificate of your own in PEM, for https.
         key: Its private key in PEM.
         speed: Speed of all axes from the first command on; the present one cannot be read.
@@ -98,7 +98,7 @@ async def web(
         with forwarded_warnings(tell):
             await _show(page, operators, settings, shown, open_browser=open_browser)
     except asyncio.CancelledError:
-        pass  # Being told to stop is how this command ends well.
+        pass  # Ctrl-C is the normal end of this command.
 
 
 async def _show(
@@ -113,7 +113,7 @@ async def _show(
         try:
             await _serve(page, operators, settings, shown, stack, open_browser=open_browser)
         finally:
-            # First: nothing that concerns the page, or a gripper that cannot be reached, delays it.
+            # First, so that neither the page nor an unreachable gripper delays it.
             await _leave_all(operators, page)
 
 
@@ -128,48 +128,48 @@ async def _serve(
 ) -> None:
     for index, operator in enumerate(operators):
         await _start(page, index, operator, alone=len(operators) == 1, stack=stack)
-    if all(news.problem for news in page.news):
-        raise CommandError("; ".join(news.problem for news in page.news))
+    if all(updates.problem for updates in page.updates):
+        raise CommandError("; ".join(updates.problem for updates in page.updates))
     for address in shown:
         tell(gripper_words(address))
     if not settings.loopback and not settings.certificate:
-        tell("without a certificate the password goes through the network for everybody to read")
+        tell("without a certificate everyone on the network can read the password")
     print(page.url, flush=True)
     if open_browser and not await stack.enter_async_context(opened(page.url)):
         tell("no browser could be opened here: open the address above yourself")
     await page.ended()
-    raise CommandError("the process of the page has ended; what it says is above")
+    raise CommandError("the process of the page has ended; its message is above")
 
 
 async def _start(
     page: PageServer, index: int, operator: Operator, *, alone: bool, stack: AsyncExitStack
 ) -> None:
-    """Start a hand; one of several that cannot be reached is tried again and again, and shows as such."""
-    news = page.news[index]
+    """Start a hand. One of several that cannot be reached is tried again and shown as such."""
+    updates = page.updates[index]
     try:
         await operator.hand.start(activate=False)
     except RobotiqError as error:
-        news.problem = str(error)
+        updates.problem = str(error)
         if alone:
             raise
         trying = asyncio.get_running_loop().create_task(_try_again(page, index, operator))
         stack.push_async_callback(_cancelled, trying)
-    news.open()
+    updates.open()
 
 
 async def _try_again(page: PageServer, index: int, operator: Operator) -> None:
-    news = page.news[index]
-    while news.problem:
+    updates = page.updates[index]
+    while updates.problem:
         await asyncio.sleep(AGAIN_S)
         if page.is_ending:
             return
         try:
             await operator.hand.start(activate=False)
         except RobotiqError as error:
-            news.problem = str(error)
+            updates.problem = str(error)
         else:
-            news.problem = ""
-            news.open()
+            updates.problem = ""
+            updates.open()
 
 
 async def _cancelled(task: asyncio.Task[None]) -> None:
@@ -178,14 +178,14 @@ async def _cancelled(task: asyncio.Task[None]) -> None:
 
 
 async def _leave_all(operators: Sequence[Operator], page: PageServer) -> None:
-    """Stop all hands at once: one whose link is dead takes 2 s, and the others would move on meanwhile."""
+    """Stop all hands at once: a dead link takes 2 s, and the others would move on meanwhile."""
     page.refuse_commands()
-    await wait_shielded(asyncio.gather(*map(_leave, operators, page.news)))
+    await wait_shielded(asyncio.gather(*map(_leave, operators, page.updates)))
 
 
-async def _leave(operator: Operator, news: HandNews) -> None:
+async def _leave(operator: Operator, updates: HandUpdates) -> None:
     words = await operator.leave()
-    if not news.problem:  # of one that was never reached there is nothing to say
+    if not updates.problem:  # no line for a hand that was never reached
         tell(f"{operator.hand.address}: {words}")
 
 
@@ -210,11 +210,10 @@ def _text(file: Path) -> str:
     except OSError as error:
         raise CommandError(f"{file}: {error.strerror}") from error
     except UnicodeDecodeError as error:
-        raise UsageError(f"{file} is no text") from error
+        raise UsageError(f"{file} is not a text file") from error
 
 
 def _refuse_doubles(addresses: Sequence[str]) -> None:
-    """A simulated hand has an address of its own; any other that comes twice is one gripper."""
     for address in addresses:
         if addresses.count(address) > 1:
-            raise UsageError(f"{address} is there twice")
+            raise UsageError(f"{address} is given twice")

@@ -1,1 +1,1 @@
-"""What commands print, and where it goes."""
+"""The output of commands."""

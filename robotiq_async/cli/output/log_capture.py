@@ -1,4 +1,4 @@
-"""The library's log while a command runs."""
+"""Redirects the library's log while a command runs."""
 
 from __future__ import annotations
 
@@ -10,13 +10,11 @@ from typing import TextIO
 
 
 def forget(stream: TextIO) -> None:
-    """Redirect a stream that nobody reads any more to the null device: its last flush must not fail."""
+    """Redirect a stream without a reader to the null device: its last flush must not fail."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 class _Forwarder(logging.Handler):
-    """Calls a function with the message of each record."""
-
     def __init__(self, to: Callable[[str], object], of: str) -> None:
         super().__init__(logging.WARNING)
         self._to = to
@@ -25,13 +23,13 @@ class _Forwarder(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         try:
             self._to(record.getMessage().removeprefix(self._known))
-        except Exception:  # noqa: BLE001  # it is called in the hand's own task, which must not end
+        except Exception:  # noqa: BLE001  # it runs in the hand's own task, which must not end
             self.handleError(record)
 
 
 @contextmanager
 def collected_warnings() -> Iterator[list[str]]:
-    """Collect the library's warnings, to be printed when the command has ended."""
+    """Collect the library's warnings, to print them after the command."""
     messages: list[str] = []
     with forwarded_warnings(messages.append):
         yield messages
@@ -39,11 +37,11 @@ def collected_warnings() -> Iterator[list[str]]:
 
 @contextmanager
 def forwarded_warnings(to: Callable[[str], object], *, of: str = "") -> Iterator[None]:
-    """Forward the library's warnings, and those of foxglove-sdk, to a function, and to no outer one.
+    """Forward warnings of the library and of foxglove-sdk to a function, and not to outer ones.
 
     Args:
         to: the function.
-        of: the name of the one hand that is shown there: it need not be said with every warning.
+        of: name of the only hand there, which is then left out of the warnings.
     """
     foxglove = logging.getLogger("foxglove")
     log, forwarder = logging.getLogger("robotiq_async"), _Forwarder(to, of)

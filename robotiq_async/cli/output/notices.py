@@ -1,4 +1,4 @@
-"""What a command says beside its output."""
+"""Messages of a command beside its output."""
 
 from __future__ import annotations
 
@@ -8,5 +8,5 @@ from ...runtime.log import printable
 
 
 def tell(words: str) -> None:
-    """A line on stderr. Some of the words are others': of clients, of agents."""
+    """Print a line on stderr. Makes text of clients and agents printable."""
     print("robotiq-async:", printable(words), file=sys.stderr, flush=True)

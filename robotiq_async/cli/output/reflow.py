@@ -1,4 +1,4 @@
-"""Text of a source file, whose lines are of one width, as text for a terminal of any width."""
+"""Reflows docstrings for terminals of any width."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from itertools import groupby
 
 
 def reflow(text: str) -> str:
-    """Docstrings have lines of one width; a terminal has its own: a paragraph becomes one line.
+    """Join the lines of each paragraph; a terminal wraps them to its own width.
 
-    What is indented, examples say, keeps its lines.
+    Indented lines, such as examples, stay as they are.
     """
     lines = inspect.cleandoc(text).splitlines()
     return "\n".join(

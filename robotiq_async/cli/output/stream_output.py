@@ -9,13 +9,12 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Final
 
-from ...runtime.clock import now
 from ...runtime.concurrency import in_a_thread
 from ...tools.recording.feed import compact
-from ...tools.recording.payloads import Fields, fault_fields, transition_fields
+from ...tools.recording.payloads import Fields
 from ...tools.recording.raw_output import write_all
-from ...values.enums import Fault, State
-from ...values.events import Transition
+from ...tools.recording.timeline import Timeline
+from ...values.enums import State
 from ...values.status import RobotiqStatus
 from .log_capture import forwarded_warnings
 from .text import clock, event_line, status_line
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     from ...hand import Hand
 
 BUFFER: Final = 4000
-"""Statuses kept for a slow reader: twenty seconds."""
+"""Statuses kept for a slow reader: 20 s."""
 JSON_INTERVAL_S: Final = 0.02
 WATCH_INTERVAL_S: Final = 0.1
 EVENTS: Final = ("transition", "fault", "log")
@@ -35,26 +34,26 @@ Formatter = Callable[[list[Fields]], list[str]]
 async def print_objects(hand: Hand, buffer: int = BUFFER) -> None:
     """Print every status, transition and fault as a line of JSON until the hand is stopped.
 
-    ``kind`` says what a line is about, ``time`` is in seconds since 1970. A slow reader loses the oldest
-    statuses; a line of the kind ``missed`` has their number. Warnings of the library are of the kind ``log``.
+    ``kind`` is the kind of the line, ``time`` is in seconds since 1970. A slow reader loses the oldest
+    statuses; a line of kind ``missed`` has their number. Warnings of the library have the kind ``log``.
     """
     await _print(_History(hand, buffer), _json_lines, JSON_INTERVAL_S)
 
 
 async def watch(hand: Hand) -> None:
-    """Print the state; then every transition and fault, and the newest status if it shows something new."""
+    """Print the state; then every transition and fault, and the newest status if its line has changed."""
     await in_a_thread(lambda: _write(f"{clock(time.time())} state    {hand.state.name}\n".encode()))
     await _print(_History(hand, BUFFER), _TextLines(), WATCH_INTERVAL_S)
 
 
 async def _print(history: _History, formatter: Formatter, interval: float) -> None:
-    with forwarded_warnings(history.add_warning, of=history.name):
+    with forwarded_warnings(history.add_warning, of=history.hand.name):
         ended = False
         while not ended:
-            ended = history.has_ended  # and once more for what has come with the end
+            ended = history.hand.state is State.SHUTDOWN  # and once more for the last events
             if lines := formatter(list(history.new())):
                 data = "".join(f"{line}\n" for line in lines).encode()
-                # The reader may be slow: a full pipe must not block the event loop that polls, nor the end.
+                # The reader may be slow: a full pipe must not block the event loop that polls, nor the stop.
                 await in_a_thread(lambda: _write(data))  # noqa: B023  # awaited before it changes
             await asyncio.sleep(interval)
 
@@ -64,52 +63,32 @@ def _write(data: bytes) -> None:
 
 
 class _History:
-    """What happens to a hand, in the order in which it happened."""
+    """The timeline of a hand as objects, with the warnings of the library."""
 
     def __init__(self, hand: Hand, buffer: int) -> None:
-        self._hand = hand
+        self.hand = hand
         self._warnings: deque[tuple[float, str]] = deque(maxlen=BUFFER)
-        self._statuses = hand.statuses(buffer)
-        self._transitions = hand.transitions()
-        self._state = hand.state
-        self._fault = Fault.NONE
+        self._timeline = Timeline(hand, buffer)
+        self._state = hand.state.name
         self._missed = 0
-        # Timestamps are monotonic; people and files go by wall-clock time.
-        self._epoch = time.time() - now()
-
-    @property
-    def name(self) -> str:
-        """Of the hand."""
-        return self._hand.name
-
-    @property
-    def has_ended(self) -> bool:
-        """Whether nothing more will come."""
-        return self._hand.state is State.SHUTDOWN
 
     def add_warning(self, message: str) -> None:
-        """Add a warning of the library; at any time."""
         self._warnings.append((time.time(), message))
 
     def new(self) -> Iterator[Fields]:
-        """What has happened since the last call."""
         while self._warnings:
             at, message = self._warnings.popleft()
             yield {"kind": "log", "time": at, "message": message}
-        if self._statuses.missed > self._missed:
-            yield {"kind": "missed", "time": time.time(), "count": self._statuses.missed - self._missed}
-            self._missed = self._statuses.missed
-        happened: list[RobotiqStatus | Transition] = [*self._transitions.drain(), *self._statuses.drain()]
-        for each in sorted(happened, key=lambda one: one.timestamp):
-            stamp = {"time": round(self._epoch + each.timestamp, 6)}
-            if isinstance(each, Transition):
-                self._state = each.target
-                yield stamp | transition_fields(each)
-                continue
-            yield stamp | {"kind": "status", "state": self._state.name} | each.as_dict()
-            if each.fault != self._fault:
-                self._fault = each.fault
-                yield stamp | fault_fields(each)
+        if missed := self._timeline.missed - self._missed:
+            yield {"kind": "missed", "time": time.time(), "count": missed}
+            self._missed += missed
+        for at, each in self._timeline.new():
+            stamp = {"time": round(at, 6)}
+            if isinstance(each, RobotiqStatus):
+                yield stamp | {"kind": "status", "state": self._state} | each.as_dict()
+            else:
+                self._state = each.get("target", self._state)
+                yield stamp | each
 
 
 def _json_lines(new: list[Fields]) -> list[str]:
@@ -117,8 +96,6 @@ def _json_lines(new: list[Fields]) -> list[str]:
 
 
 class _TextLines:
-    """Makes lines of text of what has happened."""
-
     def __init__(self) -> None:
         self._shown = ""
 

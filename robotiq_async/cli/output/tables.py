@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def print_status(hand: Hand) -> None:
-    """Print state and fault, a line each, then a row for every axis."""
+    """Print state and fault, one line each, then a row for every axis."""
     last = hand.status
     print(f"{hand.state.name}: {_activation(last)}, {'moving' if last.is_moving else 'not moving'}")
     if last.fault is not Fault.NONE:
@@ -42,7 +42,7 @@ def _activation(status: RobotiqStatus) -> str:
 
 
 def print_outcomes(result: MoveResult) -> None:
-    """Print a row for every axis of the move, then how long it took."""
+    """Print a row for every axis of the move, then its duration."""
     axes = list(result.outcomes)
     rows = [
         (result.positions[axis], result.outcomes[axis].name, result.peak_current_ma[axis]) for axis in axes

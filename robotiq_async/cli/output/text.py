@@ -1,4 +1,4 @@
-"""What happens to a hand as lines of text."""
+"""Statuses, requests and events as lines of text."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from collections.abc import Callable
 from datetime import datetime
 from typing import Any, Final
 
-from ...tools.recording.payloads import Fields
-from ...values.enums import Finger, State
+from ...tools.recording.payloads import Fields, is_command
+from ...values.enums import Finger
 from ...values.status import NO_REQUEST
 from ...values.trigger import Trigger
 
 NOTHING: Final = "-"
-"""Stands for what means nothing."""
+"""In place of a state without a meaning."""
 _NAMES: Final = [str(axis.name) for axis in Finger.ALL]
 
 
@@ -26,13 +26,13 @@ def _axes_in(fields: Fields) -> list[str]:
 
 
 def status_line(fields: Fields) -> str:
-    """The line for a status: where every axis is, and what it does."""
+    """The line for a status: position and state of every axis."""
     axes = (f"{n}={fields[n]['position']} {axis_words(fields[n]['axis_state'])}" for n in _axes_in(fields))
     return f"status   {' '.join(axes)}"
 
 
 def axis_words(state: str) -> str:
-    """What an axis does, of its state; ``-`` where that means nothing."""
+    """The state of an axis; ``-`` where it means nothing."""
     return NOTHING if state == NO_REQUEST else state
 
 
@@ -59,16 +59,14 @@ def event_line(fields: Fields) -> str:
 
 
 def brief_line(fields: Fields, contacts: dict[str, Any]) -> str:
-    """The line for a state, a fault, or a change of the contacts; empty for all else.
+    """The line for a state, a fault, or a change of the contacts; empty for everything else.
 
     Args:
         fields: a status, a request, or an event.
-        contacts: the axes in contact and where, as of the last status; is kept up to date.
+        contacts: positions of the axes in contact as of the last status; is updated.
     """
     if "kind" in fields:
-        # A control loop goes to RUNNING_CC and back with every command.
-        is_command = State.RUNNING_CC.name in (fields.get("source"), fields.get("target"))
-        return "" if is_command else event_line(fields)
+        return "" if is_command(fields) else event_line(fields)
     if "contacts" not in fields:
         return ""
     now = {name: fields[name]["position"] for name in fields["contacts"]}
@@ -84,4 +82,4 @@ FORMATTERS: Final[dict[str, Callable[[Fields], str]]] = {
     "/gripper/command": command_line,
     "/gripper/event": event_line,
 }
-"""What makes a line of a message, by topic."""
+"""The formatter of each topic."""

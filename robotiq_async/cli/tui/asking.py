@@ -1,7 +1,7 @@
-"""What the monitor asks before it does something: a yes, or an axis and a position. Pure: text and keys.
+"""Questions of the monitor: a yes, or axes and a position. Pure: text and keys.
 
-No screens of textual's: while one lies over another, every paint draws all of both, and the loop that paints
-is the one that polls.
+They are no screens of textual's: with one above another, every paint draws both, and the loop that paints is
+the one that polls.
 """
 
 from __future__ import annotations
@@ -15,53 +15,51 @@ from ...runtime.clock import now
 from ...values.enums import CLOSED, Finger
 
 READING_S: Final = 0.3
-"""A yes counts only after this time: it may have been typed before the question could be read."""
+"""A yes counts only after this time: an earlier one was typed before the question could be read."""
 NO: Final = frozenset({"escape", "q", "ctrl+c"})
-"""Keys that end every question, and nothing is done."""
+"""Keys that cancel every question."""
 _ERASE: Final = frozenset({"backspace", "delete", "ctrl+h"})
 _LETTERS: Final = {"a": Finger.A, "b": Finger.B, "c": Finger.C, "s": Finger.SCISSOR}
 
 
 class Asking(Protocol):
-    """Something that waits for keys. Those that halt never come here."""
+    """A question that takes the keys, except those that halt."""
 
     @property
     def text(self) -> Text:
-        """What is to be shown now."""
+        """The text of the question, with the keys so far."""
 
     def press(self, key: str) -> bool:
-        """Take a key, by textual's name for it; returns whether it was the last."""
+        """Take a key by textual's name for it; returns whether it was the last."""
 
 
 class Question:
-    """Asks before a dangerous action."""
+    """Asks before a dangerous action.
+
+    Args:
+        question: what it is about.
+        warning: the consequences.
+        yes: called after a yes.
+    """
 
     def __init__(self, question: str, warning: str, yes: Callable[[], None]) -> None:
-        """Ask now.
-
-        Args:
-            question: what it is about.
-            warning: what will happen.
-            yes: is called when the answer is a yes.
-        """
         self._question, self._warning, self._yes = question, warning, yes
         self._asked_at = now()
 
     @property
     def is_open(self) -> bool:
-        """Whether a yes counts: not before the question can have been read."""
+        """Whether a yes counts: not before the question could be read."""
         return now() - self._asked_at >= READING_S
 
     @property
     def text(self) -> Text:
-        """Question, warning and keys."""
         text = Text(f"{self._question}\n\n", "bold")
         text.append(self._warning, "bold yellow")
         text.append("\n\ny yes    n no    space halt")
         return text
 
     def press(self, key: str) -> bool:
-        """Only a yes and a no count, and a yes not too early."""
+        """Only yes and no count, and a yes not too early."""
         if key == "y" and self.is_open:
             self._yes()
             return True
@@ -69,21 +67,15 @@ class Question:
 
 
 class Target:
-    """Asks which axes are to go where. Only the last key, Enter, moves anything."""
+    """Asks for axes and a position. Only Enter moves anything."""
 
     def __init__(self, move: Callable[[Finger, int], None]) -> None:
-        """Ask now.
-
-        Args:
-            move: is called with axes and position.
-        """
         self._move = move
         self._axes = Finger(0)
         self._digits = ""
 
     @property
     def text(self) -> Text:
-        """What has been chosen so far, and the keys."""
         text = Text("move axes to a position\n\naxes     ", "bold")
         for axis in Finger.ALL:
             text.append(str(axis.name), "reverse" if axis in self._axes else "dim not bold")

@@ -1,7 +1,7 @@
 """A driver for textual that never blocks on the terminal.
 
-Textual's own hands its output to a thread, and waits when that falls behind: a terminal that has stopped
-reading (a stalled ssh, a window that is gone) would block the event loop that polls the gripper, and the end.
+Textual's own driver waits when its output thread falls behind. A terminal that has stopped reading (a stalled
+ssh, a closed window) would block the event loop that polls the gripper, and the stop of the fingers.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ CLOSING_S: Final = 0.5
 
 
 class NonblockingDriver(LinuxDriver):
-    """Drops what the terminal does not take.
+    """Drops output that the terminal does not take.
 
     Attributes:
-        is_behind: whether something was dropped; repaint the screen when it :meth:`has_caught_up`.
+        is_behind: whether output was dropped; repaint the screen when it :meth:`has_caught_up`.
     """
 
     def __init__(
@@ -57,8 +57,8 @@ class NonblockingDriver(LinuxDriver):
             self._waiting.put(data.encode())
 
     def close(self) -> None:
-        """Write what is queued, if the terminal takes it."""
-        super().close()  # its thread has nothing to do and ends at once
+        """Write the queued output, if the terminal takes it."""
+        super().close()  # its thread is idle and ends at once
         self._waiting.put(None)
         if self._thread.is_alive():
             self._thread.join(CLOSING_S)
@@ -66,6 +66,6 @@ class NonblockingDriver(LinuxDriver):
     def _run(self) -> None:
         assert self._file is not None
         terminal = self._file.fileno()
-        with contextlib.suppress(OSError):  # it is gone
+        with contextlib.suppress(OSError):  # the terminal has gone
             while (data := self._waiting.get()) is not None:
                 write_all(terminal, data)

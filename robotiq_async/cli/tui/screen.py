@@ -1,11 +1,11 @@
-"""The monitor's screen: shows a hand, and does what keys ask. Needs the extra ``monitor`` (textual)."""
+"""The screen of the monitor: shows a hand, and carries out keys. Needs the extra ``monitor`` (textual)."""
 
 from __future__ import annotations
 
 import sys
 import time
 from collections import deque
-from collections.abc import Awaitable, Callable, Iterable
+from collections.abc import Awaitable, Callable
 from functools import partial
 from typing import ClassVar, Final
 
@@ -18,9 +18,10 @@ from textual.worker import Worker
 
 from ...runtime.clock import now
 from ...tools.actions import ACTIONS, Operator
-from ...tools.recording.payloads import fault_fields, title
+from ...tools.recording.payloads import title
+from ...tools.recording.timeline import Timeline
 from ...tools.wording import refusal_words
-from ...values.enums import Fault, Finger, State
+from ...values.enums import Finger, State
 from ...values.errors import RobotiqError
 from ...values.status import RobotiqStatus
 from ..output.text import clock, event_line
@@ -42,7 +43,7 @@ FIGURES_S: Final = 0.5
 BUFFER: Final = 400
 """Statuses kept for the next paint: two seconds."""
 HALTING: Final = frozenset({"space", "h"})
-"""Keys that halt, whatever is asked."""
+"""Keys that halt, also during a question."""
 STEP: Final = 16
 """Change of speed or force for one press of a key."""
 LOG_LINES: Final = 2000
@@ -90,23 +91,20 @@ class Monitor(App[None]):
         self._hand = operator.hand
         self._lines: deque[tuple[float, str, str]] = deque(maxlen=LOG_LINES)
         """For the log, at the next paint: time, text, style."""
-        self._statuses = operator.hand.statuses(BUFFER)
-        self._transitions = operator.hand.transitions()
+        self._timeline = Timeline(operator.hand, BUFFER)
         self._newest = operator.hand.status
-        self._fault = Fault.NONE
-        # Held here and not looked up: a paint may come when the screen is already being taken down.
+        # Kept here and not looked up: a paint may come while the screen is closing.
         self._top = Line(id="state")
         self._axes = Axes(operator.hand.model)
         self._figures = Line(id="link")
         self._question = Static(id="question")
         self.asking: Asking | None = None
-        """What waits for keys; it stands on the screen."""
+        """The open question, which takes the keys."""
         self._history = RichLog(id="log", max_lines=LOG_LINES, min_width=1, wrap=True)
         self._overruns = 0
         self._polls = (now(), operator.hand.statistics.polls)
 
     def compose(self) -> ComposeResult:
-        """The widgets, from top to bottom."""
         yield self._top
         yield self._axes
         yield self._figures
@@ -116,9 +114,8 @@ class Monitor(App[None]):
         yield self._question
 
     def on_mount(self) -> None:
-        """Start painting."""
         self.write_log("Watching. Nothing has been written to the gripper.", "")
-        self._see([self._newest])
+        self._look()
         self._paint_state()
         self._paint_figures()
         self.set_interval(1 / FRAMES, self._paint)
@@ -127,37 +124,32 @@ class Monitor(App[None]):
     # -- painting -------------------------------------------------------------------------------------
 
     def write_log(self, text: str, style: str = "yellow", when: float | None = None) -> None:
-        """Add a line to the log, at any time; ``when`` in monotonic seconds."""
-        self._lines.append((now() if when is None else when, text, style))
+        """Add a line to the log; ``when`` in seconds since 1970, None for now."""
+        self._lines.append((time.time() if when is None else when, text, style))
 
     def _paint(self) -> None:
-        """Show what is new since the last paint; of the statuses, the newest."""
         driver = self._driver
         if isinstance(driver, NONBLOCKING) and driver.is_behind:
             if not driver.has_caught_up:
-                return  # nobody sees it
+                return
             driver.is_behind = False
             self.refresh(layout=True)
-        self._see(self._statuses.drain())
-        for each in self._transitions.drain():
-            if words := transition_words(each):
-                self.write_log(words, "", each.timestamp)
-        epoch = time.time() - now()
+        self._look()
         for when, text, style in sorted(self._lines):
-            self._history.write(Text(f"{clock(epoch + when)} {text}", style), expand=True)
+            self._history.write(Text(f"{clock(when)} {text}", style), expand=True)
         self._lines.clear()
         self._paint_state()
 
-    def _see(self, statuses: Iterable[RobotiqStatus]) -> None:
+    def _look(self) -> None:
         peaks = dict.fromkeys(self._hand.model.axes, -1)
-        for status in statuses:
-            self._newest = status
-            for axis in peaks:
-                peaks[axis] = max(peaks[axis], status.current_ma(axis))
-            if status.fault != self._fault:
-                self._fault = status.fault
-                style = "bold" if status.fault else ""
-                self.write_log(event_line(fault_fields(status)), style, status.timestamp)
+        for at, each in self._timeline.new():
+            if isinstance(each, RobotiqStatus):
+                self._newest = each
+                peaks = {axis: max(peak, each.current_ma(axis)) for axis, peak in peaks.items()}
+            elif each["kind"] == "fault":
+                self.write_log(event_line(each), "bold" if each["fault_code"] else "", at)
+            elif words := transition_words(each):
+                self.write_log(words, "", at)
         self._axes.show(self._newest, peaks)
 
     def _paint_state(self) -> None:
@@ -177,14 +169,14 @@ class Monitor(App[None]):
     # -- keys -----------------------------------------------------------------------------------------
 
     async def on_event(self, event: events.Event) -> None:
-        """Give keys to what is asked, but for those that halt."""
+        """Pass keys to the open question, except those that halt."""
         if isinstance(event, events.Key) and self.asking is not None and event.key not in HALTING:
             self.ask(None if self.asking.press(event.key) else self.asking)
         else:
             await super().on_event(event)
 
     def ask(self, asking: Asking | None) -> None:
-        """Show what waits for keys from now on, above the log; None for nothing."""
+        """Open a question above the log, or close it with None."""
         self.asking = asking
         if asking is not None:
             self._question.update(asking.text)
@@ -203,7 +195,7 @@ class Monitor(App[None]):
             begin()
 
     def action_position(self) -> None:
-        """Ask which axes are to go where, and move them."""
+        """Ask for axes and a position, and move."""
 
         def begin(axes: Finger, position: int) -> None:
             self._begin(f"{axes} to {position}", partial(self._operator.move, position, axes))
@@ -211,17 +203,15 @@ class Monitor(App[None]):
         self.ask(Target(begin))
 
     def action_speed(self, by: int) -> None:
-        """Change the speed of every axis."""
         self._begin("speed", partial(self._operator.change_speed, by))
 
     def action_force(self, by: int) -> None:
-        """Change the force of every axis."""
         self._begin("force", partial(self._operator.change_force, by))
 
     def _begin(self, name: str, work: Callable[[], Awaitable[str]]) -> None:
-        # A function and not a coroutine: one that is not begun any more would complain.
+        # A function and not a coroutine: a coroutine that never runs causes a warning.
         async def carry_out() -> None:
-            # Painted with the next paint: a key that is held would paint thirty times a second.
+            # Shown with the next paint: a held key would paint thirty times a second.
             try:
                 self.write_log(f"{name}: {await work()}", "bold")
             except RobotiqError as error:

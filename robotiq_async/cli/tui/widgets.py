@@ -1,4 +1,4 @@
-"""The parts of the monitor's screen. Each shows what it is given; none has access to a hand."""
+"""The parts of the monitor's screen. They have no access to a hand."""
 
 from __future__ import annotations
 
@@ -10,40 +10,39 @@ from rich.text import Text
 from textual.widget import Widget
 from textual.widgets import Static
 
-from ...tools.wording import STATE_WORDS
+from ...tools.wording import AXIS_WORDS, STATE_WORDS
 from ...values.enums import Fault, Finger, ObjectStatus, Severity, State
 from ...values.model import Model
 from ...values.statistics import Statistics
 from ...values.status import NO_REQUEST, RobotiqStatus
-from ..output.text import NOTHING
 from .words import HINTS
 
 HISTORY: Final = 60
 """Currents kept, one per paint: five seconds."""
 FULL: Final = 255
 SMALL_MA: Final = 500
-"""Lower bound of the scale of the currents: the noise of a motor at rest does not fill it."""
+"""Minimum full scale of the currents, so that the noise of a motor at rest stays small."""
 STILL: Final = 4
-"""Number of paints without a change after which an axis counts as at rest."""
+"""Paints without a change until an axis counts as at rest."""
 LEVELS: Final = "▁▂▃▄▅▆▇█"
 FIXED: Final = 47
 """Columns of a line that are neither bar nor sparkline."""
-_OBJECT: Final = {
-    ObjectStatus.IN_MOTION: ("moving", "cyan"),
-    ObjectStatus.CONTACT_OPENING: ("CONTACT opening", "bold yellow"),
-    ObjectStatus.CONTACT_CLOSING: ("CONTACT closing", "bold yellow"),
-    ObjectStatus.AT_POSITION: ("there", "green"),
+_STYLES: Final = {
+    NO_REQUEST: "dim",
+    ObjectStatus.IN_MOTION.name: "cyan",
+    ObjectStatus.CONTACT_OPENING.name: "bold yellow",
+    ObjectStatus.CONTACT_CLOSING.name: "bold yellow",
+    ObjectStatus.AT_POSITION.name: "green",
 }
 _CALM: Final = (State.RUNNING_IDLE, State.RUNNING_CC)
 
 
 class Line(Static):
-    """A text of a fixed size. Painting is expensive, so it is painted only when it has changed."""
+    """A text of a fixed size. It is painted only after a change, because painting is expensive."""
 
     _text = Text()
 
     def show(self, text: Text) -> None:
-        """Show another text."""
         if text != self._text:
             self._text = text
             self.update(text, layout=False)
@@ -52,8 +51,8 @@ class Line(Static):
 class Axes(Widget):
     """A line for each axis: position and request, object status, current now and in the last seconds.
 
-    One widget draws all of it: many small ones take five times as long to paint, and the event loop that
-    paints is the one that polls.
+    It is one widget: many small ones take five times as long to paint, and the event loop that paints is the
+    one that polls.
     """
 
     def __init__(self, model: Model) -> None:
@@ -65,7 +64,7 @@ class Axes(Widget):
         self._stale = False
 
     def show(self, status: RobotiqStatus, peaks_ma: Mapping[Finger, int]) -> None:
-        """Show a status, and the highest currents since the last paint; -1 where there was no status."""
+        """Show a status, and the highest currents since the last paint; -1 without a status."""
         for axis in status.model.axes:
             self._currents[axis].append(peaks_ma[axis])
             same = status.position(axis) == self._status.position(axis)
@@ -74,14 +73,13 @@ class Axes(Widget):
         self.refresh()
 
     def show_stale(self, stale: bool) -> None:
-        """Dim the lines while what they show is out of date."""
+        """Dim the lines while they are out of date."""
         if stale != self._stale:
             self._stale = stale
             self.refresh()
 
     def render(self) -> Text:
-        """A heading, and a line for each axis."""
-        # What is left of the width is shared by bar and sparkline.
+        # Bar and sparkline share the rest of the width.
         bar = max((self.size.width - FIXED) // 2, 8)
         where, current = (f"{words:{bar}.{bar}}" for words in ("is █, asked ▼", "current, 5 s"))
         head = Text(f"axis     {where}   counts   {'':15} {current}      now", "dim")
@@ -103,11 +101,12 @@ class Axes(Widget):
         return line
 
     def _does(self, axis: Finger) -> Text:
-        # In an activation and in a release axes move of which the gripper says nothing.
-        if self._status.axis_state(axis) == NO_REQUEST and self._still[axis] >= STILL:
-            return Text(f"{NOTHING:15}", "dim")
-        words, style = _OBJECT[self._status.finger_status(axis)]
-        return Text(f"{words:15}", style)
+        state = self._status.axis_state(axis)
+        if state == NO_REQUEST and self._still[axis] < STILL:
+            # The gripper does not report the motion of an activation or of a release.
+            state = ObjectStatus.IN_MOTION.name
+        words = AXIS_WORDS[state].replace("contact while", "CONTACT")  # the column is narrow
+        return Text(f"{words:15}", _STYLES[state])
 
 
 def position_bar(position: int, requested: int, width: int) -> Text:
@@ -124,7 +123,7 @@ def position_bar(position: int, requested: int, width: int) -> Text:
 def sparkline(values: Sequence[int], width: int) -> str:
     """Currents in mA as a line of bars, each the peak of its column; full scale is 0.5 A or the highest.
 
-    Where there is none (-1) the column stays empty.
+    The column of a missing current (-1) is empty.
     """
     count, top = len(values), max(SMALL_MA, *values)
     columns = min(width, count)
@@ -161,7 +160,6 @@ def state_text(address: str, state: State, status: RobotiqStatus, age: float) ->
 
 
 def _short(state: State) -> str:
-    """The first of the words for a state; the others follow by what the gripper does."""
     return STATE_WORDS[state].partition(":")[0].upper()
 
 
@@ -181,7 +179,7 @@ def link_text(figures: Statistics, rate: float, held_up: bool, speed: int, force
     Args:
         figures: of the hand.
         rate: polls per second, lately.
-        held_up: whether polls were overrun since the last update.
+        held_up: whether there were overruns since the last update.
         speed: of the next motion.
         force: of the next motion.
     """

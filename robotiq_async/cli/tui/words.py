@@ -1,12 +1,13 @@
-"""What happens to a hand, for a person at the monitor: words and keys, in place of states and methods."""
+"""Texts of the monitor: keys, hints, and transitions for people who do not know the API."""
 
 from __future__ import annotations
 
 from typing import Final
 
+from ...tools.recording.payloads import Fields
 from ...tools.wording import STATE_WORDS, without_methods
 from ...values.enums import State
-from ...values.events import Transition
+from ...values.trigger import Trigger
 
 KEYS: Final = """\
 o open  c close  1 wide  2 normal  3 pinch  SPACE halt  + - speed  ] [ force
@@ -20,10 +21,10 @@ HINTS: Final = {
 """The key that helps in a state."""
 
 
-def transition_words(transition: Transition) -> str | None:
-    """What has become of the hand, and why; None where there is nothing to tell.
+def transition_words(event: Fields) -> str | None:
+    """The new state and its cause; None if both states have the same description.
 
-    States that a person calls the same are one: those between which a request is sent and acknowledged.
+    That drops the transitions between sending a request and its acknowledgement.
     """
-    before, after = STATE_WORDS[transition.source], STATE_WORDS[transition.target]
-    return None if before == after else f"{after} ({without_methods(transition.trigger.value)})"
+    before, after = (STATE_WORDS[State[event[end]]] for end in ("source", "target"))
+    return None if before == after else f"{after} ({without_methods(Trigger[event['trigger']].value)})"

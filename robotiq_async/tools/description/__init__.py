@@ -1,4 +1,4 @@
-"""The hand in three dimensions: its description in URDF, and where its links are at given joint angles."""
+"""The hand in three dimensions: its URDF, and the poses of its links at given joint angles."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ __all__ = ["HandModel", "Joint", "Link", "Pose", "Shape", "hand_model", "urdf"]
 
 @cache
 def urdf() -> str:
-    """The description as text: what ROS calls ``/robot_description``."""
+    """The URDF as text, which ROS calls ``/robot_description``."""
     return (files("robotiq_async") / "data" / "robotiq_3f.urdf").read_text(encoding="utf-8")
 
 
 @cache
 def hand_model() -> HandModel:
-    """The description, parsed."""
+    """The parsed URDF."""
     return HandModel.parse(urdf())

@@ -1,4 +1,4 @@
-"""Poses: where something is and how it is turned. Pure arithmetic on tuples, for a dozen links."""
+"""Poses: position and rotation. Pure arithmetic on tuples, for a dozen links."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ UNTURNED: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """A frame, as seen from another one.
+    """A frame, expressed in its parent frame.
 
     Attributes:
-        position: its origin, in metres.
-        rotation: its axes are the columns.
+        position: the origin, in metres.
+        rotation: a matrix whose columns are the axes.
     """
 
     position: Vector = (0.0, 0.0, 0.0)
@@ -30,15 +30,15 @@ class Pose:
         return Pose(self.apply(inner.position), (_vector(rows[0]), _vector(rows[1]), _vector(rows[2])))
 
     def apply(self, point: Vector) -> Vector:
-        """A point of this frame, as seen from where this frame is seen."""
+        """Transform a point of this frame to the parent frame."""
         turned = [_dot(row, point) for row in self.rotation]
         return _vector([a + b for a, b in zip(self.position, turned, strict=True)])
 
     @property
     def quaternion(self) -> tuple[float, float, float, float]:
-        """The rotation as x, y, z, w, with w not negative."""
+        """The rotation as x, y, z, w, with w >= 0."""
         (a, b, c), (d, e, f), (g, h, i) = self.rotation
-        # Of the four ways to begin, the largest root is the one that does not lose its digits.
+        # Of the four formulas, the one with the largest root loses no digits.
         squares = (1 + a - e - i, 1 - a + e - i, 1 - a - e + i, 1 + a + e + i)
         largest = max(range(4), key=squares.__getitem__)
         rows = (
@@ -52,14 +52,14 @@ class Pose:
 
 
 def from_rpy(position: Vector, rpy: Vector) -> Pose:
-    """A pose as URDF writes it: turned about the fixed axes x, y and z, one after the other."""
+    """A pose in URDF's form: rotations about the fixed axes x, y and z, in this order."""
     roll, pitch, yaw = rpy
     turn = turned((0, 0, 1), yaw) @ turned((0, 1, 0), pitch) @ turned((1, 0, 0), roll)
     return Pose(position, turn.rotation)
 
 
 def turned(axis: Vector, angle: float) -> Pose:
-    """A rotation about an axis through the origin, by the right hand.
+    """A rotation about an axis through the origin, by the right-hand rule.
 
     Args:
         axis: of any length.

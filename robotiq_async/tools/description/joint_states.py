@@ -1,4 +1,4 @@
-"""sensor_msgs/msg/JointState as ROS 2 puts it on the wire (CDR, little endian), without ROS.
+"""Encodes sensor_msgs/msg/JointState as ROS 2 does (CDR, little endian), without ROS.
 
 The names never change, so the bytes before the numbers are encoded once.
 """
@@ -27,7 +27,7 @@ MSG: builtin_interfaces/Time
 int32 sec
 uint32 nanosec
 """
-"""The message definition and those it refers to, in the format that MCAP calls ros2msg."""
+"""The message definition and the definitions it refers to, in MCAP's format ros2msg."""
 
 _ENCAPSULATION: Final = b"\x00\x01\x00\x00"
 _STAMP: Final = Struct("<iI")
@@ -52,7 +52,7 @@ class JointStateEncoder:
             _add_string(body, name)
         self._count = len(names)
         self._constant = bytes(body[_STAMP.size :])
-        # Three sequences of doubles: each count on a multiple of 4, its numbers on a multiple of 8.
+        # Three sequences of doubles. CDR aligns each count to 4 bytes and the numbers to 8.
         layout, at = "<", len(body)
         for _ in range(3):
             layout += f"{-at % 4}xI"

@@ -51,7 +51,7 @@ B and C, and a person has not looked yet: docs/decisions/finger-names.md.
 
 def _joints() -> Iterator[str]:
     for name in FINGER_NAMES.values():
-        if name != "finger_middle":  # it does not turn on the palm
+        if name != "finger_middle":  # it has no palm joint
             yield f"palm_{name}_joint"
         yield from (f"{name}_joint_{number}" for number in (1, 2, 3))
 
@@ -75,7 +75,7 @@ def finger_angles(position: int) -> tuple[float, float, float]:
 
 @cache
 def _finger_angles(counts: int) -> tuple[float, float, float]:
-    # Kept, 256 of them: a recording asks for nine fingers at every poll.
+    # Cached, 256 of them: a recording needs nine fingers at every poll.
     base, middle, tip = (radians(_between(counts, points)) for points in (BASE, MIDDLE, TIP))
     return base, middle, tip
 
@@ -100,14 +100,14 @@ def joint_angles(status: RobotiqStatus) -> tuple[float, ...]:
 
 @lru_cache(maxsize=16)
 def _joint_angles(scissor: int, *fingers: int) -> tuple[float, ...]:
-    # Kept, for most of the time the fingers stand.
+    # Cached, because the fingers rest most of the time.
     palm = palm_angle(scissor)
     one, two, middle = map(_finger_angles, fingers)
     return (palm, *one, -palm, *two, *middle)
 
 
 def joint_velocities(before: RobotiqStatus, after: RobotiqStatus) -> tuple[float, ...]:
-    """Radians a second between two statuses, in the order of :data:`JOINTS`.
+    """Joint velocities between two statuses in rad/s, in the order of :data:`JOINTS`.
 
     A count is 0.5 degrees, so that between two polls this is either nothing or a lot: take statuses that are
     some tens of milliseconds apart.

@@ -1,4 +1,4 @@
-"""Links and joints out of a URDF text, and where the links are at given joint angles."""
+"""Reads links and joints of a URDF, and computes the poses of the links at given joint angles."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Color = tuple[float, float, float, float]
 """Red, green, blue and opacity, 0..1."""
 
 PAD: Final = "pad"
-"""The name of the shape with which a finger touches."""
+"""Name of the shape of a fingertip's pad."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +22,7 @@ class Shape:
 
     Attributes:
         kind: ``box``, ``cylinder`` or ``sphere``.
-        size: the three edges; radius and length; the radius.
+        size: of a box the three edges; of a cylinder radius and length; of a sphere the radius.
         origin: in the frame of the link.
         color: of its material.
         name: of the shape; empty if it has none.
@@ -50,13 +50,13 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """What holds a link to another.
+    """A joint between two links.
 
     Attributes:
         name: as joint states name it.
-        parent: name of the link that it stands on.
-        child: name of the link that it carries.
-        origin: the frame of the child at angle 0, in that of the parent.
+        parent: name of the parent link.
+        child: name of the child link.
+        origin: the frame of the child at angle 0, in the frame of the parent.
         axis: in the frame of the child; None when the joint is fixed.
         lower: the smallest angle in radians.
         upper: the largest angle in radians.
@@ -71,7 +71,7 @@ class Joint:
     upper: float = 0.0
 
     def pose(self, angle: float = 0.0) -> Pose:
-        """The frame of the child in that of the parent."""
+        """The frame of the child in the frame of the parent."""
         return self.origin if self.axis is None else self.origin @ turned(self.axis, angle)
 
 
@@ -80,7 +80,7 @@ class HandModel:
     """A tree of links.
 
     Attributes:
-        root: name of the link that stands on nothing.
+        root: name of the root link.
         links: by name.
         joints: every parent before its children.
     """
@@ -91,36 +91,34 @@ class HandModel:
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Read a URDF. Only what our own file has: boxes, cylinders, spheres; fixed and revolute joints.
+        """Read a URDF with boxes, cylinders, spheres, fixed joints and revolute joints, as ours has.
 
         Raises:
-            ValueError: no XML, or no single tree of links.
+            ValueError: the text is not XML, or the links do not form a single tree.
         """
         try:
             robot = ET.fromstring(text)
         except ET.ParseError as error:
-            raise ValueError(f"the description is no XML: {error}") from error
+            raise ValueError(f"the description is not XML: {error}") from error
         colors = {each.attrib["name"]: _color(each) for each in robot.findall("material")}
         links = {each.attrib["name"]: _link(each, colors) for each in robot.findall("link")}
         joints = [_joint(each) for each in robot.findall("joint")]
         roots = links.keys() - {joint.child for joint in joints}
         if len(roots) != 1:
-            raise ValueError(
-                f"the description must have one link that stands on nothing, got {sorted(roots)}"
-            )
+            raise ValueError(f"the description must have one root link, got {sorted(roots)}")
         root = roots.pop()
         return cls(root, links, _ordered(root, joints))
 
     @property
     def moving(self) -> tuple[Joint, ...]:
-        """The joints that have an angle."""
+        """The joints that are not fixed."""
         return tuple(joint for joint in self.joints if joint.axis is not None)
 
     def link_poses(self, angles: Mapping[str, float]) -> dict[str, Pose]:
-        """Where every link is, in the frame of the root.
+        """The pose of every link in the frame of the root.
 
         Args:
-            angles: radians by the names of joints; one that is missing is 0, others are left alone.
+            angles: radians by the names of joints; missing joints are at 0, unknown ones are ignored.
         """
         poses = {self.root: Pose()}
         for joint in self.joints:
@@ -128,7 +126,7 @@ class HandModel:
         return poses
 
     def pad(self, link: str) -> Shape:
-        """The shape with which a fingertip touches.
+        """The shape of the pad of a fingertip.
 
         Raises:
             KeyError: there is no such link, or it has no pad.
@@ -144,7 +142,7 @@ def _ordered(root: str, joints: list[Joint]) -> tuple[Joint, ...]:
     while waiting := [joint for joint in joints if joint.child not in placed]:
         ready = [joint for joint in waiting if joint.parent in placed]
         if not ready:
-            raise ValueError(f"the joint {waiting[0].name} hangs on nothing")
+            raise ValueError(f"the joint {waiting[0].name} is not connected to the root")
         ordered += ready
         placed |= {joint.child for joint in ready}
     return tuple(ordered)

@@ -1,4 +1,4 @@
-"""The hand for 3-D panels: its description as ROS 2 puts it on the wire, and where its links are."""
+"""The hand for 3-D panels: its URDF and the transforms of its links as ROS 2 encodes them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .kinematics import JOINTS, joint_angles
 SCHEMA_NAME: Final = "std_msgs/msg/String"
 SCHEMA: Final = "string data\n"
 TRANSFORMS_NAME: Final = "foxglove.FrameTransforms"
-"""The name by which viewers know it."""
+"""The schema name that viewers expect."""
 _TIME: Final = {
     "type": "object",
     "title": "time",
@@ -45,17 +45,17 @@ TRANSFORMS_SCHEMA: Final = {
 
 
 def description_message() -> bytes:
-    """The URDF, as a message."""
+    """The URDF as a message."""
     text = urdf().encode() + b"\0"
     return b"\x00\x01\x00\x00" + pack("<I", len(text)) + text
 
 
 def transforms(status: RobotiqStatus, nanoseconds: int) -> dict[str, Any]:
-    """Every joint as a transform of its child in the frame of its parent.
+    """The transform of every joint, from parent to child.
 
     Args:
-        status: where the fingers are.
-        nanoseconds: since 1970: when that was.
+        status: the positions.
+        nanoseconds: since 1970: the time of the status.
     """
     seconds, rest = divmod(nanoseconds, 1_000_000_000)
     angles = dict(zip(JOINTS, joint_angles(status), strict=True))

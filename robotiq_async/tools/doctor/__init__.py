@@ -1,4 +1,4 @@
-"""What is wrong with my connection? Finding after finding, each with advice.
+"""Diagnoses a connection: one finding per check, each with advice.
 
 Nothing moves, whatever is examined: a gripper that this host reaches, or one that an agent serves.
 """

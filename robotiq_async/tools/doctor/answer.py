@@ -1,4 +1,4 @@
-"""Who answers? The usual unit id and registers first, then others; and is that a gripper at all?"""
+"""Finds the unit id and the registers that answer, and checks that a gripper answers."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from .findings import Finding, GiveUpError, Level, Report
 REACH_S: Final = 3.0
 """Timeout for resolving the name, and for connecting to the port."""
 ANSWER_S: Final = 0.5
-"""For a reply; the last attempt with the usual unit id and registers has as long as a hand can have."""
+"""Timeout for a reply; the last attempt with the usual registers waits as long as a hand ever does."""
 LET_GO_S: Final = 0.5
-"""After a failed attempt, for a gateway that serves one client to see that this one has gone."""
+"""Pause after a failed attempt: a gateway that serves one client must notice that this one has gone."""
 TRIES: Final = 3
 """Attempts with the usual unit id and registers, before others are tried: replies get lost."""
 UNITS: Final = (2, 9, 1, 0, 255)
-"""Unit ids that are tried when the usual one does not answer; on a serial line nobody has the last two."""
+"""Unit ids to try when the usual one does not answer; 0 and 255 are not valid on a serial line."""
 ALONE: Final = "It may serve one client at a time"
 
 
@@ -44,7 +44,7 @@ class Answering(NamedTuple):
 
     Attributes:
         link: open.
-        registers: where its blocks are, and under which unit id.
+        registers: addresses of its registers, and its unit id.
     """
 
     link: Link
@@ -52,12 +52,12 @@ class Answering(NamedTuple):
 
 
 async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> Answering:
-    """An open link to a gripper that answers, and how it was asked.
+    """Find the unit id and the registers under which a gripper answers; returns an open link to it.
 
-    No connection is made to try the port: a gateway that serves one client would be busy with that one.
+    It opens no extra connection to test the port, which would occupy a gateway that serves one client.
 
     Raises:
-        GiveUpError: nothing answers, or it is no gripper.
+        GiveUpError: nothing answers, or another device does.
     """
     failure: RobotiqConnectionError | None = None
     stranger: RobotiqStatus | None = None
@@ -76,7 +76,7 @@ async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> 
             continue
         if number == 0:
             _report_port(address, report)
-        if _strange_bits(status):
+        if _has_reserved_bits(status):
             await link.close()
             stranger = stranger or status
             continue
@@ -94,12 +94,12 @@ async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> 
 
 
 def long_enough(seconds: float) -> float:
-    """The response_timeout for replies that take so long: twice that, as far as a hand takes it."""
+    """A response_timeout for replies that take so long: twice that, within the limits of a hand."""
     return min(LONGEST_RESPONSE_S, math.ceil(20 * seconds) / 10)
 
 
 def _attempts(address: Address, usual: RegisterMap) -> Iterator[tuple[RegisterMap, float]]:
-    """What to try, and how long to wait for a reply: first the usual, several times."""
+    # Each with its timeout. The usual registers come first, several times.
     if address.kind == "sim":
         yield usual, ANSWER_S
         return
@@ -118,7 +118,7 @@ def _attempts(address: Address, usual: RegisterMap) -> Iterator[tuple[RegisterMa
 
 
 async def _other_frames(address: Address) -> str:
-    """What to do if a socket speaks the other kind of frames: those of a serial line, or of Modbus TCP."""
+    # Advice for a socket with the wrong framing: RTU in place of Modbus TCP, or the reverse.
     if not address.is_socket:
         return ""
     other = replace(address, kind="tcp" if address.is_rtu else "rtu+tcp")
@@ -139,11 +139,7 @@ def _link(address: Address, registers: RegisterMap, patience: float) -> Link:
 
 
 async def _first_reading(link: Link) -> tuple[RobotiqStatus, float]:
-    """What is read once the link is open, and after how many seconds the reply came.
-
-    Raises:
-        RobotiqConnectionError: it cannot be opened, or nothing clean comes. The link is closed.
-    """
+    # Also returns the seconds until the reply. Closes the link when there is none.
     loop = asyncio.get_running_loop()
     try:
         await link.open()
@@ -192,20 +188,13 @@ def _advice_for_opening(address: Address, why: str) -> str:
 
 
 def _answers(failure: RobotiqConnectionError | None, tries: int, seconds: float) -> Finding:
-    """How it answers.
-
-    Args:
-        failure: of the first attempt with the same unit id and registers; None if there was none.
-        tries: how many attempts it took.
-        seconds: after which the reply came.
-    """
     if seconds > ANSWER_S:
         advice = f"Pass response_timeout={long_enough(seconds):g}; a write, and a stop, take as long."
         return Finding(Level.DOUBT, "Modbus", f"answers, after {seconds:.1f} s", advice)
     if failure is None:
         return Finding(Level.GOOD, "Modbus", "answers")
     if isinstance(failure, ConnectionLostError):
-        advice = f"It hung up first. {ALONE}, and was busy with another: is another program connected?"
+        advice = f"It hung up first. {ALONE} and was busy with another: is another program connected?"
     else:
         advice = (
             "Replies get lost or damaged: look at cable and switch, and for another client. "
@@ -225,11 +214,10 @@ def _advice_for_silence(error: RobotiqConnectionError) -> str:
     return f"It hangs up when asked. {ALONE}, or not speak Modbus."
 
 
-# -- what answers ------------------------------------------------------------------------------------------
+# -- the device that answers -------------------------------------------------------------------------------
 
 
 def _report_place(usual: RegisterMap, found: RegisterMap, report: Report) -> None:
-    """Under which unit id, and where the registers are."""
     unit = Finding(Level.GOOD, "unit id", str(found.device_id))
     if found.device_id != usual.device_id:
         advice = f"Pass device_id={found.device_id}, or --device-id {found.device_id}."
@@ -254,15 +242,14 @@ def _report_place(usual: RegisterMap, found: RegisterMap, report: Report) -> Non
 
 
 def _report_silence(status: RobotiqStatus, report: Report) -> None:
-    """Tell when nothing speaks for a gripper behind what answers."""
     if not any(status.registers):
         found = "all registers read 0, which those of a gripper never do"
         advice = "The gripper behind the fieldbus may be without power, or this is another device."
         report(Finding(Level.DOUBT, "gripper", found, advice))
 
 
-def _strange_bits(status: RobotiqStatus) -> bool:
-    """Whether bits are set that the manual reserves. Random memory passes once in 4096 times."""
+def _has_reserved_bits(status: RobotiqStatus) -> bool:
+    # Random memory passes this check once in 4096 times.
     return any(field.read(status.registers) for field in STATUS_RESERVED)
 
 

@@ -1,4 +1,4 @@
-"""The certificate of a client: is it there, does it hold, and what does it let its owner do?"""
+"""Checks the certificate of a client: files, dates, permissions, role."""
 
 from __future__ import annotations
 
@@ -17,43 +17,35 @@ _MAY: Final = {
     Role.HALT: "may watch and halt",
     Role.OPERATE: "may watch, halt and command",
 }
-_NEW: Final = "Have whoever has the authority make a new one: robotiq-async fleet keys."
+_NEW: Final = "The owner of the authority can make a new one: robotiq-async fleet keys."
 
 
-def examine_keys(folder: Path, report: Report, *, now: datetime) -> Role | None:
+def examine_keys(folder: Path, report: Report, *, now: datetime) -> None:
     """Examine a folder of keys.
 
     Args:
         folder: of a client.
         report: called with each finding.
-        now: the time that its dates are compared with.
-
-    Returns:
-        What its owner may do; None if that does not stand in it.
+        now: the current time.
 
     Raises:
-        GiveUpError: it does not let anybody in.
+        GiveUpError: the certificate cannot be used.
     """
-    # Without it there are no keys, and a folder of keys may come from another machine.
+    # Needs the extra fleet. The folder of keys may come from another machine.
     from ...fleet.keys.credentials import read_credentials  # noqa: PLC0415
 
     try:
         found = read_credentials(check_key_folder(folder))
     except (OSError, ValueError) as error:
-        advice = "Copy the folder anew from where robotiq-async fleet keys has made it."
+        advice = "Copy the folder again from the machine where robotiq-async fleet keys made it."
         report(Finding(Level.BAD, "certificate", f"{folder}: {error}", advice))
         raise GiveUpError from error
     _report_dates(found.begins, found.ends, now, report)
     _report_mode(folder / KEY, report)
-    return _report_role(found.common_name, found.role, report)
+    _report_role(found.common_name, found.role, report)
 
 
 def _report_dates(begins: datetime, ends: datetime, now: datetime, report: Report) -> None:
-    """Whether it holds today.
-
-    Raises:
-        GiveUpError: it does not.
-    """
     if now < begins:
         found = f"holds from {begins:%Y-%m-%d} on, and here it is {now:%Y-%m-%d}"
         report(Finding(Level.BAD, "certificate", found, "Set the clock of this machine."))
@@ -68,13 +60,12 @@ def _report_dates(begins: datetime, ends: datetime, now: datetime, report: Repor
 
 
 def _report_mode(key: Path, report: Report) -> None:
-    """Whether others on this machine can read the key; they would be let in by it."""
     if stat.S_IMODE(key.stat().st_mode) & (stat.S_IRWXG | stat.S_IRWXO) and stat.S_ISREG(key.stat().st_mode):
         advice = f"chmod 600 {key}"
         report(Finding(Level.DOUBT, "private key", "others on this machine may read or write it", advice))
 
 
-def _report_role(common_name: str, role: Role | None, report: Report) -> Role | None:
+def _report_role(common_name: str, role: Role | None, report: Report) -> None:
     if role in _MAY:
         assert role is not None
         report(Finding(Level.GOOD, "role", f"{common_name}: {_MAY[role]}, if the agent's list has it"))
@@ -82,7 +73,6 @@ def _report_role(common_name: str, role: Role | None, report: Report) -> Role | 
         advice = "Name the folder of a client: read-, halt- or operate-NAME."
         report(Finding(Level.BAD, "role", f"{common_name}: an agent's, who is no client", advice))
     else:
-        found = f"{common_name!r}: no role stands in it, so the agent's own rules say what it may do"
+        found = f"{common_name!r}: it names no role, so the agent's own rules decide what it may do"
         advice = "Is it of an authority of your own? The command fleet keys writes ROLE:NAME."
         report(Finding(Level.DOUBT, "role", found, advice))
-    return role

@@ -1,4 +1,4 @@
-"""The way to an agent: does somebody listen there, and do both sides believe each other's certificates?"""
+"""The way to an agent: is the port open, and do both sides trust each other's certificates?"""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from ...fleet.network.route import Route
 from .findings import Finding, GiveUpError, Level, Report
 
 REACH_S: Final = 3.0
-"""For connecting, and for shaking hands."""
+"""Timeout for connecting, and for the TLS handshake."""
 SHUT_S: Final = 0.5
-"""A side that believes a certificate waits for more; one that does not hangs up within this time."""
+"""A side that distrusts a certificate hangs up within this time; one that trusts it waits."""
 
 
 async def examine_way(route: Route, report: Report) -> None:
@@ -31,31 +31,29 @@ async def examine_way(route: Route, report: Report) -> None:
 
 
 async def _examine(endpoint: Endpoint, route: Route, report: Report) -> bool:
-    """Whether it is open, as far as that can be told."""
     if endpoint.protocol == "quic":
-        report(Finding(Level.GOOD, "port", f"{endpoint.text}: not looked at, for it is no TCP"))
+        report(Finding(Level.GOOD, "port", f"{endpoint.text}: not checked, because it is not TCP"))
         return True
-    if not await _knock(endpoint, report):
+    if not await _is_open(endpoint, report):
         return False
     if endpoint.is_encrypted:
-        assert route.keys is not None  # or the route would have been refused
+        assert route.keys is not None  # parse_remote_address() checks that
         return await _shake_hands(endpoint, route.keys, report)
     if not endpoint.is_loopback:
-        found = f"{endpoint.text}: whoever is on that network can read along and command"
-        advice = "Make keys (robotiq-async fleet keys), unless nobody else can be on it."
+        found = f"{endpoint.text}: everyone on that network can read and command"
+        advice = "Make keys (robotiq-async fleet keys), unless no one else can be on it."
         report(Finding(Level.DOUBT, "encryption", found, advice))
     return True
 
 
-async def _knock(endpoint: Endpoint, report: Report) -> bool:
-    """Connect and hang up."""
+async def _is_open(endpoint: Endpoint, report: Report) -> bool:
     try:
         await _connect(endpoint, None)
     except TimeoutError:
         found = f"{endpoint.text} does not answer within {REACH_S:g} s"
         advice = "Is the host up, and on this network? A firewall may drop the packets."
     except ConnectionRefusedError:
-        found = f"{endpoint.text}: nobody listens"
+        found = f"{endpoint.text}: nothing listens"
         advice = "Does robotiq-async agent run there, and does its FLEET.toml listen at this address?"
     except OSError as error:
         found = f"{endpoint.text}: {error.strerror or error}"
@@ -68,12 +66,11 @@ async def _knock(endpoint: Endpoint, report: Report) -> bool:
 
 
 async def _shake_hands(endpoint: Endpoint, keys: Path, report: Report) -> bool:
-    """Whether both sides believe each other, and nobody is let in without a certificate."""
     own = _context(keys, shows=True)
     try:
         stays = await _connect(endpoint, own)
     except ssl.SSLCertVerificationError as error:
-        found = f"{endpoint.text}: its certificate is not believed: {error.verify_message}"
+        found = f"{endpoint.text}: its certificate is not trusted: {error.verify_message}"
         advice = (
             "It must be of the same authority, not past its end, and name what you connect to "
             "(fleet keys --agent NAME=HOST,...)."
@@ -86,23 +83,22 @@ async def _shake_hands(endpoint: Endpoint, keys: Path, report: Report) -> bool:
         report(Finding(Level.BAD, "certificates", found, advice))
         return False
     if not stays:
-        found = f"{endpoint.text}: the agent does not believe this certificate"
+        found = f"{endpoint.text}: the agent does not trust this certificate"
         advice = "Is it of the same authority? Look at the clock of the agent's host, too."
         report(Finding(Level.BAD, "certificates", found, advice))
         return False
-    report(Finding(Level.GOOD, "certificates", f"{endpoint.text}: both sides believe each other"))
+    report(Finding(Level.GOOD, "certificates", f"{endpoint.text}: both sides trust each other"))
     await _try_without(endpoint, keys, report)
     return True
 
 
 async def _try_without(endpoint: Endpoint, keys: Path, report: Report) -> None:
-    """Who shows no certificate must not be let in."""
     try:
         stays = await _connect(endpoint, _context(keys, shows=False))
     except OSError:
         stays = False
     if stays:
-        found = f"{endpoint.text}: whoever shows no certificate is let in, too"
+        found = f"{endpoint.text}: clients without a certificate are let in, too"
         advice = "What listens there is no agent of this kind, or a router without mutual TLS. Stop it."
         report(Finding(Level.BAD, "no certificate", found, advice))
     else:
@@ -117,7 +113,7 @@ def _context(keys: Path, *, shows: bool) -> ssl.SSLContext:
 
 
 async def _connect(endpoint: Endpoint, context: ssl.SSLContext | None) -> bool:
-    """Connect, and hang up; whether the other side would have stayed.
+    """Connect and hang up; returns whether the other side kept the connection open.
 
     Raises:
         OSError: no connection.
@@ -130,7 +126,7 @@ async def _connect(endpoint: Endpoint, context: ssl.SSLContext | None) -> bool:
         if context is None:
             return True
         async with asyncio.timeout(SHUT_S):
-            # The other side looks at our certificate after the handshake has ended on this one.
+            # The other side checks our certificate after the handshake has ended on this side.
             return bool(await reader.read(1))
     except TimeoutError:
         return True

@@ -1,4 +1,4 @@
-"""What an examination finds."""
+"""Findings of an examination."""
 
 from __future__ import annotations
 
@@ -36,4 +36,4 @@ Report = Callable[[Finding], None]
 
 
 class GiveUpError(Exception):
-    """No further check is possible; why not has been reported."""
+    """No further check is possible; the reason has been reported."""

@@ -1,6 +1,6 @@
 """A gripper that this host reaches: name, port, Modbus, rate, activation, fault, other clients.
 
-It only reads: nothing is written and nothing moves. It is one client, with one connection at a time.
+It only reads, as one client with one connection at a time: nothing is written and nothing moves.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ from .findings import Finding, GiveUpError, Level, Report
 from .serial_line import report_adapter, report_damage
 
 PROBES: Final = 300
-"""Reads from which round trip and rate are determined."""
+"""Reads for measuring round trip and rate."""
 WATCH_S: Final = 2.0
 """How long to watch for another client."""
 LONGEST_PERIOD_S: Final = 0.1
-"""The longest poll_interval that a hand takes."""
+"""The longest poll_interval of a hand."""
 
 
 async def examine(address: Address, report: Report, *, device_id: int | None = None) -> None:
@@ -45,7 +45,7 @@ async def examine(address: Address, report: Report, *, device_id: int | None = N
         device_id: Modbus unit id; None for the usual one.
 
     Raises:
-        ValueError: a unit id that no unit on such a link can have.
+        ValueError: a unit id that is not valid on such a link.
     """
     registers, model = registers_of(address, device_id=device_id), model_of(address.model)
     try:
@@ -96,7 +96,6 @@ async def _resolve(address: Address, report: Report) -> None:
 
 
 async def _timing(link: Link, interval: float, report: Report) -> None:
-    """Round trip, and the rate of reads that it allows; ``interval`` is the usual one on such a link."""
     loop = asyncio.get_running_loop()
     times, began = [], loop.time()
     for _ in range(PROBES):
@@ -122,21 +121,18 @@ async def _timing(link: Link, interval: float, report: Report) -> None:
 
 
 def _rate(rate: float, interval: float) -> Finding:
-    """The rate of reads, and the period that a hand needs for it."""
     found = f"up to {rate:.0f} reads a second" if rate >= 10 else f"up to {rate:.1f} reads a second"
     period = max(0.01, math.ceil(100 / rate) / 100)
     if rate >= 1 / interval:
         return Finding(Level.GOOD, "rate", found)
     if period <= LONGEST_PERIOD_S:
         return Finding(Level.DOUBT, "rate", found, f"Pass poll_interval={period:g}.")
-    advice = (
-        f"No poll_interval is so long (at most {LONGEST_PERIOD_S:g} s): the fingers are watched that late."
-    )
+    advice = f"No poll_interval is that long (at most {LONGEST_PERIOD_S:g} s): statuses will come late."
     return Finding(Level.DOUBT, "rate", found, advice)
 
 
 def report_state(status: RobotiqStatus, report: Report) -> None:
-    """Activation and fault."""
+    """Report activation and fault."""
     if status.is_activated:
         report(Finding(Level.GOOD, "activation", "active"))
     elif status.activation_echo:
@@ -152,14 +148,13 @@ def report_state(status: RobotiqStatus, report: Report) -> None:
         case Severity.PRIORITY:
             report(Finding(Level.GOOD, "fault", found, "This is a hint and not a failure."))
         case Severity.MINOR:
-            report(Finding(Level.DOUBT, "fault", found, "It may clear by itself; recover() waits for that."))
+            report(Finding(Level.DOUBT, "fault", found, "It may clear on its own; recover() waits for that."))
         case Severity.MAJOR:
             advice = "recover() resets and activates: the part DROPS and the fingers MOVE."
             report(Finding(Level.BAD, "fault", found, advice))
 
 
 async def _others(link: Link, report: Report) -> None:
-    """Whether the requests change although this program writes none."""
     loop = asyncio.get_running_loop()
     until, seen = loop.time() + WATCH_S, set()
     while loop.time() < until:
@@ -170,5 +165,5 @@ async def _others(link: Link, report: Report) -> None:
         report(Finding(Level.GOOD, "other clients", found))
     else:
         found = f"the requests changed within {WATCH_S:g} s, to {len(seen) - 1} others"
-        advice = "Another program commands the gripper. Two that do so disturb each other: stop one."
+        advice = "Another program commands the gripper. Two programs that do so disturb each other: stop one."
         report(Finding(Level.DOUBT, "other clients", found, advice))

@@ -1,7 +1,7 @@
 """Measurements of your own gripper, as in chapter 6 of the thesis: closing times, and the force of a grasp.
 
-The gripper's own clock may be faster than the program's (a simulated one): ``speedup`` converts times into
-the gripper's. Both campaigns save after every row, so that an interrupted one can be resumed.
+The clock of a simulated gripper may be faster than the program's: ``speedup`` converts times. Both campaigns
+save after every row, so an interrupted one can be resumed.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ from ...values.errors import MeasuringError
 from ...values.model import THREE_FINGER
 
 REST_S: Final = 0.3
-"""Between two runs, in the gripper's time: a finger that has just stopped may still swing."""
+"""Pause between runs, in the gripper's time: a finger that has just stopped may still swing."""
 ATTEMPTS: Final = 20
 """Attempts at a run: one in which the event loop was blocked is repeated."""
 TOLERATED: Final = 0.01
-"""Share of a run for which it may have been blocked, apart from two polls."""
+"""Share of a run for which the event loop may be blocked, apart from two polls."""
 SLACK: Final = 5
 """Counts by which the readings of a full closing may miss those that the manual gives."""
 GRASP_S: Final = 1.0
@@ -54,16 +54,16 @@ Currents = dict[int, list[list[Sample]]]
 """For each force value the samples of each run."""
 
 
-# -- what is measured, in which order ----------------------------------------------------------------------
+# -- values to measure, in their order ---------------------------------------------------------------------
 
 
 def speed_values(step: int = 4) -> list[int]:
-    """Speed values in steps from 0, and 255: slowest first."""
+    """Speed values in steps from 0, and 255; slowest first."""
     return sorted({*range(0, 256, step), 255})
 
 
 def force_values(step: int = 25) -> list[int]:
-    """Force values in steps from 0: every second one upwards, those in between downwards."""
+    """Force values in steps from 0: every second one upwards, the others downwards."""
     values = list(range(0, 256, step))
     return values[::2] + values[1::2][::-1]
 
@@ -72,19 +72,19 @@ def force_values(step: int = 25) -> list[int]:
 
 
 async def time_closing(hand: Hand, speed: int, fingers: Finger, speedup: float = 1.0) -> float:
-    """Open fully and at full speed, then close at a speed: seconds from the command until nothing moves.
+    """Open fully at full speed, then close at a speed; returns the seconds from the command to standstill.
 
-    A run in which the event loop was blocked is repeated. When cancelled, the fingers stop.
+    Repeats a run in which the event loop was blocked. Cancelling stops the fingers.
 
     Args:
         hand: the gripper.
         speed: speed value, 0..255.
-        fingers: of A, B and C; the scissor has another stroke.
+        fingers: some of A, B and C; the scissor has a different stroke.
         speedup: how much faster the gripper's clock is.
 
     Raises:
         ValueError: the scissor is among the fingers.
-        MeasuringError: the fingers met something, did not go the whole way, or the loop is too busy.
+        MeasuringError: the fingers met something or did not close fully, or the loop is too busy.
         RobotiqError: as :meth:`Hand.move`.
     """
     if Finger.SCISSOR in fingers:
@@ -107,11 +107,11 @@ async def time_closing(hand: Hand, speed: int, fingers: Finger, speedup: float =
         missed = max(0, after.overruns - before.overruns - 2)
         if missed * after.period_p50 <= TOLERATED * closed.duration:
             return closed.duration * speedup
-    raise MeasuringError(f"the event loop was held up in each of {ATTEMPTS} runs: too busy to measure")
+    raise MeasuringError(f"the event loop was blocked in each of {ATTEMPTS} runs: too busy to measure")
 
 
 def expected_seconds(speed: int) -> float:
-    """Estimate of the duration of one run, in the gripper's time: for progress bars."""
+    """Estimated duration of one run, in the gripper's time: for progress bars."""
     return closing_time(speed) + closing_time(255) + REST_S
 
 
@@ -119,9 +119,9 @@ def expected_seconds(speed: int) -> float:
 
 
 async def grasp(hand: Hand, force: int, speed: int, speedup: float = 1.0) -> list[Sample]:
-    """Open, then close on what lies between the fingers; returns the currents from the command on.
+    """Open, then close on the object between the fingers; returns the currents from the command on.
 
-    The fingers stay closed, for the scale to be read. When cancelled, they stop.
+    The fingers stay closed so that the scale can be read. Cancelling stops them.
 
     Args:
         hand: the gripper.
@@ -139,7 +139,7 @@ async def grasp(hand: Hand, force: int, speed: int, speedup: float = 1.0) -> lis
     await asyncio.sleep(REST_S / speedup)
     samples: list[Sample] = []
     began = now()
-    with _watching(hand, lambda time, *milliampere: samples.append((time, *milliampere)), began, speedup):
+    with _sampling(hand, lambda time, *milliampere: samples.append((time, *milliampere)), began, speedup):
         result = await hand.close(speed=speed, force=force)
         await asyncio.sleep(GRASP_S / speedup)
     if not result.object_detected:
@@ -148,10 +148,9 @@ async def grasp(hand: Hand, force: int, speed: int, speedup: float = 1.0) -> lis
 
 
 @contextlib.contextmanager
-def _watching(
+def _sampling(
     hand: Hand, take: Callable[[int, int, int, int], None], began: float, speedup: float
 ) -> Iterator[None]:
-    """Sample the currents at every poll of a block."""
     statuses = hand.statuses(buffer=10_000)
 
     if hand.model is not THREE_FINGER:
@@ -182,15 +181,15 @@ def peak_currents(runs: list[list[Sample]]) -> tuple[int, int, int]:
 
 @dataclass
 class Campaign:
-    """A table in a file that is filled row by row.
+    """A table in a file that is filled row by row, and resumed if the file exists.
 
     Attributes:
-        path: the file; it is read if it is there.
+        path: the file; read if it exists.
         layout: of the table.
-        origin: what was measured and how; kept beside the table, which only the same origin can resume.
+        origin: what was measured, and how; kept beside the table. Only the same origin can resume it.
         values: the rows, in the order of measurement.
         runs: number of columns.
-        table: what has been measured so far.
+        table: the measurements so far.
     """
 
     path: Path
@@ -215,7 +214,7 @@ class Campaign:
         self.table = read_table(self.path, self.layout)
         for runs in self.table.values():
             if len(runs) != self.runs:
-                raise TableError(self.path, None, f"holds {len(runs)} runs, asked for are {self.runs}")
+                raise TableError(self.path, None, f"has {len(runs)} runs instead of {self.runs}")
         was = read_origin(self.path)
         if was != self.origin:
             differs = ", ".join(
@@ -223,18 +222,20 @@ class Campaign:
                 for name in sorted({*was, *self.origin})
                 if was.get(name) != self.origin.get(name)
             )
-            raise TableError(self.path, None, f"was measured otherwise: {differs}; choose another file")
+            raise TableError(
+                self.path, None, f"was measured with other settings: {differs}; choose another file"
+            )
 
     @property
     def left(self) -> list[int]:
-        """The values still to be measured, in their order."""
+        """The values still to measure, in their order."""
         return [value for value in self.values if value not in self.table]
 
     async def measure(self, measure_run: Callable[[int, int], Awaitable[int]]) -> None:
-        """Measure what is left; ``measure_run`` gets value and run (from 1), and returns the reading.
+        """Measure the remaining values; ``measure_run`` gets value and run (from 1), and returns the reading.
 
         Raises:
-            TableError: a reading is beyond what the layout allows.
+            TableError: a reading is outside the range of the layout.
             OSError: the file cannot be written.
         """
         for value in self.left:
@@ -248,7 +249,7 @@ class Campaign:
             table = {**self.table, value: tuple(readings)}
             if not origin_beside(self.path).exists():
                 await asyncio.to_thread(write_origin, self.path, self.origin)
-            # In a thread: a disk may take its time, and the hand polls meanwhile.
+            # In a thread: a slow disk must not hold up polling.
             await asyncio.to_thread(write_table, self.path, self.layout, table)
             self.table = table
 
@@ -319,15 +320,15 @@ def read_currents(path: Path) -> Currents:
         time, a, b, c = sample
         runs[-1].append((time, a, b, c))
     if not currents:
-        raise TableError(path, None, "there are no currents in it")
+        raise TableError(path, None, "it contains no currents")
     return currents
 
 
 def write_currents(path: Path, currents: Currents) -> None:
-    """Write the currents of grasps into a file, which is replaced at once.
+    """Write the currents of grasps into a file, replacing it at once.
 
     Raises:
-        OSError: it cannot be written; the file is what it was.
+        OSError: it cannot be written; the file is unchanged.
     """
     rows = (
         (force, number, *sample)

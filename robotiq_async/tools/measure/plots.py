@@ -48,7 +48,7 @@ Event = tuple[float, str, bool]
 
 
 def plot_speed(path: Path, table: Table, label: str) -> list[Path]:
-    """Closing time against the speed value beside the thesis's, and how far the two are apart.
+    """Plot closing time against speed value beside the thesis's curve, and the difference between the two.
 
     Args:
         path: where to, without suffix.
@@ -82,7 +82,7 @@ def plot_speed(path: Path, table: Table, label: str) -> list[Path]:
 
 
 def plot_force(path: Path, table: Table, surface: str, label: str) -> list[Path]:
-    """Force against the force value, each run a point, beside the thesis's and the nominal figures."""
+    """Plot force against force value, one point per run, beside the thesis's and the nominal figures."""
     with _figure(path, f"Force of a grasp, {surface}") as ((axes,), files):
         nominal, thesis = ForceCalibration.nominal(), ForceCalibration.thesis(surface)
         axes.plot(*zip(*nominal.points, strict=True), color="0.6", ls="--", label=nominal.source)
@@ -102,11 +102,11 @@ def plot_force(path: Path, table: Table, surface: str, label: str) -> list[Path]
 
 
 def plot_peak_currents(path: Path, currents: Currents, surface: str, label: str) -> list[Path]:
-    """The highest current of each finger against the force value."""
+    """Plot the highest current of each finger against the force value."""
     with _figure(path, f"Highest current of a grasp, {surface} ({label})") as ((axes,), files):
         values = sorted(currents)
         peaks = [peak_currents(currents[value]) for value in values]
-        # Fingers that are alike, those of the simulator are, would lie on each other: they are one curve.
+        # Identical fingers, such as the simulator's, would overlap: they share one curve.
         alike: dict[tuple[int, ...], str] = {}
         for finger, of_finger in zip("ABC", zip(*peaks, strict=True), strict=True):
             alike[of_finger] = alike.get(of_finger, "") + finger
@@ -121,7 +121,7 @@ def plot_peak_currents(path: Path, currents: Currents, surface: str, label: str)
 
 
 def plot_current_over_time(path: Path, by_surface: Mapping[str, Currents], label: str) -> list[Path]:
-    """The current of finger A during the first grasp at some force values, surfaces one above the other."""
+    """Plot the current of finger A during the first grasp at some force values, one panel per surface."""
     with _figure(path, f"Current of finger A during a grasp ({label})", rows=len(by_surface)) as (
         axes,
         files,
@@ -141,11 +141,11 @@ def plot_current_over_time(path: Path, by_surface: Mapping[str, Currents], label
 
 
 def plot_recording(path: Path, entries: Iterable[Entry]) -> list[Path]:
-    """Positions, currents and events of a recording over time.
+    """Plot positions, currents and events of a recording over time.
 
     Args:
         path: where to, without suffix.
-        entries: its JSON messages; only what is drawn of them is kept.
+        entries: its JSON messages; only the plotted values are kept in memory.
 
     Returns:
         The files; none when there is no status to draw.
@@ -179,7 +179,7 @@ def plot_recording(path: Path, entries: Iterable[Entry]) -> list[Path]:
     height = STRIP * max((len(words) for _, words, _ in labels), default=1)
     with _figure(path, path.name, rows=3, ratios=(height, 3, 3)) as (axes, files):
         strip, positions, currents = axes
-        # Fingers that move together lie on each other: the first is the broadest, and shows at the sides.
+        # Fingers that move together overlap: the first curve is the widest and shows at the sides.
         for (name, width), colour in zip(WIDTHS.items(), (*COLOURS, "0.5"), strict=True):
             line: Any = {"color": colour, "lw": width}
             dotted: Any = {"color": colour, "lw": 0.8, "ls": ":", "drawstyle": "steps"}
@@ -202,11 +202,10 @@ def plot_recording(path: Path, entries: Iterable[Entry]) -> list[Path]:
 
 
 def _write_labels(strip: Axes, labels: Iterable[Event]) -> None:
-    """Above the curves, where they hide none."""
     strip.set_axis_off()
     strip.set_ylim(0, 1)
     style: Any = {"fontsize": 7, "rotation": 90, "va": "bottom", "ha": "center", "parse_math": False}
-    style["in_layout"] = False  # it does not push the curves aside
+    style["in_layout"] = False  # labels do not make the curves smaller
     for when, words, is_fault in labels:
         strip.annotate(words, (when, 0), color=_colour(is_fault), **style)
 
@@ -216,8 +215,7 @@ def _colour(is_fault: bool) -> str:
 
 
 def _event(fields: dict[str, Any]) -> tuple[str, bool] | None:
-    """What is told of an event, and whether it is a fault."""
-    # A control loop goes to RUNNING_CC and back with every command: that is no event to look at.
+    # Every command of a control loop goes to RUNNING_CC and back: too many to plot.
     if "RUNNING_CC" in (fields.get("source"), fields.get("target")):
         return None
     is_fault = fields["kind"] == "fault"
@@ -226,7 +224,6 @@ def _event(fields: dict[str, Any]) -> tuple[str, bool] | None:
 
 
 def _labels(events: Iterable[Event], apart: float) -> Iterator[Event]:
-    """What comes too soon after a label joins it."""
     began, words, is_fault = 0.0, "", False
     for at, name, of_a_fault in events:
         if words and at - began > apart:
@@ -244,7 +241,6 @@ def _short(words: str) -> str:
 
 
 def _shown(currents: Currents) -> list[int]:
-    """The force values to draw: of those that were measured the nearest to the usual ones."""
     nearest = {min(currents, key=lambda force: abs(force - usual)) for usual in SHOWN_FORCES}
     return sorted(nearest)
 
@@ -253,7 +249,7 @@ def _shown(currents: Currents) -> list[int]:
 def _figure(
     path: Path, title: str, rows: int = 1, ratios: tuple[float, ...] | None = None
 ) -> Iterator[tuple[list[Axes], list[Path]]]:
-    """A figure with axes one above the other; written at the end, always the same bytes for the same data."""
+    """A figure with stacked axes, written at the end; the same data give the same bytes."""
     height = 4.6 if rows == 1 else 6.4 + 1.0 * (rows > 2)
     figure = Figure(figsize=(8, height), layout="constrained")
     FigureCanvasAgg(figure)

@@ -1,4 +1,4 @@
-"""A recording as a table: a row for every poll. Needs no extra, and a file that ends anywhere is readable."""
+"""A recording as a table with one row per poll. Needs no extra; a truncated file is readable."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _KINDS = {STATUS: "status", EVENT: "event"}
 
 
 class CsvFile:
-    """Makes the bytes of a CSV file of messages."""
+    """Encodes messages as CSV."""
 
     def __init__(self, write: Callable[[bytes], object]) -> None:
         self._write = write
@@ -22,16 +22,16 @@ class CsvFile:
         self._line(COLUMNS["status"])
 
     def take(self, message: Message) -> None:
-        """Add a row for a status; an event changes the state of the rows that follow, commands have none."""
+        """Add a row for a status. Events set the state of the following rows; commands have no row."""
         kind = _KINDS.get(message.topic)
         if kind and (row := self._table.row(kind, message.nanoseconds, json.loads(message.data))):
             self._line(row)
 
     def flush(self) -> None:
-        """Nothing waits."""
+        """Do nothing: no row is buffered."""
 
     def finish(self) -> None:
-        """A table has no end of its own."""
+        """Do nothing: CSV has no footer."""
 
     def _line(self, cells: list[object] | list[str]) -> None:
         line = io.StringIO(newline="")

@@ -13,12 +13,12 @@ from .recordings import Entry
 from .table import COLUMNS, Table
 
 NEARBY: Final = 100
-"""Number of entries that are sorted by time together."""
+"""Size of the window for sorting."""
 PREFIX: Final = "/gripper/"
 
 
 def export(entries: Iterable[Entry], kind: str, target: Path | str) -> int:
-    """Write the messages of one kind into a CSV file, whole or not at all; what was there is replaced.
+    """Write the messages of one kind into a CSV file, all or none; an existing file is replaced.
 
     Args:
         entries: of a recording, JSON.
@@ -26,11 +26,11 @@ def export(entries: Iterable[Entry], kind: str, target: Path | str) -> int:
         target: the file.
 
     Returns:
-        The number of rows; with none there is no file.
+        The number of rows; 0 writes no file.
 
     Raises:
-        RecordingError: a message is not as a recorder writes it.
-        OSError: the file cannot be written; it is what it was.
+        RecordingError: a message does not have a recorder's format.
+        OSError: the file cannot be written; it is unchanged.
     """
     count = 0
 
@@ -58,7 +58,7 @@ def _rows(entries: Iterable[Entry], kind: str) -> Iterator[list[object]]:
 
 
 def in_order(entries: Iterable[Entry]) -> Iterator[Entry]:
-    """Sorted by time: messages of different streams are some milliseconds out of order in the file."""
+    """Sort by time: messages of different streams are some milliseconds out of order in the file."""
     waiting: list[tuple[int, int, Entry]] = []
     for number, entry in enumerate(entries):
         heappush(waiting, (entry.nanoseconds, number, entry))

@@ -17,40 +17,32 @@ from ...hand import Hand
 from ...runtime.clock import now
 from ...runtime.log import Log
 from ...session.streams import Stream
-from ...values.enums import Fault
 from ...values.errors import RobotiqConnectionError
 from ...values.events import SentRequest, Transition
 from ...values.model import THREE_FINGER
 from ...values.status import RobotiqStatus
 from ..description.joint_states import SCHEMA, SCHEMA_NAME, JointStateEncoder
 from ..description.kinematics import joint_angles, joint_velocities
-from .payloads import (
-    SCHEMAS,
-    Fields,
-    efforts,
-    fault_fields,
-    initial_state_fields,
-    transition_fields,
-)
+from .payloads import SCHEMAS, Fields, efforts, fault_event, initial_state_fields, transition_fields
 
 BUFFER: Final = 100_000
 """Statuses kept while the event loop is busy with something else: minutes."""
 REOPEN_S: Final = 0.2
-"""Between two attempts to open the streams of a hand that has given up on its link."""
+"""Pause before reopening the streams of a hand that has given up on its link."""
 VELOCITY_S: Final = 0.05
-"""Joint velocities are taken over this time: a count is half a degree."""
+"""Time over which joint velocities are taken: a count is half a degree."""
 
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """A topic and the type of its messages, as MCAP and Foxglove describe them.
+    """A topic and its message type, as MCAP and Foxglove describe them.
 
     Attributes:
         name: the topic.
-        encoding: of its messages.
-        schema_name: the type of its messages.
-        schema_encoding: how the type is described.
-        schema: the description.
+        encoding: of the messages.
+        schema_name: the message type.
+        schema_encoding: the language of the schema.
+        schema: the schema of the message type.
     """
 
     name: str
@@ -66,7 +58,7 @@ def json_topic(name: str, schema: object) -> Topic:
 
 
 def compact(fields: Fields) -> bytes:
-    """An object as JSON, in one line without spaces."""
+    """An object as one line of JSON without spaces."""
     return json.dumps(fields, separators=(",", ":")).encode()
 
 
@@ -82,10 +74,10 @@ class Message:
     """One message.
 
     Attributes:
-        topic: where it belongs.
-        nanoseconds: since 1970: when it happened.
+        topic: of the message.
+        nanoseconds: time since 1970.
         data: encoded as the topic says.
-        sequence: the number of the status it was made from; commands, and events, are counted from 1.
+        sequence: the number of its status; commands and events are counted from 1.
     """
 
     topic: Topic
@@ -95,7 +87,7 @@ class Message:
 
 
 class _Source:
-    """A stream of a hand that is opened again when it ends."""
+    """A stream of a hand that reopens when it ends."""
 
     def __init__(self, open_stream: Callable[[], Stream[Any]], publish: Callable[[Any], None]) -> None:
         self._open_stream = open_stream
@@ -116,7 +108,7 @@ class _Source:
                 async for item in self._stream:
                     self._publish(item)
             except RobotiqConnectionError:
-                await asyncio.sleep(REOPEN_S)  # until the hand is started again, its streams end at once
+                await asyncio.sleep(REOPEN_S)  # until the next start, streams end at once
             self._missed_before = self.missed
             self.open()
 
@@ -126,20 +118,19 @@ class _Source:
 
 
 class Feed:
-    """Publishes what happens to a hand as messages. It only listens, across stops and starts of the hand."""
+    """Publishes statuses, requests, transitions and faults of a hand as messages. It only listens."""
 
     def __init__(self, hand: Hand, publish: Callable[[Message], None]) -> None:
         """Prepare; subscribes to nothing.
 
         Args:
-            hand: started before or while the feed runs.
-            publish: is called with every message, in the event loop.
+            hand: may be stopped and started again while the feed runs.
+            publish: called with every message, in the event loop.
         """
         self._hand = hand
         self._publish = publish
         self._encoder = JointStateEncoder()
         self._before: list[RobotiqStatus] = []
-        self._fault = Fault.NONE
         self._epoch = 0.0
         self._counts = {COMMAND: 0, EVENT: 0}
         self._sources: tuple[_Source, ...] = (
@@ -155,9 +146,9 @@ class Feed:
         return self._sources[0].missed
 
     def start(self) -> None:
-        """Listen from now on."""
+        """Subscribe, and publish from now on."""
         loop = asyncio.get_running_loop()
-        # Statuses carry monotonic time; messages are stamped with wall-clock time.
+        # Statuses carry monotonic time, messages wall-clock time.
         began = now()
         self._epoch = time.time() - began
         self._publish_json(EVENT, began, initial_state_fields(self._hand.state, began))
@@ -168,7 +159,7 @@ class Feed:
         ]
 
     async def stop(self) -> None:
-        """Publish what has happened up to now, and stop listening."""
+        """Publish the remaining items, and stop listening."""
         for task in self._tasks:
             task.cancel()
         for ended in await asyncio.gather(*self._tasks, return_exceptions=True):
@@ -180,7 +171,7 @@ class Feed:
             source.drain()
 
     def nanoseconds(self, timestamp: float) -> int:
-        """Nanoseconds since 1970, of a timestamp in monotonic seconds."""
+        """Convert a timestamp in monotonic seconds to nanoseconds since 1970."""
         return round((timestamp + self._epoch) * 1e9)
 
     def _publish_json(self, topic: Topic, timestamp: float, fields: Fields) -> None:
@@ -190,11 +181,12 @@ class Feed:
     def _publish_status(self, status: RobotiqStatus) -> None:
         stamp, data = self.nanoseconds(status.timestamp), compact(status.as_dict())
         self._publish(Message(STATUS, stamp, data, status.sequence))
+        if event := fault_event(status, next(reversed(self._before), None)):
+            self._publish_json(EVENT, status.timestamp, event)
         if status.model is THREE_FINGER:  # the joints of its siblings have no description yet
             self._publish_joints(status)
-        if status.fault != self._fault:
-            self._fault = status.fault
-            self._publish_json(EVENT, status.timestamp, fault_fields(status))
+        else:
+            self._before = [status]
 
     def _publish_joints(self, status: RobotiqStatus) -> None:
         while len(self._before) > 1 and status.timestamp - self._before[1].timestamp >= VELOCITY_S:

@@ -18,29 +18,29 @@ NOTE: Final = "never run on real hardware"
 
 
 class Output(Protocol):
-    """Where the bytes go: what the MCAP writer needs of a file."""
+    """The part of a file that the MCAP writer needs."""
 
     def write(self, data: bytes) -> int:
         """Take bytes."""
 
     def tell(self) -> int:
-        """How many there were."""
+        """Number of bytes so far."""
 
     def flush(self) -> None:
-        """Nothing need happen."""
+        """May do nothing."""
 
 
 class McapFile:
-    """Makes the bytes of an MCAP file of messages."""
+    """Encodes messages as MCAP."""
 
     def __init__(self, output: Output, *, name: str, address: str, ros2: bool = False) -> None:
         """Write the header.
 
         Args:
-            output: takes the bytes.
-            name: of the hand that the file is of.
-            address: the hand's.
-            ros2: joint states alone, in the profile ``ros2``.
+            output: receives the bytes.
+            name: of the hand.
+            address: of the hand.
+            ros2: write joint states only, in the profile ``ros2``.
         """
         self._writer: Any = Writer(output, compression=CompressionType.ZSTD)  # type: ignore[arg-type]
         self._writer.start(profile="ros2" if ros2 else "", library=f"robotiq_async {__version__}")
@@ -54,15 +54,15 @@ class McapFile:
         return channel
 
     def take(self, message: Message) -> None:
-        """Add a message; one of another topic is left out."""
+        """Add a message; other topics are ignored."""
         if message.topic in self._channels:
             channel, stamp = self._channels[message.topic], message.nanoseconds
             self._writer.add_message(channel, stamp, message.data, stamp, message.sequence & 0xFFFFFFFF)
 
     def flush(self) -> None:
-        """Hand out what has been taken so far, so that a file that ends there can be recovered."""
+        """Hand out the bytes so far, so that a file that ends there can be recovered."""
         self._writer.flush()
 
     def finish(self) -> None:
-        """Write the end."""
+        """Write the footer."""
         self._writer.finish()

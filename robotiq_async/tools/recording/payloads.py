@@ -1,6 +1,6 @@
-"""What happens to a hand as JSON objects, for files and for other programs, and their schemas.
+"""Events and states of a hand as JSON objects, for files and other programs, and their JSON Schemas.
 
-Statuses and requests are what their ``as_dict()`` gives, here and wherever else they are JSON.
+Statuses and requests have the JSON form of their ``as_dict()``.
 """
 
 from __future__ import annotations
@@ -102,26 +102,33 @@ SCHEMAS: Final = {
 
 
 def title(hand: Hand) -> str:
-    """Which hand, for people: its name and its address, where the one is not the other.
+    """The name and the address of a hand for people; the address alone if both are the same.
 
-    A simulated one is called that.
+    A simulated hand is marked as simulated.
     """
     words = hand.address if hand.name == hand.address else f"{hand.name} ({hand.address})"
     return f"{words}, simulated" if hand.address.startswith("sim:") else words
 
 
 def initial_state_fields(state: State, now: float) -> Fields:
-    """The event that opens a feed: the state the hand is in."""
+    """The first event of a feed: the current state."""
     return {"kind": "state", "timestamp": now, "target": state.name}
 
 
 def transition_fields(transition: Transition) -> Fields:
-    """The event for a change of state."""
+    """The event for a transition."""
     return {"kind": "transition", **transition.as_dict()}
 
 
-def fault_fields(status: RobotiqStatus) -> Fields:
-    """The event for a fault that has appeared, or cleared (NONE); the status is the first that shows it."""
+def is_command(event: Fields) -> bool:
+    """Whether an event is the start or the end of a command. A control loop makes hundreds a second."""
+    return State.RUNNING_CC.name in (event.get("source"), event.get("target"))
+
+
+def fault_event(status: RobotiqStatus, before: RobotiqStatus | None) -> Fields | None:
+    """The event for a fault that has appeared or cleared (NONE) since the status before, or None."""
+    if status.fault == (Fault.NONE if before is None else before.fault):
+        return None
     return {"kind": "fault", "timestamp": status.timestamp, **_in_words(status.fault)}
 
 
@@ -151,7 +158,7 @@ def reading_fields(hand: Hand) -> Fields:
 
 
 def state_fields(hand: Hand, now: float) -> Fields:
-    """State and statistics of a hand; the fault and the age of the last status only while they are known.
+    """State and statistics of a hand; fault and age of the newest status only while they are known.
 
     Args:
         hand: the hand.
@@ -174,7 +181,7 @@ def state_fields(hand: Hand, now: float) -> Fields:
 
 
 def efforts(status: RobotiqStatus) -> list[float]:
-    """Motor currents in ampere, each at the joint its motor drives first; torques are not known."""
+    """Motor currents in ampere, each at the first joint of its motor; torques are not known."""
     scissor = status.current_ma(Finger.SCISSOR) / 1000
     one, two, middle = (status.current_ma(finger) / 1000 for finger in FINGER_NAMES)
     return [scissor, one, 0.0, 0.0, scissor, two, 0.0, 0.0, middle, 0.0, 0.0]

@@ -1,4 +1,4 @@
-"""Output below Python's buffers: at its end the interpreter would wait for whoever writes to one of those."""
+"""Output that bypasses Python's buffers: at exit the interpreter would wait for a thread that uses one."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 
 
 def write_all(descriptor: int, data: bytes) -> None:
-    """Write all of it. Blocks for as long as the other side takes: call it in a thread.
+    """Write all of the data. Blocks until the other side has taken it: call it in a thread.
 
     Raises:
         OSError: it cannot be written.

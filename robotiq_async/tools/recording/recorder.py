@@ -4,14 +4,13 @@
     async with Recorder(hand, "grasp.mcap"), hand:
         ...
 
-In this order the start and the stop are in it too, and nothing that concerns the file delays the stop.
+In this order the file contains start and stop, and a slow disk does not delay the stop.
 
 Four channels: ``/gripper/status`` (every poll), ``/gripper/command`` (every request that was written) and
 ``/gripper/event`` (transitions and faults) as JSON with a JSON Schema; ``/joint_states`` as ROS 2 encodes it.
-Tools of ROS 2 refuse a file with channels that are not ROS's: ``ros2=True`` leaves them out. A table has a
-row for every poll (:mod:`.files.table`), and no commands.
-What is recorded reaches the disk twice a second, from a thread: a program that is killed loses no more than
-that, and ``robotiq-async recover`` makes its file whole.
+Tools of ROS 2 refuse a file with other channels than ROS's: ``ros2=True`` leaves them out. A table has a row
+for every poll, and no commands. A thread writes to the disk twice a second. A killed program loses no more
+than that, and ``robotiq-async recover`` repairs its file.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ from .feed import JOINTS, STATUS, Feed, Message
 from .raw_output import write_all
 
 _missing = ""
-try:  # Here and not in a constructor: it takes a tenth of a second, in which a hand could not poll.
+try:  # Here and not in a constructor: importing takes 0.1 s, in which a hand could not poll.
     from .mcap_file import McapFile
 except ImportError as error:
     _missing = str(error)
@@ -46,7 +45,7 @@ DISK_S: Final = 10.0
 
 
 class _Outbox:
-    """What the file is made in: keeps the bytes until a thread writes them to the disk."""
+    """Buffers the bytes of the file until a thread writes them to the disk."""
 
     def __init__(self) -> None:
         self._waiting: list[bytes] = []
@@ -61,7 +60,7 @@ class _Outbox:
         return self._count
 
     def flush(self) -> None:
-        """Nothing: the disk is a thread's business."""
+        """Do nothing: a thread writes to the disk."""
 
     def take(self) -> bytes:
         data, self._waiting = b"".join(self._waiting), []
@@ -69,7 +68,7 @@ class _Outbox:
 
 
 class _Format(Protocol):
-    """Makes the bytes of a file, in memory."""
+    """Encodes messages into the outbox."""
 
     def take(self, message: Message) -> None: ...
 
@@ -79,17 +78,17 @@ class _Format(Protocol):
 
 
 def is_table(path: Path | str) -> bool:
-    """Whether a recording of this name is a table, and no MCAP file."""
+    """Whether a recording of this name is a table instead of an MCAP file."""
     return Path(path).suffix.lower() == ".csv"
 
 
 class Recorder:
-    """Records a hand while a block runs. It only listens: the gripper is not touched, whatever fails.
+    """Records a hand during a block. It only listens; a failing disk does not affect the gripper.
 
     Attributes:
         path: the file.
-        recorded: polls in it so far; the last half second of them may not have reached the disk.
-        saved: polls that have; 0 once the file has been deleted. Of a write that was cut off none count.
+        recorded: polls so far; those of the last half second may not be on the disk yet.
+        saved: polls on the disk; 0 once the file has been deleted. An incomplete write does not count.
     """
 
     def __init__(self, hand: Hand, path: Path | str, *, ros2: bool = False) -> None:
@@ -97,12 +96,12 @@ class Recorder:
 
         Args:
             hand: started before or while it is recorded.
-            path: a file that is not there yet; with the suffix ``.csv`` it is a table, else MCAP.
-            ros2: write the joint states alone, in the profile ``ros2``: a file that tools of ROS 2 open.
+            path: a file that does not exist yet; a table with the suffix ``.csv``, otherwise MCAP.
+            ros2: write the joint states only, in the profile ``ros2``, for tools of ROS 2.
 
         Raises:
             ImportError: MCAP without the extra ``record``.
-            ValueError: a table of ROS 2's.
+            ValueError: ``ros2`` with a table.
         """
         if ros2 and is_table(path):
             raise ValueError(f"ros2 is for MCAP files, and {path} is a table")
@@ -131,14 +130,14 @@ class Recorder:
 
     @property
     def has_failed(self) -> bool:
-        """Whether something could not be written: nothing is recorded any more."""
+        """Whether a write has failed; the recording ends then."""
         return self._failed.done()
 
     async def __aenter__(self) -> Self:
         """Create the file and start recording.
 
         Raises:
-            RecordingError: the file is there already, or cannot be made.
+            RecordingError: the file exists already, or cannot be created.
         """
         loop = asyncio.get_running_loop()
         self._failed = loop.create_future()
@@ -162,17 +161,17 @@ class Recorder:
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Write what is left and close the file, also when cancelled meanwhile.
+        """Write the rest and close the file, also when cancelled meanwhile.
 
         Raises:
-            RecordingError: something could not be written; never in place of another exception.
+            RecordingError: a write failed; it never replaces another exception.
         """
         await wait_shielded(asyncio.ensure_future(self._end()))
         if self._failed.done() and error is None:
             raise self._failed.result()
 
     async def failure(self) -> RecordingError:
-        """Wait until the recording fails (a full disk, say); what was saved before stays readable."""
+        """Wait until a write fails (a full disk, for example); everything saved before stays readable."""
         return await asyncio.shield(self._failed)
 
     def _make_format(self, *, ros2: bool) -> _Format:
@@ -215,7 +214,6 @@ class Recorder:
             self._fail(error.strerror)
 
     async def _save(self) -> None:
-        """Write what waits to the disk; a failure ends the recording."""
         data, polls = self._outbox.take(), self.recorded
         try:
             await in_a_thread(lambda: self._write(data))

@@ -1,6 +1,6 @@
-"""Reads recordings back: whole ones, and what a killed recorder has left. Needs the extra ``record``.
+"""Reads recordings, complete or truncated. Needs the extra ``record``.
 
-A file may come from anywhere: no length that it tells is believed, and chunks are unpacked up to a limit.
+A file may be malicious: no length field is trusted, and chunks are unpacked up to a limit.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from ...runtime.log import log
 from ...values.errors import RecordingError
 
 LARGEST: Final = 16 * 2**20
-"""Bytes of a record, and of an unpacked chunk; the writers of MCAP make chunks of a sixteenth of it."""
+"""Limit of a record and of an unpacked chunk in bytes; MCAP writers make chunks of a sixteenth of it."""
 NOT_OURS: Final = (LookupError, TypeError, ValueError, AttributeError, OverflowError)
-"""What comes of reading a message that has other fields, or fields of another type."""
+"""Errors of reading a message with other fields, or with fields of another type."""
 BROKEN: Final = (
-    "%s breaks off after %d messages: its program was killed, or still writes it, or it is damaged there; "
-    "robotiq-async recover makes a whole file of what is before"
+    "%s ends too early, after %d messages: its program was killed or still writes it, or it is damaged; "
+    "robotiq-async recover makes a complete file of these messages"
 )
 
 T = TypeVar("T")
@@ -47,9 +47,9 @@ class Entry:
     Attributes:
         topic: the channel's name.
         nanoseconds: since 1970.
-        sequence: the number of the status; of commands, and of events, counted from 1.
+        sequence: the number of the status; commands and events are counted from 1.
         data: the bytes.
-        is_json: whether they are said to be JSON.
+        is_json: whether the channel says that it is JSON.
         path: the file.
     """
 
@@ -62,24 +62,24 @@ class Entry:
 
     @property
     def fields(self) -> dict[str, Any]:
-        """What a JSON message says.
+        """The fields of a JSON message.
 
         Raises:
-            RecordingError: it is no JSON object.
+            RecordingError: it is not a JSON object.
         """
         try:
             fields = json.loads(self.data)
         except (ValueError, RecursionError) as error:
-            raise self._refused(f"is no JSON: {error}") from None
+            raise self._refused(f"is not JSON: {error}") from None
         if not isinstance(fields, dict):
-            raise self._refused("is no JSON object")
+            raise self._refused("is not a JSON object")
         return fields
 
     def read(self, what: Callable[[dict[str, Any]], T]) -> T:
-        """What a function makes of the fields.
+        """Apply a function to the fields.
 
         Raises:
-            RecordingError: they are not as a recorder writes them.
+            RecordingError: they do not have a recorder's format.
         """
         fields = self.fields
         try:
@@ -96,11 +96,11 @@ class Entry:
 
 @dataclass
 class Recovered:
-    """What :func:`recover` has found.
+    """The outcome of :func:`recover`.
 
     Attributes:
         messages: number of messages saved.
-        is_whole: whether the file was whole to begin with.
+        is_whole: whether the file was complete already.
     """
 
     messages: int = 0
@@ -108,11 +108,11 @@ class Recovered:
 
 
 def read_recording(path: Path | str) -> Iterator[Entry]:
-    """The messages of a recording in their order; of a broken one, those that are there, and a warning.
+    """Iterate over the messages of a recording. A truncated one ends with a warning.
 
     Raises:
-        RecordingError: it cannot be read, is no MCAP file, or is one that no recorder writes: a chunk that
-            would fill the memory, a message without a channel.
+        RecordingError: it cannot be read, is not an MCAP file, or does not have a recorder's format: a chunk
+            that would fill the memory, a message without a channel.
     """
     channels: _Known[Channel] = _Known(path, "channel")
     count, is_whole = 0, False
@@ -130,15 +130,15 @@ def read_recording(path: Path | str) -> Iterator[Entry]:
 
 
 def recover(path: Path | str, target: Path | str) -> Recovered:
-    """Write what is in a broken recording into a whole one.
+    """Copy the readable part of a truncated recording into a complete one.
 
     Raises:
-        RecordingError: as :func:`read_recording`, what came before is in the target then; or the target is
-            there already.
+        RecordingError: as :func:`read_recording`, with the messages before in the target; or the target
+            exists already.
     """
     found = Recovered()
     records = _records(path)
-    header = next(records)  # refuses what is no recording before there is a target
+    header = next(records)  # raises for other files, before the target exists
     assert isinstance(header, Header)
     refused: RecordingError | None = None
     try:
@@ -153,10 +153,10 @@ def recover(path: Path | str, target: Path | str) -> Recovered:
     except FileExistsError as error:
         raise RecordingError(f"{target}: {error.strerror}") from error
     except OSError as error:
-        Path(target).unlink(missing_ok=True)  # half of it looks like the whole
+        Path(target).unlink(missing_ok=True)  # a part would look complete
         raise RecordingError(f"{target}: {error.strerror}") from error
     if refused is not None:
-        raise RecordingError(f"{refused}; what stands before it is in {target}") from refused
+        raise RecordingError(f"{refused}; the messages before it are in {target}") from refused
     return found
 
 
@@ -183,7 +183,7 @@ def _copy(records: Iterator[McapRecord], writer: Writer, found: Recovered, path:
 
 
 class _Known(dict[int, T]):
-    """What a recording has told of; that it refers to something else is an error."""
+    """Schemas or channels by id; a reference to a missing one is an error."""
 
     def __init__(self, path: Path | str, kind: str) -> None:
         super().__init__()
@@ -198,7 +198,6 @@ class _Known(dict[int, T]):
 
 
 def _records(path: Path | str) -> Iterator[McapRecord]:
-    """The records of a file, from its header up to its end, or to where it breaks off."""
     try:
         with open(path, "rb") as file:
             reader = StreamReader(
@@ -209,7 +208,7 @@ def _records(path: Path | str) -> Iterator[McapRecord]:
             )
             records = iter(reader.records)
             header = None
-            with suppress(Exception):  # any bytes, which may raise anything
+            with suppress(Exception):  # damaged bytes may raise anything
                 header = next(records)
             if not isinstance(header, Header):
                 raise RecordingError(f"{path}: not an MCAP file")
@@ -219,30 +218,25 @@ def _records(path: Path | str) -> Iterator[McapRecord]:
             except RecordingError:
                 raise
             except Exception:  # noqa: BLE001  # damaged bytes may raise anything
-                return  # a killed recorder leaves a file that ends anywhere
+                return  # the file of a killed recorder ends anywhere
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror}") from error
 
 
 class _Bounded:
-    """A file that gives no more at a time than a record may have, whatever is asked for."""
+    """A file that never reads more than a record may have."""
 
     def __init__(self, file: IO[bytes]) -> None:
         self._file = file
 
     def read(self, size: int) -> bytes:
         if size > LARGEST:
-            raise ValueError(f"{size} bytes are no record")
+            raise ValueError(f"{size} bytes are not a record")
         return self._file.read(size)
 
 
 def _unpacked(path: Path | str, record: McapRecord) -> list[McapRecord]:
-    """The records of a chunk; any other record is alone.
-
-    Raises:
-        RecordingError: the chunk is larger than one may be, or than it says, or compressed in an unknown way.
-        Exception: it is damaged.
-    """
+    """The records of a chunk, or the record itself."""
     if not isinstance(record, Chunk):
         return [record]
     size = record.uncompressed_size
@@ -252,7 +246,7 @@ def _unpacked(path: Path | str, record: McapRecord) -> list[McapRecord]:
         case "":
             data = record.data
         case "zstd":
-            # What the frame says of its size and of the memory it needs is as little to be believed.
+            # The frame's own size and window size cannot be trusted either.
             unpacking = zstandard.ZstdDecompressor(max_window_size=LARGEST)
             data = unpacking.stream_reader(record.data).read(size + 1)
         case "lz4":

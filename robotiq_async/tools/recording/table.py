@@ -1,6 +1,6 @@
-"""What happens to a hand as rows of a table, for spreadsheets and pandas.
+"""Messages of a hand as rows of a table, for spreadsheets and pandas.
 
-A column has the name of the JSON key, that of an axis before it: ``A.position``. ``time`` is the wall clock,
+A column has the name of its JSON key, for an axis with a prefix: ``A.position``. ``time`` is the wall clock,
 in UTC and ISO 8601; ``timestamp`` is in seconds of the program's monotonic clock.
 """
 
@@ -15,11 +15,11 @@ from .payloads import SCHEMAS, Fields
 
 _SECOND: Final = 10**9
 _FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
-"""A spreadsheet takes a text that begins so for a formula."""
+"""A spreadsheet takes a text that begins with one of these for a formula."""
 _MAY_LACK: Final = ("B", "C", "SCISSOR")
 """The axes that a sibling of the 3-Finger does not have."""
 STATE: Final = "state"
-"""The column of a status that is not in its JSON: the state of the hand as of the last event."""
+"""The column with the state of the hand as of the last event; the JSON of a status does not have it."""
 
 
 def _names(schema: Mapping[str, Any], prefix: str = "") -> list[str]:
@@ -39,7 +39,7 @@ COLUMNS: Final = {
 
 
 class Table:
-    """The rows of one table, made of messages in the order in which they happened."""
+    """The rows of one table, made of messages in chronological order."""
 
     def __init__(self, kind: str) -> None:
         self._kind = kind
@@ -47,15 +47,15 @@ class Table:
         self._state = ""
 
     def row(self, kind: str, nanoseconds: int, fields: Fields) -> list[object] | None:
-        """The row that a message makes; None if it makes none.
+        """The row of a message; None if it has none.
 
         Args:
             kind: of the message.
-            nanoseconds: since 1970, when it happened.
+            nanoseconds: time since 1970.
             fields: its JSON.
 
         Raises:
-            LookupError, TypeError: it is not as a recorder writes it.
+            LookupError, TypeError: it does not have a recorder's format.
         """
         if kind == "event" and "target" in fields:
             self._state = fields["target"]
@@ -66,13 +66,12 @@ class Table:
 
 
 def wall_clock(nanoseconds: int) -> str:
-    """The time in UTC, ISO 8601 to the microsecond, of nanoseconds since 1970."""
+    """Format nanoseconds since 1970 in UTC, ISO 8601 to the microsecond."""
     seconds, rest = divmod(nanoseconds, _SECOND)
     return f"{datetime.fromtimestamp(seconds, UTC):%Y-%m-%dT%H:%M:%S}.{rest // 1000:06d}Z"
 
 
 def _value(fields: Fields, name: str, kind: str) -> Any:  # noqa: ANN401  # as JSON has it
-    """What a column shows; an event has only what is of its kind."""
     axis, _, key = name.rpartition(".")
     if kind == "event":
         return fields.get(name)
@@ -82,7 +81,7 @@ def _value(fields: Fields, name: str, kind: str) -> Any:  # noqa: ANN401  # as J
 
 
 def _cell(value: object) -> object:
-    """A value in a cell: lists with blanks between, nothing for null, a text never as a formula."""
+    """Format a value: lists with blanks between, empty for null, and no text as a formula."""
     if isinstance(value, list):
         return " ".join(map(str, value))
     if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""Carries out what the pages ask for, and holds the axes when a page is gone."""
+"""Carries out the commands of the pages, and holds the axes when a page has gone."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..wording import refusal_words
 from .services import SERVICES
 
 MAX_COMMANDS: Final = 16
-"""Of one page at a time; a halt is never refused."""
+"""Commands of one page at a time; a halt is never refused."""
 HALT: Final = "halt"
 BUTTONS: Final = {
     State.FAULT: "press recover",
@@ -25,26 +25,24 @@ BUTTONS: Final = {
 }
 """The button that helps in a state."""
 FRESH_S: Final = 1.5
-"""A command that was asked for longer ago moves nothing; a halt is never too old."""
+"""Maximum age of a command; a halt is never too old."""
 
 
 class PageCommands:
-    """The commands under way, by page.
+    """Carries out commands, and keeps those under way by page.
 
-    A page that is gone has its commands cancelled, and that holds the axes that still move; what cannot be
-    held half-way (an activation, a release, a reset) goes on, as it does whenever it is cancelled.
+    When a page has gone, its commands are cancelled, which holds the axes that still move. An activation, a
+    release and a reset continue, as they do whenever they are cancelled.
 
     Attributes:
-        is_ending: whether nothing but halts is taken.
+        is_ending: whether all commands but halts are refused.
+
+    Args:
+        operators: one for each hand; without any, every command is refused.
+        answer: called with the outcome of each command.
     """
 
     def __init__(self, operators: Sequence[Operator], answer: Callable[[Fields], None]) -> None:
-        """Prepare.
-
-        Args:
-            operators: one for each hand; none at all refuses every command.
-            answer: is called with how a command ended.
-        """
         self._operators = operators
         self._answer = answer
         self._tasks: dict[str, set[asyncio.Task[str]]] = {}
@@ -53,15 +51,15 @@ class PageCommands:
 
     @property
     def under_way(self) -> bool:
-        """Whether a page waits for a motion."""
+        """Whether a command has not ended yet."""
         return any(not task.done() for tasks in self._tasks.values() for task in tasks)
 
     def do(self, request: Fields) -> None:
-        """Begin to carry out a request; its answer comes later.
+        """Start a command; its answer comes later.
 
         Args:
             request: ``page``, ``number``, ``hand``, ``name`` and ``arguments`` of a service, and ``at``, when
-                it was asked for: ``time.monotonic()`` of this machine, which is the same in every process.
+                the user gave it: ``time.monotonic()`` of this machine, which is the same in every process.
         """
         page, name = str(request["page"]), str(request["name"])
         tasks = self._halts if name == HALT else self._tasks.setdefault(page, set())
@@ -73,25 +71,25 @@ class PageCommands:
 
         task = asyncio.get_running_loop().create_task(self._carry_out(request, page, name))
         tasks.add(task)
-        # Not at the end of the task: a page that is gone in the same turn has it cancelled before it begins.
+        # A callback, because a task that is cancelled before its first step runs no code of its own.
         task.add_done_callback(ended)
 
     def gone(self, page: str) -> None:
-        """The page has ended or cannot be heard: its motions are held. A halt of it is completed."""
+        """Hold the motions of a page that has ended or lost contact. A halt continues."""
         for task in self._tasks.pop(page, ()):
             task.cancel()
 
     def all_gone(self) -> None:
-        """No page can be heard."""
+        """Hold the motions of all pages."""
         for page in list(self._tasks):
             self.gone(page)
 
     def refuse(self) -> None:
-        """Take nothing but halts from now on: the hands are about to be stopped."""
+        """Refuse all commands but halts from now on: the hands are about to be stopped."""
         self.is_ending = True
 
     async def close(self) -> None:
-        """Hold whatever is under way, and take no more. Waits until all have ended."""
+        """Hold what is under way, refuse new commands, and wait until all have ended."""
         self.refuse()
         tasks = [task for tasks in self._tasks.values() for task in tasks]
         self.all_gone()
@@ -114,7 +112,6 @@ class PageCommands:
 
 
 def _outcome(task: asyncio.Task[str]) -> tuple[bool, str]:
-    """Whether a command has been carried out, and how it ended in words."""
     try:
         return True, task.result()
     except asyncio.CancelledError:

@@ -1,9 +1,9 @@
-"""Shows hands on a page while a block runs: starts its process, tells it what is newest, hears what it asks.
+"""Shows hands on a page during a block: starts its process, sends updates, receives commands.
 
     async with PageServer(hands, settings) as page:
         print(page.url)
 
-What goes between the two processes are lines of JSON through two pipes.
+The two processes exchange lines of JSON through two pipes.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from ...values.errors import ViewerError
 from ..actions import Operator
 from ..recording.payloads import Fields
 from .commands import PageCommands
-from .news import HandNews
 from .settings import PageSettings
+from .updates import HandUpdates
 
 if find_spec("nicegui") is None:
     from ...runtime.extras import install
@@ -37,22 +37,22 @@ if find_spec("nicegui") is None:
 
 UPDATE_S: Final = 0.05
 START_S: Final = 30.0
-"""NiceGUI takes a second to import, on a busy machine several."""
+"""Importing NiceGUI takes a second, on a busy machine several."""
 STOP_S: Final = 2.0
 BACKLOG: Final = 16_384
-"""Bytes that the page has not read yet. Beyond this it is told nothing until it has: then what is newest."""
+"""Bytes that the page has not read yet. Beyond this there are no updates until it has read them."""
 LINE: Final = 65_536
 SILENCE_S: Final = 2.0
-"""The page's process beats four times a second; after this its motions are held."""
+"""The page's process sends four heartbeats a second; after this silence its motions are held."""
 
 
 class PageServer:
     """The page of some hands.
 
     Attributes:
-        news: what is told, a hand each.
-        url: the address to open, once it serves.
-        pages: how many browsers look.
+        updates: the updates, one for each hand.
+        url: the address to open, once the page is served.
+        pages: number of browsers that show the page.
     """
 
     def __init__(
@@ -62,17 +62,17 @@ class PageServer:
 
         Args:
             hands: started before or while they are shown.
-            settings: how it is served.
-            operators: carry out what the pages ask for, one for each hand; without them nothing is.
+            settings: how the page is served.
+            operators: carry out the commands, one for each hand; without them the page only looks.
 
         Raises:
-            ValueError: operators of other hands, or the settings do not match them.
+            ValueError: the operators do not match the hands or the settings.
         """
         if operators and [operator.hand for operator in operators] != list(hands):
             raise ValueError("operators must be those of the hands, in their order")
         if settings.control != bool(operators):
             raise ValueError("control needs operators, and operators need control")
-        self.news = [HandNews(hand) for hand in hands]
+        self.updates = [HandUpdates(hand) for hand in hands]
         self.url = ""
         self.pages = 0
         self._settings = settings
@@ -81,11 +81,11 @@ class PageServer:
         self._tasks: list[asyncio.Task[None]] = []
         self._answers: list[Fields] = []
         self._heard_at = 0.0
-        self._somebody = asyncio.Event()
+        self._seen = asyncio.Event()
         self._over = asyncio.Event()
 
     async def __aenter__(self) -> Self:
-        """Start the process, and wait until it serves.
+        """Start the process, and wait until it serves the page.
 
         Raises:
             ViewerError: the port is taken, there is no such interface, or the process ended.
@@ -117,20 +117,20 @@ class PageServer:
         await wait_shielded(asyncio.ensure_future(self._close()))
 
     async def seen(self) -> None:
-        """Wait until a browser looks."""
-        await self._somebody.wait()
+        """Wait until a browser shows the page."""
+        await self._seen.wait()
 
     async def ended(self) -> None:
-        """Wait until the process of the page has ended by itself."""
+        """Wait until the process of the page ends."""
         await self._over.wait()
 
     @property
     def is_ending(self) -> bool:
-        """Whether nothing but halts is taken: :meth:`refuse_commands` was called, or the block is left."""
+        """Whether all commands but halts are refused: after :meth:`refuse_commands`, or after the block."""
         return self._commands.is_ending
 
     def refuse_commands(self) -> None:
-        """Take nothing but halts from now on: for a program that is about to stop the hands."""
+        """Refuse all commands but halts: for a program that is about to stop the hands."""
         self._commands.refuse()
 
     async def _close(self) -> None:
@@ -141,9 +141,8 @@ class PageServer:
         await self._end_process()
 
     async def _end_process(self) -> None:
-        """Closing its input ends it; if it does not listen, a kill does."""
         assert self._process.stdin is not None
-        self._process.stdin.close()
+        self._process.stdin.close()  # that ends it
         try:
             async with asyncio.timeout(STOP_S):
                 await self._process.wait()
@@ -151,17 +150,17 @@ class PageServer:
             self._process.kill()
             await self._process.wait()
 
-    # -- what is told ----------------------------------------------------------------------------------
+    # -- updates ---------------------------------------------------------------------------------------
 
     async def _tell(self) -> None:
         assert self._process.stdin is not None
-        while not self._over.is_set():  # then nobody reads it
-            for news in self.news:
-                news.gather()
+        while not self._over.is_set():
+            for updates in self.updates:
+                updates.gather()
             if self._commands.under_way and now() - self._heard_at > SILENCE_S:
                 self._commands.all_gone()
             if self._process.stdin.transport.get_write_buffer_size() < BACKLOG:
-                hands = [news.take(index) for index, news in enumerate(self.news)]
+                hands = [updates.take(index) for index, updates in enumerate(self.updates)]
                 self._write(json.dumps({"hands": hands, "answers": self._answers}).encode() + b"\n")
                 self._answers = []
             await asyncio.sleep(UPDATE_S)
@@ -173,15 +172,15 @@ class PageServer:
         assert self._process.stdin is not None
         self._process.stdin.write(line)
 
-    # -- what is heard ---------------------------------------------------------------------------------
+    # -- commands --------------------------------------------------------------------------------------
 
     async def _listen(self) -> None:
         try:
             while (message := await self._read()) is not None:
                 self._heard_at = now()
                 self._hear(message)
-        except Exception:  # noqa: BLE001  # another process said it: whatever that was, the axes are held
-            log.exception("the page said something that means nothing: it is not listened to any more")
+        except Exception:  # noqa: BLE001  # whatever the other process has sent, the axes are held
+            log.exception("the page has sent an invalid message: its commands are ignored from now on")
         finally:
             self._commands.all_gone()
             self._over.set()
@@ -194,10 +193,9 @@ class PageServer:
         if "pages" in message:
             self.pages = message["pages"]
             if self.pages:
-                self._somebody.set()
+                self._seen.set()
 
     async def _read(self) -> Fields | None:
-        """The next line; None after the end."""
         assert self._process.stdout is not None
         line = await self._process.stdout.readline()
         message: Fields | None = json.loads(line) if line else None
@@ -205,7 +203,7 @@ class PageServer:
 
 
 async def _start() -> Process:
-    """The process of the page: with this package, whatever the working directory holds under its name."""
+    # This package, even if the working directory contains another of its name.
     package, here = __name__.partition(".")[0], str(Path(__file__).parents[3])
     paths = os.pathsep.join(filter(None, (here, os.environ.get("PYTHONPATH"))))
     return await asyncio.create_subprocess_exec(

@@ -18,7 +18,7 @@ Arguments = Mapping[str, Any]
 _BYTE: Final = {"type": "integer", "minimum": 0, "maximum": 255}
 _FINGERS: Final = {"type": "string", "description": "ABC, or A,B, or scissor, or all"}
 RESPONSE: Final = {"type": "object", "properties": {"outcome": {"type": "string"}}}
-"""JSON Schema of every response: how the command ended, in words."""
+"""JSON Schema of every response: a description of the outcome."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,10 +26,10 @@ class Service:
     """A command that other programs can call.
 
     Attributes:
-        name: as it is called, ``/gripper/move``.
+        name: for example ``/gripper/move``.
         arguments: each with its JSON Schema.
-        required: those that must be given.
-        run: carries it out; returns how it ended, in words.
+        required: names of the required arguments.
+        run: carries it out; returns a description of the outcome.
     """
 
     name: str
@@ -48,11 +48,11 @@ class Service:
         }
 
     async def call(self, operator: Operator, payload: bytes) -> str:
-        """Carry out a request; returns how it ended, in words.
+        """Carry out a request; returns a description of the outcome.
 
         Args:
             operator: carries it out.
-            payload: a JSON object with the arguments; an empty payload stands for an empty object.
+            payload: a JSON object with the arguments; empty for none.
 
         Raises:
             ValueError: malformed, or an argument that is missing, unknown or outside its range.
@@ -79,8 +79,6 @@ class Service:
 
 
 def _of(action: Action) -> Service:
-    """The service for an action; a dangerous one must be confirmed."""
-
     async def run(operator: Operator, arguments: Arguments) -> str:
         if action.warning and arguments["confirm"] is not True:
             raise ValueError(f"{action.name} needs confirm = true: {action.warning}")
@@ -121,4 +119,4 @@ _ALL: Final = (
     Service("/gripper/set_force", {"value": _BYTE, "fingers": _FINGERS}, ("value",), _set_force),
 )
 SERVICES: Final = MappingProxyType({service.name: service for service in _ALL})
-"""Every service by its name."""
+"""The services by name."""

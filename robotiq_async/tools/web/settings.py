@@ -1,4 +1,4 @@
-"""What the process of the page is told before anything else."""
+"""The settings of the page, as its process receives them."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 
 LOOPBACK: Final = "127.0.0.1"
 EVERYWHERE: Final = ("0.0.0.0", "::", "")
-"""Every interface of this machine: to be opened by its name."""
+"""Hosts that mean every interface: the URL has the name of this machine."""
 PORT: Final = 8766
-"""Beside that of the viewers."""
+"""Next to the viewers' port."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,15 +27,15 @@ class PageSettings:
         host: the interface to listen on.
         port: the TCP port; 0 takes a free one.
         control: whether the page may command.
-        addresses: what the hands are called on the page, in their order.
-        speed: where the slider of the speed begins.
-        force: where the slider of the force begins.
-        password: asked of everybody; empty for the token in the printed address.
+        addresses: titles of the hands on the page, in their order.
+        speed: initial value of the speed slider.
+        force: initial value of the force slider.
+        password: every user must give it; empty for the token in the printed address.
         certificate: PEM file with the certificate (chain) for https; empty for http.
         key: PEM file with its private key.
         token: in the printed address.
-        folder: the path under which everything is served. Cookies do not know ports: one for this path is
-            not sent to other servers of this machine.
+        folder: the path of the page. Cookies ignore ports; one for this path is not sent to other servers of
+            this machine.
     """
 
     host: str = LOOPBACK
@@ -51,12 +51,12 @@ class PageSettings:
     folder: str = field(default_factory=lambda: f"/{secrets.token_hex(8)}", repr=False)
 
     def __post_init__(self) -> None:
-        """Keep who may not get in outside.
+        """Check the settings.
 
         Raises:
             TypeError: port, speed or force is not an int.
-            ValueError: one of them is outside its range; another interface without a password and without a
-                certificate, or half a certificate.
+            ValueError: one of them is outside its range; an interface other than loopback has neither
+                password nor certificate; or a certificate has no key.
         """
         for name, high in (("port", 65535), ("speed", 255), ("force", 255)):
             object.__setattr__(self, name, check_int(name, getattr(self, name), 0, high))
@@ -74,25 +74,25 @@ class PageSettings:
 
     @property
     def scheme(self) -> str:
-        """How browsers reach the page."""
+        """The scheme of the URL."""
         return "https" if self.certificate else "http"
 
     def url(self, port: int) -> str:
-        """The address to open; it lets in whoever has it, unless a password is asked for."""
+        """The address to open. Everyone who has it is let in, unless there is a password."""
         host = gethostname() if self.host in EVERYWHERE else self.host
         host = f"[{host}]" if ":" in host else host
         return f"{self.scheme}://{host}:{port}/" + ("" if self.password else f"?token={self.token}")
 
     def line(self) -> bytes:
-        """All of it as a line, for a pipe: arguments of a process are there for everybody to read."""
+        """The settings as a line for a pipe: every user of the machine can read arguments of processes."""
         return json.dumps(asdict(self)).encode() + b"\n"
 
     @classmethod
     def read(cls, line: bytes) -> Self:
-        """Of such a line.
+        """Decode such a line.
 
         Raises:
-            ValueError: it is none.
+            ValueError: the line is not JSON.
         """
         fields = json.loads(line)
         return cls(**{**fields, "addresses": tuple(fields["addresses"])})

@@ -1,4 +1,4 @@
-"""What ``robotiq-async measure speed`` and ``measure force`` have in common."""
+"""Shared by ``robotiq-async measure speed`` and ``measure force``."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 SPEEDUP = 15.0
 """How much faster than real time the simulated gripper of sim:// runs by default."""
 POLL_S = 0.001
-"""Poll interval with a simulated gripper that is faster than real time, to resolve its time as finely."""
+"""Poll interval with a simulated gripper that is faster than real time: to keep the resolution."""
 
 Runs = Annotated[int, Parameter(metavar="N")]
 Speedup = Annotated[float | None, Parameter(metavar="FACTOR")]
@@ -34,7 +34,7 @@ NoPlot = Annotated[Flag, Parameter(name="--no-plot")]
 
 
 def check(address: str, output: Path, speedup: float | None, runs: int, step: int, plot: bool) -> float:
-    """Refuse what cannot be measured before anything moves; returns how much faster the gripper's time is.
+    """Check the arguments before anything moves; returns the speedup of the gripper's time.
 
     Raises:
         UsageError: an argument is out of range.
@@ -64,7 +64,7 @@ def check(address: str, output: Path, speedup: float | None, runs: int, step: in
 async def gripper(
     address: str, speedup: float, prepare: Callable[[SimulatedGripper], None] = lambda _: None
 ) -> AsyncIterator[Hand]:
-    """An active hand; that of sim:// in a simulated gripper's own, faster time.
+    """An active hand; sim:// runs in its own, faster time.
 
     Raises:
         RobotiqError: no gripper there, or it cannot be activated.
@@ -88,7 +88,7 @@ async def gripper(
 
 
 def load_rich() -> None:
-    """Import rich now: it takes a tenth of a second, in which a hand could not poll."""
+    """Import rich now: that takes 0.1 s, in which a hand could not poll."""
     import rich.progress  # noqa: F401
 
 
@@ -100,12 +100,12 @@ async def carry_out(
     *,
     bar: bool = True,
 ) -> None:
-    """Measure what is left, with a progress bar that knows how long each row takes.
+    """Measure the remaining values, with a progress bar that knows the duration of each row.
 
-    Without ``bar`` there is none: it would paint over what a person types.
+    Without ``bar`` there is no bar: it would overwrite the user's input.
 
     Raises:
-        CommandError: the measurement went wrong, or a file could not be written; what is whole is kept.
+        CommandError: the measurement failed, or a file could not be written; complete rows are kept.
     """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -114,7 +114,7 @@ async def carry_out(
 
     done, left = len(campaign.table), campaign.left
     if done and left:
-        print(f"Going on with {campaign.path}: {done} rows are there, {len(left)} are left.", flush=True)
+        print(f"Continuing {campaign.path}: {done} rows are there, {len(left)} remain.", flush=True)
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -152,11 +152,11 @@ async def carry_out(
             raise CommandError(f"{error}; {kept}") from error
 
 
-async def asked(question: str) -> str:
-    """A line from the person at the terminal; the event loop goes on meanwhile.
+async def prompt(question: str) -> str:
+    """A line that the user types; the event loop keeps running.
 
     Raises:
-        CommandError: there is nobody to ask.
+        CommandError: the input has ended.
     """
     loop = asyncio.get_running_loop()
     answer: asyncio.Future[str] = loop.create_future()
@@ -171,17 +171,17 @@ async def asked(question: str) -> str:
         if not answer.done():
             answer.set_result(line)
 
-    # A daemon: a program that is interrupted does not wait for the line.
+    # A daemon thread: an interrupted program does not wait for the line.
     threading.Thread(target=read, daemon=True).start()
     line = await answer
     if not line:
-        raise CommandError("nobody answers: the input has ended")
+        raise CommandError("no answer: the input has ended")
     return line.strip()
 
 
 @contextmanager
-def refused() -> Iterator[None]:
-    """Around tables and pictures: one that cannot be read or written ends the command.
+def file_errors() -> Iterator[None]:
+    """Turn TableError and OSError of tables and pictures into CommandError.
 
     Raises:
         CommandError: in place of TableError and OSError.
@@ -194,7 +194,7 @@ def refused() -> Iterator[None]:
         raise CommandError(str(error)) from error
 
 
-def told(files: list[Path]) -> None:
+def print_files(files: list[Path]) -> None:
     """Print the names of the files that were written."""
     for file in files:
         print(file)

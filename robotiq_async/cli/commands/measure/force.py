@@ -15,7 +15,18 @@ from ...addresses import full_address, gripper_words, is_simulated
 from ...arguments import Address, Byte, Yes
 from ...consent import consent
 from ...failures import CommandError, UsageError
-from .campaign import NoPlot, Runs, Speedup, asked, carry_out, check, gripper, load_rich, refused, told
+from .campaign import (
+    NoPlot,
+    Runs,
+    Speedup,
+    carry_out,
+    check,
+    file_errors,
+    gripper,
+    load_rich,
+    print_files,
+    prompt,
+)
 
 if TYPE_CHECKING:
     from ....simulator import SimulatedGripper
@@ -45,10 +56,10 @@ def force(
 
     As the thesis did (Pekonen 2012, chapter 6): a scale lies between the fingers, every 25th
     value is set, up by 50 and down by 50, and its reading in grams is typed in, or
-    taken from a table. At sim:// a simulated scale shows what the thesis's showed.
-    The currents of the fingers are recorded at every poll. Both files are written
-    after every row; started again, it goes on where it was. Unless the gripper is
-    that of sim:// it asks first; without a terminal it needs --yes.
+    taken from a table. At sim:// a simulated scale shows the thesis's readings. The
+    currents of the fingers are recorded at every poll. Both files are written after every
+    row; started again, it continues there. Unless the gripper is that of sim:// it asks
+    first; without a terminal it needs --yes.
 
     For example:
 
@@ -73,7 +84,7 @@ def force(
     from ....tools.measure.campaigns import force_campaign
     from ....values.calibration.csv_tables import FORCE, read_table
 
-    with refused():
+    with file_errors():
         readings = None if scale is None else read_table(scale, FORCE)
         origin = {"gripper": full_address(address), "surface": surface, "speed": str(speed)}
         campaign = force_campaign(path, step, runs, **origin)
@@ -116,29 +127,24 @@ async def _measure(
                 reading = await read_scale(value, number)
                 currents[value] = [*(currents.get(value, []) if number > 1 else []), samples]
                 if number == campaign.runs:
-                    # Before the row: a row that is there has its currents.
+                    # Before the row, so that every row has its currents.
                     await asyncio.to_thread(write_currents, currents_file, currents)
                 return reading
 
             seconds = (closing_time(speed) + closing_time(255) + GRASP_S) / speedup
             await carry_out(campaign, run, lambda _: seconds, "force", bar=bar)
-    told([output, currents_file])
+    print_files([output, currents_file])
     if plot:
         _plot(output, surface, campaign.table, "simulated" if is_simulated(address) else "measured")
 
 
 def currents_beside(output: Path) -> Path:
-    """The file beside the readings that holds the currents."""
+    """The file with the currents, beside the readings."""
     return output.with_name(f"{output.stem}_currents.csv")
 
 
 def _currents_of(campaign: Campaign) -> Currents:
-    """The currents that were recorded so far.
-
-    Raises:
-        TableError: they cannot be read.
-        CommandError: those of some runs are missing.
-    """
+    """The currents that are already in the file."""
     from ....tools.measure.campaigns import read_currents
 
     file = currents_beside(campaign.path)
@@ -158,11 +164,7 @@ def _place_scale(simulated: SimulatedGripper, surface: str) -> None:
 def _scale(
     address: str, surface: Literal["foam", "rigid"], readings: Table | None, values: list[int], runs: int
 ) -> Callable[[int, int], Awaitable[int]]:
-    """The source of the readings.
-
-    Raises:
-        CommandError: the table lacks some that are needed.
-    """
+    """The source of the readings."""
     if readings is not None:
         missing = [value for value in values if len(readings.get(value, ())) < runs]
         if missing:
@@ -174,7 +176,7 @@ def _scale(
 
     async def typed(value: int, run: int) -> int:
         while True:
-            text = await asked(f"Force {value}, run {run}: what does the scale show, in grams?")
+            text = await prompt(f"Force {value}, run {run}: what does the scale show, in grams?")
             if re.fullmatch("[0-9]{1,6}", text) and int(text) <= MOST_GRAMS:
                 return int(text)
             print(f"An integer in 0..{MOST_GRAMS}, please.")
@@ -197,7 +199,7 @@ def _plot(output: Path, surface: str, table: Table, label: str) -> None:
     from ....tools.measure.campaigns import read_currents
     from ....tools.measure.plots import plot_current_over_time, plot_force, plot_peak_currents
 
-    with refused():
+    with file_errors():
         currents = read_currents(currents_beside(output))
         over_time = {surface: currents}
         other = "rigid" if surface == "foam" else "foam"
@@ -206,10 +208,10 @@ def _plot(output: Path, surface: str, table: Table, label: str) -> None:
             over_time[other] = read_currents(currents_beside(beside))
     stem = output.with_suffix("")
     base = output.with_name(currents_beside(output).stem)
-    with refused():
-        told(plot_force(stem, table, surface, label))
-        told(plot_peak_currents(base.with_name(f"{base.name}_peak"), currents, surface, label))
-        told(
+    with file_errors():
+        print_files(plot_force(stem, table, surface, label))
+        print_files(plot_peak_currents(base.with_name(f"{base.name}_peak"), currents, surface, label))
+        print_files(
             plot_current_over_time(
                 base.with_name(f"{base.name}_over_time"), dict(sorted(over_time.items())), label
             )

@@ -13,7 +13,7 @@ from ...addresses import full_address, gripper_words, is_simulated
 from ...arguments import Address, Fingers, Yes
 from ...consent import consent
 from ...failures import UsageError
-from .campaign import NoPlot, Runs, Speedup, carry_out, check, gripper, load_rich, refused, told
+from .campaign import NoPlot, Runs, Speedup, carry_out, check, file_errors, gripper, load_rich, print_files
 
 if TYPE_CHECKING:
     from ....tools.measure.campaigns import Campaign
@@ -37,10 +37,10 @@ def speed(
     """Measure how long a full closing takes at each speed value. THE FINGERS MOVE.
 
     As the thesis did (Pekonen 2012, table A1.1): every 4th value from 0, and 255, slowest first,
-    three runs, from the command until nothing moves. It takes 20 minutes. The file
-    is written after every row; started again, it goes on where it was. Beside it a
-    plot is drawn (PNG and SVG) with the thesis's own curve. Unless the gripper is
-    that of sim:// it asks first; without a terminal it needs --yes.
+    three runs, from the command until nothing moves. It takes 20 minutes. The file is
+    written after every row; started again, it continues there. Beside it a plot is drawn
+    (PNG and SVG) with the thesis's own curve. Unless the gripper is that of sim:// it asks
+    first; without a terminal it needs --yes.
 
     For example:
 
@@ -61,7 +61,7 @@ def speed(
     factor = check(address, output, speedup, runs, step, not no_plot)
     from ....tools.measure.campaigns import speed_campaign
 
-    with refused():
+    with file_errors():
         origin = {"gripper": full_address(address), "fingers": str(fingers.name)}
         campaign = speed_campaign(output, step, runs, **origin)
     if campaign.left:
@@ -84,10 +84,10 @@ async def _measure(address: str, campaign: Campaign, fingers: Finger, speedup: f
                 return round(1000 * await time_closing(hand, value, fingers, speedup))
 
             await carry_out(campaign, run, lambda value: expected_seconds(value) / speedup, "speed")
-    told([output])
+    print_files([output])
     if plot:
         from ....tools.measure.plots import plot_speed
 
         label = "simulated" if is_simulated(address) else "measured"
-        with refused():
-            told(plot_speed(output.with_suffix(""), campaign.table, label))
+        with file_errors():
+            print_files(plot_speed(output.with_suffix(""), campaign.table, label))

@@ -1,1 +1,1 @@
-"""``robotiq-async record``, and what becomes of a recording."""
+"""``robotiq-async record``, and the commands that use a recording."""

@@ -35,11 +35,11 @@ async def record(
 
     It only looks: nothing moves and nothing is written to the gripper. The file is
     MCAP, for viewers (Foxglove, PlotJuggler), and for replay, plot and export. Tools of
-    ROS 2 open only one made with --ros2. One named .csv is a table with a row for each
-    poll, for spreadsheets and pandas; it needs no extra but cli. Commands are those of
-    this program, so that a recording made by this command has none: record from your own program with
-    robotiq_async.tools.recording.recorder.Recorder. A killed recording loses at most the last
-    second; recover makes its file whole.
+    ROS 2 open only one made with --ros2. A file named .csv is a table with a row for each
+    poll, for spreadsheets and pandas; it needs no extra but cli. Commands are recorded only
+    in the program that sends them, so this file has none: to record yours, use
+    robotiq_async.tools.recording.recorder.Recorder in your program. A killed recording
+    loses at most the last second; recover repairs its file.
 
     For example:
 
@@ -49,8 +49,8 @@ async def record(
         robotiq-async record grasp.csv tcp://192.168.1.11
 
     Args:
-        file: The recording; it must not be there yet.
-        seconds: End by itself after so long.
+        file: The recording; it must not exist yet.
+        seconds: End after so many seconds.
         ros2: Record /joint_states alone, in a file with the profile ros2.
         as_csv: Record a table; the file must be named .csv, which alone is enough.
     """
@@ -79,12 +79,12 @@ async def record(
                 if recorder.recorded:
                     _tell_figures(recorder, hand)
     except asyncio.CancelledError:
-        pass  # Being told to stop is how this command ends well.
+        pass  # Ctrl-C is the normal end of this command.
 
 
 def _tell_figures(recorder: Recorder, hand: Hand) -> None:
     polls, overruns = recorder.recorded, f"{hand.statistics.overruns} not polled in time"
-    # What was not polled is not in the file and not missed either: the polling tells of it.
+    # Late polls are missing from the file, but not among the missed ones: the statistics have them.
     if not recorder.has_failed:
         words = f"{polls} polls, {recorder.missed} lost, {overruns}, {recorder.size} bytes"
     elif recorder.saved:

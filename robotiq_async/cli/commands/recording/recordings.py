@@ -1,4 +1,4 @@
-"""``robotiq-async replay``, ``export``, ``plot`` and ``recover``: what becomes of a recording."""
+"""``robotiq-async replay``, ``export``, ``plot`` and ``recover``: the commands that use a recording."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ...output.text import FORMATTERS, brief_line, clock
 if TYPE_CHECKING:
     from ....tools.recording.recordings import Entry
 
-Overwrite = Annotated[Flag, Parameter(help="Replace a file that is there already.")]
+Overwrite = Annotated[Flag, Parameter(help="Replace an existing file.")]
 KINDS: Final = {"statuses": "status", "commands": "command", "events": "event"}
 
 
@@ -28,11 +28,11 @@ def replay(
     as_picture: Annotated[Flag, Parameter(name="--plot")] = False,
     overwrite: Overwrite = False,
 ) -> None:
-    """Print what a recording holds: states, faults, commands, and what the fingers did.
+    """Print the states, faults, commands and finger motions of a recording.
 
-    A line for each event and command, and one for each status in which a finger has
-    come to another position or has begun or ended a contact. With --brief a line for
-    each state, fault and contact, and a sum at the end.
+    A line for each event and command, and for each status in which a finger has another
+    position, or a contact has begun or ended. With --brief a line for each state, fault
+    and contact, and a summary at the end.
 
     For example:
 
@@ -40,7 +40,7 @@ def replay(
         robotiq-async replay --brief grasp.mcap
 
     Args:
-        file: The recording; a truncated one is read up to where it breaks off.
+        file: The recording; a truncated one is read as far as it goes.
         brief: Print states, faults and contacts only.
         as_picture: Draw a plot instead, as the command plot does.
     """
@@ -53,11 +53,10 @@ def replay(
         print(line)
         is_empty = False
     if is_empty:
-        raise CommandError(f"{file}: there is nothing in it that this command shows")
+        raise CommandError(f"{file}: it contains nothing that this command shows")
 
 
 def _in_order(file: Path) -> Iterator[Entry]:
-    """The JSON messages of a recording by their time."""
     need("mcap", "record")
     from ....tools.recording.export import in_order
     from ....tools.recording.recordings import read_recording
@@ -107,8 +106,8 @@ def export(
 ) -> None:
     """Write a recording as a table, CSV, for spreadsheets and pandas.
 
-    A row for each poll; its time is that of the wall clock, in UTC. With --of commands
-    or events a row for each of those.
+    A row for each poll, with the time of the wall clock in UTC. With --of a row for each
+    command or event.
 
     For example:
 
@@ -136,16 +135,12 @@ def export(
     except OSError as error:
         raise CommandError(f"{table}: {error.strerror}") from error
     if not rows:
-        raise CommandError(f"{file}: there are no {of} in it")
+        raise CommandError(f"{file}: it contains no {of}")
     print(f"{rows} {of} in {table}")
 
 
 def _keep(*files: Path, overwrite: bool) -> None:
-    """Refuse to replace a file that is there.
-
-    Raises:
-        CommandError: there is one.
-    """
+    """Refuse to replace an existing file."""
     for file in files:
         if not overwrite and file.exists():
             raise CommandError(f"{file}: File exists; --overwrite replaces it")
@@ -176,7 +171,7 @@ def plot(file: Path, picture: Path | None = None, /, *, overwrite: Overwrite = F
     except OSError as error:
         raise CommandError(f"{target}: {error.strerror}") from error
     if not pictures:
-        raise CommandError(f"{file}: there is no status in it")
+        raise CommandError(f"{file}: it contains no status")
     for written in pictures:
         print(written)
 
@@ -198,5 +193,5 @@ def recover(file: Path, target: Path | None = None, /) -> None:
     whole = target or file.with_name(f"{file.stem}.recovered.mcap")
     found = save(file, whole)
     if found.is_whole:
-        print(f"{file} was whole; {whole} is a copy of it")
+        print(f"{file} was complete; {whole} is a copy of it")
     print(f"{found.messages} messages in {whole}")

@@ -1,1 +1,1 @@
-"""The process of the page. Nobody imports it: it is started, and spoken to through its standard streams."""
+"""The process of the page. It is not imported but started, and uses its standard streams as pipes."""

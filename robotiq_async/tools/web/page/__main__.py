@@ -1,4 +1,4 @@
-"""The process of the page: its settings come as the first line, then what is newest, until the end."""
+"""The process of the page. Reads its settings from the first line of standard input, then updates."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from .pipes import Pipes
 
 def main() -> int:
     """Serve until standard input ends; returns the exit code."""
-    # A Ctrl-C in a terminal is for the process that has the hands: it ends this one when it has stopped them.
+    # Ctrl-C in a terminal is for the process that has the hands: it stops them, and then ends this one.
     for name in ("SIGINT", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
     if hasattr(os, "nice"):
         os.nice(5)  # the hand comes first
-    # NiceGUI remembers visitors in files, if it is asked to; it is not, but it looks for them at once.
+    # NiceGUI can store data of its visitors. We do not use that, but it looks for the folder at once.
     os.environ["NICEGUI_STORAGE_PATH"] = mkdtemp(prefix="robotiq_async-")
     pipes = Pipes()
     line = pipes.first_line()
@@ -37,7 +37,7 @@ def main() -> int:
     try:
         if settings.certificate:
             ssl.create_default_context().load_cert_chain(settings.certificate, settings.key)
-        from .serve import run  # noqa: PLC0415  # a second, which what is refused need not wait for
+        from .serve import run  # noqa: PLC0415  # takes a second; errors come before
 
         run(settings, listening, pipes)
     except OSError as error:  # a certificate that cannot be read

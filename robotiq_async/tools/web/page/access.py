@@ -1,12 +1,12 @@
-"""Who gets in: decides on a request from its head. Pure.
+"""Decides from the head of a request whether it may pass. Pure.
 
-Three checks, on every request and every websocket:
+Three checks for every request and every websocket:
 
-- Host must be a name of this server: a name of another site that resolves to this machine (DNS rebinding)
-  is refused.
-- Origin, if there is one, must be this server itself; what changes something or stays open has one. A page
-  of another site can make a browser send requests, but not lie about where they come from.
-- The cookie must be there. It is given to whoever has the token of the printed address, or the password.
+- Host must be a name of this server. That refuses names of other sites that resolve to this machine (DNS
+  rebinding).
+- Origin must be this server. It may be missing only in a GET or HEAD. A page of another site can make a
+  browser send requests, but cannot forge their origin.
+- The cookie must be there. A browser gets it for the token of the printed address, or for the password.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _LOCAL: Final = ("127.0.0.1", "localhost", "[::1]")
 
 
 class Verdict(Enum):
-    """What becomes of a request."""
+    """The decision about a request."""
 
     SERVE = "it is served"
     LET_IN = "it gets the cookie, and is sent on"
@@ -38,7 +38,7 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """What of a request decides.
+    """The parts of a request that the decision needs.
 
     Attributes:
         method: of HTTP; empty for a websocket.
@@ -54,32 +54,26 @@ class Head:
 
 
 class Access:
-    """The rules of one server.
+    """The rules of one server, and its secret cookie.
 
     Attributes:
         settings: how the page is served.
     """
 
     def __init__(self, settings: PageSettings, port: int) -> None:
-        """Make a cookie that nobody else has.
-
-        Args:
-            settings: how the page is served.
-            port: where it is.
-        """
         self.settings = settings
         self._session = secrets.token_urlsafe(24)
         named = f"[{settings.host}]" if ":" in settings.host else settings.host
         names = (named, *_LOCAL) if settings.loopback else (named,)
         self._hosts = {f"{name.lower()}:{port}" for name in names}
-        # Browsers leave out the port that is usual.
+        # Browsers omit the default port.
         if port == (443 if settings.certificate else 80):
             self._hosts |= {name.lower() for name in names}
 
     def judge(self, head: Head) -> Verdict:
-        """What becomes of a request."""
+        """Decide about a request."""
         host = head.headers.get("host", "").lower()
-        # Behind another interface the server does not know its names; the cookie is bound to the right one.
+        # On another interface the server does not know its own names; the cookie belongs to the right one.
         if not host or (self.settings.loopback and host not in self._hosts):
             return Verdict.WRONG_HOST
         origin = head.headers.get("origin")
@@ -98,10 +92,10 @@ class Access:
 
     @property
     def cookie(self) -> str:
-        """The header that lets a browser in. No script reads it, and no page of another site makes use of it.
+        """The header that lets a browser in. Scripts and pages of other sites cannot use the cookie.
 
-        Lax, not Strict: a strict one stays at home when somebody comes by a link of another page (a terminal
-        in the browser, a chat). What it would guard against is refused by its Origin.
+        Lax, not Strict: browsers do not send a strict cookie after a link in another page (a terminal in the
+        browser, a chat). The check of the origin covers the difference.
         """
         secure = "; Secure" if self.settings.certificate else ""
         path = self.settings.folder
@@ -119,12 +113,12 @@ class Access:
         return origin is None or origin.lower() == f"{self.settings.scheme}://{host}"
 
     def _has_cookie(self, head: Head) -> bool:
-        # By hand: other servers of this machine have cookies, too, and a parser stops at one that it cannot
-        # read, or believes the last of two that have a name in common.
+        # Not http.cookies: other servers of this machine have cookies, too, and a parser stops at the first
+        # invalid one, or takes the last of two with the same name.
         ours = f"{COOKIE}={self._session}"
         return any(_same(each.strip(), ours) for each in head.headers.get("cookie", "").split(";"))
 
 
 def _same(one: str, other: str) -> bool:
-    """Compare without telling by the time how much of it is right."""
+    # In constant time: the duration must not reveal how much is right.
     return hmac.compare_digest(one.encode("utf-8", "replace"), other.encode())

@@ -1,4 +1,4 @@
-"""Stands before the page: every request and every websocket passes here, or does not."""
+"""Checks every request and every websocket before it reaches the page."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ Send = Callable[[Message], Awaitable[None]]
 App = Callable[[Message, Receive, Send], Awaitable[None]]
 
 TRY_S: Final = 1.0
-"""A wrong password takes this long, and the next one from there waits for it."""
+"""Duration of a wrong attempt; the next one from the same address waits for it."""
 FORM_S: Final = 10.0
 MAX_FORM: Final = 4096
 
 HEADERS: Final = {
-    # Nothing is fetched from elsewhere, whatever a library has in mind.
+    # No library may fetch anything from other hosts.
     "content-security-policy": "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:;"
     " frame-ancestors 'none'; base-uri 'none'; form-action 'self'",
     "cross-origin-resource-policy": "same-origin",
@@ -42,19 +42,13 @@ _FORM: Final = """<form method="post" action="/"><label>Password <input type="pa
 
 
 class Guard:
-    """An ASGI application that lets in only whom the rules let in."""
+    """An ASGI application that passes on only what the rules allow."""
 
     def __init__(self, app: App, access: Access) -> None:
-        """Stand before an application.
-
-        Args:
-            app: gets what may pass.
-            access: the rules.
-        """
         self.app = app
         self._access = access
         self._trying: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
-        """By address: whoever tries many holds up nobody who sits elsewhere."""
+        """By address: many attempts from one do not delay those from others."""
 
     async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
         if scope["type"] == "lifespan":
@@ -96,13 +90,13 @@ def _head(scope: Message) -> Head:
     headers: dict[str, str] = {}
     for name, value in scope["headers"]:
         key, text = name.decode("latin-1"), value.decode("latin-1")
-        headers[key] = f"{headers[key]}, {text}" if key in headers else text  # two origins are none
+        headers[key] = f"{headers[key]}, {text}" if key in headers else text  # two origins match no rule
     method = scope.get("method", "")
     return Head(method, scope["path"], scope["query_string"].decode("latin-1"), headers)
 
 
 async def _body(receive: Receive) -> bytes:
-    """A short one; of a long or a slow one the beginning."""
+    # Truncated if it is long or slow.
     body, more = b"", True
     with suppress(TimeoutError):
         async with asyncio.timeout(FORM_S):

@@ -1,12 +1,11 @@
 """Whether a page and its browser are in touch, in both directions.
 
-The server sends the time by its own clock four times a second, and the browser sends back what it got last:
-with its heartbeat, and with every press of a button. So a press that was held up on its way, or made on a
-page that shows what was long ago, is told apart from a fresh one (where the hand is, and the whole way behind
-it), although the two clocks know nothing of each other.
+The server sends its time four times a second. The browser sends the last time it received back: with its
+heartbeat, and with every press of a button. So a stale press (delayed on its way, or made on a page that
+shows old values) differs from a fresh one on the whole way to the hand, and the clocks need not agree.
 
-It also tells when a browser that was away has got all that it missed. NiceGUI 3 sends what is newest first
-then, and after it once more what was on its way when the connection was lost: that would go on being shown.
+It also notices when a returning browser has caught up. NiceGUI 3 first sends the newest values, then again
+the messages that were on their way when the connection was lost: these old values would stay on the screen.
 """
 
 from __future__ import annotations
@@ -16,9 +15,9 @@ from typing import Final
 
 BEAT_MS: Final = 250
 CUT_MS: Final = 1500
-"""After this a page says that it hears nothing: what it shows is old."""
+"""After this silence a page warns that its values are old."""
 LOST_S: Final = 2.0
-"""After this a page cannot be heard. A browser wakes up a tab in the background once a second."""
+"""After this silence a browser counts as lost. It wakes up a background tab once a second."""
 SCRIPT: Final = f"""
 <script>
 window.robotiqTime = 0;
@@ -40,16 +39,16 @@ for (const kind of ['keydown', 'keyup']) {{
 </script>
 """
 PRESS: Final = "() => emit(window.robotiqTime)"
-"""What a button sends."""
+"""The handler of a button."""
 PRESS_WITH_VALUE: Final = "(value) => emit(window.robotiqTime, value)"
-"""What a slider sends: the value that it was let go at, which is not always known here yet."""
+"""The handler of a slider. It sends the final value, which the server may not have yet."""
 
 
 class Heartbeat:
     """The time that one browser has sent back.
 
     Attributes:
-        is_lost: whether it counts as out of touch.
+        is_lost: whether the browser counts as out of touch.
     """
 
     def __init__(self) -> None:
@@ -59,16 +58,17 @@ class Heartbeat:
         self._came_back_at: float | None = None
 
     def begin(self) -> None:
-        """It has just connected, for the first time or again."""
+        """Note that the browser has connected, for the first time or again."""
         self.is_lost, self._newest = False, monotonic()
         if self._has_been_here:
             self._came_back_at = self._newest
         self._has_been_here = True
 
     def has_caught_up(self) -> bool:
-        """Whether a browser that came back has got all that it missed; true once.
+        """Whether a returning browser has caught up; true once.
 
-        It knows a time then that it was told since: after everything else, for messages keep their order.
+        It has sent back a time from after its return. Messages keep their order, so it has received the older
+        ones.
         """
         if self._came_back_at is None or self._newest <= self._came_back_at:
             return False
@@ -77,11 +77,11 @@ class Heartbeat:
 
     @staticmethod
     def now() -> str:
-        """The script that tells the browser the time."""
+        """The script that sends the time to the browser."""
         return f"robotiqHear({monotonic():.6f})"
 
     def heard(self, sent_back: object) -> float:
-        """A heartbeat, or a press, after which it can be lost again. Returns the time that was sent back."""
+        """Note a heartbeat or a press; returns the time that was sent back."""
         at = _time(sent_back)
         self._newest = max(self._newest, at)
         if self.is_lost and monotonic() - self._newest < LOST_S:
@@ -95,7 +95,7 @@ class Heartbeat:
 
 
 def _time(sent_back: object) -> float:
-    """What a browser may have sent is anything."""
+    # A browser may send anything.
     if isinstance(sent_back, bool) or not isinstance(sent_back, int | float):
         return 0.0
     return float(sent_back) if 0 <= sent_back <= monotonic() else 0.0

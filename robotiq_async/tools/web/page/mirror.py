@@ -1,4 +1,4 @@
-"""What the page's process knows of the hands, and how it asks for something."""
+"""The state of the hands in the process of the page, and the way to send commands."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from ....values.status import RobotiqStatus
 
 HISTORY_S: Final = 30.0
 SAMPLE_S: Final = 0.2
-"""Between two points of a curve: 150 of them."""
+"""Interval of the points of a curve: 150 points."""
 EVENTS: Final = 100
 QUIET_S: Final = 1.5
-"""After this the program that feeds the page counts as silent."""
+"""After this time without updates the other process counts as silent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class Sample:
 
     Attributes:
         at: monotonic seconds of this process.
-        positions: in counts, of A, B, C and the scissor; None while they are not known.
+        positions: in counts, of A, B, C and the scissor; None while they are unknown.
         currents: the peaks since the sample before, in mA.
     """
 
@@ -39,20 +39,20 @@ class Sample:
 
 @dataclass(slots=True)
 class HandMirror:
-    """A hand, as the page knows it.
+    """The state of a hand in the process of the page.
 
     Attributes:
-        index: which one.
+        index: number of the hand.
         address: of the gripper.
-        state: where the hand is.
+        state: of the hand.
         status: the newest; None before the first.
-        age: seconds since it was read, when this was told.
+        age: seconds since the status was read, at the last update.
         problem: why the hand could not be started; empty if it was.
         statistics: the newest.
-        samples: of the last half minute.
-        events: the newest, with a number each.
+        samples: of the last 30 s.
+        events: the newest, numbered.
         peaks: of the currents since the last sample.
-        changes: grows with everything that is told.
+        changes: number of updates.
     """
 
     index: int
@@ -75,34 +75,34 @@ class HandMirror:
 
     @property
     def is_lost(self) -> bool:
-        """Whether what the status says is old."""
+        """Whether the status is out of date."""
         return self.status is None or self.state in (State.DISCONNECTED, State.SHUTDOWN)
 
-    def hear(self, told: dict[str, Any]) -> None:
-        """Take in what the other process tells."""
-        self.state, self.problem = State[told["state"]], told["problem"]
-        if "registers" in told:
+    def hear(self, update: dict[str, Any]) -> None:
+        """Take in an update."""
+        self.state, self.problem = State[update["state"]], update["problem"]
+        if "registers" in update:
             self.status = RobotiqStatus.from_registers(
-                told["registers"],
-                timestamp=told["timestamp"],
-                sequence=told["sequence"],
-                model=model_of(told["model"]),
+                update["registers"],
+                timestamp=update["timestamp"],
+                sequence=update["sequence"],
+                model=model_of(update["model"]),
             )
-            self.age = told["age"]
-        self.statistics = told.get("statistics", self.statistics)
-        for event in told["events"]:
+            self.age = update["age"]
+        self.statistics = update.get("statistics", self.statistics)
+        for event in update["events"]:
             self.event_count += 1
             self.events.append((self.event_count, event))
-        self.peaks = [max(pair) for pair in zip_longest(self.peaks, told["peaks"], fillvalue=0)]
+        self.peaks = [max(pair) for pair in zip_longest(self.peaks, update["peaks"], fillvalue=0)]
         self._sample(monotonic())
         self.changes += 1
 
     def _sample(self, now: float) -> None:
-        # Half a millisecond of grace: ticks of a float do not add up.
+        # Half a millisecond of tolerance for rounding.
         if self.samples and now - self.samples[-1].at < SAMPLE_S - 0.0005:
             return
         if self.samples and now - self.samples[-1].at > QUIET_S:
-            self.samples.append(Sample(now - SAMPLE_S, None, tuple(self.peaks)))  # a gap, and not a line
+            self.samples.append(Sample(now - SAMPLE_S, None, tuple(self.peaks)))  # a gap in the curve
         status = None if self.is_lost else self.status
         positions = None if status is None else tuple(status.position(axis) for axis in status.model.axes)
         self.samples.append(Sample(now, positions, tuple(self.peaks)))
@@ -112,13 +112,17 @@ class HandMirror:
 
 
 class Mirror:
-    """All hands, and the way to the process that has them.
+    """The state of all hands, and the way to the process that has them.
 
     Attributes:
         hands: in the order of their addresses.
         control: whether the pages may command.
-        speed: where the sliders begin.
-        force: where the sliders begin.
+        speed: initial value of the sliders.
+        force: initial value of the sliders.
+
+    Args:
+        addresses: of the hands.
+        say: sends a message to the other process.
     """
 
     def __init__(
@@ -130,15 +134,6 @@ class Mirror:
         speed: int = DEFAULT_SPEED,
         force: int = DEFAULT_FORCE,
     ) -> None:
-        """Know nothing yet.
-
-        Args:
-            addresses: of the hands.
-            control: whether the pages may command.
-            say: tells the other process something.
-            speed: where the sliders begin.
-            force: where the sliders begin.
-        """
         self.hands = [HandMirror(index, address) for index, address in enumerate(addresses)]
         self.control = control
         self.speed = speed
@@ -150,19 +145,19 @@ class Mirror:
 
     @property
     def is_quiet(self) -> bool:
-        """Whether the other process has stopped talking: what is shown is old then."""
+        """Whether the other process has fallen silent: the values are out of date then."""
         return monotonic() - self._heard_at > QUIET_S
 
     def hear(self, line: bytes) -> None:
         """Take in a line of the other process."""
-        told = json.loads(line)
+        message = json.loads(line)
         self._heard_at = monotonic()
-        for each in told["hands"]:
+        for each in message["hands"]:
             self.hands[each["hand"]].hear(each)
-        for answer in told["answers"]:
-            tell = self._answers.pop(answer["number"], None)
-            if tell is not None:
-                tell(answer["ok"], answer["words"])
+        for answer in message["answers"]:
+            report = self._answers.pop(answer["number"], None)
+            if report is not None:
+                report(answer["ok"], answer["words"])
 
     def ask(
         self,
@@ -174,15 +169,15 @@ class Mirror:
         *,
         at: float,
     ) -> None:
-        """Ask for a command; ``answered`` is called with whether and how it ended.
+        """Send a command; ``answered`` is called with success and a description of the outcome.
 
         Args:
-            page: who asks.
-            hand: which one is to do it.
+            page: id of the page.
+            hand: number of the hand.
             name: of the command.
             arguments: of the command.
-            answered: is called later.
-            at: the time of this process that the browser knew when it asked.
+            answered: called later.
+            at: the time of this process that the browser had received.
         """
         number = next(self._numbers)
         self._answers[number] = answered
@@ -190,13 +185,13 @@ class Mirror:
         self._say({"do": asked})
 
     def gone(self, page: str) -> None:
-        """A page has ended, or its browser cannot be heard: what it has set in motion is held."""
+        """Hold the motions of a page that has ended, or whose browser is lost."""
         self._say({"gone": page})
 
     def count(self, pages: int) -> None:
-        """Tell how many browsers look."""
+        """Send the number of browsers that show a page."""
         self._say({"pages": pages})
 
     def beat(self) -> None:
-        """Say that this process lives."""
+        """Send a heartbeat."""
         self._say({"beat": True})

@@ -1,4 +1,4 @@
-"""The pages: one hand, or a tile for each of many; and how long a browser looks at them."""
+"""The pages: one hand, or a tile for each of several; and the sessions of browsers."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from .widgets.words import timed
 
 REFRESH_S: Final = 0.05
 STAGE: Final = "h-[36vh] lg:h-[calc(100vh-13rem)] lg:sticky lg:top-16 min-h-[250px]"
-"""How large the scene is: a part of a phone, and all that is left of a wide window."""
+"""Size of the scene: part of a phone, the free height of a wide window."""
 SCENES_MAX: Final = 12
-"""Tiles with a scene: a browser takes the first ones away when there are more than some sixteen."""
+"""Tiles with a scene: with more than about sixteen, browsers drop the first ones."""
 STYLE: Final = """
 <style>
 .rq-axes { display: grid; gap: .35rem; width: 100%; }
@@ -63,15 +63,15 @@ No connection to robotiq-async: what is shown is old{}.</div>
 PRESSED: Final = ", and nothing that is pressed here arrives, HALT neither"
 
 
-class Visits:
-    """Who looks: counts the browsers, notices when one is gone, and tells one that came back all anew."""
+class PageSessions:
+    """Counts the browsers, notices when one is lost, and resends everything to one that returns."""
 
     def __init__(self, mirror: Mirror) -> None:
         self._mirror = mirror
         self._present: set[str] = set()
 
     def begin(self, client: Client) -> Heartbeat:
-        """A page is being made."""
+        """Start the session of a page that is being built."""
         heartbeat = Heartbeat()
         client.on_connect(lambda: self._arrive(client.id, heartbeat))
         client.on_disconnect(lambda: self._leave(client))
@@ -99,27 +99,27 @@ class Visits:
 
     def _leave(self, client: Client) -> None:
         self._mirror.gone(client.id)
-        # A browser that came back may be heard of before its old connection is found to have ended.
+        # A browser may connect again before its old connection is known to have ended.
         if not client.has_socket_connection:
             self._present.discard(client.id)
         self._mirror.count(len(self._present))
 
 
 def register(mirror: Mirror) -> None:
-    """Make the pages known to NiceGUI."""
-    visits = Visits(mirror)
+    """Register the pages with NiceGUI."""
+    sessions = PageSessions(mirror)
 
     @ui.page("/")
     def front(client: Client) -> None:
         if len(mirror.hands) == 1:
-            _hand_page(mirror, mirror.hands[0], client, visits)
+            _hand_page(mirror, mirror.hands[0], client, sessions)
         else:
-            _tiles(mirror, client, visits)
+            _tiles(mirror, client, sessions)
 
     @ui.page("/hand/{index}")
     def one(client: Client, index: int) -> None:
         if 0 <= index < len(mirror.hands):
-            _hand_page(mirror, mirror.hands[index], client, visits)
+            _hand_page(mirror, mirror.hands[index], client, sessions)
         else:
             ui.label(f"There is no hand {index}: there are {len(mirror.hands)}.")
 
@@ -142,9 +142,9 @@ def _frame(title: str, mirror: Mirror, *, home: bool) -> None:
                 button.props(f"flat dense color=white data-testid={icon}")
 
 
-def _hand_page(mirror: Mirror, hand: HandMirror, client: Client, visits: Visits) -> None:
+def _hand_page(mirror: Mirror, hand: HandMirror, client: Client, sessions: PageSessions) -> None:
     _frame(hand.address, mirror, home=len(mirror.hands) > 1)
-    heartbeat = visits.begin(client)
+    heartbeat = sessions.begin(client)
     shown: list[Callable[[], None]] = []
     with ui.element("div").classes("grid w-full gap-3 grid-cols-1 lg:grid-cols-2"):
         with ui.column().classes("w-full gap-2"):
@@ -178,16 +178,16 @@ def _hand_page(mirror: Mirror, hand: HandMirror, client: Client, visits: Visits)
 
 
 def _halt_button(name: str, what: str, halt: Callable[[], None]) -> None:
-    """At the foot of the window, wherever the page is scrolled to, and above a question that is open."""
+    # At the foot of the window, however the page is scrolled, and above an open question.
     ui.on("space", halt)
     with ui.footer().classes("p-2 bg-transparent rq-foot"):
         button = ui.button(name, on_click=halt, color="red-8").classes("w-full rq-halt")
         button.props("data-testid=halt").tooltip(f"{what}; the space bar does it too")
 
 
-def _tiles(mirror: Mirror, client: Client, visits: Visits) -> None:
+def _tiles(mirror: Mirror, client: Client, sessions: PageSessions) -> None:
     _frame(f"{len(mirror.hands)} hands", mirror, home=False)
-    visits.begin(client)
+    sessions.begin(client)
     with ui.element("div").classes("grid w-full gap-3 grid-cols-1 sm:grid-cols-2 xl:grid-cols-3"):
         shown = [_tile(mirror, hand) for hand in mirror.hands]
     if mirror.control:
@@ -201,7 +201,7 @@ def _halt_all(mirror: Mirror, page: str) -> None:
 
 
 def _tile(mirror: Mirror, hand: HandMirror) -> Callable[[], None]:
-    # A link, so that it can be opened in another tab, and with the keyboard.
+    # A link, so that it can be opened in another tab and by keyboard.
     link = ui.link(target=f"/hand/{hand.index}").classes(replace="w-full text-inherit no-underline")
     with link.props(f"data-testid=tile-{hand.index}"), ui.card().classes("w-full"):
         ui.label(hand.address).classes("font-bold")

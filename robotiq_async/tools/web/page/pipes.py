@@ -1,4 +1,4 @@
-"""The two pipes to the process that has the hands: a line of JSON each time."""
+"""The two pipes to the process that has the hands; each message is a line of JSON."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Pipes:
         self._in = sys.stdin.buffer
 
     def say(self, message: dict[str, Any]) -> None:
-        """A line to the other process; nothing if it is gone, for then this one ends as well."""
+        """Send a message; ignored if the other process has gone, because this one then ends, too."""
         with suppress(OSError):
             self._out.write(json.dumps(message).encode() + b"\n")
 
@@ -28,5 +28,5 @@ class Pipes:
         return self._in.readline()
 
     def lines(self) -> Iterator[bytes]:
-        """Whatever comes after them, to the end. Blocks."""
+        """The following lines, to the end. Blocks."""
         return iter(self._in.readline, b"")

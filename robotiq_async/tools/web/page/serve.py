@@ -22,11 +22,11 @@ from .pipes import Pipes
 
 BEAT_S: Final = 0.25
 MESSAGE_MAX: Final = 65_536
-"""Bytes of what a browser says at a time."""
+"""Limit of a websocket message in bytes."""
 
 
 class _Server(uvicorn.Server):
-    """One that leaves signals alone, and says when it serves."""
+    """A server that leaves signals alone, and reports when it serves."""
 
     def __init__(self, config: uvicorn.Config) -> None:
         super().__init__(config)
@@ -37,7 +37,7 @@ class _Server(uvicorn.Server):
         yield
 
     def end(self) -> None:
-        """Now, and not when every browser has closed its page."""
+        # At once: do not wait until every browser has closed its page.
         self.should_exit = self.force_exit = True
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
@@ -46,12 +46,7 @@ class _Server(uvicorn.Server):
 
 
 def run(settings: PageSettings, listening: socket.socket, pipes: Pipes) -> None:
-    """Serve until the end of the pipe.
-
-    Args:
-        settings: how.
-        listening: where.
-        pipes: to the process that has the hands.
+    """Serve the page until the pipe ends.
 
     Raises:
         OSError: a certificate that cannot be used.
@@ -66,7 +61,7 @@ def run(settings: PageSettings, listening: socket.socket, pipes: Pipes) -> None:
     port = listening.getsockname()[1]
     config = uvicorn.Config(
         Guard(_application(settings, mirror), Access(settings, port)),
-        http="h11",  # the other one keeps as many headers as come
+        http="h11",  # httptools accepts any number of headers
         proxy_headers=False,
         log_level="critical",
         access_log=False,
@@ -111,7 +106,7 @@ async def _beat(mirror: Mirror, server: _Server, pipes: Pipes, port: int) -> Non
 
 
 def _hear(pipes: Pipes, mirror: Mirror, loop: asyncio.AbstractEventLoop, server: _Server) -> None:
-    """In a thread of its own: not every system can wait for a pipe in an event loop."""
+    # In a thread: not every system can wait for a pipe in an event loop.
     with suppress(RuntimeError):  # the loop has been closed meanwhile
         for line in pipes.lines():
             loop.call_soon_threadsafe(mirror.hear, line)

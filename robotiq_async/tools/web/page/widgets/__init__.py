@@ -1,1 +1,1 @@
-"""What stands on the page of a hand."""
+"""The parts of the page of a hand."""

@@ -1,4 +1,4 @@
-"""What a person makes the hand do: buttons, sliders, questions, and the halt."""
+"""The controls of a hand: buttons, sliders, questions, and the halt."""
 
 from __future__ import annotations
 
@@ -16,28 +16,27 @@ from .positions import Positions
 from .slider import Slider
 
 ARMED_S: Final = 0.3
-"""A question takes no yes before: nobody has read it."""
+"""A yes counts only after this time: an earlier one was clicked before the question could be read."""
 DIRECT: Final = ("open", "close", "wide", "normal", "pinch")
 ASKED: Final = tuple(name for name, action in ACTIONS.items() if action.warning)
 
 
 class Controls:
-    """The part of the page that commands; only there when the page may."""
+    """The controls; only a page that may command has them.
+
+    Args:
+        mirror: sends the commands.
+        hand: the hand.
+        page: id of the page.
+        heartbeat: of the page and its browser.
+        report: called with the outcome of each command.
+    """
 
     def __init__(
-        self, mirror: Mirror, hand: HandMirror, page: str, heartbeat: Heartbeat, told: Callable[[str], None]
+        self, mirror: Mirror, hand: HandMirror, page: str, heartbeat: Heartbeat, report: Callable[[str], None]
     ) -> None:
-        """Build it where the page is being built.
-
-        Args:
-            mirror: the way to the hand.
-            hand: which one.
-            page: who asks.
-            heartbeat: between it and its browser.
-            told: is called with how each command ended.
-        """
         self._mirror, self._hand, self._page = mirror, hand, page
-        self._heartbeat, self._told = heartbeat, told
+        self._heartbeat, self._report = heartbeat, report
         self._dialogs: list[ui.dialog] = []
         with ui.row().classes("w-full gap-2"):
             for name in DIRECT:
@@ -52,11 +51,10 @@ class Controls:
         self._outcome = ui.label("").classes("text-sm").props("data-testid=outcome")
 
     def show(self) -> None:
-        """Take in what is newest."""
         self._positions.show()
 
     def halt(self) -> None:
-        """Stop every axis; it is never too old and never asked about. Closes what is open."""
+        """Stop every axis, without a question and however old the press is. Closes open questions."""
         for dialog in self._dialogs:
             dialog.close()
         self._ask("halt", {}, at=monotonic())
@@ -96,7 +94,7 @@ class Controls:
 
         ui.label(what)
         slider = Slider(min=0, max=highest, value=value).props(f"data-testid={what}")
-        # Sent when it is let go, and not for every value on the way.
+        # Sent when the slider is released, and not for every value on the way.
         slider.on("change", change, js_handler=PRESS_WITH_VALUE)
         ui.label().bind_text_from(slider, "value", lambda each: f"{each:.0f}").classes("w-8 text-right")
 
@@ -116,4 +114,4 @@ class Controls:
             return
         self._outcome.set_text(f"{name}: {words}")
         self._outcome.classes(add="" if ok else "rq-red", remove="rq-red" if ok else "")
-        self._told(f"{name}: {words}")
+        self._report(f"{name}: {words}")

@@ -1,12 +1,12 @@
-"""What the fingers hold, and how they stand around it. Pure.
+"""The pose of the fingers, and the object that they hold. Pure.
 
-It is an idea of a grasp, for positions are all that is known.
+Only the positions are known, so this is an approximation.
 
-Fingertips that meet something before they meet each other are drawn as their positions say, with something
-between them. Beyond that no fingertip can hold anything: a real finger has bent around it, its base stopped
-earlier than the position alone would have it. How the counts are shared between base and middle joint
-depends on what is held. Here that is a round bar: it lies the deeper the further the fingers closed, and is
-thinner where they closed further than around one that lies on the palm.
+Fingertips that meet an object before they meet each other are drawn at their positions, with the object
+between them. Beyond that, a real finger has bent around the object: its base has stopped earlier than the
+position alone would say. How the counts are shared between base and middle joint depends on the object. Here
+it is a round bar. The further the fingers have closed, the deeper it lies, and beyond the palm the thinner it
+is.
 """
 
 from __future__ import annotations
@@ -25,20 +25,21 @@ from ....description.geometry import Vector
 from ....description.kinematics import BASE, FINGER_NAMES, JOINTS, MIDDLE, TIP, joint_angles
 
 ALONE_M: Final = 0.02
-"""How far something reaches from a finger that no other helps to hold it."""
+"""Radius of an object that is held from one side only."""
 THIN_M: Final = 0.004
-"""Half of what fingertips hold at least: with less between them the fingers have bent around something."""
+"""Minimum radius of an object between fingertips; with less, the fingers have bent around it."""
 HALF_TIP_M: Final = 0.011
 """From the middle of a fingertip to its side."""
 THICK_M: Final = 0.033
-"""Half as thick as the bar is: thicker ones do not lie between the bases of the fingers on the palm."""
+"""Radius of the bar: a thicker one does not fit between the bases of the fingers on the palm."""
 LEAST_M: Final = 0.025
-"""Half as thick as it is at the end: thinner ones the middle joints cannot reach around."""
+"""Minimum radius of the bar: the middle joints cannot reach around a thinner one."""
 
-# A finger in its own plane, from the URDF: complex numbers, real out of the palm from where the finger stands
-# on it, imaginary to the other side of the hand. A test draws the result with the URDF itself.
+# A finger in its own plane, from the URDF, in complex numbers. The origin is the foot of the finger; the real
+# axis points out of the palm, the imaginary axis to the other side of the hand. A test compares it with the
+# URDF.
 _FOOT_M: Final = 0.0214
-"""Height of that point in the frame of the palm."""
+"""Height of the foot in the frame of the palm."""
 _BASE_JOINT: Final = 0.020 + 0j
 _BASE_LINK: Final = 0.050 - 0.028j
 _MIDDLE_M: Final = 0.039
@@ -49,19 +50,19 @@ _HALF_MIDDLE_M: Final = 0.0085
 _PAD_M: Final = 0.010
 """From the axis of the last joint to the face of the pad."""
 _INWARDS_M: Final = 0.0455
-"""From there to the middle of the hand."""
+"""From the foot to the middle of the hand."""
 _PALM_M: Final = -0.0054
 """Height of the palm's face."""
 _HIGHEST_M: Final = 0.075
-"""Height of a bar at the knees, around which the fingers are hardly bent."""
+"""Height of a bar at the knees, around which the fingers hardly bend."""
 
 
 @dataclass(frozen=True, slots=True)
 class Thing:
-    """Something between the fingers, in the frame of the palm.
+    """An object between the fingers, in the frame of the palm.
 
     Attributes:
-        middle: of it, in metres.
+        middle: of the object, in metres.
         radius: in metres.
         length: of a bar along z, in metres; 0 for a ball.
     """
@@ -72,7 +73,7 @@ class Thing:
 
 
 def grasp(model: HandModel, status: RobotiqStatus) -> tuple[dict[str, float], Thing | None]:
-    """How the fingers stand, in radians by the names of joints, and what they hold; None for nothing."""
+    """The joint angles in radians by the names of joints, and the object; None for no object."""
     free = dict(zip(JOINTS, joint_angles(status), strict=True))
     closing = _met_something_closing(status)
     fingers = [finger for finger in FINGER_NAMES if finger & closing]
@@ -94,7 +95,7 @@ def grasp(model: HandModel, status: RobotiqStatus) -> tuple[dict[str, float], Th
 
 
 def pads(model: HandModel, poses: Mapping[str, Pose]) -> dict[Finger, Pose]:
-    """The face of each fingertip; y looks to the other side of the hand."""
+    """The face of each fingertip; its y axis points to the other side of the hand."""
     faces = {}
     for finger, name in FINGER_NAMES.items():
         link = f"{name}_link_3"
@@ -132,7 +133,7 @@ def _length(faces: list[Pose]) -> tuple[float, float]:
 
 @lru_cache(maxsize=256)
 def _around_a_bar(counts: int) -> tuple[float, float, tuple[float, float, float]]:
-    """Of a finger that has closed so far: height of the bar above its foot, the bar's radius, its joints."""
+    """The bar inside a finger at this position: height above the foot, radius; and the joint angles."""
     low, high = 0.0, 2.0
     for _ in range(20):
         share = (low + high) / 2
@@ -145,7 +146,7 @@ def _around_a_bar(counts: int) -> tuple[float, float, tuple[float, float, float]
 
 
 def _bar(share: float) -> tuple[float, float]:
-    """Height and radius: from the highest (0) down to the palm (1), and there to the thinnest (2)."""
+    """Height and radius: from the highest bar (0) down to the palm (1), and there to the thinnest (2)."""
     low = _PALM_M + THICK_M
     if share < 1:
         return _HIGHEST_M + (low - _HIGHEST_M) * share, THICK_M
@@ -154,7 +155,7 @@ def _bar(share: float) -> tuple[float, float]:
 
 
 def _bent_around(height: float, radius: float) -> tuple[float, float, float]:
-    """The joints of a finger each of whose links lies on the bar, as far as its joint turns."""
+    """The joint angles of a finger whose links touch the bar, within the limits of the joints."""
     bar = complex(height, _INWARDS_M)
     base = _within(_towards(bar - _BASE_JOINT, radius + _HALF_BASE_M) - cmath.phase(_BASE_LINK), BASE)
     knee = _BASE_JOINT + _BASE_LINK * cmath.exp(1j * base)
@@ -166,7 +167,7 @@ def _bent_around(height: float, radius: float) -> tuple[float, float, float]:
 
 
 def _towards(bar: complex, apart: float) -> float:
-    """The direction of a straight line from here which passes a bar at a distance from its axis."""
+    """The direction of a line from here that passes the bar at a distance from its axis."""
     return cmath.phase(bar) - asin(min(apart / abs(bar), 1.0))
 
 
@@ -176,7 +177,7 @@ def _within(angle: float, points: tuple[tuple[int, float], ...]) -> float:
 
 
 def _counts(joints: tuple[float, float, float]) -> float:
-    """What the one motor has gone for base and middle joint."""
+    """The motion of the motor, in counts, for these angles of base and middle joint."""
     base, middle, _ = joints
     return sum(
         degrees(angle) * (last - first) / (at_last - at_first)

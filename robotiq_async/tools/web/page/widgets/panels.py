@@ -1,4 +1,4 @@
-"""What the page says about a hand: state, axes, curves, events, statistics."""
+"""The panels of a hand: state, axes, curves, events, statistics."""
 
 from __future__ import annotations
 
@@ -13,20 +13,19 @@ from .words import COLORS, NAMES, axis_words, event_words, fault_words, state_wo
 
 CURVES_S: Final = 0.5
 WIDTHS: Final = (6, 4, 2, 2)
-"""Of the curves: fingers that move together are drawn on each other, and all of them are seen."""
+"""Widths of the curves: fingers that move together overlap, and all of them stay visible."""
 CURRENT_MAX: Final = 600
-"""The axis of the currents reaches at least so far, in mA."""
+"""Minimum range of the axis of the currents, in mA."""
 
 
 class StatePanel:
-    """State and fault in words."""
+    """State and fault."""
 
     def __init__(self) -> None:
         self._state = ui.badge("", color="grey").classes("text-base px-3 py-1").props("data-testid=state")
         self._fault = ui.label("").classes("text-sm").props("data-testid=fault")
 
     def show(self, hand: HandMirror, *, is_quiet: bool) -> None:
-        """Write what is newest."""
         words, color = state_words(hand, is_quiet=is_quiet)
         self._state.set_text(words)
         self._state.props(f"color={color}")
@@ -36,20 +35,18 @@ class StatePanel:
 
 
 class AxesPanel:
-    """For each axis where it is, where it is asked to go, what it does, and its current."""
+    """For each axis its position, its requested position, what it does, and its current.
+
+    Args:
+        wide: one line for each axis if there is room, instead of two.
+    """
 
     def __init__(self, *, wide: bool = False) -> None:
-        """Build it where the page is being built.
-
-        Args:
-            wide: a line for each axis where there is room, in place of two.
-        """
         self._html = ui.html("", sanitize=False).classes("w-full").props("data-testid=axes")
         self._classes = "rq-axes rq-line" if wide else "rq-axes"
         self._shown = ""
 
     def show(self, hand: HandMirror) -> None:
-        """Draw what is newest."""
         rows = "".join(_axis_row(hand, index) for index in range(len(hand.model.axes)))
         if rows != self._shown:
             self._shown = rows
@@ -76,7 +73,7 @@ def _axis_row(hand: HandMirror, index: int) -> str:
 
 
 class Curves:
-    """Positions and currents of the last half minute."""
+    """Positions and currents of the last 30 s, drawn twice a second."""
 
     def __init__(self) -> None:
         self._drawn_at = 0.0
@@ -84,14 +81,13 @@ class Curves:
         self._currents = ui.echart(_options("current / mA", CURRENT_MAX, 200)).classes("w-full h-40")
 
     def show(self, hand: HandMirror) -> None:
-        """Draw what is newest, twice a second."""
         now = monotonic()
         if now - self._drawn_at < CURVES_S or not hand.samples:
             return
         self._drawn_at = now
         ages = [round(sample.at - now, 2) for sample in hand.samples]
         for index in range(len(hand.model.axes)):
-            # A gap, and not a line, where nothing was known.
+            # A gap in the curve where nothing was known.
             places = [None if each.positions is None else each.positions[index] for each in hand.samples]
             peaks = [None if each.positions is None else each.currents[index] for each in hand.samples]
             for chart, values in ((self._positions, places), (self._currents, peaks)):
@@ -152,7 +148,7 @@ def _options(title: str, highest: int, step: int) -> dict[str, Any]:
 
 
 class Events:
-    """What has happened, the newest last."""
+    """Events, the newest last."""
 
     def __init__(self) -> None:
         ui.label("events").classes("text-xs font-bold opacity-60 -mb-2")
@@ -160,7 +156,7 @@ class Events:
         self._shown = -1
 
     def show(self, hand: HandMirror) -> None:
-        """Add what is new; at first what happened before the page was opened."""
+        """Add the new events; at first also those from before the page was opened."""
         is_first, self._shown = self._shown < 0, max(self._shown, 0)
         for number, event in hand.events:
             if number > self._shown:
@@ -170,18 +166,17 @@ class Events:
             self._log.push(timed("this page was opened"))
 
     def add(self, words: str) -> None:
-        """Add what this page has to say."""
+        """Add a line of this page."""
         self._log.push(words)
 
 
 class StatisticsPanel:
-    """How the polling goes."""
+    """Polling statistics."""
 
     def __init__(self) -> None:
         self._label = ui.label("").classes("text-xs opacity-70").props("data-testid=statistics")
 
     def show(self, hand: HandMirror) -> None:
-        """Write what is newest."""
         figures = hand.statistics
         if not figures:
             return

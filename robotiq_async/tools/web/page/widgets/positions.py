@@ -1,4 +1,4 @@
-"""Sends axes to positions, each to its own. A slider alone moves nothing: the button beside it does."""
+"""Moves each axis to a position of its own. A slider alone moves nothing: the button beside it does."""
 
 from __future__ import annotations
 
@@ -17,25 +17,24 @@ ROWS: Final = (
     ("fingers", Finger.ABC, "inherit"),
     *((name, axis, color) for name, axis, color in zip(NAMES, Finger.ALL, COLORS, strict=True)),
 )
-"""Name, axes and colour. All fingers together, and each axis alone."""
+"""Name, axes and colour: all fingers together, and each axis alone."""
 
 
 class Positions:
-    """A row for each axis: where it is to go, and the button that sends it there."""
+    """A row for each axis: its target, and the button that moves it there.
+
+    Args:
+        hand: the hand; an untouched slider shows the position of its axis.
+        pressed: called with name and arguments of the command, and the time that the browser sent back.
+    """
 
     def __init__(self, hand: HandMirror, pressed: Callable[[str, dict[str, Any], object], None]) -> None:
-        """Build it where the page is being built.
-
-        Args:
-            hand: which one; a slider that is not touched shows where its axis stands.
-            pressed: is called with name and arguments of the command, and what the browser sent back.
-        """
         self._hand, self._pressed = hand, pressed
         self._sliders: dict[str, Slider] = {}
         self._targets: dict[str, object] = {}
-        """What each slider was let go at: the server knows its value a little later."""
+        """The value at which each slider was released: the server knows its value a little later."""
         self._touched: set[str] = set()
-        """Those that somebody has moved, and not sent yet."""
+        """Sliders that were moved and not sent yet."""
         self._is_placing = False
         with ui.grid(columns="auto 1fr 2rem auto").classes("w-full items-center gap-x-3 gap-y-1"):
             for name, axes, color in ROWS:
@@ -43,7 +42,7 @@ class Positions:
         self.show()
 
     def show(self) -> None:
-        """Let the sliders that are not touched follow the axes, so that to send them moves nothing."""
+        """Let untouched sliders follow their axes, so that sending them moves nothing."""
         status = self._hand.status
         if status is None or status.is_moving:
             return

@@ -20,45 +20,44 @@ from .held import Thing, grasp
 from .words import COLORS
 
 SCALE: Final = 10.0
-"""Three.js likes things of a size of one."""
+"""Scale: three.js works best with objects of size 1."""
 LIFT: Final = 0.45
-"""The face that is bolted on lies on the ground."""
+"""Height at which the mounting face lies on the ground."""
 GLOW: Final = "#ff5a1f"
 GHOST: Final = "#0ea5e9"
 STAGE: Final = "#b9c3cf"
-"""Behind the hand, which is grey and black; on a light page and on a dark one."""
+"""Background of the hand, which is grey and black, on a light and on a dark page."""
 HALO: Final = "text-shadow:0 0 2px #fff,0 0 2px #fff,0 0 4px #fff"
-"""Around a letter, wherever it is before."""
+"""Around a letter, for any background."""
 LETTER: Final = "font:bold 17px sans-serif"
 NAME: Final = "font:11px sans-serif;font-size:clamp(0px,(100vw - 640px) * 9,11px);padding-top:2.2em"
-"""Below the letter, which stands in the same place; on a phone there is no room for it."""
+"""Below the letter, at the same point; a phone has no room for it."""
 HELD: Final = "#f2c230"
 STALE: Final = 0.25
 APART: Final = 3
-"""Counts between request and position from which on the request of an axis that is not there yet is drawn."""
+"""Minimum distance in counts between position and request for drawing the request."""
 TURNED: Final = 2e-4
-"""Radians below which nobody sees a difference."""
+"""Minimum visible change of an angle in radians."""
 
 Calls = list[list[Any]]
 
 
 class Figure:
-    """The links of a hand as nested groups, so that turning one joint carries what stands on it."""
+    """The links of a hand as nested groups: turning a joint moves all links beyond it.
+
+    Args:
+        model: the hand.
+        ghost: whether to draw a ghost, which cannot be found by the names of the links.
+    """
 
     def __init__(self, model: HandModel, *, ghost: bool) -> None:
-        """Build it in the scene that is being filled.
-
-        Args:
-            model: what it looks like.
-            ghost: whether it is drawn as one, and cannot be found by the names of the links.
-        """
         self._model = model
         self._ghost = ghost
         self._angles: dict[str, float] = {}
         self._shapes: dict[str, list[tuple[Shape, Object3D]]] = {}
         self._looks: dict[str, tuple[str, float]] = {}
         self.root = ui.scene.group().move(0, 0, LIFT).scale(SCALE)
-        self.root.rotate(pi / 2, 0, 0)  # out of the palm is up
+        self.root.rotate(pi / 2, 0, 0)  # the palm faces upwards
         self._groups: dict[str, Object3D] = {model.root: self.root}
         if not ghost:
             self.root.with_name(model.root)
@@ -72,7 +71,7 @@ class Figure:
             self._fill(joint.child)
 
     def turn(self, angles: Mapping[str, float]) -> Calls:
-        """What has to be done so that the joints are at these angles."""
+        """Turn the joints; returns the calls for the browser."""
         calls: Calls = []
         for joint in self._model.moving:
             angle = angles[joint.name]
@@ -80,17 +79,17 @@ class Figure:
                 continue
             self._angles[joint.name] = angle
             group = self._groups[joint.child]
-            # Kept as well as sent, all joints in one message: a browser that comes back is told all of it.
+            # All joints go in one message. The value is also kept: a returning browser gets all of it.
             group.R = [list(row) for row in joint.pose(angle).rotation]
             calls.append(["rotate", group.id, group.R])
         return calls
 
     def group(self, link: str) -> Object3D:
-        """What moves with a link."""
+        """The group that moves with a link."""
         return self._groups[link]
 
     def show(self, link: str, *, is_shown: bool) -> None:
-        """Show or hide a link, and whatever stands on it."""
+        """Show or hide a link, and all links beyond it."""
         self._groups[link].visible(is_shown)
 
     def look(self, link: str, color: str | None, opacity: float) -> None:
@@ -99,17 +98,16 @@ class Figure:
             return
         self._looks[link] = (color or "", opacity)
         for shape, drawn in self._shapes[link]:
-            # The joints of a link that glows stay as they are: otherwise nobody sees its shape.
+            # The joints of a glowing link keep their colour: otherwise its shape is not visible.
             kept = color is None or (color == GLOW and shape.kind == "cylinder")
             drawn.material(_hex(shape) if kept else color, opacity)
 
     def look_all(self, color: str | None, opacity: float) -> None:
-        """Colour every link."""
         for link in self._shapes:
             self.look(link, color, opacity)
 
     def _fill(self, link: str) -> None:
-        # The request says nothing about the palm: drawn twice in one place, it would flicker.
+        # No palm for a ghost: drawn twice in one place, it would flicker.
         wanted = () if self._ghost and link == self._model.root else self._model.links[link].shapes
         with self._groups[link]:
             shapes = [(shape, _drawn(shape)) for shape in wanted]
@@ -118,14 +116,13 @@ class Figure:
 
 
 class HandScene:
-    """A scene with one hand, what it is asked for, and what it holds."""
+    """A scene with a hand, its request, and the object that it holds.
+
+    Args:
+        compact: for a tile, without the request.
+    """
 
     def __init__(self, *, compact: bool = False) -> None:
-        """Build it where the page is being built.
-
-        Args:
-            compact: for a tile: without the request.
-        """
         model = hand_model()
         with ui.scene(grid=(4, 16), background_color=STAGE, fps=30).classes("w-full h-full") as scene:
             self.scene = scene
@@ -142,7 +139,7 @@ class HandScene:
         scene.move_camera(0.8, -2.2, 2.1, 0, 0, 1.05, duration=0)
 
     def show(self, hand: HandMirror) -> None:
-        """Draw what is newest; costs nothing where nothing has changed."""
+        """Draw the newest status; cheap if nothing has changed."""
         if hand.status is None:
             self._figure.look_all(None, STALE)
             return
@@ -185,7 +182,7 @@ class HandScene:
             drawn.scale(radius, thing.length * SCALE if is_bar else radius, radius)
 
     def _labels(self) -> None:
-        """What the gripper calls its fingers, and below it what joint states call them."""
+        # The gripper's letter of each finger, and below it the name in joint states.
         for axis, color in zip(Finger.ALL, COLORS, strict=True):
             if axis in FINGER_NAMES:
                 with self._figure.group(f"{FINGER_NAMES[axis]}_link_3"):
@@ -194,11 +191,11 @@ class HandScene:
 
 
 def _away(status: RobotiqStatus) -> Finger:
-    """The fingers that are on their way to where they are asked to be; the scissor stands for B and C."""
+    # The fingers on their way to a request; the scissor moves B and C.
     away = Finger(0)
     for axis in status.model.axes:
-        # Open is 6 or 7 where 0 was asked for: what an axis itself calls reached is no difference. One that
-        # has met something goes no further, and the request would be drawn within what it holds.
+        # Only axes in motion. An open axis stops at 6 or 7 for a request of 0. An axis in contact goes no
+        # further, and its request would be drawn inside the object.
         if status.finger_status(axis) is ObjectStatus.IN_MOTION:
             apart = abs(status.requested_position(axis) - status.position(axis)) > APART
             away |= (Finger.B | Finger.C if axis is Finger.SCISSOR else axis) if apart else Finger(0)
@@ -217,7 +214,7 @@ def _drawn(shape: Shape) -> Object3D:
     if shape.kind == "sphere":
         return _placed(ui.scene.sphere(shape.size[0]), shape.origin)
     radius, length = shape.size
-    upright = shape.origin @ turned((1, 0, 0), pi / 2)  # those of three.js lie along y
+    upright = shape.origin @ turned((1, 0, 0), pi / 2)  # a cylinder of three.js lies along y
     return _placed(ui.scene.cylinder(radius, radius, length, 24), upright)
 
 

@@ -1,4 +1,4 @@
-"""A slider whose value is the browser's."""
+"""A slider whose value belongs to the browser."""
 
 from __future__ import annotations
 
@@ -6,6 +6,6 @@ from nicegui import ui
 
 
 class Slider(ui.slider):
-    """Keeps its value in the browser: an answer of the server would set back one that has moved on."""
+    """Keeps its value in the browser: an answer of the server would move it back during a drag."""
 
     LOOPBACK = False

@@ -1,4 +1,4 @@
-"""The state of a hand in words and colours."""
+"""Descriptions and colours for the state of a hand."""
 
 from __future__ import annotations
 
@@ -6,26 +6,18 @@ from datetime import datetime
 from time import time
 from typing import Any, Final
 
-from .....values.enums import Fault, Finger, ObjectStatus, Severity, State
+from .....values.enums import Fault, Finger, Severity, State
 from .....values.status import NO_REQUEST
-from ....wording import STATE_WORDS
+from ....wording import AXIS_WORDS, STATE_WORDS
 from ..mirror import HandMirror
 
 NAMES: Final = tuple("scissor" if axis is Finger.SCISSOR else str(axis.name) for axis in Finger.ALL)
 COLORS: Final = ("#3b82f6", "#22a35a", "#e8890c", "#a855f7")
-"""Of A, B, C and the scissor, wherever they are drawn: to be told apart on light and on dark."""
-
-_AXIS_STATES: Final = {
-    NO_REQUEST: "-",
-    ObjectStatus.IN_MOTION.name: "moving",
-    ObjectStatus.CONTACT_OPENING.name: "contact while opening",
-    ObjectStatus.CONTACT_CLOSING.name: "contact while closing",
-    ObjectStatus.AT_POSITION.name: "there",
-}
+"""Colours of A, B, C and the scissor, for light and dark pages."""
 
 
 def state_words(hand: HandMirror, *, is_quiet: bool) -> tuple[str, str]:
-    """The state in words, and a colour of Quasar for it."""
+    """A description of the state, and a colour of Quasar."""
     if is_quiet:
         return "the program that watches the gripper is silent", "negative"
     if hand.problem:
@@ -40,7 +32,7 @@ def state_words(hand: HandMirror, *, is_quiet: bool) -> tuple[str, str]:
 
 
 def fault_words(hand: HandMirror) -> tuple[str, bool]:
-    """The fault in words, and whether it is a serious one."""
+    """A description of the fault, and whether it is serious."""
     if hand.problem:
         return hand.problem, True
     if hand.is_lost:
@@ -60,8 +52,8 @@ def axis_words(hand: HandMirror, axis: Finger) -> str:
     """What an axis does."""
     status = hand.status
     if hand.is_lost or status is None or hand.state is State.RESET:
-        return "-"
-    return _AXIS_STATES[status.axis_state(axis)]
+        return AXIS_WORDS[NO_REQUEST]
+    return AXIS_WORDS[status.axis_state(axis)]
 
 
 def event_words(event: dict[str, Any]) -> str:
@@ -73,11 +65,6 @@ def event_words(event: dict[str, Any]) -> str:
 
 
 def timed(words: str, at: float | None = None) -> str:
-    """Words with the time of day before them.
-
-    Args:
-        words: what has happened.
-        at: seconds since 1970; None for now.
-    """
+    """Text after the time of day; ``at`` in seconds since 1970, None for now."""
     clock = datetime.fromtimestamp(time() if at is None else at).astimezone()
     return f"{clock:%H:%M:%S.%f}"[:-4] + f"  {words}"
