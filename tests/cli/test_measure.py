@@ -192,7 +192,10 @@ def test_wrong_usage(arguments: list[str], words: str, capsys: pytest.CaptureFix
 
 @pytest.mark.parametrize(
     ("text", "words"),
-    [("speed_value\n", "line 1: expected the columns"), ("speed_value,run_1_ms\n0,5\n", "has 1 runs instead")],
+    [
+        ("speed_value\n", "line 1: expected the columns"),
+        ("speed_value,run_1_ms\n0,5\n", "has 1 runs instead"),
+    ],
 )
 def test_a_bad_table_is_refused(
     text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
