@@ -141,10 +141,10 @@ def test_a_repeated_request_for_the_lease() -> None:
     one.acquire(asked, "anna")
     assert one.is_repeated(asked), "it has what it asked for"
     assert not one.is_repeated(replace(asked, number=6))
-    with pytest.raises(AgentError, match="came again"):
+    with pytest.raises(AgentError, match="was repeated"):
         one.is_repeated(asked)
     one.lease.end("taken")
-    with pytest.raises(AgentError, match="came again"):
+    with pytest.raises(AgentError, match="was repeated"):
         one.is_repeated(replace(asked, number=6))
 
 

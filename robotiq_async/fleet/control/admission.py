@@ -68,7 +68,7 @@ class Admission:
             return False
         holder = self.lease.holder
         if holder is None or holder.client != call.client or call.number < before:
-            raise AgentError("the request for the lease came again; nothing was done")
+            raise AgentError("the request for the lease was repeated; nothing was done")
         return True
 
     def acquire(self, call: Call, label: str) -> int:

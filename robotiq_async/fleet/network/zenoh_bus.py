@@ -32,7 +32,7 @@ from .reply_sender import ReplySender
 CLOSE_S: Final = 1.0
 """Seconds for closing a session."""
 LAST_ANSWERS_S: Final = 0.2
-"""Seconds to send the answers to requests that are canceled at the end."""
+"""Seconds to send the answers to requests that are cancelled at the end."""
 LONGEST: Final = 4096
 """Bytes of a request; a longer one is dropped unread."""
 _PRIORITY: Final = {
