@@ -106,8 +106,8 @@ class Fleet:
         self._entered_at = now()
         base = f"{ROOT}/{self._site}/*/*"
         self._undo = [
-            bus.subscribe(f"{base}/summary", self._hear),
-            bus.watch(f"{base}/alive/*", self._see),
+            bus.subscribe(f"{base}/summary", self._receive),
+            bus.watch(f"{base}/alive/*", self._update_token),
         ]
         try:
             await self._look()
@@ -198,9 +198,9 @@ class Fleet:
 
     async def _look(self) -> None:
         for key in await self._entered().announced(f"{ROOT}/{self._site}/*/*/alive/*", timeout=LOOK_S):
-            self._see(key, True)
+            self._update_token(key, True)
 
-    def _see(self, key: str, is_there: bool) -> None:
+    def _update_token(self, key: str, is_there: bool) -> None:
         """A token of an agent has come or gone."""
         try:
             name = GripperName.of_key(key)
@@ -210,7 +210,7 @@ class Fleet:
         (tokens.add if is_there else tokens.discard)(key)
         self._change(name, is_there=bool(tokens), agents=len(tokens))
 
-    def _hear(self, _key: str, payload: bytes) -> None:
+    def _receive(self, _key: str, payload: bytes) -> None:
         """A summary has arrived."""
         try:
             read = self._summaries.read(payload, now())

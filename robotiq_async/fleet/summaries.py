@@ -54,7 +54,7 @@ class Summaries:
                 "address": words(told["address"]),
             }
             run = self._run_of(name, int(told["epoch"]))
-        run.clock.hear(stamp, arrival)
+        run.clock.receive(stamp, arrival)
         if stamp < run.newest:
             return None
         run.newest = stamp

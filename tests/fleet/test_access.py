@@ -213,7 +213,7 @@ def test_an_agent_with_keys_needs_an_access_list(keys: Path) -> None:
 
 
 def test_clients_connect_encrypted_or_on_this_machine(keys: Path) -> None:
-    with pytest.raises(ValueError, match="open to everybody"):
+    with pytest.raises(ValueError, match="open to everyone"):
         client_configuration(["tcp/cell-1:7447"])
     with pytest.raises(ValueError, match="needs keys"):
         client_configuration(["tls/cell-1:7447"])

@@ -45,7 +45,7 @@ def test_for_another_run_of_the_agent() -> None:
     one.check_meant(call)
     one.check_meant(replace(call, epoch=0))
     for epoch in (EPOCH - 1, EPOCH + 1, 1):
-        with pytest.raises(AgentError, match="started anew"):
+        with pytest.raises(AgentError, match="the agent was restarted"):
             one.check_meant(replace(call, epoch=epoch))
 
 
@@ -76,7 +76,7 @@ def test_of_somebody_else_or_under_another_lease() -> None:
 def test_under_a_lease_that_has_ended_says_why(reason: str) -> None:
     one, call = admission()
     one.lease.end(reason)
-    with pytest.raises(ControlLostError, match=f"ended .{reason}., nobody commands") as caught:
+    with pytest.raises(ControlLostError, match=f"ended .{reason}., no client commands") as caught:
         one.admit(call, NOW)
     assert caught.value.reason == reason
     one.acquire(Call(BASE, "ben", EPOCH, 0, 1, NOW), "ben@cell")
@@ -141,10 +141,10 @@ def test_a_repeated_request_for_the_lease() -> None:
     one.acquire(asked, "anna")
     assert one.is_repeated(asked), "it has what it asked for"
     assert not one.is_repeated(replace(asked, number=6))
-    with pytest.raises(AgentError, match="came again"):
+    with pytest.raises(AgentError, match="was repeated"):
         one.is_repeated(asked)
     one.lease.end("taken")
-    with pytest.raises(AgentError, match="came again"):
+    with pytest.raises(AgentError, match="was repeated"):
         one.is_repeated(replace(asked, number=6))
 
 

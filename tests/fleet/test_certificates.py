@@ -118,7 +118,7 @@ def test_nothing_is_overwritten(authority: Path) -> None:
     with pytest.raises(FileExistsError, match="authority"):
         make_authority(authority)
     for name, role in (("cell-1", Role.AGENT), ("bob", Role.OPERATE)):
-        with pytest.raises(FileExistsError, match=f"{role.value}-{name} is there already"):
+        with pytest.raises(FileExistsError, match=f"{role.value}-{name} already exists"):
             issue(authority, name, role)
     (authority / "ca.key").unlink()
     with pytest.raises(FileExistsError):

@@ -30,7 +30,7 @@ def test_on_this_machine_nothing_is_needed(check: Check) -> None:
 @CHECKS
 @pytest.mark.parametrize("endpoint", OPEN)
 def test_beyond_it_somebody_must_say_so(check: Check, endpoint: str) -> None:
-    with pytest.raises(ValueError, match="is open to everybody on that network"):
+    with pytest.raises(ValueError, match="is open to everyone on that network"):
         check([LOOPBACK[0], endpoint], has_keys=False)
     assert check([endpoint], has_keys=False, insecure=True) == (endpoint,)
 

@@ -321,7 +321,7 @@ async def test_somebody_without_certificates(authority: Path) -> None:
 async def test_a_way_that_is_not_protected() -> None:
     found = await findings(f"{LEFT}?connect=tcp/192.0.2.1:7447")
     assert list(found) == ["address", "way"]
-    assert "open to everybody" in found["way"].found
+    assert "open to everyone" in found["way"].found
 
 
 @pytest.mark.parametrize("address", ["zenoh://lab/cell", "zenoh://lab/cell/*", "zenoh://a/b/c?x=1"])

@@ -35,10 +35,10 @@ class Bench:
         self.entered: list[State] = []
         self.mirror = Mirror(MARK, channels, self.entered.append, before)
 
-    def hear(
+    def receive(
         self, stamp: float, sequence: int | None, *, delay: float = 0.0, in_turn: bool = True, **fields: Any
     ) -> None:
-        self.mirror.hear(message(stamp, sequence, **fields), stamp + AHEAD + delay, in_turn=in_turn)
+        self.mirror.receive(message(stamp, sequence, **fields), stamp + AHEAD + delay, in_turn=in_turn)
 
     def sequences(self) -> list[int]:
         return [status.sequence for status in self.statuses.drain()]
@@ -71,7 +71,7 @@ def event(index: int, source: State, target: State, at: float = 0.0) -> dict[str
 def test_statuses_in_their_order_and_none_twice() -> None:
     here = Bench()
     for sequence in (3, 4, 4, 5, 4, 9):
-        here.hear(10.0 + sequence / 100, sequence)
+        here.receive(10.0 + sequence / 100, sequence)
     assert here.sequences() == [3, 4, 5, 9]
     assert here.mirror.status is not None
     assert here.mirror.status.sequence == 9
@@ -79,13 +79,13 @@ def test_statuses_in_their_order_and_none_twice() -> None:
 
 def test_an_answer_that_overtakes_takes_no_reader_s_status_away() -> None:
     here = Bench()
-    here.hear(10.0, 1)
-    here.hear(10.3, 4, in_turn=False)
+    here.receive(10.0, 1)
+    here.receive(10.3, 4, in_turn=False)
     assert here.mirror.status is not None
     assert here.mirror.status.sequence == 4, "it is known at once"
     overtaking = here.mirror.status
     for sequence in (2, 3, 4):
-        here.hear(10.0 + (sequence - 1) / 10, sequence)
+        here.receive(10.0 + (sequence - 1) / 10, sequence)
     told = list(here.statuses.drain())
     assert [status.sequence for status in told] == [1, 2, 3, 4]
     assert told[-1] is overtaking
@@ -94,8 +94,8 @@ def test_an_answer_that_overtakes_takes_no_reader_s_status_away() -> None:
 
 def test_a_late_message_changes_nothing() -> None:
     here = Bench()
-    here.hear(10.0, 5, state=BUSY)
-    here.hear(9.0, 4, state=State.FAULT)
+    here.receive(10.0, 5, state=BUSY)
+    here.receive(9.0, 4, state=State.FAULT)
     assert here.mirror.state is BUSY
     assert here.mirror.stamp == 10.0
     assert here.sequences() == [5]
@@ -103,7 +103,7 @@ def test_a_late_message_changes_nothing() -> None:
 
 def test_before_the_gripper_was_read_there_is_no_status() -> None:
     here = Bench()
-    here.hear(10.0, None, state=State.DISCONNECTED)
+    here.receive(10.0, None, state=State.DISCONNECTED)
     assert here.mirror.status is None
     assert not here.mirror.is_silent
     assert here.sequences() == []
@@ -122,9 +122,9 @@ def test_about_another_gripper() -> None:
 
 def test_another_run_of_the_agent() -> None:
     here = Bench()
-    here.hear(5000.0, 70, events=9)
-    here.hear(10.0, 0, epoch=2, events=3, state=BUSY)
-    here.hear(10.1, 1, epoch=2, events=3, state=BUSY)
+    here.receive(5000.0, 70, events=9)
+    here.receive(10.0, 0, epoch=2, events=3, state=BUSY)
+    here.receive(10.1, 1, epoch=2, events=3, state=BUSY)
     assert here.sequences() == [70, 71, 72], "sequences go on"
     assert here.mirror.stamp == 10.1
     assert here.mirror.events == 3, "what happened before is not told again"
@@ -141,14 +141,14 @@ def test_another_run_of_the_agent() -> None:
 def test_another_run_of_this_hand() -> None:
     for first in (0, 500):
         one = Bench()
-        one.hear(10.0, 70)
+        one.receive(10.0, 70)
         one.mirror.shut_down(State.SHUTDOWN, Trigger.STOPPED, 1011.0)
         unheard = Mirror(MARK, Channels(), lambda _: None, one.mirror)
         unheard.shut_down(State.SHUTDOWN, Trigger.STOPPED, 1012.0)
         for before in (one.mirror, unheard):
             other = Bench(before)
             other.mirror.begin(1013.0)
-            other.hear(20.0, first)
+            other.receive(20.0, first)
             assert other.sequences() == [max(71, first)]
             assert other.changes() == [(State.SHUTDOWN, State.DISCONNECTED), (State.DISCONNECTED, IDLE)]
 
@@ -158,12 +158,12 @@ def test_another_run_of_this_hand() -> None:
 
 def test_silence_and_the_end_of_it() -> None:
     here = Bench()
-    here.hear(10.0, 1)
+    here.receive(10.0, 1)
     here.mirror.fall_silent(1012.0)
     here.mirror.fall_silent(1013.0)
     assert (here.mirror.state, here.mirror.is_silent) == (State.DISCONNECTED, True)
     assert here.mirror.status is not None, "the last status stays"
-    here.hear(13.0, 2)
+    here.receive(13.0, 2)
     assert (here.mirror.state, here.mirror.is_silent) == (IDLE, False)
     told = list(here.transitions.drain())
     assert [each.trigger for each in told] == [Trigger.SEEN_READY, Trigger.LINK_LOST, Trigger.SEEN_READY]
@@ -173,12 +173,12 @@ def test_silence_and_the_end_of_it() -> None:
 
 def test_what_happened_in_a_silence_is_told_after_it_and_in_its_order() -> None:
     here = Bench()
-    here.hear(10.0, 1, state=BUSY, events=1)
+    here.receive(10.0, 1, state=BUSY, events=1)
     here.mirror.fall_silent(1012.0)
-    here.hear(13.0, 2, state=State.FAULT, events=3)
+    here.receive(13.0, 2, state=State.FAULT, events=3)
     assert here.mirror.state is State.FAULT
     assert here.mirror.has_missed()
-    assert not here.mirror.hear_events([event(2, BUSY, IDLE, 11.0), event(3, IDLE, State.FAULT, 11.5)])
+    assert not here.mirror.receive_events([event(2, BUSY, IDLE, 11.0), event(3, IDLE, State.FAULT, 11.5)])
     assert not here.mirror.has_missed()
     assert here.changes() == [
         (State.DISCONNECTED, BUSY),
@@ -191,10 +191,10 @@ def test_what_happened_in_a_silence_is_told_after_it_and_in_its_order() -> None:
 
 def test_after_the_end_nothing_changes_any_more() -> None:
     here = Bench()
-    here.hear(10.0, 1)
+    here.receive(10.0, 1)
     here.mirror.shut_down(State.DO_SHUTDOWN, Trigger.ASK_STOP, 1011.0)
-    here.hear(11.5, 2, state=BUSY)
-    here.mirror.hear_events([event(1, IDLE, BUSY)])
+    here.receive(11.5, 2, state=BUSY)
+    here.mirror.receive_events([event(1, IDLE, BUSY)])
     here.mirror.fall_silent(1013.0)
     here.mirror.shut_down(State.SHUTDOWN, Trigger.STOPPED, 1012.0)
     assert here.mirror.state is State.SHUTDOWN
@@ -203,10 +203,10 @@ def test_after_the_end_nothing_changes_any_more() -> None:
 
 def test_the_end_of_the_agent_s_hand_is_not_the_end_of_ours() -> None:
     here = Bench()
-    here.hear(10.0, 1)
+    here.receive(10.0, 1)
     for state, other in ((State.DO_SHUTDOWN, IDLE), (State.SHUTDOWN, State.DO_SHUTDOWN)):
-        here.mirror.hear_events([event(here.mirror.events + 1, other, state, 11.0)])
-        here.hear(11.0, 1, state=state, events=here.mirror.events)
+        here.mirror.receive_events([event(here.mirror.events + 1, other, state, 11.0)])
+        here.receive(11.0, 1, state=state, events=here.mirror.events)
         assert here.mirror.state is State.DISCONNECTED
     assert here.changes() == [(State.DISCONNECTED, IDLE), (IDLE, State.DISCONNECTED)]
     assert State.SHUTDOWN not in here.entered
@@ -217,18 +217,18 @@ def test_the_end_of_the_agent_s_hand_is_not_the_end_of_ours() -> None:
 
 def test_events_wait_for_those_before_them() -> None:
     here = Bench()
-    here.hear(10.0, 1)
-    assert not here.mirror.hear_events([event(1, IDLE, BUSY)])
-    assert here.mirror.hear_events([event(3, IDLE, BUSY)])
-    assert not here.mirror.hear_events([event(1, IDLE, BUSY), event(2, BUSY, IDLE), event(3, IDLE, BUSY)])
+    here.receive(10.0, 1)
+    assert not here.mirror.receive_events([event(1, IDLE, BUSY)])
+    assert here.mirror.receive_events([event(3, IDLE, BUSY)])
+    assert not here.mirror.receive_events([event(1, IDLE, BUSY), event(2, BUSY, IDLE), event(3, IDLE, BUSY)])
     assert here.changes()[1:] == [(IDLE, BUSY), (BUSY, IDLE), (IDLE, BUSY)]
 
 
 def test_those_that_the_agent_has_forgotten_leave_no_gap() -> None:
     here = Bench()
-    here.hear(10.0, 1)
+    here.receive(10.0, 1)
     here.mirror.skip_events(100)
-    assert not here.mirror.hear_events([event(101, State.RESET, State.DO_ACTIVATION)])
+    assert not here.mirror.receive_events([event(101, State.RESET, State.DO_ACTIVATION)])
     here.mirror.skip_events(50)
     assert here.mirror.events == 101
     changes = here.changes()
@@ -238,23 +238,23 @@ def test_those_that_the_agent_has_forgotten_leave_no_gap() -> None:
 
 def test_a_state_that_lasted_for_a_moment_is_entered() -> None:
     here = Bench()
-    here.hear(10.0, 1)
-    here.mirror.hear_events([event(1, IDLE, BUSY), event(2, BUSY, IDLE)])
+    here.receive(10.0, 1)
+    here.mirror.receive_events([event(1, IDLE, BUSY), event(2, BUSY, IDLE)])
     assert BUSY in here.entered
 
 
 @pytest.mark.parametrize("bad", [{"kind": "transition"}, {"kind": "request", "registers": [1]}, {}])
 def test_an_event_that_cannot_be_read(bad: dict[str, Any]) -> None:
     here = Bench()
-    here.hear(10.0, 1)
+    here.receive(10.0, 1)
     with pytest.raises(ProtocolError, match="an event that cannot be read"):
-        here.mirror.hear_events([{"index": 1, **bad}])
+        here.mirror.receive_events([{"index": 1, **bad}])
 
 
 def test_an_event_of_a_kind_that_is_not_known_is_passed_over() -> None:
     here = Bench()
-    here.hear(10.0, 1)
-    assert not here.mirror.hear_events([{"index": 1, "kind": "of a later version"}])
+    here.receive(10.0, 1)
+    assert not here.mirror.receive_events([{"index": 1, "kind": "of a later version"}])
     assert here.mirror.events == 1
 
 
@@ -264,7 +264,7 @@ def test_an_event_of_a_kind_that_is_not_known_is_passed_over() -> None:
 def test_the_guess_is_the_fastest_message() -> None:
     clock = AgentClock()
     for stamp, delay in ((0.0, 0.5), (0.01, 0.1), (0.02, 0.001), (0.03, 0.4)):
-        clock.hear(stamp, stamp + AHEAD + delay)
+        clock.receive(stamp, stamp + AHEAD + delay)
     assert clock(7.0) == pytest.approx(7.0 + AHEAD + 0.001, abs=1e-4)
 
 
@@ -272,11 +272,11 @@ def test_it_follows_clocks_that_part_and_no_faster() -> None:
     clock = AgentClock()
     for second in range(1001):
         arrival = second * (1 + DRIFT / 2) + AHEAD
-        clock.hear(float(second), arrival)
+        clock.receive(float(second), arrival)
         assert clock(float(second)) == pytest.approx(arrival, abs=1e-6)
     slow = AgentClock()
-    slow.hear(0.0, AHEAD)
-    slow.hear(100.0, AHEAD + 105.0)  # congestion
+    slow.receive(0.0, AHEAD)
+    slow.receive(100.0, AHEAD + 105.0)  # congestion
     assert slow(100.0) == pytest.approx(AHEAD + 100.0 + 105.0 * DRIFT)
 
 
@@ -288,9 +288,9 @@ def test_timestamps_only_rise_and_are_never_ahead(steps: list[tuple[float, float
     for sequence, (interval, delay, in_turn) in enumerate(steps):
         stamp += interval
         arrival = max(arrival, stamp + AHEAD + delay)
-        here.mirror.hear(message(stamp, sequence, age=interval / 2), arrival, in_turn=in_turn)
+        here.mirror.receive(message(stamp, sequence, age=interval / 2), arrival, in_turn=in_turn)
         source, target = ((IDLE, BUSY), (BUSY, IDLE))[sequence % 2]
-        here.mirror.hear_events([event(sequence + 1, source, target, stamp - 0.9 * interval)])
+        here.mirror.receive_events([event(sequence + 1, source, target, stamp - 0.9 * interval)])
         assert here.mirror.status is not None
         assert here.mirror.status.timestamp <= arrival + 1e-6
     for told in (
@@ -309,7 +309,7 @@ def test_timestamps_only_rise_and_are_never_ahead(steps: list[tuple[float, float
 def test_in_whatever_order_they_come(order: list[int], in_turn: list[bool], delays: list[float]) -> None:
     here = Bench()
     for sequence in order:
-        here.hear(10.0 + sequence / 100, sequence, in_turn=in_turn[sequence], delay=delays[sequence])
+        here.receive(10.0 + sequence / 100, sequence, in_turn=in_turn[sequence], delay=delays[sequence])
     told = list(here.statuses.drain())
     assert all(before.sequence < after.sequence for before, after in itertools.pairwise(told))
     assert all(before.timestamp <= after.timestamp for before, after in itertools.pairwise(told))

@@ -105,7 +105,7 @@ async def test_a_record_that_is_none_lets_nobody_back(caplog: pytest.LogCaptureF
         await asyncio.sleep(1)
         here.records.records[LEFT] = {"runs": "?", "number": 3, "barred": [1, "x"]}
         await here.start_agent("next agent")
-        assert "a record of who commanded cannot be read" in caplog.text
+        assert "the record of the lease cannot be read" in caplog.text
         await asyncio.sleep(3)
         assert not here.holder.hand.is_in_control
 
@@ -182,7 +182,7 @@ async def test_what_cannot_be_kept_takes_the_old_one_away(
         for number in (4, 5):
             one.keep(LEFT, {"number": number})
             await one.kept()
-    assert caplog.text.count("nobody comes back by itself") == 1
+    assert caplog.text.count("no client reacquires the lease automatically") == 1
     assert one.read(LEFT) is None
 
 

@@ -90,7 +90,7 @@ def test_which_is_remote(address: object, remote: bool) -> None:
 
 
 def test_a_route_beyond_this_machine_without_keys_is_refused() -> None:
-    with pytest.raises(ValueError, match="open to everybody"):
+    with pytest.raises(ValueError, match="open to everyone"):
         Route(("tcp/cell-1:7447",)).configuration()
     assert Route(("tcp/cell-1:7447",), insecure=True).configuration()
     assert Route().configuration()

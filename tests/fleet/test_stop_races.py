@@ -213,7 +213,7 @@ async def test_an_agent_takes_nothing_from_the_moment_it_is_told_to_end() -> Non
         writes = len(here.gripper.writes)
         here.serving.cancel()
         for each in requests:
-            here.agent._hear(each)
+            here.agent._receive(each)
             error = unpack_answer(each.answers[0]).error
             assert error is not None
             assert error["reason"] == "closed"
@@ -230,9 +230,9 @@ async def test_what_was_let_in_just_before_does_not_go_out_after_it() -> None:
         writes = len(here.gripper.writes)
         for each in every_motion(hand):
             if "lease" not in each.key:
-                here.agent._hear(each)
+                here.agent._receive(each)
         here.serving.cancel()
-        here.agent._hear(Asked("info", Call(LEFT.base, "somebody")))
+        here.agent._receive(Asked("info", Call(LEFT.base, "somebody")))
         await asyncio.wait({here.serving})
         assert not going(here, writes)
         await hand.stop()

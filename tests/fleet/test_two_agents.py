@@ -247,12 +247,12 @@ async def test_another_agent_that_comes_and_goes_does_not_fill_log_and_events(
         key = LEFT.key("alive", "12345")
         with caplog.at_level(logging.ERROR, logger="robotiq_async"):
             for _ in range(500):
-                here.agent._see_agent(key, is_there=True)
-                here.agent._see_agent(key, is_there=False)
+                here.agent._report_conflict(key, is_there=True)
+                here.agent._report_conflict(key, is_there=False)
             assert here.agent.hands["left"].publisher._count == events + 1
             for number in range(500):
                 client_agents = client._session.agents  # type: ignore[union-attr]
-                client_agents._see(f"{key}{number}", is_there=True)
-                client_agents._see(f"{key}{number}", is_there=False)
+                client_agents._update_token(f"{key}{number}", is_there=True)
+                client_agents._update_token(f"{key}{number}", is_there=False)
         assert len(caplog.records) <= 2
         await client.stop()

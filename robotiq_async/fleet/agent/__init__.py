@@ -1,1 +1,1 @@
-"""Serves the hands of one host."""
+"""The agent, which serves the hands of one host."""

@@ -24,20 +24,21 @@ from .records import NoRecords, Records
 from .served_hand import ServedHand
 
 SUMMARY_S: Final = 1.0
+"""Seconds from one summary to the next."""
 BEATS: Final = 5
-"""How many signs of life there are in a window, also when nothing happens."""
+"""Statuses per window that are sent even if nothing changes."""
 LOOK_S: Final = 0.3
-"""How long another agent has to show itself: a router may not have told yet."""
+"""Seconds to wait for the tokens of other agents: a router may forward them late."""
 EPOCH_BITS: Final = 53
-"""Of an epoch: those who read JSON have doubles."""
+"""Bits of an epoch: JSON readers that use doubles represent it exactly."""
 
 
 class Agent:
-    """Owns the hands of one host and serves them, each with a task of its own.
+    """Owns the hands of one host and serves them, each in a task of its own.
 
     Attributes:
-        hands: what is served, by the name of the gripper.
-        epoch: random: tells this run of the agent from all others.
+        hands: the served hands, by the name of the gripper.
+        epoch: random; identifies this run of the agent.
     """
 
     def __init__(
@@ -51,28 +52,29 @@ class Agent:
         records: Records | None = None,
         asleep: Callable[[], float] | None = None,
     ) -> None:
-        """Serve hands that are not started over an open bus; nothing is sent yet.
+        """Serve hands that are not started, over an open bus. Sends nothing yet.
 
         Args:
             site: the site's name.
             host: this host's name.
             hands: by the names of their grippers.
-            bus: is left open.
+            bus: stays open.
             window: of the leases, in seconds; see :class:`~robotiq_async.fleet.control.lease.Lease`.
-            records: where the next run of the agent finds who may come back to command by itself; None for
-                nowhere: then nobody does.
-            asleep: seconds for which this machine has been suspended so far; None asks the system.
+            records: keeps, for the next run of the agent, which clients may reacquire the lease
+                automatically. With None no client may after a restart.
+            asleep: returns the seconds for which this machine has been suspended so far; None asks the
+                system.
         """
-        self._asleep = asleep or _asleep
-        self._slept = self._asleep()
+        self._suspended = asleep or _suspended
+        self._suspended_s = self._suspended()
         self.epoch = secrets.randbits(EPOCH_BITS)
         self._bus = bus
         self._records = records or NoRecords()
         self._window = window
         self._running: asyncio.Task[Any] | None = None
-        self._strange = LimitedLog()
+        self._invalid_tokens = LimitedLog()
         self._conflicts: dict[str, LimitedLog] = {}
-        """By gripper: a token of another agent may come and go thousands of times."""
+        """By gripper; limited, because a token of another agent may come and go thousands of times."""
         self._prefix = f"{ROOT}/{site}/{host}"
         self.hands = {
             name: ServedHand(
@@ -87,13 +89,13 @@ class Agent:
         }
 
     async def run(self, ready: Callable[[], object] = lambda: None) -> None:
-        """Serve until cancelled; then the fingers are stopped and the links closed.
+        """Serve until cancelled; then stop the fingers and close the links.
 
-        Grippers that cannot be reached are tried again and again. What moves when the agent has connected
-        is held: whoever set it going is not there any more.
+        A gripper that cannot be reached is tried again every second. What moves when the agent connects is
+        held, because its client is gone.
 
         Args:
-            ready: is called when requests are answered from now on.
+            ready: called when the agent begins to answer requests.
 
         Raises:
             AgentError: another agent serves one of the grippers, or has the same site and host.
@@ -106,16 +108,17 @@ class Agent:
             await self._refuse_if_another_began()
             for each in self._all:
                 each.resume()
-            undo.append(self._bus.watch(f"{self._prefix}/*/alive/*", self._see_agent))
-            undo.append(self._bus.serve(f"{self._prefix}/*/info", self._hear, Questions(loop.time).allow))
+            undo.append(self._bus.watch(f"{self._prefix}/*/alive/*", self._report_conflict))
+            undo.append(self._bus.serve(f"{self._prefix}/*/info", self._receive, Questions(loop.time).allow))
             undo += [
-                self._bus.serve(f"{self._prefix}/*/{verb}", self._hear) for verb in ("lease", "halt", "cmd/*")
+                self._bus.serve(f"{self._prefix}/*/{verb}", self._receive)
+                for verb in ("lease", "halt", "cmd/*")
             ]
             ready()
             async with asyncio.TaskGroup() as group:
                 for each in self._all:
                     group.create_task(each.run())
-                group.create_task(self._tell())
+                group.create_task(self._report())
         finally:
             for take_back in reversed(undo):
                 take_back()
@@ -129,22 +132,21 @@ class Agent:
     async def _refuse_if_served(self) -> None:
         await asyncio.sleep(LOOK_S)
         for _, name in await self._others():
-            raise AgentError(f"{self._said_of(name)}: nothing was done")
+            raise AgentError(f"{self._conflict_with(name)}: nothing was done")
 
     async def _refuse_if_another_began(self) -> None:
-        """Of agents that start at the same moment the one with the lowest epoch stays."""
+        # Of several agents that start at the same moment the one with the lowest epoch remains.
         for is_last in (False, True):
             await asyncio.sleep(LOOK_S)
             others = await self._others()
             for epoch, name in others:
-                # One that does not go has been there for longer; it was only seen late.
+                # Still there at the second look: it started before this one, and its token came late.
                 if is_last or epoch < self.epoch:
-                    raise AgentError(f"{self._said_of(name)}: nothing was done")
+                    raise AgentError(f"{self._conflict_with(name)}: nothing was done")
             if not others:
                 return
 
-    def _said_of(self, name: GripperName) -> str:
-        """What is wrong when another agent serves a gripper."""
+    def _conflict_with(self, name: GripperName) -> str:
         if name.gripper in self.hands:
             return f"another agent serves {name} already"
         return (
@@ -152,32 +154,32 @@ class Agent:
         )
 
     async def _others(self) -> list[tuple[int, GripperName]]:
-        """What other agents of this site and host serve, each with the other's epoch."""
+        """What other agents of this site and host serve, each with the epoch of that agent."""
         keys = await self._bus.announced(f"{self._prefix}/*/alive/*", timeout=LOOK_S)
         return [other for other in map(self._other, keys) if other is not None]
 
     def _other(self, key: str) -> tuple[int, GripperName] | None:
-        """Whose token this is, if it is another agent's."""
+        """The agent and gripper of a token; None if it is a token of this agent, or invalid."""
         try:
             epoch, name = int(key.rpartition("/")[2]), GripperName.of_key(key)
         except ValueError:
-            self._strange.warn("invalid liveliness token: %r", key)
+            self._invalid_tokens.warn("invalid liveliness token: %r", key)
             return None
         return (epoch, name) if epoch != self.epoch else None
 
-    def _see_agent(self, key: str, is_there: bool) -> None:
+    def _report_conflict(self, key: str, is_there: bool) -> None:
         other = self._other(key)
         if is_there and other is not None:
             _, name = other
             limited = self._conflicts.setdefault(name.gripper, LimitedLog(Log(name.gripper)))
-            is_told = limited.warn("%s: one of them has to go", self._said_of(name), level=logging.ERROR)
-            if is_told and name.gripper in self.hands:
+            is_logged = limited.warn("%s: stop one of them", self._conflict_with(name), level=logging.ERROR)
+            if is_logged and name.gripper in self.hands:
                 self.hands[name.gripper].publisher.add({"kind": "conflict", "key": key})
 
-    def _hear(self, query: Query) -> None:
+    def _receive(self, query: Query) -> None:
         self._look_at_clocks()
         if self._running is not None and self._running.cancelling():
-            # Told to end, and its tasks have not had a turn yet.
+            # Cancelled, but the tasks of the hands have not run since.
             for each in self._all:
                 each.refuse_requests()
         try:
@@ -187,11 +189,10 @@ class Agent:
             query.reply(Answer("", 0, self.epoch, error=error_fields(refused)).pack())
             return
         served = self.hands.get(name.gripper)
-        if served is not None:  # else it is another's, that came under a wrong key, or nobody's
-            served.hear(query.key.removeprefix(f"{name.base}/"), query)
+        if served is not None:  # else the key is wrong, or there is no such gripper
+            served.receive(query.key.removeprefix(f"{name.base}/"), query)
 
-    async def _tell(self) -> None:
-        """Signs of life, summaries, and an eye on the clock."""
+    async def _report(self) -> None:
         interval = self._window / BEATS
         summary_due = now()
         while True:
@@ -205,16 +206,16 @@ class Agent:
             await asyncio.sleep(interval)
 
     def _look_at_clocks(self) -> None:
-        """The clock that everything goes by stands still while the machine is suspended."""
-        slept = self._asleep()
-        if slept - self._slept > self._window / BEATS:
-            self._slept = slept
+        # The monotonic clock stops while the machine is suspended, so expired leases would look fresh.
+        suspended = self._suspended()
+        if suspended - self._suspended_s > self._window / BEATS:
+            self._suspended_s = suspended
             for each in self._all:
                 each.wake()
 
 
-def _asleep() -> float:
-    """Seconds for which the machine has been suspended since it was started; 0 where nobody can tell."""
+def _suspended() -> float:
+    """Seconds for which this machine has been suspended since its start; 0 where the system does not say."""
     if not hasattr(time, "CLOCK_BOOTTIME"):
         return 0.0
     return time.clock_gettime(time.CLOCK_BOOTTIME) - time.clock_gettime(time.CLOCK_MONOTONIC)

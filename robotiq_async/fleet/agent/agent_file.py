@@ -1,4 +1,4 @@
-"""FLEET.toml: which grippers an agent serves, under which names, and where it listens."""
+"""FLEET.toml: the grippers that an agent serves, their names, and where it listens."""
 
 from __future__ import annotations
 
@@ -28,22 +28,22 @@ _GRIPPERS: Final = "grippers"
 
 
 class AgentFileError(ValueError):
-    """A file that an agent cannot go by; the message names file, line, key, value and range."""
+    """A FLEET.toml that an agent cannot use; the message names file, line, key, value and range."""
 
 
 @dataclass(frozen=True, slots=True)
 class AgentSettings:
-    """Everything an agent goes by, checked.
+    """The content of FLEET.toml, checked.
 
     Attributes:
         site: the site's name.
         grippers: the options of each hand, by its name.
         host: the host's name; by default this machine's.
-        listen: endpoints of zenoh where clients come in; none with a router.
-        connect: endpoints of a router, by which clients come in.
+        listen: endpoints of zenoh for clients; none with a router.
+        connect: endpoints of a router, through which clients connect.
         keys: folder with the agent's certificate and key; None for no encryption.
-        insecure: whether other machines may come in without.
-        window: seconds for which a lease holds without being renewed.
+        insecure: whether other machines may connect without encryption.
+        window: seconds for which a lease lasts without being renewed.
     """
 
     site: str
@@ -61,20 +61,19 @@ _OF_AGENT: Final = tuple(each.name for each in fields(AgentSettings))
 
 
 def make_hand(options: HandOptions) -> RobotiqHand:
-    """A hand for a gripper of the file; opens nothing."""
     return RobotiqHand(name=options.name, **{name: getattr(options, name) for name in _OF_GRIPPER})
 
 
 def machine_name() -> str:
-    """The name of this machine, made fit for a key."""
+    """This machine's name, with other characters than those of a key replaced."""
     return re.sub(r"[^A-Za-z0-9_.-]+", "-", socket.gethostname())[:64] or "host"
 
 
 def read_agent_file(path: str | Path) -> AgentSettings:
-    """What an agent is to serve, from a file.
+    """Read and check a FLEET.toml.
 
     Raises:
-        AgentFileError: the file cannot be read, or something in it cannot be meant.
+        AgentFileError: the file cannot be read, or its content is invalid.
     """
     path = Path(path)
     try:
@@ -87,18 +86,11 @@ def read_agent_file(path: str | Path) -> AgentSettings:
 
 
 class _Reader:
-    """Reads one file; knows where its keys stand."""
-
     def __init__(self, path: Path, text: str) -> None:
         self._path = path
         self._text = text
 
     def settings(self) -> AgentSettings:
-        """Everything, checked.
-
-        Raises:
-            AgentFileError: not TOML, an unknown key, a missing one, or a value that does not fit.
-        """
         table = self._table()
         self._check_keys_of(table, (), _OF_AGENT, needed=("site", _GRIPPERS))
         with self._blaming("site"):
@@ -119,7 +111,7 @@ class _Reader:
             wanted = _check_list("listen", table.get("listen", default))
             listen = check_listen(wanted, has_keys=keys is not None, insecure=insecure)
             if listen and connect:
-                why = "clients come in there, or by a router"
+                why = "clients connect there, or through a router"
                 raise ValueError(f"listen must be left out where there is connect: {why}, got {wanted!r}")
         return AgentSettings(
             site, self._grippers(table[_GRIPPERS]), host, listen, connect, keys, insecure, window
@@ -184,24 +176,19 @@ class _Reader:
         known: tuple[str, ...],
         needed: tuple[str, ...],
     ) -> None:
-        """Refuse keys that nobody knows, and tables that lack some.
-
-        Raises:
-            AgentFileError: there are such, or it does.
-        """
         for key in table:
             if key not in known:
                 near = get_close_matches(key, known, 1)
-                hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
-                raise self._error((*path, key), f"nobody knows the key {key!r}; {hint}")
+                hint = f"did you mean {near[0]}?" if near else f"known keys are {', '.join(known)}"
+                raise self._error((*path, key), f"unknown key {key!r}; {hint}")
         for key in needed:
             if key not in table:
                 what = "[grippers.NAME], a table for each gripper" if key == _GRIPPERS else key
-                raise self._error(path, f"this is missing: {what}")
+                raise self._error(path, f"missing: {what}")
 
     @contextmanager
     def _blaming(self, *path: str) -> Iterator[None]:
-        """Around the check of a value: the error says where it stands."""
+        # Adds file and line of the key to the error of a check.
         try:
             yield
         except (TypeError, ValueError) as error:

@@ -1,7 +1,8 @@
-"""What an agent tells of one hand, to whoever listens.
+"""HandPublisher: publishes statuses, events and summaries of one hand.
 
-Statuses and events go out under one key, in the order in which they happened. A status is dropped rather than
-waited for; events are numbered, every status says how many there are, and whoever has missed some asks.
+Statuses and events share one key, which keeps their order. Both may be dropped on a full link. The next
+status replaces a lost one; events are numbered and every status has the newest number, so a client notices a
+lost event and asks for it.
 """
 
 from __future__ import annotations
@@ -23,16 +24,16 @@ from ..wire.status_message import StatusMessage
 from ..wire.values import Fields, request_fields, statistics_fields, transition_fields
 
 KEPT: Final = 2000
-"""Events that are kept for those who have missed them: some seconds of a loop that commands at 200 Hz."""
+"""Events that are kept for clients that missed them: some seconds of a loop that commands at 200 Hz."""
 AT_ONCE: Final = 40
-"""Events in one answer: of the longest ones as many as a message may hold."""
+"""Events in one answer: even the longest ones fit into a message."""
 
 
 class HandPublisher:
-    """What is told of one hand.
+    """Publishes one hand.
 
     Attributes:
-        problem: why the gripper cannot be reached, in words; empty if it can.
+        problem: why the gripper cannot be reached; empty if it can.
     """
 
     def __init__(self, name: GripperName, hand: RobotiqHand, bus: Bus, epoch: int, lease: Lease) -> None:
@@ -48,8 +49,7 @@ class HandPublisher:
         self._count = 0
         self._sent_at = 0.0
 
-    def hear(self, what: RobotiqStatus | Transition | SentRequest) -> None:
-        """The hand has read, done or written something."""
+    def observe(self, what: RobotiqStatus | Transition | SentRequest) -> None:
         if isinstance(what, RobotiqStatus):
             self.send_status()
         elif isinstance(what, Transition):
@@ -58,31 +58,29 @@ class HandPublisher:
             self.add(request_fields(what))
 
     def add(self, event: Fields) -> None:
-        """Something happened."""
+        """Number an event and publish it."""
         self._count += 1
         event = {"index": self._count, **event}
         self._events.append(event)
-        # The status that it leads to comes with it: who waits for a state finds both.
+        # With the status after the event: a client that waits for a state has both at once.
         status = self.status_message().hex()
         self._sent_at = now()
         self._send(json.dumps({**self._head(), "events": [event], "status": status}).encode())
 
     def events_since(self, index: int) -> list[Fields]:
-        """The next events after one, as far as they are kept: not more than fit into an answer."""
+        """The next events after a number, as many as are kept and fit into an answer."""
         return list(islice((event for event in self._events if event["index"] > index), AT_ONCE))
 
     def send_status(self) -> None:
-        """Tell where the hand is."""
         self._sent_at = now()
         self._send(self.status_message())
 
     def beat(self, interval: float) -> None:
-        """Tell that there is somebody, unless something was told within an interval."""
+        """Send a status, unless something was sent within ``interval`` seconds: a sign of life."""
         if now() - self._sent_at >= interval:
             self.send_status()
 
     def status_message(self) -> bytes:
-        """Where the hand is."""
         stamp, status = now(), self._status()
         return StatusMessage(
             mark=self._mark,
@@ -100,11 +98,10 @@ class HandPublisher:
         ).pack()
 
     def send_summary(self) -> None:
-        """Tell what an overview shows."""
         self._send_summary(json.dumps(self.summary()).encode())
 
     def summary(self) -> Fields:
-        """What an overview shows."""
+        """What an overview of the fleet shows."""
         stamp, holder, status = now(), self._lease.holder, self._status()
         return {
             **self._head(),
@@ -133,5 +130,5 @@ class HandPublisher:
     def _is_moving(self) -> bool:
         try:
             return self._hand.is_moving
-        except RobotiqError:  # not connected: nobody knows
+        except RobotiqError:  # not connected: unknown
             return False

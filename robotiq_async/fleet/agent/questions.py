@@ -1,4 +1,4 @@
-"""Questions: how many of them an agent reads."""
+"""Questions: limits the requests for information that an agent reads."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ _CLIENT: Final = re.compile(rb'"client": ?"([^"\\]{1,64})"')
 
 
 class Questions:
-    """Looks at a question before anything is done with it: in any thread, and in a few microseconds.
+    """Admits a question before anything else is done with it, in any thread and in a few microseconds.
 
-    What is dropped is not answered, not even with a refusal: that would take as long as the answer.
+    A dropped question gets no answer, not even a refusal, which would take as long as the answer.
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
@@ -28,7 +28,7 @@ class Questions:
         self._report_due = 0.0
 
     def allow(self, payload: bytes) -> bool:
-        """Whether a question is looked at, by who asks. Those who do not say so share a budget."""
+        """Whether to read a question. Clients without an identification share one budget."""
         found = _CLIENT.search(payload)
         client, now = found[1].decode("ascii", "replace") if found else "", self._clock()
         with self._lock:

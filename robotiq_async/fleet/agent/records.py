@@ -1,8 +1,8 @@
-"""What outlives an agent: who may come back to command by itself, and who must not.
+"""Records: which clients may reacquire the lease automatically, kept over a restart of the agent.
 
-A person has halted the gripper, the agent is killed and started again; whoever commanded before, and has not
-heard of that halt, asks for control by itself. The next agent must know. Where it cannot know, nobody comes
-back by itself.
+A person halts the gripper, then the agent is killed and restarted. The client that commanded before, and did
+not receive that halt, reacquires the lease automatically; the new run of the agent must refuse it, and needs
+the record for that. Without a record no client may reacquire automatically.
 """
 
 from __future__ import annotations
@@ -19,51 +19,42 @@ from ...runtime.log import log
 from ..wire.names import GripperName
 from ..wire.values import Fields
 
-PATIENCE_S: Final = 0.1
-"""So long the answer to a halt waits for its record; a disk may stand still."""
+KEPT_S: Final = 0.1
+"""Seconds that the answer to a halt waits for its record at most; a disk may stall."""
 _BOOT: Final = Path("/proc/sys/kernel/random/boot_id")
 
 
 class Records(Protocol):
-    """Where an agent keeps what the next one must know."""
+    """Keeps what the next run of an agent must know."""
 
     def read(self, name: GripperName) -> Fields | None:
-        """What was kept of a gripper; None if that is not known for certain."""
+        """The record of a gripper; None if it is not known for certain."""
 
     def keep(self, name: GripperName, record: Fields) -> None:
-        """Keep this in place of what was kept before; never blocks."""
+        """Replace the record of a gripper; never blocks."""
 
     async def kept(self) -> None:
-        """Wait until all of it is kept, for a moment."""
+        """Wait until all records are written, KEPT_S at most."""
 
 
 class NoRecords:
-    """Nothing is known after a restart."""
+    """Keeps nothing."""
 
     def read(self, name: GripperName) -> Fields | None:  # noqa: ARG002
-        """See :class:`Records`."""
         return None
 
-    def keep(self, name: GripperName, record: Fields) -> None:
-        """See :class:`Records`."""
+    def keep(self, name: GripperName, record: Fields) -> None: ...
 
-    async def kept(self) -> None:
-        """See :class:`Records`."""
+    async def kept(self) -> None: ...
 
 
 class FileRecords:
-    """Files in a folder, one for each gripper.
+    """Files in a folder, one for each gripper. The folder is created when it is needed.
 
-    They survive the agent, and say nothing after a restart of the machine: the last one may not have reached
-    the disk.
+    They are valid until the machine restarts: the last write may not have reached the disk then.
     """
 
     def __init__(self, folder: Path) -> None:
-        """Opens nothing.
-
-        Args:
-            folder: is made when it is needed.
-        """
         self._folder = folder
         self._boot = _boot()
         self._newest: dict[GripperName, bytes] = {}
@@ -71,9 +62,8 @@ class FileRecords:
         self._has_failed = False
 
     def read(self, name: GripperName) -> Fields | None:
-        """See :class:`Records`."""
         if not os.access(self._folder, os.W_OK):
-            return None  # what is there may be old: the run before this one could not replace it
+            return None  # may be outdated: the run before this one could not replace it
         try:
             record = json.loads(self._path(name).read_bytes())
         except (OSError, ValueError, RecursionError):
@@ -83,16 +73,14 @@ class FileRecords:
         )
 
     def keep(self, name: GripperName, record: Fields) -> None:
-        """See :class:`Records`."""
         self._newest[name] = json.dumps({"boot": self._boot, **record}).encode()
         if name not in self._writing:
             self._begin(name)
 
     async def kept(self) -> None:
-        """See :class:`Records`."""
         loop = asyncio.get_running_loop()
-        until = loop.time() + PATIENCE_S
-        while self._writing and (left := until - loop.time()) > 0:  # one may wait for the one before it
+        until = loop.time() + KEPT_S
+        while self._writing and (left := until - loop.time()) > 0:  # a write may wait for the one before it
             await asyncio.wait(list(self._writing.values()), timeout=left)
 
     def _begin(self, name: GripperName) -> None:
@@ -105,7 +93,7 @@ class FileRecords:
         error = None if done.cancelled() else done.exception()
         if error is not None and not self._has_failed:
             self._has_failed = True
-            log.warning("%s: after a restart of this agent nobody comes back by itself", error)
+            log.warning("%s: after a restart no client reacquires the lease automatically", error)
         if name in self._newest:
             self._begin(name)
 
@@ -120,29 +108,29 @@ class FileRecords:
                 opened.write(data)
             new.replace(path)
         except OSError:
-            path.unlink(missing_ok=True)  # an old one would let back in who must not come
+            path.unlink(missing_ok=True)  # an outdated record could admit a barred client
             raise
 
     def _path(self, name: GripperName) -> Path:
-        # No name has a plus in it.
+        # Names cannot contain a plus.
         return self._folder / f"{name.site}+{name.host}+{name.gripper}.json"
 
 
 def file_records() -> Records:
-    """Records where systemd says (``StateDirectory=``), else where this user's programs keep such things."""
-    told = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
-    if told:
-        return FileRecords(Path(told))
+    """Records in systemd's ``StateDirectory=``, else in the user's state folder (XDG)."""
+    folder = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
+    if folder:
+        return FileRecords(Path(folder))
     state = os.environ.get("XDG_STATE_HOME")
     try:
         return FileRecords((Path(state) if state else Path.home() / ".local" / "state") / "robotiq-async")
     except RuntimeError:  # a user without a home
-        log.warning("no folder for records: after a restart of this agent nobody comes back by itself")
+        log.warning("no folder for records: after a restart no client reacquires the lease automatically")
         return NoRecords()
 
 
-def _boot() -> Any:  # noqa: ANN401  # compared, and nothing else
-    """Tells this run of the machine from all others; None where nobody can tell."""
+def _boot() -> Any:  # noqa: ANN401  # only compared
+    # Identifies this run of the machine; None where the system does not say. Records are then not used.
     try:
         return _BOOT.read_text(encoding="ascii").strip() or None
     except OSError:

@@ -1,4 +1,4 @@
-"""Requests that an agent carries out: their tasks, and their answers, also to those that come again."""
+"""Requests that an agent carries out: their tasks and their answers, also to repetitions."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from .publisher import HandPublisher
 REMEMBERED: Final = 256
 """Requests whose answers are kept for repetitions."""
 END_S: Final = 0.5
-"""For what is under way when the hand has been stopped: it ends by itself."""
+"""Seconds for requests under way to end after the hand has been stopped, before they are cancelled."""
 T = TypeVar("T")
 Work = Coroutine[Any, Any, MoveResult | None]
 
 
 class Request:
-    """Something under way, or answered already: a repetition gets the same answer.
+    """A request under way, or answered: repetitions get the same answer.
 
     Attributes:
-        reason: why it was called off; empty if it was not, or by its caller.
+        reason: why the agent cancelled it; empty if it was not cancelled, or by its client.
     """
 
     def __init__(self, name: str, call: Call, query: Query) -> None:
@@ -37,15 +37,14 @@ class Request:
         self.task: asyncio.Task[MoveResult | None] | None = None
         self.reason = ""
 
-    def call_off(self, reason: str = "") -> None:
-        """Cancel it, if it is still under way."""
+    def cancel(self, reason: str = "") -> None:
         if self.task is not None and not self.task.done():
             self.reason = reason
             self.task.cancel()
 
 
 class Requests:
-    """Those of one hand. The ones under the present lease are known by their numbers."""
+    """The requests for one hand. Those under the present lease are found by their numbers."""
 
     def __init__(
         self, publisher: HandPublisher, epoch: int, log: Log, carried_out: Callable[[Request], None]
@@ -62,45 +61,42 @@ class Requests:
         return self._known.get(number) if isinstance(number, int) else None
 
     def begin(self, request: Request, work: Work) -> None:
-        """Carry one out, and know it by its number from now on."""
+        """Carry out a command, and keep it for repetitions."""
         self._known[request.call.number] = request
         if len(self._known) > REMEMBERED:
             self._forget()
         self.start(request, work)
 
     def start(self, request: Request, work: Work) -> None:
-        """Carry one out that comes as often as it is asked."""
+        """Carry out a request without keeping it: each repetition is carried out, too."""
         request.task = self.spawn(work)
-        # Not in the task itself: one that is cancelled before it has begun never runs.
+        # Not in the task itself: a task that is cancelled before its first turn never runs.
         request.task.add_done_callback(lambda task: self._finish(request, task))
 
     def repeat(self, request: Request, query: Query) -> None:
-        """One has come again."""
-        self._log.debug("request %d came again", request.call.number)
+        self._log.debug("request %d was repeated", request.call.number)
         if request.answer is None:
             request.queries.append(query)
         else:
             query.reply(request.answer, self._publisher.status_message())
 
-    def leave_moves(self) -> None:
-        """Moves go on; nobody waits for them."""
+    def forget_moves(self) -> None:
+        # The client leaves the fingers moving, so the end of its lease must not cancel the moves.
         self._known = {at: each for at, each in self._known.items() if each.name != "move"}
 
-    def call_off_all(self, reason: str) -> None:
-        """The lease has ended."""
+    def cancel_all(self, reason: str) -> None:
         for request in self._known.values():
-            request.call_off(reason)
+            request.cancel(reason)
         self._known.clear()
 
     def spawn(self, work: Coroutine[Any, Any, T]) -> asyncio.Task[T]:
-        """Do something beside."""
         task = asyncio.get_running_loop().create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
         return task
 
     async def end(self) -> None:
-        """The hand was stopped: wait until everybody has been answered."""
+        """Wait until all requests have been answered, END_S at most."""
         if self._tasks:
             await asyncio.wait(self._tasks, timeout=END_S)
         for task in self._tasks:
@@ -111,7 +107,7 @@ class Requests:
         call, error = request.call, None if task.cancelled() else task.exception()
         if task.cancelled():
             reason = request.reason or "released"
-            error = ControlLostError(f"called off: {request.reason or 'by the caller'}", reason)
+            error = ControlLostError(f"cancelled: {request.reason or 'by the caller'}", reason)
         elif isinstance(error, Exception) and not isinstance(error, RobotiqError | TypeError | ValueError):
             self._log.error("%s failed", request.name, exc_info=error)
             error = AgentError(f"the agent failed: {error!r}")
@@ -126,7 +122,7 @@ class Requests:
         request.queries.clear()
 
     def _forget(self) -> None:
-        """The oldest requests that have been answered."""
+        # Only answered ones: a repetition of one under way must not be carried out twice.
         for number in sorted(self._known)[: REMEMBERED // 2]:
             if self._known[number].answer is not None:
                 del self._known[number]

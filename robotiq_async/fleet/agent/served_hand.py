@@ -1,4 +1,4 @@
-"""One hand of an agent: it answers requests, and holds what moves when nobody commands any more."""
+"""ServedHand: one hand of an agent. Answers requests, and holds what moves when a lease ends."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ from .requests import Request, Requests, Work
 from .settings import RestoredSettings
 
 RETRY_S: Final = 1.0
-"""From one attempt to reach a gripper that is not there to the next."""
+"""Seconds between two attempts to reach the gripper."""
 SEQUENCES: Final = frozenset({"activate", "reset", "atr", "recover"})
-"""Which go by a speed and a force of their own."""
+"""Commands with a speed and a force of their own."""
 COMMANDS: Final = frozenset({"set_position", "set_speed", "set_force", "move", "hold"}) | SEQUENCES
-"""What a holder may ask for: the method of a hand of that name. Beside them there are command and cancel."""
+"""Commands of a holder: the methods of a hand by that name. In addition there are command and cancel."""
 
 
 class ServedHand:
-    """Serves one hand. Everything happens in the agent's event loop.
+    """Serves one hand, in the agent's event loop.
 
     Attributes:
         name: the gripper's.
-        publisher: tells what happens to it.
+        publisher: publishes its statuses and events.
     """
 
     def __init__(
@@ -58,36 +58,36 @@ class ServedHand:
         self._lease = Lease(window, epoch, lambda: records.keep(name, self._lease.record))
         self._admission = Admission(name.base, epoch, self._lease)
         self.publisher = HandPublisher(name, hand, bus, epoch, self._lease)
-        self._requests = Requests(self.publisher, epoch, self._log, self._note)
+        self._requests = Requests(self.publisher, epoch, self._log, self._carried_out)
         self._settings = RestoredSettings(hand)
         self._released: Request | None = None
-        """The last one that gave the lease back."""
+        """The last request that released the lease; it may be repeated."""
         self._commanded = Finger(0)
-        """The axes that the holder has commanded."""
-        self._owed = Finger(0)
-        """The axes that are to be held as soon as the gripper is reached again."""
+        """Axes that the holder has commanded: they are held when its lease ends."""
+        self._to_hold = Finger(0)
+        """Axes to hold when the gripper is reached again: the link was down when they should have been."""
         self._expiry: asyncio.TimerHandle | None = None
         self._is_ending = False
 
     def resume(self) -> None:
-        """Go on from what the run before this one has left. Nobody else serves the gripper."""
+        """Continue from the record of the agent's previous run. No other agent serves the gripper."""
         record = self._records.read(self.name)
         if record is not None:
             try:
                 self._lease.resume(record)
             except (KeyError, TypeError, ValueError) as error:
-                self._log.warning("a record of who commanded cannot be read: %r", error)
+                self._log.warning("the record of the lease cannot be read: %r", error)
         self._records.keep(self.name, self._lease.record)
 
     async def run(self) -> None:
         """Keep the hand running, with or without its gripper, until cancelled; then stop the fingers."""
         loop = asyncio.get_running_loop()
-        removes = [self._hand.add_listener(each) for each in (self.publisher.hear, self._settings.observe)]
+        removes = [self._hand.add_listener(each) for each in (self.publisher.observe, self._settings.observe)]
         try:
             while True:
                 await self._run_once()
         finally:
-            # A task that was left in a closed loop is ended when it is collected: nothing can be sent then.
+            # The garbage collector ends a task that was left in a closed loop: nothing can be sent then.
             if not loop.is_closed():
                 self.refuse_requests()
                 await self._hand.stop()
@@ -98,7 +98,7 @@ class ServedHand:
                 await self._requests.end()
 
     def refuse_requests(self) -> None:
-        """The agent ends: take nothing more but halts, and drop what was not sent."""
+        """The agent ends: accept only halts, and drop requests that have not been sent."""
         if not self._is_ending:
             self._is_ending = True
             self.end_lease("closed")
@@ -109,8 +109,8 @@ class ServedHand:
             self.publisher.problem = ""
             await self._hold_what_moves()
             async for transition in self._hand.transitions():
-                if transition.target in RUNNING and self._owed:
-                    await self._hold(self._owed)
+                if transition.target in RUNNING and self._to_hold:
+                    await self._hold(self._to_hold)
         except RobotiqError as error:
             if error.message != self.publisher.problem:
                 self._log.warning("%s", error.message)
@@ -119,7 +119,7 @@ class ServedHand:
             await asyncio.sleep(RETRY_S)
 
     async def _hold_what_moves(self) -> None:
-        """Whoever set going what moves now is not there any more: an agent that was killed, perhaps."""
+        # The client that started the motion is gone: its agent was killed, for example.
         if self._hand.state in RUNNING and self._hand.is_moving:
             self._log.warning("the fingers moved when the agent started; they are held")
             with suppress(RobotiqConnectionError):
@@ -127,8 +127,7 @@ class ServedHand:
 
     # -- requests --------------------------------------------------------------------------------------
 
-    def hear(self, verb: str, query: Query) -> None:
-        """A request has arrived."""
+    def receive(self, verb: str, query: Query) -> None:
         try:
             call = unpack_call(query.payload)
         except RobotiqError as error:
@@ -139,9 +138,10 @@ class ServedHand:
             self._admission.check_meant(call, in_any_run=verb in ("info", "halt"))
             self._expire()
             value = self._answer(verb, call, query)
-        except (RobotiqError, TypeError, ValueError, OverflowError) as error:  # JSON may hold infinity
+        except (RobotiqError, TypeError, ValueError, OverflowError) as error:  # JSON may contain infinity
             self._log.info("%s refused: %s", verb, getattr(error, "message", error))
-            # By this gripper, whichever it was for: a copy of it may have found its way meanwhile.
+            # From this gripper, even if the request names another: the client then ignores the refusal,
+            # since a copy of the request may have reached the right gripper.
             refused = Answer(self.name.base, call.number, self._epoch, error=error_fields(error))
             self._reply(query, refused)
         else:
@@ -149,7 +149,7 @@ class ServedHand:
                 self._reply(query, Answer(call.to, call.number, self._epoch, value))
 
     def _answer(self, verb: str, call: Call, query: Query) -> Fields | None:
-        """The answer, or None if it comes later."""
+        """The answer; None if it follows later."""
         if self._is_ending and verb not in ("info", "halt"):
             raise ControlLostError("the agent is ending; nothing was done", "closed")
         match verb.split("/"):
@@ -166,7 +166,7 @@ class ServedHand:
         return None
 
     def _reply(self, query: Query, answer: Answer) -> None:
-        # The newest status goes with it, for answers overtake statuses.
+        # With the newest status, because answers overtake statuses.
         query.reply(answer.pack(), self.publisher.status_message())
 
     def _info(self, call: Call) -> Fields:
@@ -203,7 +203,7 @@ class ServedHand:
         if take:
             self._lease.intervene(call.client, "taken")
         if holder is not None and (take or holder.client == call.client):
-            # Of the same client: it has lost the thread, and what it asked before is not to go on.
+            # The holder itself acquires again: it lost track, so what it asked before must not continue.
             self.end_lease("expired" if holder.client == call.client else "taken", label)
         number = self._admission.acquire(call, label)
         self._settings.restore(settings)
@@ -212,7 +212,8 @@ class ServedHand:
         self._watch_expiry()
 
     def _release(self, call: Call, query: Query) -> None:
-        """Also once more, and more strongly, while nobody else has come."""
+        # A client may repeat its release, or strengthen it, as long as no other client has acquired the
+        # lease.
         known = self._released
         if known is not None and (known.call.client, known.call.number) == (call.client, call.number):
             self._requests.repeat(known, query)
@@ -222,7 +223,7 @@ class ServedHand:
         keeps = call.arguments.get("keep_grip") is True and self._hand.state in RUNNING
         if leaves:
             self._commanded = Finger(0)
-            self._requests.leave_moves()
+            self._requests.forget_moves()
         self.end_lease("released")
 
         async def release() -> None:
@@ -235,7 +236,7 @@ class ServedHand:
         self._requests.start(self._released, release())
 
     async def _come_to_rest(self) -> None:
-        """Hold what moves; halt if that does not come to rest in time, and nobody commands by then."""
+        # After the time limit it halts, unless a client has acquired the lease since.
         self._settings.merge({})
         await self._hand.hold(Finger.ALL)
         with suppress(TimeoutError):
@@ -247,39 +248,39 @@ class ServedHand:
             await self._hand.halt()
 
     def end_lease(self, reason: str, by: str = "") -> None:
-        """Take the lease from whoever holds it: what it commanded and still moves is held, grips stay."""
+        """Take the lease from its holder. What it set in motion is held; contacts keep their grip."""
         holder = self._lease.end(reason)
         if holder is None:
             return
         self._log.log(
             logging.INFO if reason == "released" else logging.WARNING,
-            "%s commands the gripper no longer: %s%s",
+            "the lease of %s has ended: %s%s",
             holder.label,
             reason,
             f" by {by}" if by else "",
         )
-        self._requests.call_off_all(reason)
-        # Holding is for what moves. A speed or a force that is still to be written would act under the next
-        # holder, and after a freeze seconds late.
+        self._requests.cancel_all(reason)
+        # A hold affects only what moves. A speed or a force that is not written yet would take effect under
+        # the next holder, or, after a freeze of this process, seconds late.
         self._hand._drop_requests(f"the lease has ended: {reason}")  # noqa: SLF001  # the agent's own
         axes, self._commanded = self._commanded, Finger(0)
-        if axes and not self._is_ending:  # else stop() sees to the fingers
+        if axes and not self._is_ending:  # else stop() stops the fingers
             self._requests.spawn(self._hold(axes))
         self.publisher.add({"kind": "lease", "number": self._lease.number, "holder": None, "reason": reason})
 
     async def _hold(self, axes: Finger) -> None:
-        self._owed &= ~axes
+        self._to_hold &= ~axes
         self._settings.merge({})
         try:
             await self._hand.hold(axes)
         except RobotiqConnectionError as error:
-            self._owed |= axes
-            self._log.warning("the fingers are held when the gripper is reached: %s", error.message)
+            self._to_hold |= axes
+            self._log.warning("the fingers will be held when the gripper is reached: %s", error.message)
         except RobotiqError as error:
             self._log.warning("the fingers could not be held: %s", error.message)
 
     def wake(self) -> None:
-        """The machine was suspended: nobody has proven anything since."""
+        # After the machine was suspended, no client has proven to be there.
         self._log.warning("this machine was suspended")
         self._lease.wake(now())
         self.end_lease("expired")
@@ -289,7 +290,7 @@ class ServedHand:
             self.end_lease("expired")
 
     def _watch_expiry(self) -> None:
-        """Look again when the lease ends unless it is renewed."""
+        # Renewals only move the expiry, so the timer checks it again when it fires.
         if self._expiry is not None:
             self._expiry.cancel()
             self._expiry = None
@@ -301,21 +302,17 @@ class ServedHand:
     # -- commands --------------------------------------------------------------------------------------
 
     def _halt(self, call: Call, query: Query) -> None:
-        """From anyone, always, and as often as it is asked."""
+        # Accepted from any client, in any state, and never treated as a repetition.
         self._lease.intervene(call.client, "halted")
         if self._admission.is_of_holder(call):
             self._admission.bar(call)
         else:
-            # Or a control loop would undo it in ten milliseconds.
+            # Otherwise a control loop of the holder would move the fingers again within 10 ms.
             self.end_lease("halted", label_of(call))
         self._requests.start(Request("halt", call, query), self._stop_now())
 
     async def _stop_now(self) -> None:
-        """Halt; a hand that is being stopped stops its fingers then, whatever was asked of it before.
-
-        Raises:
-            RobotiqError: the fingers were not seen to stop.
-        """
+        # While the agent ends, the hand is being stopped anyway: wait for that stop and check its outcome.
         if not self._is_ending:
             await self._hand.halt()
             await self._records.kept()
@@ -335,7 +332,7 @@ class ServedHand:
         self._check_known(name)
         self._admission.admit(call, now())
         axes = axes_of(name, call.arguments)
-        work = self._work(name, call.arguments)  # arguments that do not fit end here, before anything is kept
+        work = self._work(name, call.arguments)  # raises for invalid arguments, before anything changes
         self._commanded |= axes
         self._requests.begin(Request(name, call, query), work)
 
@@ -343,15 +340,15 @@ class ServedHand:
         if name != "command" and name not in COMMANDS:
             raise AgentError(f"unknown command {name!r}")
 
-    def _note(self, request: Request) -> None:
-        """A request was carried out."""
+    def _carried_out(self, request: Request) -> None:
+        # A new command replaces the hold that its axes still wait for.
         if request.name in ("move", "set_position", "command"):
-            self._owed &= ~axes_of(request.name, request.call.arguments)
+            self._to_hold &= ~axes_of(request.name, request.call.arguments)
 
     def _work(self, name: str, arguments: Fields) -> Work:
         if name == "command":
             return self._set(**arguments)
-        # Called with anything, it would say so when it is awaited.
+        # Checked here: a coroutine raises for wrong arguments only when it is awaited.
         signature(getattr(self._hand, name)).bind(**arguments)
         return self._carry_out(name, arguments)
 
@@ -362,9 +359,9 @@ class ServedHand:
         return result
 
     async def _set(self, axes: Fields) -> None:
-        """What :meth:`RobotiqHand.command` does, for several axes at once."""
+        """Like :meth:`RobotiqHand.command`, for several axes at once."""
         asked = {check_mask(int(mask)): changes for mask, changes in axes.items()}
-        for changes in asked.values():  # all of them before the first is asked for
+        for changes in asked.values():  # all of them before the first takes effect
             for name, value in changes.items():
                 check_byte(name, value)
         self._settings.merge(settings_of("command", {"axes": axes}))
@@ -372,12 +369,11 @@ class ServedHand:
             self._hand.command(mask, **changes)
 
     def _cancel(self, call: Call, query: Query) -> None:
-        """Call off a command of the holder; the axes it moves are held."""
         self._admission.renew(call, now())
         request = self._requests.find(call.arguments.get("number", -1))
         if request is not None:
-            request.call_off()
+            request.cancel()
         else:
-            # It may have been overtaken: it is not to be let in when it comes.
+            # The cancellation may have overtaken the command: refuse it when it arrives.
             self._admission.bar(Call(call.to, call.client, number=int(call.arguments.get("number", 0))))
         self._reply(query, Answer(call.to, call.number, self._epoch, {}))

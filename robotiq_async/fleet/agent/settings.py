@@ -11,19 +11,22 @@ from ..wire.settings import Setting
 
 
 class RestoredSettings:
-    """Merged into each command, so that both go out in one image, until an image is acknowledged."""
+    """Merged into each command, so that both are written in one image, until such an image is acknowledged.
+
+    A restarted agent has its own speeds and forces: the next motion could be faster and stronger than the
+    client asked for.
+    """
 
     def __init__(self, hand: RobotiqHand) -> None:
         self._hand = hand
         self._missing: dict[Setting, int] = {}
 
     def restore(self, settings: Mapping[Setting, int]) -> None:
-        """Send these with the next command."""
         has = self._hand.model.all_axes
         self._missing.update({each: value for each, value in settings.items() if each[0] in has})
 
     def merge(self, renewed: Mapping[Setting, int]) -> None:
-        """Merge them into the command of this turn, which sets some of them anew."""
+        """Merge them into the command of this turn, which sets the renewed ones itself."""
         try:
             for (axis, what), value in self._missing.items():
                 self._hand.command(axis, **{what: value})
@@ -34,7 +37,7 @@ class RestoredSettings:
         )
 
     def observe(self, what: object) -> None:
-        """Forget them when an image with all of them is acknowledged."""
+        # An acknowledged image that contains all of them has restored them.
         if self._missing and isinstance(what, SentRequest) and what.acknowledged:
             axes = dict(what.request.by_axis)
             if all(getattr(axes[axis], name) == value for (axis, name), value in self._missing.items()):

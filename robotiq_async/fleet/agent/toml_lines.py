@@ -1,4 +1,4 @@
-"""On which line of a TOML file a key stands: the reader of the standard library does not tell."""
+"""Line numbers of keys in a TOML file, which the parser of the standard library does not provide."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _KEY: Final = re.compile(r"""\s*((?:"[^"\n]*"|'[^'\n]*'|[A-Za-z0-9_.\s-])+)=""")
 
 
 def line_of(text: str, path: Names) -> int | None:
-    """The line, counted from 1, of the key or the table at a path.
+    """The line, counted from 1, of the key or the table at a path; None if it is not certain.
 
-    For what stands inside an inline table or an array that is the line where this begins. None if it is not
-    certain: the search looks at lines one by one, and a text of several lines may hold what looks like a key.
+    Inside an inline table or an array it is the line where that begins. The search looks at single lines, and
+    a multi-line string may contain what looks like a key.
     """
     for length in range(len(path), 0, -1):
         lines = [number for number, found in _keys(text) if found == path[:length]]
@@ -25,7 +25,7 @@ def line_of(text: str, path: Names) -> int | None:
 
 
 def _keys(text: str) -> Iterator[tuple[int, Names]]:
-    """The lines that begin with a key or are the header of a table, and its path."""
+    """Line number and path of each line that begins with a key or is the header of a table."""
     table: Names = ()
     for number, line in enumerate(text.splitlines(), 1):
         if line.lstrip().startswith("["):
@@ -36,7 +36,7 @@ def _keys(text: str) -> Iterator[tuple[int, Names]]:
 
 
 def _path(line: str) -> Names:
-    """The names that a line nests, empty if it is none of TOML."""
+    """The nested names on a line; empty if the line is not TOML."""
     try:
         found: object = tomllib.loads(line)
     except tomllib.TOMLDecodeError:

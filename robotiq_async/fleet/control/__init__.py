@@ -1,1 +1,1 @@
-"""Who commands a gripper, and which requests are let in. Pure."""
+"""The lease, and which requests are admitted. Pure."""

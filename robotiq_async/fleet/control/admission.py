@@ -1,7 +1,7 @@
-"""Admission: which requests are carried out. Pure: the caller says what time it is.
+"""Admission: decides which requests are carried out. Pure: the caller passes the time.
 
-Nothing is carried out twice, late, out of turn, for a lease that has ended, for another run of the agent or
-by the wrong gripper; a request that is refused says why.
+Nothing is carried out twice, late, out of order, under a lease that has ended, for another run of the agent
+or by the wrong gripper. A refusal states the reason.
 """
 
 from __future__ import annotations
@@ -13,14 +13,15 @@ from ..wire.envelope import Call
 from .lease import Holder, Lease
 
 _CLIENTS: Final = 1000
-"""Clients that are remembered for repeated requests for the lease."""
+"""Clients whose last request for the lease is kept, to recognize repetitions. Bounds the memory: any program
+can make up clients."""
 
 
 class Admission:
-    """What one gripper lets in.
+    """The requests that one gripper accepts.
 
     Attributes:
-        lease: who may command.
+        lease: the right to command.
     """
 
     def __init__(self, base: str, epoch: int, lease: Lease) -> None:
@@ -28,28 +29,22 @@ class Admission:
         self._base = base
         self._epoch = epoch
         self._newest = 0
-        """Number of the newest request let in under the present lease."""
+        """Number of the newest request admitted under the present lease."""
         self._asked: dict[str, int] = {}
-        """For each client, the number of the newest request for the lease."""
+        """Number of the newest request for the lease, by client."""
 
     def check_meant(self, call: Call, *, in_any_run: bool = False) -> None:
-        """Refuse what is meant for another gripper, or another run of the agent if that matters.
-
-        Raises:
-            AgentError: it is.
-        """
         if call.to != self._base:
             raise AgentError(f"a request for {call.to} was carried to {self._base}; nothing was done")
         if not in_any_run and call.epoch not in (0, self._epoch):
-            raise AgentError("the agent has been started anew since this was asked; nothing was done")
+            raise AgentError("the agent was restarted since this request was made; nothing was done")
 
     def admit(self, call: Call, now: float) -> None:
-        """Let a command in, and count it, or say why not. The caller has ended a lease that has expired.
+        """Accept a command and count it. The caller has ended an expired lease first.
 
         Raises:
-            ControlLostError: it is not the holder's, or it was on its way for too long; or the one before it
-                has not come yet.
-            AgentError: a later one came first.
+            ControlLostError: not from the holder; or late; or the preceding command is missing.
+            AgentError: a later command came first.
         """
         self._check_holder(call, now)
         if call.number <= self._newest:
@@ -60,10 +55,10 @@ class Admission:
         self.lease.renew(call.seen)
 
     def is_repeated(self, call: Call) -> bool:
-        """Whether a request for the lease has come before, and its sender holds the lease because of it.
+        """Whether a request for the lease is a repetition of the one that gave its sender the present lease.
 
         Raises:
-            AgentError: it has come before, and the lease is another's by now.
+            AgentError: a repetition, but its sender does not hold the lease now.
         """
         before = self._asked.pop(call.client, -1)
         self._asked[call.client] = max(before, call.number)
@@ -73,11 +68,11 @@ class Admission:
             return False
         holder = self.lease.holder
         if holder is None or holder.client != call.client or call.number < before:
-            raise AgentError("the request for the lease came again; nothing was done")
+            raise AgentError("the request for the lease was repeated; nothing was done")
         return True
 
     def acquire(self, call: Call, label: str) -> int:
-        """Give the lease to a client; returns its number. The caller has ended what has to end.
+        """Give the lease to a client; returns its number. The caller ends the previous lease first.
 
         Raises:
             ControlLostError: another client holds it.
@@ -90,31 +85,20 @@ class Admission:
         return self.lease.grant(Holder(call.client, label), call.seen)
 
     def renew(self, call: Call, now: float) -> None:
-        """Prolong the lease.
-
-        Raises:
-            ControlLostError: as :meth:`admit`.
-        """
         self._check_holder(call, now)
         self.lease.renew(call.seen)
 
     def release(self, call: Call, now: float) -> None:
-        """Let a client give the lease back; also one that has done so, as long as nobody has come after it.
-
-        Raises:
-            ControlLostError: as :meth:`admit`.
-        """
+        # The holder may repeat its release, or strengthen it, as long as no other client has acquired the
+        # lease.
         if self.lease.is_released_by(call.client, call.lease):
             self.check_fresh(call, now)
         else:
             self.renew(call, now)
 
     def _check_again(self, call: Call) -> None:
-        """Refuse a client that comes back by itself when somebody else has stepped in since it left.
-
-        Raises:
-            ControlLostError: somebody has.
-        """
+        # A client that reacquires the lease automatically ("again") must not undo a halt or a take that came
+        # in the meantime. Only an explicit acquire() may.
         again = call.arguments.get("again")
         if again is None:
             return
@@ -124,26 +108,20 @@ class Admission:
             raise ControlLostError(f"the gripper was {reason} since: acquire() it when people agree", reason)
         if not is_known:
             raise ControlLostError(
-                "the agent was started anew, and does not know whether somebody has halted since: acquire() "
+                "the agent was restarted, and does not know whether the gripper was halted since: acquire() "
                 "it when people agree",
                 "restarted",
             )
 
     def is_of_holder(self, call: Call) -> bool:
-        """Whether a request comes from who holds the lease, under this lease."""
         holder = self.lease.holder
         return holder is not None and holder.client == call.client and self.lease.number == call.lease
 
     def bar(self, call: Call) -> None:
-        """Let nothing in any more that the holder asked before this."""
+        """Refuse, from now on, commands with a number up to this one."""
         self._newest = max(self._newest, call.number)
 
     def check_fresh(self, call: Call, now: float) -> None:
-        """Refuse what was on its way for too long.
-
-        Raises:
-            ControlLostError: it was.
-        """
         if not self.lease.is_fresh(call.seen, now):
             raise ControlLostError(
                 f"the request was on its way for {now - call.seen:.1f} s, longer than the window of "
@@ -154,7 +132,7 @@ class Admission:
     def _check_holder(self, call: Call, now: float) -> None:
         if not self.is_of_holder(call):
             holder, reason = self.lease.holder, self.lease.end_of(call.lease)
-            who = holder.label if holder is not None and holder.client != call.client else "nobody"
+            who = holder.label if holder is not None and holder.client != call.client else "no client"
             raise ControlLostError(
                 f"the lease has ended ({reason}), {who} commands the gripper now; nothing was done", reason
             )

@@ -1,7 +1,7 @@
-"""Budget: how many questions are answered. Pure: the caller says what time it is.
+"""Budget: limits the rate of questions. Pure: the caller passes the time.
 
-Questions are free, and answering one takes as long as a poll. A client that asks thousands a second would
-take the polls of the gripper, and with them the statuses of everybody. Halts have no budget.
+Questions need no lease, and answering one takes as long as a poll. A client that asks thousands a second
+would slow the polling of the gripper, and with it the statuses of all clients. Halts have no budget.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from typing import Final
 
 EACH: Final = 100.0
-"""Questions a second of one client; who fetches missed events asks 50."""
+"""Questions a second of one client; fetching missed events takes 50."""
 ALL: Final = 1000.0
-"""Questions a second of all clients: who calls itself something else each time has no more."""
+"""Questions a second of all clients together: limits a program that changes its client name each time."""
 _CLIENTS: Final = 1000
-"""Clients that are told apart."""
+"""Clients with a budget of their own. The least recent one is forgotten."""
 
 
 @dataclass(slots=True)
@@ -23,7 +23,7 @@ class _Bucket:
     at: float
 
     def take(self, rate: float, now: float) -> bool:
-        """Take one, if there is one; a second's worth may be saved up."""
+        # At most the tokens of one second accumulate.
         self.left = min(rate, self.left + (now - self.at) * rate)
         self.at = now
         if self.left < 1:
@@ -33,14 +33,14 @@ class _Bucket:
 
 
 class Budget:
-    """Of one agent."""
+    """The budget of one agent."""
 
     def __init__(self) -> None:
         self._all = _Bucket(ALL, 0.0)
         self._each: dict[str, _Bucket] = {}
 
     def allows(self, client: str, now: float) -> bool:
-        """Whether a question of a client is answered; counts it then."""
+        """Whether to answer a question of a client; if so, it is counted."""
         bucket = self._each.pop(client, None) or _Bucket(EACH, now)
         self._each[client] = bucket
         if len(self._each) > _CLIENTS:

@@ -1,9 +1,9 @@
-"""Lease: who may command a gripper, and until when. Pure: the caller says what time it is.
+"""Lease: which client may command a gripper, and until when. Pure: the caller passes the time.
 
-The time is the agent's own, and it never counts from the arrival of a message: a holder proves with each
-message which stamp of the agent it has heard, and holds the lease until ``window`` seconds after that stamp.
-So a message that was stuck in the network prolongs nothing, and a link that is dead in one direction ends the
-lease as well as one that is dead in both.
+All times are the agent's own, and the arrival of a message never counts: each message proves which stamp of
+the agent its sender has received, and the lease lasts until ``window`` seconds after that stamp. So a message
+that was stuck in the network prolongs nothing, and a link that is dead in one direction ends the lease like
+one that is dead in both.
 """
 
 from __future__ import annotations
@@ -13,22 +13,22 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 WINDOW_S: Final = 1.0
-"""How long a holder stays one without having proven to hear the agent."""
+"""Seconds that a lease lasts beyond the newest stamp that its holder has proven to have received."""
 WINDOW_MIN_S: Final = 0.1
 WINDOW_MAX_S: Final = 10.0
 _KEPT: Final = 64
-"""For how many of the last leases it is known why they ended."""
+"""Leases whose reason for ending is kept."""
 _RUNS: Final = 64
-"""For how many of the last runs of the agent who comes back is known."""
+"""Runs of the agent that are kept: a client may reacquire a lease of one of these."""
 
 
 @dataclass(frozen=True, slots=True)
 class Holder:
-    """Who commands.
+    """The client that commands.
 
     Attributes:
-        client: tells one client from all others; made up at random by the client.
-        label: the client's words about itself: user, host, process.
+        client: identifies the client; random, chosen by the client.
+        label: what the client calls itself: user, host, process.
     """
 
     client: str
@@ -40,10 +40,10 @@ class Lease:
 
     Attributes:
         window: seconds.
-        number: counts the changes of holder, also the change to nobody. A request names the number of the
-            lease it was made under, and no other is carried out.
-        holder: who holds it; None for nobody.
-        runs: those of the agent that its numbers are of.
+        number: rises with each change of holder, also when the lease ends. A request is refused unless it
+            names the present number.
+        holder: the client that holds it; None if free.
+        runs: the runs of the agent in which the numbers were given.
     """
 
     def __init__(
@@ -58,26 +58,25 @@ class Lease:
         self._awake_since = 0.0
         self._ends: dict[int, str] = {}
         self._last = ""
-        """The client that held it last, and the number of its first lease in a row."""
+        """The client that held it last; ``_last_from`` is the first lease number of its present series."""
         self._last_from = 0
         self._barred = -1, ""
-        """Number of the newest lease whose holder may not come back by itself, and why."""
+        """Leases up to this number may not be reacquired automatically, for this reason."""
 
     @property
     def expires(self) -> float:
-        """The agent's time at which the lease ends unless it is renewed; only while somebody holds it."""
+        """The agent's time at which the lease ends unless renewed; valid while a client holds it."""
         return self._proven + self.window
 
     def has_expired(self, now: float) -> bool:
-        """Whether a lease is held that nobody has renewed in time."""
         return self.holder is not None and now > self.expires
 
     def is_fresh(self, seen: float, now: float) -> bool:
-        """Whether whoever has heard of ``seen`` has heard it within the window, and not from the future."""
+        # A stamp from the future was not received from this run of the agent: it proves nothing.
         return max(now - self.window, self._awake_since) <= seen <= now
 
     def grant(self, holder: Holder, seen: float) -> int:
-        """Give a lease that nobody holds to a client; returns its number."""
+        """Give the free lease to a client; returns its number."""
         self.number += 1
         self.holder = holder
         if holder.client != self._last:
@@ -87,11 +86,11 @@ class Lease:
         return self.number
 
     def renew(self, seen: float) -> None:
-        """The holder has proven to have heard a stamp of the agent; an older one changes nothing."""
+        # A message that was overtaken proves an older stamp, which must not shorten the lease.
         self._proven = max(self._proven, seen)
 
     def end(self, reason: str) -> Holder | None:
-        """Take the lease from whoever holds it; returns who that was."""
+        """Take the lease from its holder; returns the former holder."""
         holder, self.holder = self.holder, None
         if holder is not None:
             self._ends[self.number] = reason
@@ -101,14 +100,15 @@ class Lease:
         return holder
 
     def wake(self, now: float) -> None:
-        """The machine was suspended, and its clock with it: nothing from before that is fresh any more."""
+        # The clock stopped while the machine was suspended: older stamps look fresh, but are not.
         self._awake_since = now
 
     def intervene(self, client: str, reason: str) -> None:
-        """A client has halted the gripper, or taken the lease: who held it before does not return by itself.
+        """Bar present and former holders from reacquiring automatically after a halt or a take.
 
-        Call it before the lease is ended or granted. The last holder's own halt bars all but itself.
+        Call it before the lease is ended or granted.
         """
+        # A halt by the last holder itself bars all others, but not its own series of leases.
         number = self.number if client != self._last else self._last_from - 1
         if number >= self._barred[0]:
             self._barred = number, reason
@@ -116,28 +116,28 @@ class Lease:
 
     @property
     def record(self) -> dict[str, object]:
-        """What the next run of the agent has to know."""
+        """What the next run of the agent needs to know."""
         return {"runs": self.runs, "number": self.number, "barred": self._barred}
 
     def resume(self, record: Mapping[str, Any]) -> None:
-        """Go on from what a run before this one has left.
+        """Continue from the record of an earlier run.
 
         Raises:
-            KeyError, TypeError, ValueError: it has left something else.
+            KeyError, TypeError, ValueError: the record is malformed.
         """
         number, (barred, reason) = int(record["number"]), record["barred"]
         runs = tuple(int(run) for run in record["runs"])
         self.runs = (*runs, *self.runs)[-_RUNS:]
-        # The lease that was held when that run ended has ended with it.
+        # The lease that was held at the end of that run ended with it.
         self.number, self._barred = number + 1, (int(barred), str(reason))
 
     def why_not_again(self, number: int) -> str:
-        """Why who held the lease of a number may not come back by itself; empty if it may."""
+        """Why the lease of a number may not be reacquired automatically; empty if it may."""
         barred, reason = self._barred
         return reason if number <= barred else ""
 
     def is_released_by(self, client: str, number: int) -> bool:
-        """Whether a client has given back the lease of a number, and it was the last one."""
+        """Whether the newest lease has this number, and this client has released it."""
         is_last = self.holder is None and client == self._last and number == self.number - 1
         return is_last and self._ends.get(number) == "released"
 

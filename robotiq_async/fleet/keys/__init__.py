@@ -1,1 +1,1 @@
-"""Certificates, roles, and what each of them may do."""
+"""Certificates, roles and their rights."""

@@ -1,8 +1,8 @@
-"""Access control: what zenoh lets pass between an agent and each of its clients. What is not here does not.
+"""Access control: the messages that zenoh passes between an agent and its clients. All others are denied.
 
-A rule of zenoh covers an expression if it includes it whole: a subscription that is wider than the rule is
-dropped without a word, and so is what is published under a key that no rule names. Roles are told by the
-common names in the certificates of both sides.
+A rule of zenoh covers an expression only if it includes all of it: zenoh silently drops a subscription that
+is wider than the rule, and a message under a key without a rule. The common names in the certificates of both
+sides identify the roles.
 """
 
 from __future__ import annotations
@@ -22,17 +22,13 @@ _RIGHTS: Final = {
     Role.HALT: ("ask halt", "answer halt"),
     Role.OPERATE: ("ask lease", "answer lease", "ask cmd", "answer cmd"),
 }
-"""The rules that each role adds to those before it."""
+"""The rules that each role has in addition to those of the roles before it."""
 
 Rule = dict[str, object]
 
 
 def access_control(site: str, host: str, clients: AccessList) -> dict[str, object]:
-    """The access control of the agent of a host, for zenoh's configuration: denied is what is not allowed.
-
-    Raises:
-        TypeError, ValueError: no such site or host can be.
-    """
+    """The part of an agent's zenoh configuration that denies everything but the rights of its clients."""
     own = f"{ROOT}/{check_name('site', site)}/{check_name('host', host)}/*"
     return {
         "enabled": True,
@@ -44,7 +40,7 @@ def access_control(site: str, host: str, clients: AccessList) -> dict[str, objec
             *_asking("cmd", own, "cmd/*"),
         ],
         "subjects": [
-            # An empty list would be no list to zenoh.
+            # Roles without clients are left out: zenoh treats an empty list like a missing one.
             {"id": role.value, "cert_common_names": [role.common_name(name) for name in clients.of(role)]}
             for role in CLIENTS
             if clients.of(role)
@@ -56,17 +52,17 @@ def access_control(site: str, host: str, clients: AccessList) -> dict[str, objec
 
 
 def rights(role: Role) -> tuple[str, ...]:
-    """The rules that let somebody in a role do what he may."""
+    """The names of all rules of a role."""
     roles = CLIENTS[: CLIENTS.index(role) + 1]
     return tuple(rule for each in roles for rule in _RIGHTS[each])
 
 
 def _reading(own: str) -> list[Rule]:
     return [
-        # What one gripper publishes, and what a whole fleet does.
+        # The topics of one gripper, and the summaries of a whole fleet.
         _rule("watch", ("declare_subscriber",), _IN, (f"{own}/*", f"{ROOT}/*/*/*/summary")),
         _rule("published", ("put",), _OUT, (f"{own}/feed", f"{own}/summary")),
-        # Peers are told of tokens unasked; clients in zenoh's sense, and routers, ask.
+        # Peers receive tokens without a query; zenoh clients and routers query them.
         _rule(
             "presence",
             ("declare_liveliness_subscriber", "liveliness_query"),
@@ -79,7 +75,7 @@ def _reading(own: str) -> list[Rule]:
 
 
 def _asking(name: str, own: str, key: str) -> list[Rule]:
-    """A request and its answer. Without word of the queryable the client's side asks nobody."""
+    # A request and its answer. The client's side sends a request only if it knows of the queryable.
     return [
         _rule(f"ask {name}", ("query",), _IN, (f"{own}/{key}",)),
         _rule(f"answer {name}", ("declare_queryable", "reply"), _OUT, (f"{own}/{key}",)),

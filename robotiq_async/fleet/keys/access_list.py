@@ -1,8 +1,8 @@
-"""The access list: which client has which role. A text file beside the certificates; agents go by a copy.
+"""The access list: the role of each client. A text file beside the certificates; agents use a copy.
 
-zenoh compares whole names and knows no patterns, so every client that is to get in stands in the list. Who is
-taken out of it gets nothing, whatever certificate they have, once the agents have been started with the new
-list. Nobody else is to get such a name: the old certificate would open again.
+zenoh compares whole names, without patterns, so the list contains every client. A client that is removed from
+it has no access, whatever its certificate, after the agents have been restarted with the new list. Do not
+give its name to another client: the old certificate would be valid again.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from typing import Final, Self
 from ..wire.names import check_name
 
 NAME_MAX: Final = 56
-"""A common name in a certificate has at most 64 characters, and the role stands before it."""
+"""The common name in a certificate has at most 64 characters, and includes the role."""
 _HEAD: Final = """\
-# Which client may do what. Agents go by the copy in their folder, from their next start on.
-# To shut a client out, take its name away, here and in the agents' copies, and never give it again:
-# the old certificate would open.
+# The role of each client. Agents use the copy in their folder, from their next start on.
+# To shut a client out, remove its name, here and in the agents' copies, and never give it again:
+# the old certificate would be valid again.
 """
 
 
 class Role(Enum):
-    """What a certificate is for."""
+    """The purpose of a certificate."""
 
     AGENT = "agent"
     """Serves grippers."""
@@ -39,7 +39,7 @@ class Role(Enum):
     """Watches, halts and commands."""
 
     def common_name(self, name: str) -> str:
-        """What stands in the certificate of somebody in this role, and what zenoh compares."""
+        """The common name in the certificate of a role, which zenoh compares."""
         return f"{self.value}:{name}"
 
 
@@ -47,11 +47,11 @@ CLIENTS: Final = (Role.READ, Role.HALT, Role.OPERATE)
 
 
 def check_subject(name: object) -> str:
-    """The name of somebody who gets a certificate.
+    """Check the name of the owner of a certificate.
 
     Raises:
         TypeError: not a string.
-        ValueError: empty, too long, or with other characters than a gripper's name has.
+        ValueError: empty, too long, or with characters that a gripper's name cannot have.
     """
     checked = check_name("the name in a certificate", name)
     if len(checked) > NAME_MAX:
@@ -64,9 +64,9 @@ class AccessList:
     """The clients by role.
 
     Attributes:
-        read: names of those who watch.
-        halt: names of those who also halt.
-        operate: names of those who also command.
+        read: names of clients that watch.
+        halt: names of clients that also halt.
+        operate: names of clients that also command.
     """
 
     read: tuple[str, ...] = ()
@@ -74,19 +74,18 @@ class AccessList:
     operate: tuple[str, ...] = ()
 
     def of(self, role: Role) -> tuple[str, ...]:
-        """The names in a role of clients."""
         return {Role.READ: self.read, Role.HALT: self.halt, Role.OPERATE: self.operate}[role]
 
     def including(self, role: Role, name: str) -> Self:
-        """The same with one more."""
+        """A copy with one more client."""
         return replace(self, **{role.value: (*self.of(role), name)})
 
     @classmethod
     def read_file(cls, path: Path) -> Self:
-        """The list in a file.
+        """Read a list.
 
         Raises:
-            ValueError: there is none, or it is malformed; the message names file and key.
+            ValueError: missing or malformed; the message names file and key.
         """
         try:
             table = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -97,17 +96,11 @@ class AccessList:
             raise ValueError(f"{path}: {error}") from error
 
     def text(self) -> str:
-        """The file's text."""
         lines = [f"{role.value} = {json.dumps(self.of(role))}\n" for role in CLIENTS]
         return _HEAD + "".join(lines)
 
 
 def _check(table: Mapping[str, object]) -> dict[str, tuple[str, ...]]:
-    """The names by role.
-
-    Raises:
-        TypeError, ValueError: something else is in it.
-    """
     known = [role.value for role in CLIENTS]
     names: dict[str, tuple[str, ...]] = {}
     for key, value in table.items():

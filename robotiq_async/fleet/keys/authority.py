@@ -1,4 +1,4 @@
-"""A certificate authority in memory: its certificate, its key, and the certificates that it signs."""
+"""Authority: a certificate authority in memory."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 DAYS_MAX: Final = 36500
 _SKEW: Final = timedelta(days=1)
-"""Valid so long before now: the clocks of other machines may be behind."""
+"""Certificates are valid from this long ago: the clocks of other machines may be behind."""
 _LABELS: Final = re.compile(
     r"(?=.{1,253}$)[A-Za-z0-9_]([A-Za-z0-9_-]{0,62})(\.[A-Za-z0-9_][A-Za-z0-9_-]{0,62})*"
 )
@@ -24,7 +24,7 @@ _LABELS: Final = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """A certificate and its key, as PEM files hold them."""
+    """A certificate and its key in PEM format."""
 
     certificate: bytes
     key: bytes
@@ -32,19 +32,13 @@ class Pair:
 
 @dataclass(frozen=True, slots=True)
 class Authority:
-    """Who vouches.
-
-    Attributes:
-        certificate: what others go by.
-        key: signs.
-    """
+    """A certificate and its key, which sign other certificates."""
 
     certificate: x509.Certificate
     key: ec.EllipticCurvePrivateKey
 
     @classmethod
     def make(cls, days: int) -> Self:
-        """A new one, valid for so many days."""
         key = ec.generate_private_key(ec.SECP256R1())
         name = _name("robotiq_async authority")
         builder = _builder(name, name, key, datetime.now(UTC) + timedelta(days=days))
@@ -54,10 +48,10 @@ class Authority:
 
     @classmethod
     def load(cls, pair: Pair) -> Self:
-        """One that was made before.
+        """Load an authority.
 
         Raises:
-            ValueError: these are no certificate and its key.
+            ValueError: not a certificate and its key.
         """
         certificate = x509.load_pem_x509_certificate(pair.certificate)
         key = serialization.load_pem_private_key(pair.key, None)
@@ -66,19 +60,20 @@ class Authority:
         return cls(certificate, key)
 
     def pair(self) -> Pair:
-        """To be kept: the key is secret."""
+        """Certificate and key. The key is secret."""
         return _pair(self.certificate, self.key)
 
     def certify(self, common_name: str, until: datetime, server_names: Sequence[str] = ()) -> Pair:
-        """A new key, and a certificate for it.
+        """Make a key and a certificate for it.
 
         Args:
-            common_name: whose it is.
-            until: when it ends.
-            server_names: host names and IP addresses under which it opens a server; with none it opens none.
+            common_name: the owner's.
+            until: end of validity.
+            server_names: host names and IP addresses that clients connect to; empty for a client's
+                certificate.
 
         Raises:
-            ValueError: the authority ends before, or no such host can be.
+            ValueError: the authority expires earlier, or a malformed host.
         """
         end = self.certificate.not_valid_after_utc
         if until > end:
@@ -102,10 +97,10 @@ class Authority:
 
 
 def check_host(host: str) -> x509.GeneralName:
-    """A host by which a server is connected to: a number or a name.
+    """Check a host name or IP address of a server.
 
     Raises:
-        ValueError: it is neither.
+        ValueError: malformed.
     """
     try:
         return x509.IPAddress(ip_address(host))

@@ -1,10 +1,10 @@
-"""The folder of a certificate authority, and in it the folders that go to agents and clients.
+"""The folder of a certificate authority, with a folder for each agent and each client.
 
 ::
 
     FOLDER/
-        ca.pem, ca.key      the authority; whoever has ca.key can let anybody in, so it goes nowhere
-        access.toml         which client may do what
+        ca.pem, ca.key      the authority; ca.key can give anyone access, so it never leaves this folder
+        access.toml         the role of each client
         agent-cell-1/       for the host cell-1: ca.pem, cert.pem, key.pem, access.toml
         operate-bob/        for Bob: ca.pem, cert.pem, key.pem
 """
@@ -25,11 +25,11 @@ from .key_folder import ACCESS, AUTHORITY, CERTIFICATE, DAYS, KEY
 AUTHORITY_KEY: Final = "ca.key"
 AUTHORITY_DAYS: Final = 3650
 HERE: Final = ("localhost", "127.0.0.1", "::1")
-"""By these every agent can be connected to on its own machine."""
+"""Names of every agent on its own machine."""
 
 
 def has_authority(folder: Path) -> bool:
-    """Whether there is an authority in a folder, or a part of one."""
+    """Whether a folder has an authority, or a part of one."""
     return any((folder / name).exists() for name in (AUTHORITY, AUTHORITY_KEY, ACCESS))
 
 
@@ -37,20 +37,20 @@ def make_authority(folder: Path, *, days: int = AUTHORITY_DAYS) -> Path:
     """Make a certificate authority with an empty access list.
 
     Args:
-        folder: is made if it is not there.
-        days: how long it is valid.
+        folder: created if it does not exist.
+        days: validity, 1..36500.
 
     Returns:
-        Its certificate.
+        The path of its certificate.
 
     Raises:
-        FileExistsError: there is one already.
+        FileExistsError: the folder has an authority already.
         OSError: the folder cannot be written.
-        TypeError, ValueError: days are not in 1..36500.
+        TypeError, ValueError: days not in range.
     """
     days = check_int("days", days, 1, DAYS_MAX)
     if has_authority(folder):
-        raise FileExistsError(f"there is an authority in {folder} already")
+        raise FileExistsError(f"there is already an authority in {folder}")
     pair = Authority.make(days).pair()
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     _write_new(folder / AUTHORITY_KEY, pair.key, secret=True)
@@ -60,31 +60,31 @@ def make_authority(folder: Path, *, days: int = AUTHORITY_DAYS) -> Path:
 
 
 def issue(folder: Path, name: str, role: Role, *, hosts: Sequence[str] = (), days: int = DAYS) -> Path:
-    """Make a key and a certificate for an agent or a client, and enter a client in the access lists.
+    """Make a key and a certificate for an agent or a client, and add a client to the access lists.
 
     Args:
         folder: the authority's.
         name: of the agent's host, or of the client.
-        role: what it may do.
+        role: of the agent or the client.
         hosts: names and IP addresses by which clients connect to the agent; loopback is added.
-        days: how long it is valid.
+        days: validity, 1..36500.
 
     Returns:
         The folder for that machine.
 
     Raises:
-        FileExistsError: it is there already.
+        FileExistsError: the folder exists already.
         OSError: there is no authority, or the folder cannot be written.
-        TypeError, ValueError: no such name or host can be; days are not in 1..36500, or go beyond the
-            authority's; a client is given hosts; a file of the authority is malformed.
+        TypeError, ValueError: a malformed name or host; days not in range, or beyond the end of the
+            authority; hosts for a client; a malformed file of the authority.
     """
     check_subject(name)
     days = check_int("days", days, 1, DAYS_MAX)
     if hosts and role is not Role.AGENT:
-        raise ValueError(f"hosts are for agents, and {name!r} is to be a client")
+        raise ValueError(f"hosts are for agents, but {name!r} is a client")
     own = subject_folder(folder, name, role)
     if own.exists():
-        raise FileExistsError(f"{own} is there already")
+        raise FileExistsError(f"{own} already exists")
     authority = _load(folder)
     clients = AccessList.read_file(folder / ACCESS)
     server_names = tuple(dict.fromkeys((*hosts, *HERE))) if role is Role.AGENT else ()
@@ -102,22 +102,15 @@ def issue(folder: Path, name: str, role: Role, *, hosts: Sequence[str] = (), day
 
 
 def subject_folder(folder: Path, name: str, role: Role) -> Path:
-    """Where the keys of somebody are put."""
     return folder / f"{role.value}-{name}"
 
 
 def access_lists(folder: Path) -> list[Path]:
-    """The access list of an authority, and the copies in its folders for agents."""
+    """The access list of an authority, and the copies in its agents' folders."""
     return [folder / ACCESS, *sorted(folder.glob(f"{Role.AGENT.value}-*/{ACCESS}"))]
 
 
 def _load(folder: Path) -> Authority:
-    """The authority in a folder.
-
-    Raises:
-        OSError: there is none.
-        ValueError: what is there is malformed.
-    """
     try:
         return Authority.load(Pair((folder / AUTHORITY).read_bytes(), (folder / AUTHORITY_KEY).read_bytes()))
     except (TypeError, ValueError) as error:
@@ -125,7 +118,7 @@ def _load(folder: Path) -> Authority:
 
 
 def _enter(folder: Path, clients: AccessList) -> None:
-    """Write the access list wherever it is. Whenever it ends: a file has the old list or the new one."""
+    # Each file is replaced in one step, so that an interruption leaves the old list or the new one.
     for path in access_lists(folder):
         beside = path.with_suffix(".new")
         beside.write_text(clients.text(), encoding="utf-8")
@@ -133,11 +126,7 @@ def _enter(folder: Path, clients: AccessList) -> None:
 
 
 def _write_new(path: Path, data: bytes, *, secret: bool = False) -> None:
-    """Write a file that is not there yet; a secret one was never anybody else's to read.
-
-    Raises:
-        OSError: it is there, or cannot be written.
-    """
+    # Opened with its final mode: other users could read a secret between its creation and a chmod.
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600 if secret else 0o644)
     with open(descriptor, "wb") as file:
         file.write(data)

@@ -1,4 +1,4 @@
-"""What stands in the certificate of a folder of keys, and whether its files belong together."""
+"""Credentials: the certificate in a folder of keys; checks that the files there belong together."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from .key_folder import AUTHORITY, CERTIFICATE, KEY
 
 @dataclass(frozen=True, slots=True)
 class Credentials:
-    """A certificate whose key and authority lie beside it.
+    """A certificate whose key and authority are in the same folder.
 
     Attributes:
-        common_name: whose it is, as zenoh compares it.
-        begins: from when it holds.
-        ends: until when it holds; the authority's end, if that comes first.
+        common_name: the owner's, as zenoh compares it.
+        begins: start of validity.
+        ends: end of validity; that of the authority, if earlier.
     """
 
     common_name: str
@@ -31,25 +31,25 @@ class Credentials:
 
     @property
     def role(self) -> Role | None:
-        """What the certificate is for; None if that does not stand in it."""
+        """The role in the common name; None if it has none."""
         role, colon, _ = self.common_name.partition(":")
         known = {each.value: each for each in Role}
         return known.get(role) if colon else None
 
 
 def read_credentials(folder: Path) -> Credentials:
-    """What a folder of keys holds.
+    """Read a folder of keys.
 
     Raises:
         OSError: a file cannot be read.
-        ValueError: one is malformed, or they do not belong together.
+        ValueError: a file is malformed, or the files do not belong together.
     """
     authority = _certificate(folder / AUTHORITY)
     own = _certificate(folder / CERTIFICATE)
     try:
         key = serialization.load_pem_private_key((folder / KEY).read_bytes(), None)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"{KEY} is no private key without a password") from error
+        raise ValueError(f"{KEY} is not an unencrypted private key") from error
     if key.public_key() != own.public_key():
         raise ValueError(f"{KEY} is not the key of {CERTIFICATE}")
     try:
@@ -68,4 +68,4 @@ def _certificate(path: Path) -> x509.Certificate:
     try:
         return x509.load_pem_x509_certificate(path.read_bytes())
     except ValueError as error:
-        raise ValueError(f"{path.name} is no certificate") from error
+        raise ValueError(f"{path.name} is not a certificate") from error

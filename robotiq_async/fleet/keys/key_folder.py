@@ -1,4 +1,4 @@
-"""The folder of keys that a machine gets."""
+"""The folder of keys of one machine."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ from pathlib import Path
 from typing import Final
 
 AUTHORITY: Final = "ca.pem"
-"""The authority's certificate: whose word both sides go by."""
+"""The authority's certificate, which both sides trust."""
 CERTIFICATE: Final = "cert.pem"
 KEY: Final = "key.pem"
-"""Secret: whoever has it is the one whose name is in the certificate."""
+"""Secret: proves that its owner is the one named in the certificate."""
 ACCESS: Final = "access.toml"
-"""Which client may do what; only agents have it."""
+"""The access list; only agents have it."""
 DAYS: Final = 825
-"""How long a certificate is valid unless told otherwise; some systems accept none for longer."""
+"""Default validity of a certificate; some systems reject longer ones."""
 
 
 def check_key_folder(folder: Path) -> Path:
-    """A folder with keys, as an absolute path.
+    """Check a folder of keys; returns its absolute path.
 
     Raises:
-        ValueError: something is missing in it.
+        ValueError: a file is missing.
     """
     missing = [name for name in (AUTHORITY, CERTIFICATE, KEY) if not (folder / name).is_file()]
     if missing:

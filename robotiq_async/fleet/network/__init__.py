@@ -1,1 +1,1 @@
-"""How agents and clients reach each other; zenoh stops here."""
+"""The network between agents and clients; only this package knows zenoh."""

@@ -1,4 +1,4 @@
-"""Bus: what agents and clients need of a network, in one event loop. zenoh is one; tests have another."""
+"""Bus: the network as agents and clients use it, in one event loop. Over zenoh, or simulated in tests."""
 
 from __future__ import annotations
 
@@ -8,37 +8,37 @@ from enum import Enum
 from typing import Protocol
 
 Undo = Callable[[], None]
-"""Takes back what was declared."""
+"""Ends a declaration."""
 
 
 class Urgency(Enum):
-    """What goes first when there is not room for all."""
+    """Priority of a message on a full link."""
 
     STOP = "stop"
     """Halts: before everything else."""
     COMMAND = "command"
     """Commands, leases, their answers."""
     TELEMETRY = "telemetry"
-    """Statuses, events, summaries: dropped rather than waited for."""
+    """Statuses, events, summaries: dropped when the link is full."""
 
 
 class Query(Protocol):
-    """A request that has arrived; it is answered once."""
+    """A request that has arrived. Answer it once."""
 
     @property
     def key(self) -> str:
-        """The key it came under; it may be a wrong one."""
+        """The key that it arrived under; may be a wrong one."""
 
     @property
     def payload(self) -> bytes:
-        """What was asked."""
+        """The request."""
 
     def reply(self, payload: bytes, attachment: bytes = b"") -> None:
-        """Answer, without waiting for the network. Nothing happens when nobody waits any more."""
+        """Answer without waiting for the network. No effect once the client has stopped waiting."""
 
 
 class Reply(Protocol):
-    """What came back."""
+    """An answer to a request."""
 
     @property
     def payload(self) -> bytes:
@@ -46,27 +46,25 @@ class Reply(Protocol):
 
     @property
     def attachment(self) -> bytes:
-        """What was sent beside it; may be empty."""
+        """Data sent with the answer; may be empty."""
 
 
 def is_any(_reply: Reply) -> bool:
-    """The first reply will do."""
     return True
 
 
 def is_anything(_payload: bytes) -> bool:
-    """Every request is taken."""
     return True
 
 
 class Bus(Protocol):
-    """One open session. All calls and all callbacks belong to the event loop it was opened in."""
+    """One open session. Calls, and callbacks unless noted, belong to the event loop it was opened in."""
 
     def publisher(self, key: str, urgency: Urgency) -> Callable[[bytes], None]:
-        """Something that publishes under a key, and never waits."""
+        """Returns a function that publishes a payload under a key. It never blocks."""
 
     def subscribe(self, expression: str, listener: Callable[[str, bytes], None]) -> Undo:
-        """Call a listener with key and payload of whatever is published under matching keys."""
+        """Call a listener with key and payload of each message under matching keys. Returns what ends it."""
 
     def serve(
         self,
@@ -74,13 +72,13 @@ class Bus(Protocol):
         handler: Callable[[Query], None],
         allows: Callable[[bytes], bool] = is_anything,
     ) -> Undo:
-        """Call a handler with each request under matching keys.
+        """Call a handler with each request under matching keys. Returns what ends it.
 
         Args:
             expression: the keys.
-            handler: belongs to the loop.
-            allows: whether a request with this payload is taken. It may be called in any thread, before
-                anything else is done; what it does not allow is dropped.
+            handler: called in the event loop.
+            allows: whether to accept a request with this payload; others are dropped. Called first, in any
+                thread.
         """
 
     def ask(
@@ -92,33 +90,36 @@ class Bus(Protocol):
         urgency: Urgency,
         decides: Callable[[Reply], bool] = is_any,
     ) -> asyncio.Future[Reply | None]:
-        """Ask everybody who serves the key, once: after a partition there may be two.
+        """Send a request, once, to every process that serves the key: after a partition there may be two.
 
-        What is asked first, of the same urgency, arrives first: the request goes out in this call.
+        The request leaves within this call: requests of the same urgency arrive in the order of the calls.
 
         Args:
-            key: of whoever is asked.
-            payload: what is asked.
+            key: where to send it.
+            payload: the request.
             timeout: seconds.
             urgency: of the request and its answers.
-            decides: whether a reply is the one that is waited for. When all have answered, or the time is
-                over, it is the last one that came.
+            decides: whether a reply ends the wait. Without such a reply, the result is the last one that
+                came, once all processes have answered or the time is over.
 
         Returns:
-            The reply; None when nobody serves the key, or may be asked, or answers in time.
+            The reply; None if no process serves the key, access is denied, or no answer came in time.
         """
 
     def announce(self, key: str) -> Undo:
-        """Let others see this key for as long as this process lives and can be reached."""
+        """Show a key to others for as long as this process lives and can be reached. Returns what ends it."""
 
     async def announced(self, expression: str, *, timeout: float) -> list[str]:
-        """The matching keys that are announced now."""
+        """The matching keys that are announced now; ``timeout`` is in seconds."""
 
     def watch(self, expression: str, listener: Callable[[str, bool], None]) -> Undo:
-        """Call a listener with each matching key that is announced, also before this, and that is gone."""
+        """Call a listener with each matching key and True when it is announced, False when it is gone.
+
+        Keys announced before this call are included. Returns what ends it.
+        """
 
     async def unreached(self) -> list[str]:
-        """The endpoints that it was told to connect to, and to which there is no connection now."""
+        """The endpoints of the configuration that have no connection now."""
 
     async def close(self) -> None:
-        """Take back everything and close. Idempotent; takes a second at most."""
+        """End all declarations and close; takes a second at most. Idempotent."""

@@ -1,4 +1,4 @@
-"""How a session of zenoh is set up: loopback and nothing else, unless asked; then with certificates."""
+"""Configuration of zenoh sessions: loopback only by default, certificates beyond that."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ PORT: Final = 7447
 LOOPBACK: Final = f"tcp/127.0.0.1:{PORT}"
 LOOPBACK_TLS: Final = f"tls/127.0.0.1:{PORT}"
 QUEUED: Final = 16
-"""Halts, and commands, that may lie in a link until its thread gets a turn; zenoh's own default is two."""
+"""Halts, and commands, that may wait in a link until its thread runs; zenoh's default is 2."""
 UNKNOWN: Final = 1000
-"""Connections that have not said who they are; zenoh's own default is 100, and then it accepts no others."""
+"""Connections that have not identified themselves; at the limit, by default 100, zenoh accepts no others."""
 UNKNOWN_MS: Final = 5000
-"""They are closed after this time; zenoh's own default is ten seconds."""
+"""Time in ms after which those are closed; zenoh's default is 10 s."""
 LINK_LEASE_MS: Final = 1000
-"""A side that is frozen or unplugged is noticed after this time; zenoh's own default is ten seconds."""
+"""Time in ms after which a frozen or unplugged peer is detected; zenoh's default is 10 s."""
 
 
 def agent_configuration(
@@ -33,22 +33,23 @@ def agent_configuration(
     keys: Path | None = None,
     insecure: bool = False,
 ) -> dict[str, object]:
-    """The configuration of an agent's session.
+    """Configuration of an agent's session.
 
     Args:
         site: the site's name.
         host: the host's name.
-        listen: endpoints where clients come in.
-        connect: endpoints of routers; with none to listen on, the agent is reached through the router alone.
-        keys: the agent's folder of keys; clients may then do what its access list says, and nothing else.
+        listen: endpoints for clients.
+        connect: endpoints of routers. With no ``listen`` endpoint, the agent is reached through the router
+            alone.
+        keys: the agent's folder of keys; clients may then do only what its access list permits.
         insecure: see :func:`~robotiq_async.fleet.network.endpoints.check_listen`.
 
     Raises:
-        TypeError, ValueError: an endpoint that is malformed or not protected; a folder that lacks a file.
+        TypeError, ValueError: a malformed or unprotected endpoint; a folder that lacks a file.
     """
     listen = check_listen(listen, has_keys=keys is not None, insecure=insecure)
     connect = check_connect(connect, has_keys=keys is not None, insecure=insecure)
-    # A router carries nothing from peer to peer; one of the two has to be its client, and clients are peers.
+    # A router forwards nothing between peers. Our clients are peers, so the agent is a client of the router.
     mode = "client" if connect and not listen else "peer"
     session = session_configuration(listen, connect, keys) | {"mode": mode}
     if keys is None:
@@ -60,7 +61,7 @@ def agent_configuration(
 def client_configuration(
     connect: Sequence[str] = (LOOPBACK,), *, keys: Path | None = None, insecure: bool = False
 ) -> dict[str, object]:
-    """The configuration of a client's session; it listens nowhere.
+    """Configuration of a client's session; it does not listen.
 
     Args:
         connect: endpoints of agents, or of a router.
@@ -77,12 +78,8 @@ def client_configuration(
 def session_configuration(
     listen: Sequence[str], connect: Sequence[str], keys: Path | None = None
 ) -> dict[str, object]:
-    """The configuration of a peer that listens and connects where it is told, and looks for nobody.
-
-    Raises:
-        ValueError: the folder of keys lacks a file.
-    """
-    # A message that finds no room within a millisecond is dropped, and each request takes a batch of its own.
+    """Configuration of a peer without discovery: it uses only the endpoints given."""
+    # zenoh drops a message that finds no room within 1 ms, and each request takes a batch of its own.
     room = {"real_time": QUEUED, "interactive_high": QUEUED}
     link: dict[str, object] = {"tx": {"lease": LINK_LEASE_MS, "queue": {"size": room}}}
     if keys is not None:
@@ -90,7 +87,7 @@ def session_configuration(
     return {
         "mode": "peer",
         "listen": {"endpoints": list(listen), "timeout_ms": 0, "exit_on_failure": True},
-        # For ever: whoever is not there now may come.
+        # No limit: an agent that is not running now may be started later.
         "connect": {"endpoints": list(connect), "timeout_ms": -1, "exit_on_failure": False},
         "scouting": {"delay": 50, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
         "transport": {"link": link, "unicast": {"accept_pending": UNKNOWN, "accept_timeout": UNKNOWN_MS}},
@@ -98,15 +95,15 @@ def session_configuration(
 
 
 def _tls(folder: Path) -> Mapping[str, object]:
-    """Mutual TLS: both sides show a certificate of the same authority, or there is no connection."""
+    # Mutual TLS: both sides need a certificate of the same authority to connect.
     own = {"certificate": str(folder / CERTIFICATE), "private_key": str(folder / KEY)}
     return {
         "root_ca_certificate": str(folder / AUTHORITY),
         "enable_mtls": True,
-        # The name or number that is connected to must stand in the agent's certificate, or the agent of one
-        # host could be taken for that of another.
+        # The host name or IP address of the connection must be in the agent's certificate. Otherwise the
+        # agent of one host could pass for that of another.
         "verify_name_on_connect": True,
-        # Who was let in until Friday is not to stay over the weekend.
+        # An open link would otherwise outlive the certificate.
         "close_link_on_expiration": True,
         **{f"{side}_{what}": path for side in ("listen", "connect") for what, path in own.items()},
     }

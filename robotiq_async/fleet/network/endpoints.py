@@ -1,4 +1,4 @@
-"""Where zenoh listens and connects, and what is refused there: nothing leaves this machine unprotected."""
+"""Endpoints of zenoh, checked: beyond this machine they must be protected."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ...runtime.sockets import is_loopback
 
 FORMS: Final = "tcp/HOST:PORT, tls/HOST:PORT or quic/HOST:PORT"
 _ENDPOINT: Final = re.compile(r"(tcp|tls|quic)/(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9_.-]+):([0-9]{1,5})")
-"""What zenoh takes behind a ? or a # is left out: some of it would take the protection away."""
+"""Options of zenoh after a ? or a # are refused: some of them would turn the protection off."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,9 +19,9 @@ class Endpoint:
     """A checked endpoint.
 
     Attributes:
-        text: as it was written, and as zenoh takes it.
+        text: the endpoint as zenoh takes it.
         protocol: "tcp", "tls" or "quic".
-        host: name or number, without brackets.
+        host: name or IP address, without brackets.
     """
 
     text: str
@@ -30,21 +30,21 @@ class Endpoint:
 
     @property
     def is_encrypted(self) -> bool:
-        """Whether both sides show a certificate there."""
+        """Whether both sides need a certificate."""
         return self.protocol != "tcp"
 
     @property
     def is_loopback(self) -> bool:
-        """Whether only programs on this machine can be on the other side."""
+        """Whether only programs on this machine can connect."""
         return is_loopback(self.host)
 
 
 def parse_endpoint(what: str, text: object) -> Endpoint:
-    """The endpoint in a string; ``what`` is for the message.
+    """Parse an endpoint; ``what`` names it in messages.
 
     Raises:
         TypeError: not a string.
-        ValueError: malformed; the message shows the forms.
+        ValueError: malformed; the message shows the accepted forms.
     """
     if not isinstance(text, str):
         raise TypeError(f"{what} must be {FORMS}, got {text!r}")
@@ -55,26 +55,26 @@ def parse_endpoint(what: str, text: object) -> Endpoint:
 
 
 def check_listen(endpoints: Sequence[object], *, has_keys: bool, insecure: bool = False) -> tuple[str, ...]:
-    """Where an agent listens: on this machine only, unless it has keys.
+    """Check endpoints to listen on: without keys, only this machine is allowed.
 
     Args:
         endpoints: of zenoh.
         has_keys: whether there are certificates for mutual TLS.
-        insecure: the word of whoever runs it that nobody else is on that network.
+        insecure: the operator vouches for everyone on that network.
 
     Raises:
-        TypeError: one is not a string.
-        ValueError: one is malformed, or not protected.
+        TypeError: an endpoint is not a string.
+        ValueError: an endpoint is malformed or unprotected.
     """
     return _check("listen", endpoints, has_keys=has_keys, insecure=insecure)
 
 
 def check_connect(endpoints: Sequence[object], *, has_keys: bool, insecure: bool = False) -> tuple[str, ...]:
-    """Where an agent or a client connects; see :func:`check_listen`, for others could read and write there.
+    """Check endpoints to connect to; as :func:`check_listen`, because others could read and write there.
 
     Raises:
-        TypeError: one is not a string.
-        ValueError: one is malformed, or not protected.
+        TypeError: an endpoint is not a string.
+        ValueError: an endpoint is malformed or unprotected.
     """
     return _check("connect", endpoints, has_keys=has_keys, insecure=insecure)
 
@@ -89,17 +89,12 @@ def _check(what: str, endpoints: Sequence[object], *, has_keys: bool, insecure: 
 
 
 def _check_protected(what: str, endpoint: Endpoint, *, has_keys: bool, insecure: bool) -> None:
-    """Refuse an endpoint that is not protected, or that its protection does not fit.
-
-    Raises:
-        ValueError: it is not.
-    """
     if endpoint.is_encrypted and not has_keys:
         raise ValueError(f"{what} {endpoint.text!r} needs keys: certificates of both sides")
     if has_keys and not endpoint.is_encrypted:
-        raise ValueError(f"{what} {endpoint.text!r} must begin with tls/: tcp/ knows no certificates")
+        raise ValueError(f"{what} {endpoint.text!r} must begin with tls/: tcp/ has no certificates")
     if not (endpoint.is_encrypted or endpoint.is_loopback or insecure):
         raise ValueError(
-            f"{what} {endpoint.text!r} is open to everybody on that network, who could read and command: "
-            "use keys and tls/, or say insecure"
+            f"{what} {endpoint.text!r} is open to everyone on that network, to read and to command: "
+            "use keys and tls/, or set insecure"
         )

@@ -1,4 +1,4 @@
-"""What zenoh calls the other end of a connection: the endpoint, with a number in place of a name."""
+"""Locators: zenoh's names for the other end of a connection, endpoints with an IP address as host."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from ...link.host_names import addresses_of
 from .endpoints import parse_endpoint
 
 RESOLVED_S: Final = 1.0
-"""A name that takes longer is taken for unknown."""
+"""Seconds to resolve a host name; one that takes longer counts as unknown."""
 
 
 async def locators(endpoint: str) -> set[str]:
-    """What the other end of a connection to an endpoint may be called; empty if nobody knows its name."""
+    """All locators that a connection to an endpoint may have; empty if its host name is unknown."""
     checked, port = parse_endpoint("connect", endpoint), endpoint.rpartition(":")[2]
     try:
         async with asyncio.timeout(RESOLVED_S):

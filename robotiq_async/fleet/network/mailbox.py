@@ -1,4 +1,4 @@
-"""Mailbox: carries what zenoh's threads bring into the event loop."""
+"""Mailbox: brings messages from zenoh's threads into the event loop."""
 
 from __future__ import annotations
 
@@ -14,30 +14,31 @@ from ...runtime.log import log
 from ..limited_log import EVERY_S, LimitedLog
 
 GATHER_S: Final = 0.001
-"""How long news are gathered where they come thick and fast."""
+"""Seconds for which telemetry is collected under load, to wake the loop once for all of it."""
 TURN_S: Final = 0.002
-"""How long deliveries are made in one turn of the loop: the rest of the program has its turn, too."""
+"""Seconds of deliveries in one turn of the loop: the rest of the program must run, too."""
 MOST: Final = 2000
-"""At most this many requests and news may lie there; the rest is dropped, as on a network that is full."""
+"""Requests and telemetry that may wait. Beyond that they are dropped, as on a full network."""
 
 
 class Kind(Enum):
-    """What a delivery is."""
+    """Kind of a delivery."""
 
     HALT = "halt"
-    """Opened before all others."""
+    """Delivered before all others."""
     ANSWER = "answer"
-    """To something of ours: never dropped."""
+    """To a request of this process: never dropped."""
     REQUEST = "request"
     TELEMETRY = "telemetry"
-    """May wait for a millisecond."""
+    """May wait 1 ms."""
 
 
 class Mailbox:
-    """Letters, in their order but for halts.
+    """Deliveries in the order of arrival, halts first.
 
-    Waking the loop costs more than handling a status. Where news come thick and fast, from dozens of hands,
-    it wakes for those of a millisecond at once; nothing else waits for that, nor do the news of one hand.
+    Waking the loop costs more than handling a status. Under load, with telemetry from dozens of hands, the
+    loop is woken once for all that arrives within a millisecond. Requests, answers and the telemetry of a
+    single hand never wait for that.
     """
 
     def __init__(self) -> None:
@@ -52,16 +53,17 @@ class Mailbox:
         self._failed = LimitedLog()
 
     def put(self, delivery: Callable[[], None], kind: Kind) -> bool:
-        """Have something called in the loop. From any thread. Returns whether there was room for it."""
+        """Call a function in the loop; thread-safe. False if the mailbox is full: the call is dropped."""
         deliveries = self._halts if kind is Kind.HALT else self._deliveries
         if kind is Kind.ANSWER or len(deliveries) < MOST:
             deliveries.append(delivery)
         else:
             self._dropped += 1
             return False
+        # Telemetry waits for a timer that is already set. Anything else wakes the loop before that.
         if not self._is_due or (kind is not Kind.TELEMETRY and self._gathering is not None):
             self._is_due = True
-            with contextlib.suppress(RuntimeError):  # the loop has been closed
+            with contextlib.suppress(RuntimeError):  # the loop is closed
                 self._loop.call_soon_threadsafe(self._open)
         return True
 
@@ -77,13 +79,15 @@ class Mailbox:
             count += 1
             try:
                 delivery()
-            except Exception:  # noqa: BLE001  # the next delivery is another's
+            except Exception:  # noqa: BLE001  # must not stop the deliveries after it
                 self._failed.warn("handling a fleet message failed", exc_info=True)
             if time.perf_counter() > until:
                 break
+        # A delivery may have put another one, so _is_due may be set again.
         if (self._halts or self._deliveries) and not self._is_due:
             self._is_due = True
             self._loop.call_soon(self._open)
+        # Two openings in close succession mean load: collect, instead of waking the loop for each message.
         elif count and not self._is_due and self._opened_at - before < 2 * GATHER_S:
             self._is_due = True
             self._gathering = self._loop.call_later(GATHER_S, self._open)

@@ -1,4 +1,4 @@
-"""A query on its way, and the replies to it. Several may answer; one reply is waited for."""
+"""PendingQuery: a query without a result yet. Several processes may reply to it; one reply is the result."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from .bus import Reply
 
 
 class PendingQuery:
-    """Waits for the reply that decides; without one, when all have answered, it is the last that came.
+    """Waits for the reply that decides; without such a reply, the result is the last one.
 
     Attributes:
-        answered: what came of it; None if nothing did.
+        answered: the reply; None if none came.
     """
 
     def __init__(self, decides: Callable[[Reply], bool]) -> None:
@@ -21,13 +21,12 @@ class PendingQuery:
         self._last: Reply | None = None
 
     def take(self, reply: Reply) -> None:
-        """A reply has come."""
         if not self.answered.done():
             self._last = reply
             if self._decides(reply):
                 self.answered.set_result(reply)
 
     def end(self) -> None:
-        """No more replies come."""
+        """No more replies will come."""
         if not self.answered.done():
             self.answered.set_result(self._last)

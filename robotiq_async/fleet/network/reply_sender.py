@@ -12,12 +12,12 @@ from collections.abc import Callable
 from typing import Final
 
 MOST: Final = 1000
-"""Replies that may wait. Beyond it the query is dropped, which happens in the thread too: zenoh tells the
-client of it, so it can block as long. Clients repeat their requests."""
+"""Replies that may wait. Beyond that the query is dropped, also in this thread: zenoh notifies the client of
+it, which can block for as long. Clients repeat their requests."""
 
 
 class ReplySender:
-    """One thread, started with the first answer."""
+    """One thread, started with the first reply."""
 
     def __init__(self) -> None:
         self._waiting: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
@@ -31,11 +31,11 @@ class ReplySender:
         self._waiting.put(send if self._waiting.qsize() < MOST else drop)
 
     def close(self) -> None:
-        """Send what waits, then end the thread."""
+        """Send the waiting replies, then end the thread."""
         self._waiting.put(None)
 
     def join(self, timeout: float) -> None:
-        """Wait for the end of the thread; blocks."""
+        # Blocks: call it outside the event loop.
         if self._thread is not None:
             self._thread.join(timeout)
 

@@ -1,4 +1,4 @@
-"""Addresses of hands on other hosts, with how to get there."""
+"""Route: addresses of hands on other hosts, and how to reach them."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _OPTIONS: Final = frozenset({"connect", "keys", "insecure"})
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """How to get to agents.
+    """How to reach agents.
 
     Attributes:
         connect: zenoh endpoints of agents or routers; empty for an agent on this machine.
         keys: folder with the certificates of this client; None for none.
-        insecure: whether to go beyond loopback without certificates.
+        insecure: whether to connect beyond this machine without certificates.
     """
 
     connect: tuple[str, ...] = ()
@@ -33,11 +33,11 @@ class Route:
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """Where it leads: to an agent on this machine, if nothing else was said."""
+        """The endpoints to connect to; by default an agent on this machine."""
         return self.connect or (LOOPBACK if self.keys is None else LOOPBACK_TLS,)
 
     def configuration(self) -> dict[str, object]:
-        """The configuration of a session that takes this route.
+        """The zenoh configuration of a client session on this route.
 
         Raises:
             TypeError, ValueError: a malformed or unprotected endpoint, or a folder that lacks a file.
@@ -46,7 +46,7 @@ class Route:
 
 
 def default_route() -> Route:
-    """The route that the environment names, else loopback."""
+    """The route in the environment, else an agent on this machine."""
     connect = tuple(filter(None, os.environ.get(CONNECT_VARIABLE, "").split(",")))
     keys = os.environ.get(KEYS_VARIABLE)
     return Route(connect, Path(keys) if keys else None)
@@ -58,7 +58,7 @@ def is_remote(address: object) -> bool:
 
 
 def parse_remote_address(address: object) -> tuple[GripperName, Route]:
-    """The gripper, and how to get there; what the address does not say the environment does.
+    """Parse an address into gripper and route. The environment supplies what the address leaves out.
 
     Raises:
         TypeError: not a string.

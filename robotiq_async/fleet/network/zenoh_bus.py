@@ -1,7 +1,7 @@
-"""The bus over zenoh; nothing of zenoh goes beyond this file.
+"""ZenohBus: the bus over zenoh. No other module imports zenoh.
 
-zenoh calls back in threads of its own. Nothing is done there: what came is put into a mailbox, and the event
-loop is woken once for all that lies in it.
+zenoh calls back in threads of its own. The callbacks only put each message into a mailbox, which wakes the
+event loop once for all that wait.
 """
 
 from __future__ import annotations
@@ -30,34 +30,31 @@ from .pending_query import PendingQuery
 from .reply_sender import ReplySender
 
 CLOSE_S: Final = 1.0
+"""Seconds for closing a session."""
 LAST_ANSWERS_S: Final = 0.2
-"""For the answers to what an end has called off."""
+"""Seconds to send the answers to requests that are cancelled at the end."""
 LONGEST: Final = 4096
-"""Bytes of a request; what is longer is none, and is not looked at."""
+"""Bytes of a request; a longer one is dropped unread."""
 _PRIORITY: Final = {
     Urgency.STOP: zenoh.Priority.REAL_TIME,
     Urgency.COMMAND: zenoh.Priority.INTERACTIVE_HIGH,
     Urgency.TELEMETRY: zenoh.Priority.DATA,
 }
 _EXPRESS: Final = (Urgency.STOP, Urgency.COMMAND)
-"""Not batched with others."""
+"""Sent at once, not batched."""
 
 
 async def open_bus(configuration: Mapping[str, object], what: str) -> ZenohBus:
-    """Open a session.
-
-    Args:
-        configuration: zenoh's.
-        what: is opened, for the message.
+    """Open a session; ``what`` names it in messages.
 
     Raises:
-        ConnectFailedError: it cannot be opened: an address in use, a malformed certificate.
+        ConnectFailedError: an address in use, or a malformed certificate, for example.
     """
 
     def open_session() -> zenoh.Session:
         return zenoh.open(zenoh.Config.from_json5(json.dumps(configuration)))
 
-    opening = in_a_thread(open_session)  # which waits for a router that is not there
+    opening = in_a_thread(open_session)  # blocks while a router is out of reach
     try:
         session = await asyncio.shield(opening)
     except zenoh.ZError as error:
@@ -69,7 +66,6 @@ async def open_bus(configuration: Mapping[str, object], what: str) -> ZenohBus:
 
 
 def _endpoints(configuration: Mapping[str, Any]) -> Sequence[str]:
-    """Where a session is to connect to."""
     endpoints: Sequence[str] = configuration["connect"]["endpoints"]
     return endpoints
 
@@ -80,14 +76,12 @@ def _close_opened(opening: asyncio.Future[zenoh.Session]) -> None:
 
 
 def _drop(query: zenoh.Query) -> None:
-    """Answer nothing, and say so."""
+    # Without an answer zenoh ends the query of the client at once.
     with contextlib.suppress(zenoh.ZError):
         query.drop()  # type: ignore[no-untyped-call]
 
 
 class _Query:
-    """A query that has arrived."""
-
     def __init__(self, query: zenoh.Query, reply_sender: ReplySender) -> None:
         self._query = query
         self._reply_sender = reply_sender
@@ -98,38 +92,35 @@ class _Query:
         query, key = self._query, self.key
 
         def send() -> None:
-            with contextlib.suppress(zenoh.ZError), query:  # the asker is gone
+            with contextlib.suppress(zenoh.ZError), query:  # the client is gone
                 query.reply(key, payload, attachment=attachment)
 
         self._reply_sender.put(send, functools.partial(_drop, query))
 
 
 class _Reply:
-    """A reply that has come back."""
-
     def __init__(self, sample: zenoh.Sample) -> None:
         self.payload = sample.payload.to_bytes()
         self.attachment = b"" if sample.attachment is None else sample.attachment.to_bytes()
 
 
 class ZenohBus:
-    """An open session."""
+    """An open session: :class:`~robotiq_async.fleet.network.bus.Bus` over zenoh."""
 
     def __init__(self, session: zenoh.Session, endpoints: Sequence[str] = ()) -> None:
         self._session = session
         self._endpoints = endpoints
         self._mailbox = Mailbox()
-        # A halt is acknowledged also where others do not read their answers.
+        # Halts have a sender of their own: clients that do not read their answers must not delay these.
         self._repliers = {True: ReplySender(), False: ReplySender()}
         self._dropping = ReplySender()
         self._closing: asyncio.Future[None] | None = None
 
     def publisher(self, key: str, urgency: Urgency) -> Callable[[bytes], None]:
-        """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
         publisher = self._session.declare_publisher(
             key,
             priority=_PRIORITY[urgency],
-            # A reader that stands still must not hold up the loop that polls.
+            # A stalled reader must not block the loop that polls.
             congestion_control=zenoh.CongestionControl.DROP,
             express=urgency in _EXPRESS,
         )
@@ -137,16 +128,14 @@ class ZenohBus:
         put = publisher.put
 
         def publish(payload: bytes) -> None:
-            try:  # noqa: SIM105  # runs most often of all, and suppress() takes 0.3 us
+            try:  # noqa: SIM105  # the most frequent call, and suppress() takes 0.3 us
                 put(payload)
             except zenoh.ZError:
-                pass  # closed meanwhile
+                pass  # the session is closed
 
         return publish
 
     def subscribe(self, expression: str, listener: Callable[[str, bytes], None]) -> Undo:
-        """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
-
         def deliver(sample: zenoh.Sample) -> None:
             delivery = functools.partial(_deliver, listener, sample)
             self._mailbox.put(delivery, Kind.TELEMETRY)
@@ -159,7 +148,6 @@ class ZenohBus:
         handler: Callable[[Query], None],
         allows: Callable[[bytes], bool] = is_anything,
     ) -> Undo:
-        """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
         is_halt = expression.endswith("/halt")
         reply_sender, kind = self._repliers[is_halt], Kind.HALT if is_halt else Kind.REQUEST
 
@@ -171,8 +159,8 @@ class ZenohBus:
                 and self._mailbox.put(lambda: handler(_Query(query, reply_sender)), kind)
             ):
                 return
-            # Not here: whoever asked is told, and where nobody reads that takes until the link is given up.
-            # zenoh hears nobody else meanwhile.
+            # Dropping notifies the client, and blocks while that does not read, until its link is closed.
+            # In this thread it would keep zenoh from receiving anything else.
             self._dropping.put(drop := functools.partial(_drop, query), drop)
 
         return self._undo(self._session.declare_queryable(expression, _direct(deliver)))
@@ -186,7 +174,6 @@ class ZenohBus:
         urgency: Urgency,
         decides: Callable[[Reply], bool] = is_any,
     ) -> asyncio.Future[Reply | None]:
-        """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
         asking = PendingQuery(decides)
 
         def arrive(reply: zenoh.Reply) -> None:
@@ -210,15 +197,13 @@ class ZenohBus:
                 congestion_control=zenoh.CongestionControl.DROP,
             )
         except zenoh.ZError:
-            asking.end()  # closed
+            asking.end()  # the session is closed
         return asking.answered
 
     def announce(self, key: str) -> Undo:
-        """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
         return self._undo(self._session.liveliness().declare_token(key))
 
     async def announced(self, expression: str, *, timeout: float) -> list[str]:
-        """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
         found: list[str] = []
         ended = asyncio.Event()
 
@@ -226,7 +211,7 @@ class ZenohBus:
             if reply.ok is not None:
                 found.append(str(reply.ok.key_expr))
 
-        # Not into a channel of zenoh's: it holds 256, get() itself fills it, and would wait there for ever.
+        # Not a channel of zenoh: it holds 256, and get() fills it itself, so it would wait forever.
         handler = Callback(arrive, lambda: self._mailbox.put(ended.set, Kind.ANSWER), indirect=False)
         with contextlib.suppress(TimeoutError, zenoh.ZError):
             self._session.liveliness().get(expression, handler, timeout=timeout)
@@ -235,8 +220,6 @@ class ZenohBus:
         return list(found)
 
     def watch(self, expression: str, listener: Callable[[str, bool], None]) -> Undo:
-        """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
-
         def deliver(sample: zenoh.Sample) -> None:
             key, is_there = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
             self._mailbox.put(lambda: listener(key, is_there), Kind.ANSWER)
@@ -245,12 +228,10 @@ class ZenohBus:
         return self._undo(liveliness.declare_subscriber(expression, _direct(deliver), history=True))
 
     async def unreached(self) -> list[str]:
-        """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
         there = {str(link.dst) for link in self._session.info.links()}
         return [each for each in self._endpoints if there.isdisjoint(await locators(each))]
 
     async def close(self) -> None:
-        """See :class:`~robotiq_async.fleet.network.bus.Bus`."""
         if self._closing is None:
             self._closing = asyncio.ensure_future(asyncio.to_thread(self._close))
         with contextlib.suppress(TimeoutError, zenoh.ZError):
@@ -278,5 +259,5 @@ def _deliver(listener: Callable[[str, bytes], None], sample: zenoh.Sample) -> No
 
 
 def _direct(deliver: Callable[[Any], None]) -> Any:  # noqa: ANN401
-    """Called in zenoh's own thread: the thread that it would take instead does not end with the program."""
+    # In zenoh's own thread: the thread that it would start otherwise does not end with the program.
     return Callback(deliver, indirect=False)

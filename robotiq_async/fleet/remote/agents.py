@@ -25,7 +25,7 @@ class Agents:
         self._two = two
         self._tokens: set[str] = set()
         self._log = LimitedLog(Log(str(name)))
-        self.end: Undo = bus.watch(name.key("alive", "*"), self._see)
+        self.end: Undo = bus.watch(name.key("alive", "*"), self._update_token)
 
     async def check_one(self) -> None:
         """Refuse to begin to command while two serve the gripper.
@@ -38,7 +38,7 @@ class Agents:
         if len(self._tokens) > 1:
             raise AgentError(f"{self._name}: {TWO_AGENTS}; nothing was done")
 
-    def _see(self, token: str, is_there: bool) -> None:
+    def _update_token(self, token: str, is_there: bool) -> None:
         before = len(self._tokens)
         (self._tokens.add if is_there else self._tokens.discard)(token)
         if before < 2 <= len(self._tokens):

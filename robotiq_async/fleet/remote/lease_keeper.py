@@ -25,7 +25,7 @@ ANSWER_S: Final = 0.5
 """For an answer that the agent gives at once; asked again within the time that there is."""
 RELEASE_S: Final = 0.9
 """With the second that closing a session of zenoh may take, within the two of a stop."""
-BY_OTHERS: Final = ("taken", "halted", "held", "restarted")
+NOT_REACQUIRED: Final = ("taken", "halted", "held", "restarted")
 """Reasons for which nobody comes back without having been asked to."""
 
 
@@ -50,7 +50,7 @@ class AgentClient(Protocol):
     async def answer(self, posted: PendingRequest) -> Any:  # noqa: ANN401
         """Wait for the answer to a request."""
 
-    def end_calls(self, lease: int, error: ControlLostError) -> None:
+    def fail_calls(self, lease: int, error: ControlLostError) -> None:
         """A lease has ended: who waits for something that was asked under it is told."""
 
     async def ask_quietly(self, verb: str, arguments: Fields, timeout: float) -> None:
@@ -76,13 +76,13 @@ class LeaseKeeper:
         self._run = run
         self._log = Log(str(run.name))
         self._wants_control = wants_control
-        self._may_return = True
+        self._may_reacquire = True
         self._lease_run = 0
         """The run of the agent that the number is of."""
         self._acquiring = asyncio.Lock()
-        self._returning: asyncio.Task[Any] | None = None
-        self._finding_out: asyncio.Task[Any] | None = None
-        self._giving_back: asyncio.Task[Any] | None = None
+        self._reacquiring: asyncio.Task[Any] | None = None
+        self._checking: asyncio.Task[Any] | None = None
+        self._releasing: asyncio.Task[Any] | None = None
         """How the lease is given back now, or was last."""
         self._ending: Ending | None = None
         self._is_ending = False
@@ -103,19 +103,19 @@ class LeaseKeeper:
                     raise
 
     def end(self, ending: Ending) -> None:
-        """The run ends: give the lease back, at once; see :meth:`give_back`."""
-        if not self._is_ending and self._giving_back is not None and self._giving_back.done():
-            self._giving_back = None  # that was another end, and is over
+        """The run ends: give the lease back, at once; see :meth:`release`."""
+        if not self._is_ending and self._releasing is not None and self._releasing.done():
+            self._releasing = None  # that was another end, and is over
         self._is_ending = True
-        self.give_back(ending)
+        self.release(ending)
 
     def abandon(self) -> None:
         """Nothing can be sent any more."""
         self.is_in_control = self._wants_control = False
 
-    def stay_away(self) -> None:
+    def forbid_reacquiring(self) -> None:
         """If the lease is lost, it is not acquired again without that being asked for."""
-        self._may_return = False
+        self._may_reacquire = False
 
     async def acquire(self, *, take: bool = False) -> None:
         """Get the lease.
@@ -132,7 +132,7 @@ class LeaseKeeper:
                 return  # asked for again, the agent would take what is under way for forgotten
             await self._acquire({"what": "take" if take else "acquire"})
 
-    def give_back(self, ending: Ending) -> None:
+    def release(self, ending: Ending) -> None:
         """Give the lease back, if this client holds it; sent in this very call.
 
         Asked for again, before that is acknowledged or before the run is over, the strongest ending counts.
@@ -140,51 +140,51 @@ class LeaseKeeper:
         self._wants_control = False
         if self.is_in_control:
             self.lose("released", "it was given back")
-            self._giving_back, self._ending = None, None
-        elif self._giving_back is None or (self._giving_back.done() and not self._is_ending):
-            self._giving_back = None
+            self._releasing, self._ending = None, None
+        elif self._releasing is None or (self._releasing.done() and not self._is_ending):
+            self._releasing = None
             return
         if self._ending is None or ending > self._ending:
             self._ending = ending
             what = {"what": "release", "halt": ending > Ending.LEAVE, "keep_grip": ending is Ending.KEEP}
             posted = self._run.post(self._run.call(what), "lease", timeout=RELEASE_S)
-            self._giving_back = self._run.spawn(self._run.answer(posted))
+            self._releasing = self._run.spawn(self._run.answer(posted))
             # Who asked for a gentler end is not told of its failure, but of how this one went.
-            self._giving_back.add_done_callback(lambda task: task.cancelled() or task.exception())
+            self._releasing.add_done_callback(lambda task: task.cancelled() or task.exception())
         elif ending < self._ending:
             self._log.warning("a stop that is under way is stronger: the fingers are %s", self._ending.done)
 
-    async def given_back(self) -> None:
+    async def released(self) -> None:
         """Wait until the end that was asked for is acknowledged.
 
         Raises:
             RobotiqError: the agent did not answer, or the fingers were not seen to stop.
         """
         awaited = None
-        while self._giving_back is not awaited:
-            awaited = self._giving_back
+        while self._releasing is not awaited:
+            awaited = self._releasing
             assert awaited is not None
             await asyncio.wait({awaited})
         if awaited is not None:
             awaited.result()
 
-    def look(self) -> None:
+    def maintain(self) -> None:
         """Renew the lease, or acquire it again when that is due; several times in a window."""
         if self.is_in_control:
             # Also while others are under way: one that is lost is not to cost the lease.
             self._run.spawn(self._renew())
             return
-        is_returning = self._returning is not None and not self._returning.done()
-        wants_back = self._wants_control and self._may_return
-        if wants_back and not self._run.mirror.is_silent and not is_returning:
-            self._returning = self._run.spawn(self._acquire_again())
+        is_reacquiring = self._reacquiring is not None and not self._reacquiring.done()
+        wants_back = self._wants_control and self._may_reacquire
+        if wants_back and not self._run.mirror.is_silent and not is_reacquiring:
+            self._reacquiring = self._run.spawn(self._reacquire())
 
-    def hear(self, lease: int) -> None:
+    def receive(self, lease: int) -> None:
         """The agent has told the number of the present lease."""
-        is_asking = self._finding_out is not None and not self._finding_out.done()
-        if self.is_in_control and lease > self.lease and not is_asking:
+        is_checking = self._checking is not None and not self._checking.done()
+        if self.is_in_control and lease > self.lease and not is_checking:
             # The answer to a request under the former one says why it ended.
-            self._finding_out = self._run.spawn(self._find_out())
+            self._checking = self._run.spawn(self._check_lease())
 
     def lose(self, reason: str, why: str) -> None:
         """The lease has ended."""
@@ -192,9 +192,9 @@ class LeaseKeeper:
             return
         self.is_in_control = False
         # After a halt or a take of somebody else nobody takes it back without having been asked to.
-        self._wants_control = self._wants_control and reason not in (*BY_OTHERS, "released")
+        self._wants_control = self._wants_control and reason not in (*NOT_REACQUIRED, "released")
         self.lost = ControlLostError(f"lost control of {self._run.name}: {why}", reason)
-        self._run.end_calls(self.lease, self.lost)
+        self._run.fail_calls(self.lease, self.lost)
         if reason != "released":
             self._log.warning("lost control: %s", why)
 
@@ -220,14 +220,14 @@ class LeaseKeeper:
         with reading("a lease"):
             self.lease, self._lease_run = int(value["lease"]), self._run.mirror.epoch
         if not self._is_ending:
-            self.is_in_control, self._wants_control, self._may_return, self.lost = True, True, True, None
+            self.is_in_control, self._wants_control, self._may_reacquire, self.lost = True, True, True, None
 
-    async def _acquire_again(self) -> None:
+    async def _reacquire(self) -> None:
         try:
             async with self._acquiring:
                 await self._acquire({"what": "acquire", "again": self.lease, "run": self._lease_run})
         except ControlLostError as error:
-            if error.reason in BY_OTHERS:
+            if error.reason in NOT_REACQUIRED:
                 # Somebody else was first, or has stepped in meanwhile; whose turn it is people decide.
                 self._wants_control, self.lost = False, error
         except RobotiqError:
@@ -236,7 +236,7 @@ class LeaseKeeper:
     async def _renew(self) -> None:
         await self._run.ask_quietly("lease", {"what": "renew"}, self._run.window)
 
-    async def _find_out(self) -> None:
+    async def _check_lease(self) -> None:
         lease, run = self.lease, self._lease_run
         await self._run.ask_quietly("lease", {"what": "renew"}, self._run.window / RENEWALS)
         if (lease, run) == (self.lease, self._run.mirror.epoch):

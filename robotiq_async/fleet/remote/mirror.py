@@ -47,7 +47,7 @@ class AgentClock:
         self._offset: float | None = None
         self._at = 0.0
 
-    def hear(self, stamp: float, arrival: float, asked: float | None = None) -> None:
+    def receive(self, stamp: float, arrival: float, asked: float | None = None) -> None:
         """A message with this stamp of the agent has arrived; it was asked for at ``asked``, if it was."""
         difference = arrival - stamp
         if self._offset is None:
@@ -74,7 +74,7 @@ class Mirror:
         is_silent: whether nothing is heard of the agent.
         events: number of the newest event that was handed on.
         misrouted: messages that were about another gripper, and dropped.
-        heard_at: when the last one arrived that was current.
+        received_at: when the last one arrived that was current.
     """
 
     def __init__(
@@ -102,15 +102,15 @@ class Mirror:
         self.is_silent = True
         self.events = 0
         self.misrouted = 0
-        self.heard_at = 0.0
+        self.received_at = 0.0
         self._mark = mark
         self._channels = channels
         self._entered = entered
         self._is_over = False
-        self._told = State.DISCONNECTED if before is None else before.state
+        self._reported = State.DISCONNECTED if before is None else before.state
         """The state that the last transition led to: the next one begins there."""
-        self._told_at = 0.0
-        self._followed = State.DISCONNECTED
+        self._reported_at = 0.0
+        self._events_state = State.DISCONNECTED
         """Where the events so far have led; statuses may be ahead of them."""
         self._pushed: RobotiqStatus | None = None
         """The last status that was handed on."""
@@ -152,13 +152,13 @@ class Mirror:
         newest = self.newest
         if newest is None or message.epoch == newest.epoch:
             return False
-        is_heard = not self.is_silent and arrival - self.heard_at <= window
-        if is_heard and newest.state not in _OFF:
+        is_current = not self.is_silent and arrival - self.received_at <= window
+        if is_current and newest.state not in _OFF:
             return True
         clock = self._clocks.get(message.epoch)
         return clock is not None and arrival - clock(message.stamp) > window
 
-    def hear(
+    def receive(
         self,
         message: StatusMessage,
         arrival: float,
@@ -178,17 +178,17 @@ class Mirror:
             asked: our time at which it was asked for; None if it was not.
         """
         if message.epoch != self.epoch:
-            self._begin_anew(message, arrival)
-        self.clock.hear(message.stamp, arrival, asked)
+            self._begin_run(message, arrival)
+        self.clock.receive(message.stamp, arrival, asked)
         is_current = arrival - self.clock(message.stamp) <= window
         if is_current:
-            self.heard_at = arrival
+            self.received_at = arrival
         status = self._status(message)
         if message.stamp >= self.stamp:
             self.newest = message
             self.status = status or self.status
             if is_current:
-                self._enter(as_seen_from_here(message.state), arrival)
+                self._set_state(as_seen_from_here(message.state), arrival)
         if (
             in_turn
             and status is not None
@@ -198,7 +198,7 @@ class Mirror:
             self._channels.statuses.push(status)
         return is_current
 
-    def hear_events(self, events: Iterable[Fields]) -> bool:
+    def receive_events(self, events: Iterable[Fields]) -> bool:
         """Events have arrived. Returns whether some before them are missing: they wait for those."""
         for event in events:
             index = event["index"]
@@ -223,23 +223,23 @@ class Mirror:
 
     def begin(self, at: float) -> None:
         """The run begins: nothing is heard yet."""
-        self._tell(State.DISCONNECTED, Trigger.ASK_START, at)
+        self._report(State.DISCONNECTED, Trigger.ASK_START, at)
 
     def fall_silent(self, at: float) -> None:
         """Nothing is heard of the agent any more."""
         if not (self.is_silent or self._is_over):
             self.is_silent = True
             self.state = State.DISCONNECTED
-            self._tell(State.DISCONNECTED, Trigger.LINK_LOST, at)
+            self._report(State.DISCONNECTED, Trigger.LINK_LOST, at)
             self._entered(State.DISCONNECTED)
 
     def shut_down(self, state: State, trigger: Trigger, at: float) -> None:
         """The run ends: what is still heard changes the state no more."""
         self._is_over = True
         self.state = state
-        self._tell(state, trigger, at)
+        self._report(state, trigger, at)
 
-    def _begin_anew(self, message: StatusMessage, arrival: float) -> None:
+    def _begin_run(self, message: StatusMessage, arrival: float) -> None:
         """Another run of the agent: its clock, its events and its polls are others."""
         self.fall_silent(arrival)
         # What is late from a run that was heard before is told by the clock of that run.
@@ -249,17 +249,17 @@ class Mirror:
             del self._clocks[next(iter(self._clocks))]
         self.newest = None
         self.events = message.events
-        self._followed = as_seen_from_here(message.state)
+        self._events_state = as_seen_from_here(message.state)
         self._base = self.next_sequence if message.sequence < self.next_sequence else 0
 
-    def _enter(self, state: State, arrival: float) -> None:
+    def _set_state(self, state: State, arrival: float) -> None:
         if self._is_over:
             return
         source, self.state = self.state, state
         if self.is_silent:
             self.is_silent = False
             # What came meanwhile, the events tell: they may be late.
-            self._tell(self._followed, _SEEN.get(self._followed, Trigger.SEEN_BUSY), arrival)
+            self._report(self._events_state, _SEEN.get(self._events_state, Trigger.SEEN_BUSY), arrival)
         if source is not state:
             self._entered(state)
 
@@ -280,27 +280,27 @@ class Mirror:
     def _hand_on(self, event: Fields) -> None:
         with reading("an event"):
             if event["kind"] == "transition":
-                self._follow(read_transition(event, self.clock))
+                self._apply(read_transition(event, self.clock))
             elif event["kind"] == "request":
                 sent = read_request(event, self.clock)
                 self._channels.requests.push(replace(sent, timestamp=self._in_order(sent.timestamp)))
 
-    def _follow(self, transition: Transition) -> None:
+    def _apply(self, transition: Transition) -> None:
         source, target = as_seen_from_here(transition.source), as_seen_from_here(transition.target)
-        self._followed = target
+        self._events_state = target
         if not (self.is_silent or self._is_over):
             # Those between, if any, the agent has forgotten.
-            self._tell(source, _SEEN.get(source, Trigger.SEEN_BUSY), transition.timestamp)
-            self._tell(target, transition.trigger, transition.timestamp)
+            self._report(source, _SEEN.get(source, Trigger.SEEN_BUSY), transition.timestamp)
+            self._report(target, transition.trigger, transition.timestamp)
 
-    def _tell(self, state: State, trigger: Trigger, at: float) -> None:
+    def _report(self, state: State, trigger: Trigger, at: float) -> None:
         """Hand on a change of state, if it is one."""
-        source, self._told = self._told, state
+        source, self._reported = self._reported, state
         if source is not state:
             self._channels.transitions.push(Transition(source, state, trigger, self._in_order(at)))
             # Also a state that lasted too short for any message.
             self._entered(state)
 
     def _in_order(self, at: float) -> float:
-        self._told_at = max(self._told_at, at)
-        return self._told_at
+        self._reported_at = max(self._reported_at, at)
+        return self._reported_at

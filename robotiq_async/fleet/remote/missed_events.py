@@ -43,7 +43,7 @@ class MissedEvents:
                     events = info["events"]
                     if info["epoch"] == mirror.epoch and events:
                         mirror.skip_events(events[0]["index"] - 1)
-                        mirror.hear_events(events)
+                        mirror.receive_events(events)
                 await asyncio.sleep(PAUSE_S)
         except RobotiqError as error:
             mirror.log.info("missed events could not be fetched: %s", error)

@@ -12,9 +12,9 @@ from ...values.errors import RobotiqError
 from ..network.bus import Reply, Urgency
 from ..wire.envelope import Answer, Call, unpack_answer
 
-AGAIN_S: Final = 0.25
+REPEAT_S: Final = 0.25
 """After so long without an answer a request is said again: a round trip is shorter than that."""
-SELDOM_S: Final = 1.0
+REPEAT_SLOWLY_S: Final = 1.0
 """After this time, so often: it has been let in by then, or is too late, and its answer may be lost."""
 STRAYS: Final = 3
 """So many answers to something else are passed over."""
@@ -89,7 +89,7 @@ class PendingRequest:
         return self.is_command or (self.verb == "lease" and self.call.arguments.get("what") != "renew")
 
     @property
-    def is_last_word(self) -> bool:
+    def is_allowed_after_stop(self) -> bool:
         """Whether it may still be said when the hand was stopped: it starts and continues no motion."""
         return self.is_halt or (self.verb == "lease" and self.call.arguments.get("what") == "release")
 
@@ -111,7 +111,7 @@ class PendingRequest:
             if self.answered.done() or (reply is None and self._copies):
                 return
             if reply is not None and self.may_repeat:
-                if self._is_anothers(reply) and self._strays < STRAYS:
+                if self._is_stray(reply) and self._strays < STRAYS:
                     self._strays += 1
                     return  # a copy went astray, or its answer: it is said again
                 if _came_early(reply):
@@ -122,7 +122,7 @@ class PendingRequest:
         self._copies.add(copy)
         copy.add_done_callback(take)
 
-    def _is_anothers(self, reply: Reply) -> bool:
+    def _is_stray(self, reply: Reply) -> bool:
         try:
             answer = unpack_answer(reply.payload)
         except RobotiqError:
@@ -132,12 +132,12 @@ class PendingRequest:
 
     def repeat(self, say: Callable[[], None]) -> None:
         """Have it said again if it is not answered in time."""
-        self.rest()
+        self.stop_repeating()
         if self.may_repeat:
-            pause = AGAIN_S if now() < self._until - self.timeout + SELDOM_S else SELDOM_S
+            pause = REPEAT_S if now() < self._until - self.timeout + REPEAT_SLOWLY_S else REPEAT_SLOWLY_S
             self._timer = self._loop.call_later(pause, say)
 
-    def rest(self) -> None:
+    def stop_repeating(self) -> None:
         """Say it no more."""
         if self._timer is not None:
             self._timer.cancel()
@@ -149,7 +149,7 @@ class PendingRequest:
 
     def end(self) -> None:
         """Nobody waits for it."""
-        self.rest()
+        self.stop_repeating()
         self.answered.cancel()
         for copy in list(self._copies):
             copy.cancel()

@@ -211,9 +211,9 @@ class RemoteHand(Hand):
         check_flag("halt", halt)
         ending = Ending.of(halt=halt, keep_grip=self._keeps_grip(keep_grip))
         keeper = self._asked().keeper
-        keeper.give_back(ending)
+        keeper.release(ending)
         with no_answer_as_lost_connection():
-            await keeper.given_back()
+            await keeper.released()
 
     # -- commands --------------------------------------------------------------------------------------
 
@@ -295,7 +295,7 @@ class RemoteHand(Hand):
                 )
         except (asyncio.CancelledError, RobotiqConnectionError, NotAllowedError):
             # Also after an answer that leaves open whether the request was carried out.
-            cancelling = session.stops.call_off(name, call)
+            cancelling = session.stops.cancel_command(name, call)
             if cancelling is not None and name in MOTIONS:
                 outbox.count_motion(cancelling)
             raise

@@ -65,14 +65,14 @@ class Requests:
         self._number = 0
         self._loop = asyncio.get_running_loop()
         self._silence: asyncio.Future[None] = self._loop.create_future()
-        self._sign: asyncio.Future[None] = self._loop.create_future()
+        self._received: asyncio.Future[None] = self._loop.create_future()
         """Done as soon as the agent is heard."""
         self._closed: asyncio.Future[None] = self._loop.create_future()
         self._has_ended = False
         self._pending: set[PendingRequest] = set()
         self._commands: dict[int, PendingRequest] = {}
         """Those that have no answer yet, in the order in which they were asked."""
-        self._round: asyncio.TimerHandle | None = None
+        self._resending: asyncio.TimerHandle | None = None
         self.settings = Settings()
 
     @property
@@ -80,10 +80,10 @@ class Requests:
         """Whether a hold was asked for that the agent has not answered for."""
         return any(each.verb == "cmd/hold" for each in self._commands.values())
 
-    def hear(self) -> None:
+    def receive(self) -> None:
         """The agent is heard."""
-        if not self._sign.done():
-            self._sign.set_result(None)
+        if not self._received.done():
+            self._received.set_result(None)
 
     def fall_silent(self) -> None:
         """The agent is not heard any more: nobody waits for the answers to what was asked until now."""
@@ -94,7 +94,7 @@ class Requests:
         """A lease has ended: the agent has a moment to say what became of the commands under it."""
         for posted in self._commands.values():
             if posted.call.lease == lease:
-                posted.rest()
+                posted.stop_repeating()
                 self._loop.call_later(LAST_ANSWER_S, posted.fail, copy_of(error))
 
     def end(self) -> None:
@@ -132,15 +132,15 @@ class Requests:
             NotStartedError: the hand was stopped.
         """
         posted = PendingRequest(call, verb, timeout, urgency)
-        if self._has_ended and not posted.is_last_word:
+        if self._has_ended and not posted.is_allowed_after_stop:
             raise NotStartedError("the hand was stopped")
         self._pending.add(posted)
         if posted.is_command:
             self._commands[call.number] = posted
-        self._say(posted)
+        self._send(posted)
         return posted
 
-    def _say(self, posted: PendingRequest) -> None:
+    def _send(self, posted: PendingRequest) -> None:
         number = posted.call.number
         before = [each for each in self._commands if each < number] if posted.is_command else ()
         copy = self._bus.ask(
@@ -150,23 +150,27 @@ class Requests:
             urgency=posted.urgency,
             decides=is_refusal if posted.is_halt else of_its_run(posted.call),
         )
-        posted.add(copy, self._say_all_again)
-        posted.repeat(lambda: self._say_again(posted))
+        posted.add(copy, self._resend_all_soon)
+        posted.repeat(lambda: self._resend(posted))
 
-    def _say_again(self, posted: PendingRequest) -> None:
+    def _resend(self, posted: PendingRequest) -> None:
         """It may have been dropped on the way, or its answer: on a full network either is."""
-        if posted.left and not posted.answered.done() and (posted.is_last_word or not self._has_ended):
-            self._say(posted)
+        if (
+            posted.left
+            and not posted.answered.done()
+            and (posted.is_allowed_after_stop or not self._has_ended)
+        ):
+            self._send(posted)
 
-    def _say_all_again(self) -> None:
+    def _resend_all_soon(self) -> None:
         """A command was lost, and those after it wait for it: in their order, and soon."""
-        if self._round is None:
-            self._round = self._loop.call_later(EARLY_S, self._say_round)
+        if self._resending is None:
+            self._resending = self._loop.call_later(EARLY_S, self._resend_all)
 
-    def _say_round(self) -> None:
-        self._round = None
+    def _resend_all(self) -> None:
+        self._resending = None
         for posted in list(self._commands.values()):
-            self._say_again(posted)
+            self._resend(posted)
 
     def _forget(self, posted: PendingRequest) -> None:
         self._commands.pop(posted.call.number, None)
@@ -209,13 +213,13 @@ class Requests:
             RobotiqError: there is none; as :meth:`answer`.
         """
         reply, at_once = await self._wait(posted)
-        if reply is None and at_once and await self._hears_on():
+        if reply is None and at_once and await self._is_agent_present():
             # Just after a link has come up nobody seems to be there. Nothing is done twice: the number is the
             # same, and so is what had been heard when it was asked.
             posted.begin()
-            self._say_again(posted)
+            self._resend(posted)
             reply, at_once = await self._wait(posted)
-            if reply is None and at_once and await self._hears_on():
+            if reply is None and at_once and await self._is_agent_present():
                 raise NotAllowedError(f"{self._name}: nobody there answers to {posted.verb}: access denied")
         if reply is None:
             raise NoAnswerError(f"{self._name}: no answer in time; {posted.verb} may have been carried out")
@@ -230,7 +234,7 @@ class Requests:
         """
         answered = posted.answered
         awaited: set[asyncio.Future[Any]] = {answered, self._closed}
-        if not posted.is_last_word:
+        if not posted.is_allowed_after_stop:
             awaited.add(self._silence)
         # The bus says when the time is over; that nobody waits for longer does not hang on it.
         limit = posted.left + LAST_ANSWER_S
@@ -246,11 +250,11 @@ class Requests:
             raise reply
         return reply, now() - posted.asked_at < min(AT_ONCE_S, posted.timeout / 2)
 
-    async def _hears_on(self) -> bool:
+    async def _is_agent_present(self) -> bool:
         """Whether the agent is heard from now on; a link that is down may have been up a moment ago."""
-        if self._sign.done():
-            self._sign = self._loop.create_future()
-        sign = self._sign
+        if self._received.done():
+            self._received = self._loop.create_future()
+        sign = self._received
         await asyncio.wait({sign, self._closed}, timeout=RECENT_S, return_when=asyncio.FIRST_COMPLETED)
         return sign.done()
 

@@ -108,13 +108,13 @@ class RemoteSession:
         )
         self.keeper = LeaseKeeper(self, wants_control=wants_control)
         self.stops = Stops(self)
-        self._looking: asyncio.Task[Any] | None = None
+        self._querying: asyncio.Task[Any] | None = None
         channels.reopen(self.loop)
         self.mirror.begin(now())
         self._unreadable, self._misrouted = LimitedLog(self.log), LimitedLog(self.log)
         # One wildcard, and every payload says what it is about: samples may come under the wrong key.
-        self._undo: Undo = bus.subscribe(name.key("*"), self._hear)
-        self.agents = Agents(name, bus, self.keeper.stay_away)
+        self._undo: Undo = bus.subscribe(name.key("*"), self._receive)
+        self.agents = Agents(name, bus, self.keeper.forbid_reacquiring)
 
     # -- start and end ---------------------------------------------------------------------------------
 
@@ -132,7 +132,7 @@ class RemoteSession:
                 await self._give_up()
             await asyncio.sleep(0.05)
         await self.keeper.begin(deadline)
-        self.spawn(self._keep())
+        self.spawn(self._supervise())
         await self._wait_for_gripper(deadline)
 
     async def _wait_for_gripper(self, deadline: float) -> None:
@@ -194,7 +194,7 @@ class RemoteSession:
 
     async def _close(self) -> None:
         try:
-            await self.keeper.given_back()
+            await self.keeper.released()
         except RobotiqError as error:
             self.log.warning("the end was not acknowledged (%s): the agent holds what moves", error)
         finally:
@@ -250,13 +250,13 @@ class RemoteSession:
 
     # -- what is heard ---------------------------------------------------------------------------------
 
-    def _hear(self, _key: str, payload: bytes) -> None:
+    def _receive(self, _key: str, payload: bytes) -> None:
         try:
             with reading("news"):
                 if payload[:1] == b"{":
-                    self._hear_fields(json.loads(payload))
+                    self._receive_fields(json.loads(payload))
                 else:
-                    self._hear_status(payload, in_turn=True)
+                    self._receive_status(payload, in_turn=True)
         except RobotiqError as error:
             self._unreadable.warn("a message was dropped: %s", error)
         if self.mirror.has_missed() and not self.is_over:
@@ -268,7 +268,7 @@ class RemoteSession:
         self._misrouted.warn("a message about another gripper was dropped")
         return True
 
-    def _hear_status(self, payload: bytes, *, in_turn: bool, asked: float | None = None) -> bool:
+    def _receive_status(self, payload: bytes, *, in_turn: bool, asked: float | None = None) -> bool:
         """A status has arrived; returns whether it is about the gripper as it is."""
         message, arrival = unpack(payload), now()
         if self._is_about_another(message.mark):
@@ -279,23 +279,23 @@ class RemoteSession:
             self.keeper.lose("closed", "the agent was started anew")
             self._requests.fall_silent()  # what the former one was asked it does not answer
         self._arrived_at = arrival
-        if not self.mirror.hear(message, arrival, in_turn=in_turn, window=self.window, asked=asked):
+        if not self.mirror.receive(message, arrival, in_turn=in_turn, window=self.window, asked=asked):
             return True  # it has been on its way for so long that it says nothing about now
-        self._requests.hear()
+        self._requests.receive()
         if in_turn:
-            self.keeper.hear(message.lease)
+            self.keeper.receive(message.lease)
         return True
 
-    def _hear_fields(self, fields: Mapping[str, Any]) -> None:
+    def _receive_fields(self, fields: Mapping[str, Any]) -> None:
         if self._is_about_another(fields["mark"]):
             return
         if "statistics" in fields:
             self.statistics = read_statistics(fields["statistics"])
             return
-        if self._hear_status(bytes.fromhex(fields["status"]), in_turn=True):
-            self.mirror.hear_events(fields["events"])
+        if self._receive_status(bytes.fromhex(fields["status"]), in_turn=True):
+            self.mirror.receive_events(fields["events"])
 
-    async def _keep(self) -> None:
+    async def _supervise(self) -> None:
         """Look for silence, renew the lease, and acquire it again when that is due."""
         interval = self.window / RENEWALS
         while True:
@@ -303,16 +303,16 @@ class RemoteSession:
             await asyncio.sleep(interval)
             woken = now()
             # After a hold-up of this loop, what has arrived meanwhile is heard first.
-            if woken - due < interval and woken - self.mirror.heard_at > self.window:
+            if woken - due < interval and woken - self.mirror.received_at > self.window:
                 self._fall_silent(woken)
             if self.mirror.is_silent and woken - self._arrived_at < interval:
-                self._look_again()
-            self.keeper.look()
+                self._query_agent()
+            self.keeper.maintain()
 
-    def _look_again(self) -> None:
+    def _query_agent(self) -> None:
         """What is heard seems to be old: it is, or the agent's clock stood still. An answer tells."""
-        if self._looking is None or self._looking.done():
-            self._looking = self.spawn(self.ask_quietly("info", {}, ANSWER_S))
+        if self._querying is None or self._querying.done():
+            self._querying = self.spawn(self.ask_quietly("info", {}, ANSWER_S))
 
     def _fall_silent(self, at: float) -> None:
         if self.mirror.is_silent:
@@ -322,7 +322,7 @@ class RemoteSession:
         self.keeper.lose("expired", "the agent is silent")
         self._requests.fall_silent()
 
-    def end_calls(self, lease: int, error: ControlLostError) -> None:
+    def fail_calls(self, lease: int, error: ControlLostError) -> None:
         """A lease has ended: who waits for something that was asked under it is told."""
         self._requests.lose_lease(lease, error)
 
@@ -366,11 +366,11 @@ class RemoteSession:
         try:
             answer, news = await self._requests.answer(posted)
         except NoAnswerError:
-            if not posted.is_last_word:
+            if not posted.is_allowed_after_stop:
                 self.check_running()
             raise
         if news:
-            self._hear_status(news, in_turn=False, asked=posted.asked_at)
+            self._receive_status(news, in_turn=False, asked=posted.asked_at)
         try:
             return answer.outcome(self.mirror.clock)
         except (TypeError, ValueError) as error:

@@ -17,11 +17,11 @@ from .requests import label
 
 TRIES: Final = 2
 """How many times a request is called off in a window."""
-GOES_ON: Final = frozenset({"activate", "reset", "atr", "recover"})
+CONTINUES: Final = frozenset({"activate", "reset", "atr", "recover"})
 """What the gripper carries on with when the call is cancelled, as with a hand of this process."""
 
 
-class Asker(Protocol):
+class AgentClient(Protocol):
     """What is needed of a run."""
 
     keeper: LeaseKeeper
@@ -38,7 +38,7 @@ class Asker(Protocol):
 class Stops:
     """What one run has asked for that ends motion."""
 
-    def __init__(self, run: Asker) -> None:
+    def __init__(self, run: AgentClient) -> None:
         self._run = run
         self._halts: set[asyncio.Task[Any]] = set()
         self._cancels: set[asyncio.Task[Any]] = set()
@@ -58,18 +58,18 @@ class Stops:
         """Wait until halts under way have ended, well or not."""
         await asyncio.gather(*self._halts, return_exceptions=True)
 
-    def call_off(self, name: str, call: Call) -> asyncio.Task[Any] | None:
+    def cancel_command(self, name: str, call: Call) -> asyncio.Task[Any] | None:
         """The call of a command was cancelled: what it set going is to be held, unless it goes on."""
         if not self._run.keeper.is_in_control or self._run.is_over:
             return None
-        if name in GOES_ON:
-            return self._run.spawn(self._call_off(call))
-        return self._begin(self._cancels, self._call_off(call))
+        if name in CONTINUES:
+            return self._run.spawn(self._cancel_command(call))
+        return self._begin(self._cancels, self._cancel_command(call))
 
     async def _halt_once(self, left: float) -> None:
         await self._run.ask("halt", {"label": label()}, timeout=left, urgency=Urgency.STOP)
 
-    async def _call_off(self, call: Call) -> None:
+    async def _cancel_command(self, call: Call) -> None:
         for _ in range(TRIES):
             try:
                 await self._run.ask("cmd/cancel", {"number": call.number}, timeout=self._run.window / TRIES)

@@ -1,1 +1,1 @@
-"""What agents and clients say to each other: names, requests, answers, statuses. Pure."""
+"""Messages between agents and clients: names, requests, answers, statuses. Pure."""

@@ -1,4 +1,4 @@
-"""A request to an agent, and its answer."""
+"""Requests to an agent, and their answers."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ class Call:
     """One request.
 
     Attributes:
-        to: base key of the gripper it is meant for; it is compared, for a key may be wrong.
-        client: who asks; see :class:`~robotiq_async.fleet.control.lease.Holder`.
-        epoch: the run of the agent it is meant for; 0 for whichever there is.
-        lease: number of the lease it is made under.
-        number: rises with each request of a client; tells a repetition, and what was overtaken.
-        seen: newest stamp of the agent that the client had heard when it asked.
+        to: base key of the addressed gripper. The receiver compares it: zenoh may deliver under a wrong key.
+        client: identifies the client; see :class:`~robotiq_async.fleet.control.lease.Holder`.
+        epoch: the run of the agent that is addressed; 0 for any.
+        lease: number of the lease that the request is made under.
+        number: rises with each request of a client; identifies repetitions and requests that were overtaken.
+        seen: newest stamp of the agent that the client had received when it made the request.
         arguments: by name.
-        after: number of the command before this one if that is not answered yet, so that this one does not
-            take its place when it got lost; else 0.
+        after: number of the preceding command if that is still unanswered, else 0. If that command was lost,
+            the agent refuses this one, which must not take its place.
     """
 
     to: str
@@ -41,15 +41,15 @@ class Call:
     after: int = 0
 
     def pack(self) -> bytes:
-        """The request as bytes."""
         return _pack(self)
 
 
 def unpack_call(data: bytes) -> Call:
-    """The request in bytes.
+    """Parse a request.
 
     Raises:
-        ProtocolError: none, or one of another version.
+        ProtocolError: not a request.
+        AgentError: a request of another version.
     """
     fields = _object("a request", data)
     try:
@@ -62,7 +62,7 @@ def unpack_call(data: bytes) -> Call:
 
 
 def _is_well_formed(call: Call) -> bool:
-    """Whether every field is of its type: a stranger may have written them."""
+    # Any program on the network may have written the fields, so each type is checked.
     values = {name: getattr(call, name) for name in call.__slots__}
     return (
         isinstance(values["to"], str)
@@ -78,14 +78,14 @@ def _is_well_formed(call: Call) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What became of a request.
+    """The answer to a request.
 
     Attributes:
         to: base key of the gripper that answers.
         number: of the request.
         epoch: of the agent.
-        value: what it returned.
-        error: what it raised; None if it was carried out.
+        value: what the request returned.
+        error: what the request raised; None if it was carried out.
     """
 
     to: str
@@ -95,14 +95,13 @@ class Answer:
     error: Fields | None = None
 
     def pack(self) -> bytes:
-        """The answer as bytes."""
         return _pack(self)
 
     def outcome(self, clock: Clock) -> Any:  # noqa: ANN401  # what each request returns
-        """What the request returned.
+        """Return what the request returned, or raise what it raised.
 
         Raises:
-            RobotiqError, TypeError, ValueError: what it raised.
+            RobotiqError, TypeError, ValueError: the error in the answer.
         """
         if self.error is not None:
             raise read_error(self.error, clock)
@@ -110,10 +109,11 @@ class Answer:
 
 
 def unpack_answer(data: bytes) -> Answer:
-    """The answer in bytes.
+    """Parse an answer.
 
     Raises:
-        ProtocolError: none, or one of another version.
+        ProtocolError: not an answer.
+        AgentError: an answer of another version.
     """
     fields = _object("an answer", data)
     try:
@@ -123,7 +123,6 @@ def unpack_answer(data: bytes) -> Answer:
 
 
 def failure(call: Call, epoch: int, error: Exception) -> Answer:
-    """The answer to a request that failed."""
     return Answer(call.to, call.number, epoch, error=error_fields(error))
 
 

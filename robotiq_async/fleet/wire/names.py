@@ -1,4 +1,4 @@
-"""Which gripper, on which host, at which site: addresses, and the keys of what is said about it."""
+"""GripperName: site, host and name of a gripper, with its address and its keys."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from zlib import crc32
 
 SCHEME: Final = "zenoh://"
 ROOT: Final = "robotiq/v1"
-"""Every key begins with it; the number is the version of the protocol (docs/fleet-protocol.md)."""
+"""Prefix of every key; the number is the version of the protocol (docs/fleet-protocol.md)."""
 FORM: Final = "zenoh://SITE/HOST/GRIPPER"
 _NAME: Final = re.compile(r"[A-Za-z0-9_.-]{1,64}")
 
 
 def check_name(what: str, name: object) -> str:
-    """The name of a site, a host or a gripper: 1..64 of ``A-Z a-z 0-9 _ . -``, so never a wildcard.
+    """Check the name of a site, a host or a gripper: 1..64 of ``A-Z a-z 0-9 _ . -``, so never a wildcard.
 
     Raises:
         TypeError: not a string.
@@ -29,7 +29,7 @@ def check_name(what: str, name: object) -> str:
 
 
 def has_scheme(address: str) -> bool:
-    """Whether an address begins as those of hands on other hosts do; in capitals, too."""
+    """Whether an address begins with ``zenoh://``, in lower or upper case."""
     return address[: len(SCHEME)].lower() == SCHEME
 
 
@@ -41,6 +41,10 @@ class GripperName:
         site: the site's name.
         host: the name of the host whose agent owns the gripper.
         gripper: the gripper's name on that host.
+
+    Raises:
+        TypeError: a name is not a string.
+        ValueError: a name is not 1..64 of ``A-Z a-z 0-9 _ . -``.
     """
 
     site: str
@@ -48,21 +52,16 @@ class GripperName:
     gripper: str
 
     def __post_init__(self) -> None:
-        """Refuse what is no name.
-
-        Raises:
-            TypeError, ValueError: as :func:`check_name`.
-        """
         for part in self.__slots__:
             check_name(part, getattr(self, part))
 
     @classmethod
     def parse(cls, address: object) -> Self:
-        """The gripper that an address names.
+        """The gripper that an address ``zenoh://SITE/HOST/GRIPPER`` names.
 
         Raises:
             TypeError: not a string.
-            ValueError: malformed; the message says what is wrong, and not with which address.
+            ValueError: malformed; the message gives the reason, but does not repeat the address.
         """
         if not isinstance(address, str):
             raise TypeError(f"address must be a string, got {address!r}; accepted: {FORM}")
@@ -73,10 +72,10 @@ class GripperName:
 
     @classmethod
     def of_key(cls, key: str) -> Self:
-        """The gripper that a key is about.
+        """The gripper that a key belongs to.
 
         Raises:
-            ValueError: no key of ours.
+            ValueError: not a key of a gripper.
         """
         if not key.startswith(f"{ROOT}/") or key.count("/") < 5:
             raise ValueError(f"not a key of a gripper: {key!r}")
@@ -84,16 +83,16 @@ class GripperName:
 
     @property
     def base(self) -> str:
-        """What every key of the gripper begins with."""
+        """The prefix of every key of the gripper."""
         return f"{ROOT}/{self.site}/{self.host}/{self.gripper}"
 
     @property
     def mark(self) -> int:
-        """32 bits that tell the gripper in binary messages: the CRC-32 of :attr:`base`."""
+        """32 bits that identify the gripper in binary messages: the CRC-32 of :attr:`base`."""
         return crc32(self.base.encode())
 
     def key(self, *parts: str) -> str:
-        """A key of the gripper."""
+        """A key of the gripper: :attr:`base` and these parts."""
         return "/".join((self.base, *parts))
 
     def __str__(self) -> str:

@@ -1,4 +1,4 @@
-"""Speeds and forces: what a request sets, and what a client gives an agent that was started anew."""
+"""Speeds and forces: those that a request sets, and those that a client sends to a restarted agent."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from .values import Fields
 
 SETTINGS: Final = ("speed", "force")
 Setting = tuple[Finger, str]
-"""One axis, and speed or force."""
+"""One axis, and "speed" or "force"."""
 _SETTERS: Final = {"set_speed": "speed", "set_force": "force"}
 
 
 def settings_of(name: str, arguments: Mapping[str, Any]) -> dict[Setting, int]:
-    """What a command sets; empty if its arguments say nothing that can be read.
+    """Speeds and forces that a command sets; empty if its arguments are malformed.
 
     Args:
         name: of the command, without ``cmd/``.
@@ -50,7 +50,7 @@ def _by_axis(changed: Mapping[str, Any]) -> Iterator[tuple[Setting, int]]:
 
 
 def settings_fields(settings: Mapping[Setting, int]) -> Fields:
-    """The object for settings: as the axes of a ``command``."""
+    """Settings as JSON, in the format of the axes of a ``command``."""
     fields: Fields = {}
     for (axis, what), value in settings.items():
         fields.setdefault(str(int(axis)), {})[what] = value
@@ -58,10 +58,10 @@ def settings_fields(settings: Mapping[Setting, int]) -> Fields:
 
 
 def read_settings(fields: object) -> dict[Setting, int]:
-    """The settings in an object.
+    """Parse settings.
 
     Raises:
-        TypeError, ValueError: there are none in it.
+        TypeError, ValueError: malformed.
     """
     if not isinstance(fields, dict) or not all(isinstance(each, dict) for each in fields.values()):
         raise TypeError(f"settings must be an object of objects, got {fields!r:.200}")

@@ -1,17 +1,17 @@
-"""The status of a gripper on its way to readers: 60 bytes, two hundred times a second.
+"""StatusMessage: the status of a gripper for its readers, 60 bytes, 200 times a second.
 
 | bytes | what |
 |--|--|
 | B | version of the layout |
-| B | state, by its place in ``State`` |
-| B | flags: 1 a status was read, 2 the axes move, 4 somebody holds the lease |
-| B | model of the gripper, by its place in ``MODELS``: 0 is the 3-Finger |
-| I | which gripper: the CRC-32 of its base key |
+| B | state, as its index in ``State`` |
+| B | flags: 1 a status was read, 2 the axes move, 4 the lease is held |
+| B | model of the gripper, as its index in ``MODELS``: 0 is the 3-Finger |
+| I | mark of the gripper: the CRC-32 of its base key |
 | I | number of the lease |
 | I | number of the newest event |
-| Q | epoch: random, anew with each start of the agent |
+| Q | epoch: random, new with each start of the agent |
 | Q | sequence of the status |
-| d | the agent's time at which this was sent, in seconds |
+| d | stamp: the agent's time at which this was sent, in seconds |
 | f | age of the status when it was sent, in seconds |
 | 8H | the eight status registers |
 """
@@ -38,18 +38,18 @@ _NO_REGISTERS: Final = (0,) * 8
 
 
 class StatusMessage(NamedTuple):
-    """What an agent says about a gripper in one moment.
+    """The condition of a gripper at one moment.
 
     Attributes:
-        mark: which gripper it is about (see :attr:`~robotiq_async.fleet.wire.names.GripperName.mark`).
-        epoch: random, anew with each start of the agent.
+        mark: identifies the gripper (see :attr:`~robotiq_async.fleet.wire.names.GripperName.mark`).
+        epoch: random, new with each start of the agent.
         stamp: the agent's time at which this was sent, in seconds.
         state: of the agent's hand.
         lease: number of the lease.
-        is_held: whether somebody holds it.
-        events: number of the newest event; whoever knows of fewer has missed some.
-        is_moving: whether an axis moves, or will because of a command that does not act yet.
-        sequence: of the status, as the agent's hand counts; meaningless without registers.
+        is_held: whether a client holds the lease.
+        events: number of the newest event; a client that has received fewer has missed some.
+        is_moving: whether an axis moves, or will because of a command that has no effect yet.
+        sequence: of the status, counted by the agent's hand; meaningless without registers.
         age: seconds from the gripper's reply to ``stamp``.
         registers: the status; None if none has been read yet.
         model: of the gripper.
@@ -69,7 +69,6 @@ class StatusMessage(NamedTuple):
     model: Model = THREE_FINGER
 
     def pack(self) -> bytes:
-        """The message as bytes."""
         mark, epoch, stamp, state, lease, is_held, events, is_moving, sequence, age, registers, model = self
         flags = _READ * (registers is not None) | _MOVES * is_moving | _HELD * is_held
         return _LAYOUT.pack(
@@ -89,10 +88,10 @@ class StatusMessage(NamedTuple):
 
 
 def unpack(data: bytes) -> StatusMessage:
-    """The message in bytes.
+    """Parse a status message.
 
     Raises:
-        ProtocolError: not such a message, or one of another version.
+        ProtocolError: not a status message, or one of another version.
     """
     if len(data) != SIZE or data[0] != VERSION:
         raise ProtocolError(f"not a status of version {VERSION}: {data[:8].hex()} ({len(data)} bytes)")
@@ -104,7 +103,8 @@ def unpack(data: bytes) -> StatusMessage:
     if model >= len(_MODELS):
         raise ProtocolError(f"a status of a model that does not exist: {model}")
     if not (isfinite(stamp) and isfinite(age)):
-        # What has been heard is told back with every request, and no older one counts after it.
+        # The client returns the newest stamp with every request and ignores older ones: an infinite stamp
+        # would block all that follow.
         raise ProtocolError(f"a status at no time: {stamp}, {age} s old")
     return StatusMessage(
         mark=mark,

@@ -1,4 +1,4 @@
-"""What travels as JSON: errors, results, transitions, requests, statistics."""
+"""JSON encoding of statuses, errors, results, transitions, requests and statistics."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from ...values.trigger import Trigger
 
 Fields = dict[str, Any]
 Clock = Callable[[float], float]
-"""Makes a time of this process of a time of the agent."""
+"""Converts a time of the agent to a time of this process."""
 
 _KINDS: Final = {
     name: kind
@@ -37,15 +37,15 @@ _KINDS: Final = {
     if isinstance(kind, type) and issubclass(kind, RobotiqError) and kind is not errors.NotAllStoppedError
 } | {"TypeError": TypeError, "ValueError": ValueError}
 _WORDS: Final = ("address", "reason")
-"""What errors know in words."""
+"""Attributes of errors that are text."""
 
 
 @contextmanager
 def reading(what: str) -> Iterator[None]:
-    """Read what an agent has sent; it may be one of another version, or none at all.
+    """Report malformed data from an agent, or from another program, as ProtocolError.
 
     Raises:
-        ProtocolError: what is read is not there, or of the wrong kind.
+        ProtocolError: a field is missing or of the wrong type.
     """
     try:
         yield
@@ -54,10 +54,10 @@ def reading(what: str) -> Iterator[None]:
 
 
 def words(text: object) -> str:
-    """What somebody on the network calls something, fit to be shown.
+    """Text from the network, without control characters, fit to be shown.
 
     Raises:
-        TypeError: no string.
+        TypeError: not a string.
     """
     if not isinstance(text, str):
         raise TypeError(f"words must be a string, got {text!r}")
@@ -68,7 +68,6 @@ def words(text: object) -> str:
 
 
 def status_fields(status: RobotiqStatus) -> Fields:
-    """The object for a status."""
     return {
         "registers": status.registers,
         "timestamp": status.timestamp,
@@ -78,11 +77,6 @@ def status_fields(status: RobotiqStatus) -> Fields:
 
 
 def read_status(fields: Mapping[str, Any], clock: Clock) -> RobotiqStatus:
-    """The status in an object.
-
-    Raises:
-        KeyError, TypeError, ValueError: there is none.
-    """
     return RobotiqStatus.from_registers(
         fields["registers"],
         timestamp=clock(fields["timestamp"]),
@@ -95,7 +89,7 @@ def read_status(fields: Mapping[str, Any], clock: Clock) -> RobotiqStatus:
 
 
 def error_fields(error: Exception) -> Fields:
-    """The object for an error: its kind, its message without the name of the agent's hand, what it knows."""
+    """Encode an error: kind, attributes, and the message without the name of the agent's hand."""
     fields: Fields = {
         "kind": type(error).__name__,
         "message": error.message if isinstance(error, RobotiqError) else str(error),
@@ -117,7 +111,7 @@ def error_fields(error: Exception) -> Fields:
 
 
 def read_error(fields: Fields, clock: Clock) -> Exception:
-    """The error in an object; one of a kind that is not known here is an AgentError."""
+    """Decode an error. An unknown kind becomes AgentError, malformed data ProtocolError."""
     try:
         with reading("an error"):
             return _error(fields, clock)
@@ -152,7 +146,6 @@ def _error(fields: Fields, clock: Clock) -> Exception:
 
 
 def result_fields(result: MoveResult | None) -> Fields | None:
-    """The object for what a command returns."""
     if result is None:
         return None
     return {
@@ -166,11 +159,6 @@ def result_fields(result: MoveResult | None) -> Fields | None:
 
 
 def read_result(fields: Mapping[str, Any], clock: Clock) -> MoveResult:
-    """The result of a move in an object.
-
-    Raises:
-        KeyError, TypeError, ValueError: there is none.
-    """
     return MoveResult(
         outcomes={Finger(int(axis)): ObjectStatus(how) for axis, how in fields["outcomes"].items()},
         positions={Finger(int(axis)): int(at) for axis, at in fields["positions"].items()},
@@ -181,11 +169,10 @@ def read_result(fields: Mapping[str, Any], clock: Clock) -> MoveResult:
     )
 
 
-# -- what happens ------------------------------------------------------------------------------------------
+# -- events ------------------------------------------------------------------------------------------------
 
 
 def transition_fields(transition: Transition) -> Fields:
-    """The object for a change of state."""
     return {
         "kind": "transition",
         "source": transition.source.value,
@@ -196,11 +183,6 @@ def transition_fields(transition: Transition) -> Fields:
 
 
 def read_transition(fields: Mapping[str, Any], clock: Clock) -> Transition:
-    """The change of state in an object.
-
-    Raises:
-        KeyError, TypeError, ValueError: there is none.
-    """
     return Transition(
         source=State(fields["source"]),
         target=State(fields["target"]),
@@ -210,7 +192,6 @@ def read_transition(fields: Mapping[str, Any], clock: Clock) -> Transition:
 
 
 def request_fields(sent: SentRequest) -> Fields:
-    """The object for an image that was written."""
     return {
         "kind": "request",
         "registers": sent.request.registers,
@@ -221,11 +202,6 @@ def request_fields(sent: SentRequest) -> Fields:
 
 
 def read_request(fields: Mapping[str, Any], clock: Clock) -> SentRequest:
-    """The image that was written in an object.
-
-    Raises:
-        KeyError, TypeError, ValueError: there is none.
-    """
     return SentRequest(
         request=Request.from_registers(fields["registers"], model_of(fields.get("model"))),
         timestamp=clock(fields["timestamp"]),
@@ -234,17 +210,10 @@ def read_request(fields: Mapping[str, Any], clock: Clock) -> SentRequest:
 
 
 def statistics_fields(statistics: Statistics) -> Fields:
-    """The object for a snapshot of the polling."""
     return statistics.as_dict()
 
 
 def read_statistics(fields: Mapping[str, Any]) -> Statistics:
-    """The snapshot of the polling in an object; figures that are not known here are left out.
-
-    Those that an agent of an earlier version does not count are 0.
-
-    Raises:
-        KeyError, TypeError, ValueError: there is none.
-    """
+    # An older agent does not count passing faults; figures of a newer one that are unknown here are ignored.
     figures = {"passing_faults": 0, **fields}
     return Statistics(**{name: figures[name] for name in Statistics.__dataclass_fields__})
