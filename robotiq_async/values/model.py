@@ -12,7 +12,7 @@ from typing import Final
 
 from . import registers as reg
 from .checks import check_axis, check_byte, check_int, check_mask, check_number
-from .enums import Fault, Finger, ObjectStatus
+from .enums import Fault, Finger, ObjectStatus, names_of
 from .registers import Field, RegisterMap, Registers
 
 TOLERANCE: Final = 2
@@ -97,6 +97,8 @@ class Model:
         all_axes: its axes, as a mask.
         moving: for each value of the byte with the object status, the axes that move.
         contacts: the same for the axes that a contact stopped.
+        names: of the axes.
+        contact_names: of the axes in ``contacts``.
     """
 
     name: str
@@ -116,6 +118,8 @@ class Model:
     all_axes: Finger = field(init=False)
     moving: tuple[Finger, ...] = field(init=False)
     contacts: tuple[Finger, ...] = field(init=False)
+    names: tuple[str, ...] = field(init=False)
+    contact_names: tuple[tuple[str, ...], ...] = field(init=False)
     _index: dict[Finger, int] = field(init=False)
     _shift: int = field(init=False)
 
@@ -125,6 +129,8 @@ class Model:
         keep(self, "all_axes", Finger(sum(self.axes)))
         keep(self, "moving", _masks(self.object_status, self.axes, {ObjectStatus.IN_MOTION}))
         keep(self, "contacts", _masks(self.object_status, self.axes, contact))
+        keep(self, "names", tuple(names_of(self.all_axes)))
+        keep(self, "contact_names", tuple(tuple(names_of(axes)) for axes in self.contacts))
         keep(self, "_index", {axis: index for index, axis in enumerate(self.axes)})
         keep(self, "_shift", 0 if self.object_status[0].byte else 8)
 
@@ -201,7 +207,7 @@ class Model:
     @property
     def axes_text(self) -> str:
         """The names of its axes, for messages."""
-        return ", ".join(str(axis.name) for axis in self.axes)
+        return ", ".join(self.names)
 
 
 THREE_FINGER: Final = Model(

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from . import registers as reg
 from .checks import check_int, check_seconds
-from .enums import Fault, Finger, Initialization, Mode, ObjectStatus, names_of
+from .enums import Fault, Finger, Initialization, Mode, ObjectStatus
 from .model import THREE_FINGER, Model
 
 NO_REQUEST: Final = "NO_REQUEST"
@@ -245,15 +245,15 @@ class RobotiqStatus:
             "mode": self.mode.name,
             "activation_echo": self.activation_echo,
             "go_echo": self.go_echo,
-            "contacts": names_of(self.contacts),
+            "contacts": list(model.contact_names[model.object_byte(words)]),
             **{
-                str(axis.name): {
+                name: {
                     "position": reg.gPO[n].read(words),
                     "requested_position": reg.gPR[n].read(words),
                     "current_ma": reg.gCU[n].read(words) * reg.MILLIAMPERE_PER_COUNT,
                     "axis_state": states[model.object_status[n].read(words)],
                 }
-                for n, axis in enumerate(model.axes)
+                for n, name in enumerate(model.names)
             },
         }
 
