@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import time
+import threading
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from typing import Any
 
@@ -25,14 +25,14 @@ WHICH = {Finger.A: "a", Finger.B: "p", Finger.C: "o", Finger.SCISSOR: "s"}
 
 @contextlib.asynccontextmanager
 async def threads() -> AsyncIterator[None]:
-    """Let threads come to their end in a virtual loop, to which a wait for one is a wait for nothing."""
+    """Let threads come to their end in a virtual loop, whose seconds would otherwise pass in a moment."""
 
     async def turn() -> None:
         while True:
             await asyncio.sleep(0.001)
-            # Gives up the interpreter's lock: a virtual loop never idles, and a thread that imports or draws
-            # would wait 5 ms for each of its steps.
-            time.sleep(0.0001)  # noqa: ASYNC251
+            for thread in threading.enumerate():
+                if thread.name == "robotiq_async":
+                    thread.join(0.01)
 
     turning = asyncio.ensure_future(turn())
     try:
