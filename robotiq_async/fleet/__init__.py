@@ -1,13 +1,13 @@
 """Hands on other hosts, over zenoh: an agent that serves them, remote hands, a view of the fleet.
 
-What a program needs is imported from here, also where zenoh is not installed: that is looked for when a
-session is opened. ``import robotiq_async`` does not come here. Where it comes from::
+Programs import from here. That works without zenoh, which is imported when a session is opened.
+``import robotiq_async`` does not import this package. Its folders::
 
     remote, fleet    RemoteHand, and Fleet with its members
     agent            Agent: owns the hands of a host; FLEET.toml
-    control          who commands, and which requests are let in
-    network          sessions: what is needed of one, zenoh's, where it listens
-    keys             certificates, roles, what each may do
+    control          the lease, and which requests are admitted
+    network          sessions over zenoh, endpoints, routes
+    keys             certificates, roles and their rights
     wire             names, requests, answers, statuses
 """
 

@@ -1,4 +1,4 @@
-"""Fleet: who is there, how they are, and the halt for all of them."""
+"""Fleet: an overview of all grippers of a site, and a halt for all of them."""
 
 from __future__ import annotations
 
@@ -23,9 +23,11 @@ from .summaries import Summaries
 from .wire.names import ROOT, GripperName, check_name
 
 LOOK_S: Final = 0.5
+"""Seconds to wait for the tokens of agents."""
 LOOK_AGAIN_S: Final = 0.1
+"""Seconds until the next look for agents, during a halt."""
 SETTLE_S: Final = 2.0
-"""By then the links to all agents that can be reached are up."""
+"""Seconds after which the links to all agents that can be reached are up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,18 +35,18 @@ class Member:
     """A gripper of a fleet, as of its last summary.
 
     Attributes:
-        name: which one.
+        name: the gripper's name.
         is_there: whether an agent serves it now.
-        agents: how many serve it: more than one is a mistake.
+        agents: number of agents that serve it; more than one is a mistake.
         state: of the agent's hand; None before the first summary.
-        fault: the fault the gripper reports; None if it is not known.
+        fault: the fault that the gripper reports; None if unknown.
         is_moving: whether an axis moves.
-        holder: who commands it; None for nobody.
+        holder: label of the client that commands it; None if no client does.
         problem: why the agent cannot reach the gripper; empty if it can.
         address: of the gripper, as its agent reaches it.
-        seen_at: monotonic seconds, of this process, at which the agent had last read the gripper; None if it
-            has not. Clocks of hosts differ: it was then or, by the time that the quickest summary took,
-            before.
+        seen_at: when the agent last read the gripper, in monotonic seconds of this process; None if it never
+            has. The clocks of hosts differ, so the true time may be earlier, by the transit time of the
+            fastest summary.
     """
 
     name: GripperName
@@ -62,8 +64,8 @@ class Member:
 class Fleet:
     """All grippers of a site, or of all sites, that agents serve.
 
-    Use it as ``async with Fleet("lab") as fleet:``. It reads, and it halts; commanding one gripper is what
-    :meth:`hand` is for.
+    Use it as ``async with Fleet("lab") as fleet:``. It reads and halts. To command a gripper, use
+    :meth:`hand`.
     """
 
     def __init__(
@@ -73,16 +75,16 @@ class Fleet:
 
         Args:
             site: the site's name; None for all sites.
-            route: how to get to agents; None for what the environment says, else agents on this machine.
+            route: how to reach agents; None for the route in the environment, else agents on this machine.
             bus: an open session to share; it stays open. None opens one.
 
         Raises:
-            TypeError, ValueError: not a name, or a malformed or unprotected route.
+            TypeError, ValueError: a malformed name, or a malformed or unprotected route.
         """
         self._site = "*" if site is None else check_name("site", site)
         self._route = route or default_route()
         if bus is None:
-            self._route.configuration()  # malformed or unprotected: said here
+            self._route.configuration()  # a malformed or unprotected route fails here, not at the start
         self._shared = bus
         self._bus: Bus | None = None
         self._entered_at = 0.0
@@ -94,7 +96,7 @@ class Fleet:
         self._changes: Channel[Member] = Channel(Listeners())
 
     async def __aenter__(self) -> Self:
-        """Begin to listen, and find who is there already.
+        """Subscribe, and find the agents that are there already.
 
         Raises:
             RuntimeError: not in a running asyncio event loop.
@@ -110,7 +112,7 @@ class Fleet:
             bus.watch(f"{base}/alive/*", self._update_token),
         ]
         try:
-            await self._look()
+            await self._discover()
         except BaseException:
             await self.__aexit__(None, None, None)
             raise
@@ -128,15 +130,19 @@ class Fleet:
 
     @property
     def members(self) -> Mapping[GripperName, Member]:
-        """Who was seen since the beginning, also those that have left."""
+        """All grippers seen since the fleet was entered, also those that have left."""
         return dict(sorted(self._members.items()))
 
     def changes(self) -> Stream[Member]:
-        """Every member whenever something about it changes: it joins, leaves, moves, fails."""
+        """A stream of members: each one whenever it joins, leaves, moves, fails or changes otherwise."""
         return self._changes.open(None)
 
     def hand(self, name: GripperName | str, *, control: bool = True) -> RemoteHand:
-        """A hand on one of the grippers, over the session of this fleet; it is not started.
+        """A hand for one of the grippers, over the session of this fleet; it is not started.
+
+        Args:
+            name: the gripper's name, or its address.
+            control: whether it acquires the lease when it starts.
 
         Raises:
             ValueError: a malformed address.
@@ -145,24 +151,24 @@ class Fleet:
         return RemoteHand(str(name), control=control, bus=self._entered())
 
     async def halt_all(self) -> Mapping[GripperName, str]:
-        """Stop every gripper that is or was there; returns for each how that ended: "stopped".
+        """Halt every gripper that is or was there; returns "stopped" for each.
 
-        It is no safety function: a network may be down when it is needed.
-
-        In the first seconds after the fleet was entered it looks on for agents whose links come up late.
+        It is no safety function: a network may be down when it is needed. A gripper that does not answer is
+        tried for 2 s. For 2 s after the fleet was entered, it waits for agents whose links come up late. If
+        cancelled, halts under way are given up.
 
         Raises:
-            NotAllStoppedError: one was not seen to stop, or there is none at all, or an endpoint of the route
-                was not reached: nobody knows which grippers are behind it.
+            NotAllStoppedError: a gripper was not seen to stop; no gripper was found; or an endpoint of the
+                route was not reached, so that the grippers behind it are unknown.
             RuntimeError: the fleet is not entered.
         """
         bus = self._entered()
         halting: dict[tuple[GripperName, int], asyncio.Task[str]] = {}
-        """For each gripper and number of its agents: to one that comes later it is said once more."""
+        """By gripper and number of its agents: if another agent appears, the gripper is halted again."""
         try:
-            # Links come up one after the other: whoever is there is halted at once, and looking goes on.
+            # Links come up one after the other: each gripper is halted as soon as it is found.
             while True:
-                await self._look()
+                await self._discover()
                 for name, member in self._members.items():
                     if (name, member.agents) not in halting:
                         work = halt(bus, name, member.agents)
@@ -181,7 +187,7 @@ class Fleet:
         unreached = await bus.unreached()
         failed = {name: how for name, how in outcomes.items() if how != STOPPED}
         if failed or unreached or not outcomes:
-            raise NotAllStoppedError(_account(outcomes, unreached), outcomes, unreached)
+            raise NotAllStoppedError(_report(outcomes, unreached), outcomes, unreached)
         return outcomes
 
     # -- inside ----------------------------------------------------------------------------------------
@@ -196,12 +202,11 @@ class Fleet:
             raise RuntimeError("the fleet is not entered: use 'async with Fleet(...)'")
         return self._bus
 
-    async def _look(self) -> None:
+    async def _discover(self) -> None:
         for key in await self._entered().announced(f"{ROOT}/{self._site}/*/*/alive/*", timeout=LOOK_S):
             self._update_token(key, True)
 
     def _update_token(self, key: str, is_there: bool) -> None:
-        """A token of an agent has come or gone."""
         try:
             name = GripperName.of_key(key)
         except ValueError:
@@ -211,7 +216,6 @@ class Fleet:
         self._change(name, is_there=bool(tokens), agents=len(tokens))
 
     def _receive(self, _key: str, payload: bytes) -> None:
-        """A summary has arrived."""
         try:
             read = self._summaries.read(payload, now())
         except ProtocolError as error:
@@ -231,12 +235,11 @@ class Fleet:
         return iter(self.members.values())
 
 
-def _account(outcomes: Mapping[GripperName, str], unreached: Sequence[str]) -> str:
-    """What was halted and what was not, in words."""
+def _report(outcomes: Mapping[GripperName, str], unreached: Sequence[str]) -> str:
     stopped = sum(how == STOPPED for how in outcomes.values())
-    words = [
-        f"halted {stopped} of {len(outcomes)}" if outcomes else "no gripper is heard of: nothing was stopped"
+    parts = [
+        f"halted {stopped} of {len(outcomes)}" if outcomes else "no gripper was found: nothing was stopped"
     ]
-    words += [f"{name}: {how}" for name, how in outcomes.items() if how != STOPPED]
-    words += [f"not reached: {', '.join(unreached)}"] if unreached else []
-    return "; ".join(words)
+    parts += [f"{name}: {how}" for name, how in outcomes.items() if how != STOPPED]
+    parts += [f"not reached: {', '.join(unreached)}"] if unreached else []
+    return "; ".join(parts)

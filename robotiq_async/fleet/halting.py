@@ -1,4 +1,4 @@
-"""Halting one gripper of a fleet, as somebody who holds no lease: asked until answered."""
+"""Halting one gripper of a fleet, without a lease: repeated until answered."""
 
 from __future__ import annotations
 
@@ -18,27 +18,25 @@ STOPPED: Final = "stopped"
 
 
 async def halt(bus: Bus, name: GripperName, agents: int) -> str:
-    """Halt a gripper; returns how that ended: "stopped", or "no answer" or "refused" and why.
-
-    It raises none of what an agent answers, or fails to answer: that is in what it returns.
+    """Halt a gripper; returns "stopped", or "no answer" or "refused" with the reason. Raises no such error.
 
     Args:
         bus: an open session.
-        name: which one.
-        agents: how many serve it: all of them have to say that it stands.
+        name: the gripper.
+        agents: number of agents that serve it: all of them must confirm that it has stopped.
     """
     client, numbers = secrets.token_hex(8), count(1)
 
     async def attempt(left: float) -> None:
         call = Call(name.base, client, number=next(numbers), arguments={"label": label()})
-        heard: set[int] = set()
+        confirmed: set[int] = set()
 
         def decides(reply: Reply) -> bool:
             if is_refusal(reply):
                 return True
             answer = unpack_answer(reply.payload)
             if (answer.to, answer.number) == (call.to, call.number):
-                heard.add(answer.epoch)
+                confirmed.add(answer.epoch)
             return False
 
         reply = await bus.ask(
@@ -48,10 +46,10 @@ async def halt(bus: Bus, name: GripperName, agents: int) -> str:
             raise NoAnswerError("no answer")
         answer = unpack_answer(reply.payload)
         if answer.to != name.base or answer.number != call.number:
-            raise AgentError("another answer")
+            raise AgentError("the answer to another request")
         answer.outcome(lambda stamp: stamp)
-        if len(heard) < agents:
-            raise NoAnswerError(f"no answer from {agents - len(heard)} of {agents} agents")
+        if len(confirmed) < agents:
+            raise NoAnswerError(f"no answer from {agents - len(confirmed)} of {agents} agents")
 
     try:
         await until_answered(attempt, HALT_S)

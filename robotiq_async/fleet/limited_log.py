@@ -1,4 +1,4 @@
-"""What strangers, or a bad network, may cause thousands of times does not fill the log."""
+"""LimitedLog: keeps strangers, or a bad network, from filling the log."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from ..runtime.clock import now
 from ..runtime.log import Log, log
 
 EVERY_S: Final = 10.0
+"""Seconds between two messages of one kind."""
 
 
 class LimitedLog:
-    """Of one kind, about one source: the first at once, then one in ten seconds, with how many there were."""
+    """Messages of one kind, about one source: the first at once, then one in 10 s with the number of all."""
 
     def __init__(self, log: Log = log) -> None:
         self._log = log
@@ -23,14 +24,7 @@ class LimitedLog:
     def warn(
         self, message: str, *arguments: object, exc_info: bool = False, level: int = logging.WARNING
     ) -> bool:
-        """Log a warning, or count it; returns whether it was logged.
-
-        Args:
-            message: for the logger.
-            arguments: for the logger.
-            exc_info: whether with the traceback of what is being handled.
-            level: of the logger.
-        """
+        """Log a warning, or count it; returns whether it was logged."""
         self._count += 1
         if now() < self._next:
             return False

@@ -1,4 +1,4 @@
-"""Summaries: what agents tell once a second of each gripper, as a fleet shows it."""
+"""Summaries: reads what agents publish once a second about each gripper."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .wire.values import reading, words
 
 @dataclass(slots=True)
 class _Run:
-    """A run of an agent: its clock, and the newest of its stamps."""
+    """A run of an agent: its clock, and the newest stamp."""
 
     epoch: int
     newest: float = -math.inf
@@ -24,36 +24,35 @@ class _Run:
 
 
 class Summaries:
-    """Reads what arrives."""
+    """Reads summaries, and drops those that were overtaken."""
 
     def __init__(self) -> None:
         self._runs: dict[GripperName, _Run] = {}
-        """The run that was heard last."""
+        """The last run of the agent, by gripper."""
 
     def read(self, payload: bytes, arrival: float) -> tuple[GripperName, dict[str, Any]] | None:
-        """Which gripper a summary is about, for the key may be a wrong one, and what a member shows of it.
-
-        None if a newer one has overtaken it.
+        """The gripper of a summary, and the fields of its member; None if a newer summary has overtaken it.
 
         Raises:
-            ProtocolError: it cannot be read.
+            ProtocolError: malformed.
         """
         with reading("a summary"):
-            told = json.loads(payload)
-            name = GripperName.of_key(f"{told['to']}/summary")
-            stamp, age, fault = float(told["stamp"]), told["age"], told["fault"]
+            fields = json.loads(payload)
+            # The name in the payload, not in the key: zenoh may deliver under a wrong one.
+            name = GripperName.of_key(f"{fields['to']}/summary")
+            stamp, age, fault = float(fields["stamp"]), fields["age"], fields["fault"]
             seen = stamp if age is None else stamp - float(age)
             if not math.isfinite(seen):
                 raise ValueError(f"no time: {stamp}, {age}")
             what = {
-                "state": State(told["state"]),
-                "fault": None if fault is None else model_of(told.get("model")).fault(fault),
-                "is_moving": bool(told["is_moving"]),
-                "holder": None if told["holder"] is None else words(told["holder"]),
-                "problem": words(told["problem"]),
-                "address": words(told["address"]),
+                "state": State(fields["state"]),
+                "fault": None if fault is None else model_of(fields.get("model")).fault(fault),
+                "is_moving": bool(fields["is_moving"]),
+                "holder": None if fields["holder"] is None else words(fields["holder"]),
+                "problem": words(fields["problem"]),
+                "address": words(fields["address"]),
             }
-            run = self._run_of(name, int(told["epoch"]))
+            run = self._run_of(name, int(fields["epoch"]))
         run.clock.receive(stamp, arrival)
         if stamp < run.newest:
             return None

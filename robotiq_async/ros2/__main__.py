@@ -17,14 +17,14 @@ NEEDS = {
         "sudo apt install ros-DISTRO-control-msgs"
     ),
 }
-"""What may be missing, and what to do about it."""
+"""Packages that may be missing, with advice."""
 
 
 def main() -> int:
-    """Run the node; returns the exit code: 0 after a signal, 1 for a failure, which one line tells."""
+    """Run the node; returns the exit code: 0 after a signal, 1 after a failure; 130 if interrupted early."""
     try:
         return _run()
-    except KeyboardInterrupt:  # before the node could hear of it, or while the interpreter ends
+    except KeyboardInterrupt:  # before the node handles signals, or while the interpreter exits
         return 130
 
 
@@ -35,14 +35,14 @@ def _run() -> int:
 
         from .node.process import serve  # noqa: PLC0415  # imports the rest of ROS
     except ImportError as error:
-        _tell(_missing(error))
+        _print_error(_missing(error))
         return 1
     try:
         asyncio.run(serve(sys.argv))
     except rclpy.exceptions.ROSInterruptException:
         return 130
-    except Exception as error:  # noqa: BLE001  # one line for whoever started it; the node's log has the rest
-        _tell(" ".join(str(error).split()))
+    except Exception as error:  # noqa: BLE001  # one line for the user; the node's log has the rest
+        _print_error(" ".join(str(error).split()))
         return 1
     return 0
 
@@ -55,8 +55,8 @@ def _missing(error: ImportError) -> str:
     return f"{advice.replace('DISTRO', os.environ.get('ROS_DISTRO', 'jazzy'))} ({error})"
 
 
-def _tell(words: str) -> None:
-    print("robotiq_async.ros2:", words, file=sys.stderr, flush=True)  # noqa: T201  # for whoever started it
+def _print_error(words: str) -> None:
+    print("robotiq_async.ros2:", words, file=sys.stderr, flush=True)  # noqa: T201  # for the user
 
 
 if __name__ == "__main__":

@@ -53,7 +53,8 @@ async def test_a_goal_for_several_positions_is_one_write(
 ) -> None:
     before = len(gripper.writes)
     outcome = await begin(GoalRunner(hand), Targets(((50, A), (80, B | C), (140, S))))
-    assert outcome == Outcome(Ending.SUCCEEDED, stalled=False, reached=True, reason="every axis is there")
+    reason = "every axis reached its target"
+    assert outcome == Outcome(Ending.SUCCEEDED, stalled=False, reached=True, reason=reason)
     assert [gripper.position(axis) for axis in (A, B, C, S)] == [50, 80, 80, 140]
     assert len(gripper.writes) == before + 1
     assert [axis.speed for axis in Request.from_registers(gripper.writes[-1].registers).axes] == [255] * 4

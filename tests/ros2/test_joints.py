@@ -181,7 +181,7 @@ def test_the_addressed_axes() -> None:
         (["fingers"], [], "1 joints and 0 positions"),
         (["fingers"], [1.0, 2.0], "1 joints and 2 positions"),
         ([], [], "no joint is named"),
-        ([], [0.1, 0.2], "not one position but 2"),
+        ([], [0.1, 0.2], "one position is needed, got 2"),
     ],
 )
 def test_what_a_goal_cannot_ask(names: Sequence[str], angles: Sequence[float], reason: str) -> None:

@@ -118,7 +118,7 @@ async def test_a_halt_ends_what_a_service_has_begun(connection: Connection, name
     call = asyncio.create_task(connection.command(name))
     await connection.hand.wait_for_state(State.WF_ACTIVATION)
     assert "the gripper is reset" in await connection.command("halt")
-    with pytest.raises(RefusedError, match=f"a stop took over: {name} does not go on"):
+    with pytest.raises(RefusedError, match=f"a stop took over: {name} was aborted"):
         await call
 
 

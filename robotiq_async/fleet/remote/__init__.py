@@ -1,1 +1,1 @@
-"""A hand that an agent on another host serves."""
+"""The client's side: a hand that an agent on another host serves."""

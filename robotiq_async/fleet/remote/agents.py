@@ -1,4 +1,4 @@
-"""Which agents say that they serve a gripper. There must be one."""
+"""Agents: the agents that announce a gripper. There must be exactly one."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from ..network.bus import Bus, Undo
 from ..wire.names import GripperName
 
 LOOK_S: Final = 0.5
-TWO_AGENTS: Final = "two agents serve it, each perhaps another gripper under the same name: stop one of them"
+"""Seconds to look for the tokens of agents."""
+TWO_AGENTS: Final = "two agents serve it, perhaps different grippers under one name: stop one of them"
 
 
 class Agents:
-    """Those that are seen to serve one gripper. Of two one is a mistake, and which one it is people know."""
+    """The agents that serve one gripper. With two of them, only a person can say which one is the mistake."""
 
     def __init__(self, name: GripperName, bus: Bus, two: Callable[[], None]) -> None:
         self._name = name
@@ -28,12 +29,12 @@ class Agents:
         self.end: Undo = bus.watch(name.key("alive", "*"), self._update_token)
 
     async def check_one(self) -> None:
-        """Refuse to begin to command while two serve the gripper.
+        """Refuse to acquire the lease while two agents serve the gripper.
 
         Raises:
             AgentError: they do.
         """
-        if len(self._tokens) > 1:  # one may have gone without a word
+        if len(self._tokens) > 1:  # one may be gone, and its sign-off lost
             self._tokens = set(await self._bus.announced(self._name.key("alive", "*"), timeout=LOOK_S))
         if len(self._tokens) > 1:
             raise AgentError(f"{self._name}: {TWO_AGENTS}; nothing was done")

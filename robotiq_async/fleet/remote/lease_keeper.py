@@ -1,4 +1,8 @@
-"""LeaseKeeper: the lease as its client sees it. It is renewed, lost, and acquired again when nobody minds."""
+"""LeaseKeeper: the client's side of the lease: acquires, renews, reacquires and releases it.
+
+After a lost connection the lease is reacquired automatically, unless another client took it or halted the
+gripper in the meantime, which must not be overruled. The agent decides that, by the number of the lost lease.
+"""
 
 from __future__ import annotations
 
@@ -20,17 +24,17 @@ from .requests import NoAnswerError, label
 from .settings import Settings
 
 RENEWALS: Final = 5
-"""How many times in a window the lease is renewed, and silence looked for."""
+"""Renewals, and checks for silence, per window."""
 ANSWER_S: Final = 0.5
-"""For an answer that the agent gives at once; asked again within the time that there is."""
+"""Seconds for an answer that the agent gives at once; callers with more time ask again."""
 RELEASE_S: Final = 0.9
-"""With the second that closing a session of zenoh may take, within the two of a stop."""
+"""Seconds for the answer to a release. Closing a session of zenoh may take 1 s, and a stop 2 s in total."""
 NOT_REACQUIRED: Final = ("taken", "halted", "held", "restarted")
-"""Reasons for which nobody comes back without having been asked to."""
+"""Reasons after which the lease is not reacquired automatically: only an explicit acquire() does."""
 
 
 class AgentClient(Protocol):
-    """What the keeper needs of a run: to know whom it is about, and to ask."""
+    """The part of a run that the keeper uses."""
 
     name: GripperName
     mirror: Mirror
@@ -38,35 +42,33 @@ class AgentClient(Protocol):
     settings: Settings
     window: float
 
-    def call(self, arguments: Fields | None = None) -> Call:
-        """The next request, under the present lease."""
+    def call(self, arguments: Fields | None = None) -> Call: ...
 
     async def send(self, call: Call, verb: str, **how: Any) -> Any:  # noqa: ANN401
-        """Send a request and wait for its answer."""
+        ...
 
     def post(self, call: Call, verb: str, **how: Any) -> PendingRequest:  # noqa: ANN401
-        """Send a request."""
+        ...
 
     async def answer(self, posted: PendingRequest) -> Any:  # noqa: ANN401
-        """Wait for the answer to a request."""
+        ...
 
     def fail_calls(self, lease: int, error: ControlLostError) -> None:
-        """A lease has ended: who waits for something that was asked under it is told."""
+        """A lease has ended: fail the calls that wait for a request under it."""
 
     async def ask_quietly(self, verb: str, arguments: Fields, timeout: float) -> None:
-        """Ask for what the answer does by itself."""
+        """Ask, and ignore errors: the answer itself has the effect."""
 
-    def spawn(self, work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
-        """Do something beside; it ends with the run."""
+    def spawn(self, work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]: ...
 
 
 class LeaseKeeper:
-    """One run's lease.
+    """The lease of one run.
 
     Attributes:
         is_in_control: whether this client holds the lease, as far as it knows.
-        lease: number of the lease it holds, or held last.
-        lost: why control was lost; None while it is held, or was never asked for.
+        lease: number of the lease that it holds, or held last.
+        lost: why it lost control; None while it is in control, and if it never was.
     """
 
     def __init__(self, run: AgentClient, *, wants_control: bool) -> None:
@@ -78,17 +80,17 @@ class LeaseKeeper:
         self._wants_control = wants_control
         self._may_reacquire = True
         self._lease_run = 0
-        """The run of the agent that the number is of."""
+        """The run of the agent that gave the number of the lease."""
         self._acquiring = asyncio.Lock()
         self._reacquiring: asyncio.Task[Any] | None = None
         self._checking: asyncio.Task[Any] | None = None
         self._releasing: asyncio.Task[Any] | None = None
-        """How the lease is given back now, or was last."""
+        """The present release, or the last one."""
         self._ending: Ending | None = None
         self._is_ending = False
 
     async def begin(self, deadline: float) -> None:
-        """Acquire the lease if that is wanted; again when an answer was lost, until it is time to give up.
+        """Acquire the lease if wanted; repeat until the deadline if an answer was lost.
 
         Raises:
             ControlLostError: another client commands the gripper.
@@ -103,43 +105,44 @@ class LeaseKeeper:
                     raise
 
     def end(self, ending: Ending) -> None:
-        """The run ends: give the lease back, at once; see :meth:`release`."""
+        """The run ends: release the lease at once; see :meth:`release`."""
         if not self._is_ending and self._releasing is not None and self._releasing.done():
-            self._releasing = None  # that was another end, and is over
+            self._releasing = None  # an earlier release, which has ended
         self._is_ending = True
         self.release(ending)
 
     def abandon(self) -> None:
-        """Nothing can be sent any more."""
+        # The event loop is closed: nothing can be sent.
         self.is_in_control = self._wants_control = False
 
     def forbid_reacquiring(self) -> None:
-        """If the lease is lost, it is not acquired again without that being asked for."""
+        # Two agents serve the gripper, so the lease may be the one of the wrong gripper.
         self._may_reacquire = False
 
     async def acquire(self, *, take: bool = False) -> None:
-        """Get the lease.
+        """Get the lease, with ``take`` also from another client.
 
         Raises:
-            ControlLostError: another client holds it, and it is not to be taken away.
+            ControlLostError: another client holds it.
             AgentError: two agents serve the gripper.
             RobotiqError: the agent did not answer.
         """
         async with self._acquiring:
             if self.is_in_control:
-                await self._renew()  # it may have been lost without a word
+                await self._renew()  # it may have been lost unnoticed
             if self.is_in_control:
-                return  # asked for again, the agent would take what is under way for forgotten
+                return  # asked for it again, the agent would end what is under way
             await self._acquire({"what": "take" if take else "acquire"})
 
     def release(self, ending: Ending) -> None:
-        """Give the lease back, if this client holds it; sent in this very call.
+        """Release the lease, if this client holds it; the request is sent within this call.
 
-        Asked for again, before that is acknowledged or before the run is over, the strongest ending counts.
+        Called again before the release is acknowledged, or before the run is over, the strongest ending
+        applies.
         """
         self._wants_control = False
         if self.is_in_control:
-            self.lose("released", "it was given back")
+            self.lose("released", "it was released")
             self._releasing, self._ending = None, None
         elif self._releasing is None or (self._releasing.done() and not self._is_ending):
             self._releasing = None
@@ -149,13 +152,13 @@ class LeaseKeeper:
             what = {"what": "release", "halt": ending > Ending.LEAVE, "keep_grip": ending is Ending.KEEP}
             posted = self._run.post(self._run.call(what), "lease", timeout=RELEASE_S)
             self._releasing = self._run.spawn(self._run.answer(posted))
-            # Who asked for a gentler end is not told of its failure, but of how this one went.
+            # After a stronger release, callers wait for that one, so the error of this one may go unread.
             self._releasing.add_done_callback(lambda task: task.cancelled() or task.exception())
         elif ending < self._ending:
             self._log.warning("a stop that is under way is stronger: the fingers are %s", self._ending.done)
 
     async def released(self) -> None:
-        """Wait until the end that was asked for is acknowledged.
+        """Wait until the release is acknowledged.
 
         Raises:
             RobotiqError: the agent did not answer, or the fingers were not seen to stop.
@@ -169,9 +172,9 @@ class LeaseKeeper:
             awaited.result()
 
     def maintain(self) -> None:
-        """Renew the lease, or acquire it again when that is due; several times in a window."""
+        """Renew the lease, or reacquire it when due. Called several times in a window."""
         if self.is_in_control:
-            # Also while others are under way: one that is lost is not to cost the lease.
+            # Renewals may overlap: a lost one must not cost the lease.
             self._run.spawn(self._renew())
             return
         is_reacquiring = self._reacquiring is not None and not self._reacquiring.done()
@@ -180,18 +183,17 @@ class LeaseKeeper:
             self._reacquiring = self._run.spawn(self._reacquire())
 
     def receive(self, lease: int) -> None:
-        """The agent has told the number of the present lease."""
+        """A status had this number of the present lease."""
         is_checking = self._checking is not None and not self._checking.done()
         if self.is_in_control and lease > self.lease and not is_checking:
-            # The answer to a request under the former one says why it ended.
+            # The answer to a request under the lost lease has the reason.
             self._checking = self._run.spawn(self._check_lease())
 
     def lose(self, reason: str, why: str) -> None:
-        """The lease has ended."""
         if not self.is_in_control:
             return
         self.is_in_control = False
-        # After a halt or a take of somebody else nobody takes it back without having been asked to.
+        # After a halt or a take by another client only an explicit acquire() gets it back.
         self._wants_control = self._wants_control and reason not in (*NOT_REACQUIRED, "released")
         self.lost = ControlLostError(f"lost control of {self._run.name}: {why}", reason)
         self._run.fail_calls(self.lease, self.lost)
@@ -199,10 +201,10 @@ class LeaseKeeper:
             self._log.warning("lost control: %s", why)
 
     def check(self) -> None:
-        """Refuse commands without a lease.
+        """Refuse commands without the lease.
 
         Raises:
-            ControlLostError: there is none.
+            ControlLostError: this client does not hold it.
         """
         if not self.is_in_control:
             if self.lost is None:
@@ -213,7 +215,7 @@ class LeaseKeeper:
 
     async def _acquire(self, what: Fields) -> None:
         await self._run.agents.check_one()
-        # With the lease, so that nothing moves before.
+        # Sent with the request for the lease, so that no motion precedes them.
         settings = {"settings": self._run.settings.fields} if self._run.settings.fields else {}
         call = self._run.call({**what, "label": label(), **settings})
         value = await self._run.send(call, "lease", timeout=ANSWER_S)
@@ -228,10 +230,10 @@ class LeaseKeeper:
                 await self._acquire({"what": "acquire", "again": self.lease, "run": self._lease_run})
         except ControlLostError as error:
             if error.reason in NOT_REACQUIRED:
-                # Somebody else was first, or has stepped in meanwhile; whose turn it is people decide.
+                # Another client was first, or intervened: people decide which one commands.
                 self._wants_control, self.lost = False, error
         except RobotiqError:
-            pass  # again in a moment
+            pass  # the next maintain() tries again
 
     async def _renew(self) -> None:
         await self._run.ask_quietly("lease", {"what": "renew"}, self._run.window)
@@ -240,5 +242,5 @@ class LeaseKeeper:
         lease, run = self.lease, self._lease_run
         await self._run.ask_quietly("lease", {"what": "renew"}, self._run.window / RENEWALS)
         if (lease, run) == (self.lease, self._run.mirror.epoch):
-            # Nobody answers. When the lease is asked for again the agent says whether somebody stepped in.
-            self.lose("expired", "its agent says that the lease has ended")
+            # No answer with a reason. If another client intervened, the agent refuses to reacquire.
+            self.lose("expired", "its agent reports that the lease has ended")

@@ -1,4 +1,4 @@
-"""Mirror: what a client knows of a hand on another host, from what it has heard."""
+"""Mirror: the state of a hand on another host, from the messages that have arrived."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from ..wire.status_message import StatusMessage
 from ..wire.values import Fields, read_request, read_transition, reading
 
 _RUNS: Final = 16
-"""At most this many runs of an agent are told apart."""
+"""Runs of an agent whose clocks are kept."""
 DRIFT: Final = 200e-6
-"""How far two clocks may part: seconds a second."""
+"""Drift between two clocks at most, in seconds per second."""
 _SEEN: Final = {
     State.RUNNING_IDLE: Trigger.SEEN_READY,
     State.RUNNING_CC: Trigger.SEEN_READY,
@@ -31,16 +31,17 @@ _OFF: Final = (State.DO_SHUTDOWN, State.SHUTDOWN)
 
 
 def as_seen_from_here(state: State) -> State:
-    """The state of a remote hand whose agent's hand is in a state: that one's end is not the end of ours."""
+    """The state of a remote hand. If the agent's hand shuts down, ours is only disconnected."""
     return State.DISCONNECTED if state in _OFF else state
 
 
 class AgentClock:
-    """Makes times of this process of times of the agent.
+    """Converts times of the agent to times of this process.
 
-    A message takes at least no time. So the smallest difference of arrival and stamp is the best guess of how
-    far the clocks are apart; it may grow slowly, for clocks drift. What an answer says was said after its
-    question: a smaller difference cannot be (the agent's host was suspended, and its clock with it).
+    The transit time of a message is never negative. So the smallest difference of arrival and stamp is the
+    best estimate of the clock difference; it may grow by DRIFT, because clocks drift. An answer is sent after
+    its question. So the difference cannot be smaller than the time of the question minus the stamp of the
+    answer; if it is, the agent's host was suspended, and its clock with it.
     """
 
     def __init__(self) -> None:
@@ -48,7 +49,7 @@ class AgentClock:
         self._at = 0.0
 
     def receive(self, stamp: float, arrival: float, asked: float | None = None) -> None:
-        """A message with this stamp of the agent has arrived; it was asked for at ``asked``, if it was."""
+        """Learn from a message; ``asked`` is our time of the question if the message is an answer."""
         difference = arrival - stamp
         if self._offset is None:
             self._offset = difference
@@ -63,18 +64,17 @@ class AgentClock:
 
 
 class Mirror:
-    """What has been heard of one hand.
+    """The state of one hand, as far as messages show it.
 
     Attributes:
-        clock: from the agent's times to ours.
-        newest: the newest of all messages; None before the first.
+        clock: converts the agent's times to ours.
+        newest: the newest message; None before the first.
         status: the newest status; None before the first.
-        state: where the hand is, as far as it is known: DISCONNECTED before the first message, and while the
-            agent is silent.
-        is_silent: whether nothing is heard of the agent.
-        events: number of the newest event that was handed on.
-        misrouted: messages that were about another gripper, and dropped.
-        received_at: when the last one arrived that was current.
+        state: of the hand: DISCONNECTED before the first message, and while the agent is silent.
+        is_silent: whether no current message arrives.
+        events: number of the newest event that readers got.
+        misrouted: messages about another gripper, which were dropped.
+        received_at: arrival of the last current message.
     """
 
     def __init__(
@@ -85,13 +85,14 @@ class Mirror:
         before: Mirror | None = None,
         log: Log = log,
     ) -> None:
-        """Mirror the gripper with this mark.
+        """Mirror one gripper.
 
         Args:
             mark: see :attr:`~robotiq_async.fleet.wire.names.GripperName.mark`.
-            channels: what happens is handed on there.
-            entered: is told of each state.
-            before: of the run before this one, if there was one: states and sequences go on from there.
+            channels: streams of statuses, transitions and requests.
+            entered: called with each state.
+            before: the mirror of the previous run of the hand, whose state and sequences continue; None for
+                the first run.
             log: of the hand.
         """
         self.log = log
@@ -108,21 +109,21 @@ class Mirror:
         self._entered = entered
         self._is_over = False
         self._reported = State.DISCONNECTED if before is None else before.state
-        """The state that the last transition led to: the next one begins there."""
+        """Target of the last transition that readers got: the source of the next one."""
         self._reported_at = 0.0
         self._events_state = State.DISCONNECTED
-        """Where the events so far have led; statuses may be ahead of them."""
+        """State after the events so far; statuses may be ahead of them."""
         self._pushed: RobotiqStatus | None = None
-        """The last status that was handed on."""
+        """The last status that readers got."""
         self._clocks: dict[int, AgentClock] = {}
-        """Of each run of the agent that was heard, the present one last."""
+        """By run of the agent, the present one last."""
         self._first = 0 if before is None else before.next_sequence
         self._base = 0
-        """Added to the agent's sequences: they begin anew with each run of the agent, ours do not."""
+        """Added to the sequences of the agent, which restart with each of its runs; ours never do."""
 
     @property
     def stamp(self) -> float:
-        """The newest stamp of the agent that was heard."""
+        """The newest stamp of the agent that was received."""
         return 0.0 if self.newest is None else self.newest.stamp
 
     @property
@@ -132,22 +133,22 @@ class Mirror:
 
     @property
     def next_sequence(self) -> int:
-        """What no status has been numbered with, and none before it."""
+        """The first sequence that no status has had."""
         return self._first if self.status is None else self.status.sequence + 1
 
     def is_about_another(self, mark: object) -> bool:
-        """Whether a message is about another gripper: it came under a wrong key, and is dropped."""
+        # zenoh may deliver a sample under the wrong key.
         if mark == self._mark:
             return False
         self.misrouted += 1
         return True
 
     def is_of_another_run(self, message: StatusMessage, arrival: float, window: float = WINDOW_S) -> bool:
-        """Whether a message is of another run of the agent than the one that is followed.
+        """Whether a message is of another run of the agent than the present one, and to be dropped.
 
-        Either it is late; or two agents serve the gripper, and whoever has begun with one stays with it while
-        it is heard: the other may serve another gripper under the same name. After one that has said that it
-        ends comes the next.
+        Either it is late, or two agents serve the gripper. The second may serve another gripper under the
+        same name, so the client stays with the first as long as its messages arrive. A run that has announced
+        its end is followed by the next.
         """
         newest = self.newest
         if newest is None or message.epoch == newest.epoch:
@@ -167,15 +168,15 @@ class Mirror:
         window: float = WINDOW_S,
         asked: float | None = None,
     ) -> bool:
-        """A message has arrived. Returns whether it is current: one that was on its way for long is not.
+        """Take over a message; returns whether it is current, that is, at most ``window`` seconds old.
 
         Args:
-            message: about this gripper, and of the run that is followed, or is to be from now on.
+            message: about this gripper, of the present run or the next.
             arrival: our time.
-            in_turn: whether it came among the news, where every status has its turn. One that came with an
-                answer has overtaken others: readers get theirs first.
-            window: seconds for which it is current.
-            asked: our time at which it was asked for; None if it was not.
+            in_turn: whether it was published, and has its place among the other statuses. The status of an
+                answer may have overtaken those: readers get them first.
+            window: seconds.
+            asked: our time of the question, if it came with an answer.
         """
         if message.epoch != self.epoch:
             self._begin_run(message, arrival)
@@ -199,7 +200,7 @@ class Mirror:
         return is_current
 
     def receive_events(self, events: Iterable[Fields]) -> bool:
-        """Events have arrived. Returns whether some before them are missing: they wait for those."""
+        """Hand on events. True if some before them are missing: then the later ones wait for these."""
         for event in events:
             index = event["index"]
             if index > self.events + 1:
@@ -210,23 +211,21 @@ class Mirror:
         return False
 
     def skip_events(self, index: int) -> None:
-        """The agent has forgotten those up to this one."""
+        # The agent no longer has those up to this one.
         self.events = max(self.events, index)
 
     def has_missed(self) -> bool:
-        """Whether the agent has told of more events than have arrived."""
+        """Whether a status announced more events than have arrived."""
         return self.newest is not None and self.newest.events > self.events
 
     def renumbered(self, status: RobotiqStatus) -> RobotiqStatus:
-        """A status that came within an answer, numbered as ours are."""
+        """The status of an answer, with a sequence of ours."""
         return RobotiqStatus(status.registers, status.timestamp, self._base + status.sequence, status.model)
 
     def begin(self, at: float) -> None:
-        """The run begins: nothing is heard yet."""
         self._report(State.DISCONNECTED, Trigger.ASK_START, at)
 
     def fall_silent(self, at: float) -> None:
-        """Nothing is heard of the agent any more."""
         if not (self.is_silent or self._is_over):
             self.is_silent = True
             self.state = State.DISCONNECTED
@@ -234,15 +233,14 @@ class Mirror:
             self._entered(State.DISCONNECTED)
 
     def shut_down(self, state: State, trigger: Trigger, at: float) -> None:
-        """The run ends: what is still heard changes the state no more."""
+        # From now on messages do not change the state.
         self._is_over = True
         self.state = state
         self._report(state, trigger, at)
 
     def _begin_run(self, message: StatusMessage, arrival: float) -> None:
-        """Another run of the agent: its clock, its events and its polls are others."""
         self.fall_silent(arrival)
-        # What is late from a run that was heard before is told by the clock of that run.
+        # With the clock of an earlier run, late messages of that run are recognized as late.
         self.clock = self._clocks.pop(message.epoch) if message.epoch in self._clocks else AgentClock()
         self._clocks[message.epoch] = self.clock
         while len(self._clocks) > _RUNS:
@@ -258,19 +256,18 @@ class Mirror:
         source, self.state = self.state, state
         if self.is_silent:
             self.is_silent = False
-            # What came meanwhile, the events tell: they may be late.
+            # The state after the events, not of this status: the events up to it may still arrive.
             self._report(self._events_state, _SEEN.get(self._events_state, Trigger.SEEN_BUSY), arrival)
         if source is not state:
             self._entered(state)
 
     def _status(self, message: StatusMessage) -> RobotiqStatus | None:
-        """The status that a message carries, as the reader gets it."""
         if message.registers is None:
             return None
         newest, sequence = self.status, self._base + message.sequence
         if newest is not None and newest.sequence == sequence:
             return newest
-        # The guess of the clocks' difference becomes smaller and larger; the times that are told only rise.
+        # The estimated clock difference falls and rises, but timestamps must rise with the sequence.
         at = self.clock(message.stamp - message.age)
         for other in (self._pushed, newest):
             if other is not None:
@@ -289,16 +286,15 @@ class Mirror:
         source, target = as_seen_from_here(transition.source), as_seen_from_here(transition.target)
         self._events_state = target
         if not (self.is_silent or self._is_over):
-            # Those between, if any, the agent has forgotten.
+            # Transitions in between, if any, are lost: the agent keeps only the newest events.
             self._report(source, _SEEN.get(source, Trigger.SEEN_BUSY), transition.timestamp)
             self._report(target, transition.trigger, transition.timestamp)
 
     def _report(self, state: State, trigger: Trigger, at: float) -> None:
-        """Hand on a change of state, if it is one."""
         source, self._reported = self._reported, state
         if source is not state:
             self._channels.transitions.push(Transition(source, state, trigger, self._in_order(at)))
-            # Also a state that lasted too short for any message.
+            # Also a state too short to appear in any status.
             self._entered(state)
 
     def _in_order(self, at: float) -> float:

@@ -1,4 +1,4 @@
-"""Events that were dropped on the way: the agent keeps the last ones, and is asked for them."""
+"""MissedEvents: fetches events that the network dropped. The agent keeps the last ones."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..wire.values import reading
 from .mirror import Mirror
 
 PAUSE_S: Final = 0.02
-"""From one question to the next."""
+"""Seconds between two questions: 50 a second, half of what an agent answers to one client."""
 
 
 class MissedEvents:

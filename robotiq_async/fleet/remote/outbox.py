@@ -1,4 +1,4 @@
-"""Outbox: what a control loop asks for, on its way to the agent. The last value wins."""
+"""Outbox: commands of a control loop on their way to the agent. For each axis the last value wins."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from .pending_request import PendingRequest
 from .session import RemoteSession
 
 UNDER_WAY: Final = 4
-"""Requests that may be unanswered at a time; 200 a second need no more up to 20 ms of round trip."""
+"""Unanswered requests at a time: enough for 200 a second up to a round trip of 20 ms."""
 ANSWER_S: Final = 1.0
+"""Seconds for the answer to a command."""
 
 
 class Outbox:
-    """Merges what is asked while enough is under way. What it sends keeps its place among other requests."""
+    """Merges commands while UNDER_WAY requests are unanswered. They keep their order among other requests."""
 
     def __init__(self, session: RemoteSession) -> None:
         self._session = session
         self._asked: Call | None = None
-        """As which the oldest of those that wait would have gone out: its lease, and what was heard then."""
+        """The lease, and the newest stamp, at the time of the oldest waiting command."""
         self._waiting: dict[Finger, dict[str, int]] = {}
         self._under_way = 0
         self._motions = 0
 
     @property
     def is_moving(self) -> bool:
-        """Whether a motion was asked for that the agent has not answered for yet."""
+        """Whether a motion was asked for that the agent has not answered yet."""
         return self._motions > 0 or any("position" in changes for changes in self._waiting.values())
 
     def put(self, axes: Finger, changes: dict[str, int]) -> None:
-        """Ask axes for something."""
         if self._asked is None or not self._is_under_this_lease(self._asked):
             self.clear()
             self._asked = self._session.call()
@@ -46,24 +46,22 @@ class Outbox:
         self._send_next()
 
     def clear(self) -> None:
-        """What waits is not to be sent any more."""
         self._waiting.clear()
         self._asked = None
 
     def drop(self) -> None:
-        """The hand is stopped."""
         if self._waiting:
-            self._session.log.info("stopped: what was asked for and not sent yet is dropped")
+            self._session.log.info("stopped: commands that were not sent yet are dropped")
         self.clear()
 
     def flush(self) -> None:
-        """Send what waits now: something is asked for after it."""
+        """Send the waiting commands now, because another request follows."""
         asked, self._asked = self._asked, None
         waiting, self._waiting = self._waiting, {}
         if waiting and asked is not None and self._is_under_this_lease(asked):
             is_motion = any("position" in changes for changes in waiting.values())
             arguments = {"axes": {str(int(axis)): changes for axis, changes in waiting.items()}}
-            # The time it has waited here counts like the time on its way.
+            # With the stamp of its first command: the time in the outbox counts like time in the network.
             call = replace(self._session.call(arguments), seen=asked.seen)
             posted = self._session.post(call, "cmd/command", timeout=ANSWER_S, urgency=Urgency.COMMAND)
             self._under_way += 1
@@ -77,7 +75,7 @@ class Outbox:
         return now.keeper.is_in_control and (asked.epoch, asked.lease) == (now.mirror.epoch, now.keeper.lease)
 
     def count_motion(self, asking: asyncio.Task[Any]) -> None:
-        """Something is under way that may set axes going."""
+        """Count a request as a motion until it is answered."""
         self._motions += 1
 
         def done(_: object) -> None:
@@ -87,7 +85,6 @@ class Outbox:
 
     @contextmanager
     def motion(self) -> Iterator[None]:
-        """A motion is asked for, and waited for."""
         self._motions += 1
         try:
             yield

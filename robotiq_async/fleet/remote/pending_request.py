@@ -1,4 +1,8 @@
-"""A request on its way. It may be said more than once, with the same number: agents know repetitions."""
+"""PendingRequest: a request without an answer yet.
+
+It is sent again with the same number until it is answered. The agent recognizes repetitions by the number and
+carries them out once, so a repetition costs nothing but its message.
+"""
 
 from __future__ import annotations
 
@@ -13,17 +17,18 @@ from ..network.bus import Reply, Urgency
 from ..wire.envelope import Answer, Call, unpack_answer
 
 REPEAT_S: Final = 0.25
-"""After so long without an answer a request is said again: a round trip is shorter than that."""
+"""Seconds without an answer before a request is repeated: longer than a round trip."""
 REPEAT_SLOWLY_S: Final = 1.0
-"""After this time, so often: it has been let in by then, or is too late, and its answer may be lost."""
+"""After this many seconds, the interval of repetitions: by then the request was admitted or is too late, and
+only its answer may be lost."""
 STRAYS: Final = 3
-"""So many answers to something else are passed over."""
+"""Answers to other requests that are ignored, at most."""
 
 
 def of_its_run(call: Call) -> Callable[[Reply], bool]:
-    """Whether a reply is that of the run of the agent that was asked; of any, if the request names none.
+    """A check that a reply comes from the addressed run of the agent, or any run if none is addressed.
 
-    Where two agents serve a gripper, the one that refuses is the quicker one.
+    With two agents for one gripper, the refusal of the wrong one arrives first.
     """
 
     def decides(reply: Reply) -> bool:
@@ -37,7 +42,8 @@ def of_its_run(call: Call) -> Callable[[Reply], bool]:
 
 
 def is_refusal(reply: Reply) -> bool:
-    """Whether a reply to a halt says anything but that the fingers stand: of two agents both have to."""
+    # A halt ends with the first refusal. Of two agents both must confirm it, so a success does not end the
+    # wait.
     try:
         return unpack_answer(reply.payload).error is not None
     except RobotiqError:
@@ -45,15 +51,15 @@ def is_refusal(reply: Reply) -> bool:
 
 
 class PendingRequest:
-    """Waits for the first answer to any of its copies.
+    """Waits for the first answer to any of the copies of a request.
 
     Attributes:
         call: the request.
-        verb: the last part of the key it goes to.
-        urgency: of it and its answer.
-        timeout: seconds for its answer, from the first time that it is said.
-        asked_at: when it was last said anew.
-        answered: the reply; None if there will be none, or an error that says why.
+        verb: the last part of its key.
+        urgency: of the request and its answer.
+        timeout: seconds for the answer, from the first copy.
+        asked_at: when the wait for an answer began.
+        answered: the reply; None if there is none, or the error that ended the wait.
     """
 
     def __init__(self, call: Call, verb: str, timeout: float, urgency: Urgency) -> None:
@@ -75,35 +81,35 @@ class PendingRequest:
 
     @property
     def is_halt(self) -> bool:
-        """Whether it is for every run of the agent, and answered also when the agent falls silent."""
+        # Any run of the agent may answer a halt, and its answer is awaited even if the agent falls silent.
         return self.urgency is Urgency.STOP
 
     @property
     def is_command(self) -> bool:
-        """Whether it has its place among other commands."""
+        # Commands keep their order. A cancellation does not wait for those before it.
         return self.verb.startswith("cmd/") and self.verb != "cmd/cancel"
 
     @property
     def may_repeat(self) -> bool:
-        """Whether it is said again until it is answered. Renewals follow each other, halts have their own."""
+        # The next renewal replaces a lost one, and until_answered() repeats halts.
         return self.is_command or (self.verb == "lease" and self.call.arguments.get("what") != "renew")
 
     @property
     def is_allowed_after_stop(self) -> bool:
-        """Whether it may still be said when the hand was stopped: it starts and continues no motion."""
+        # A halt and a release start and continue no motion.
         return self.is_halt or (self.verb == "lease" and self.call.arguments.get("what") == "release")
 
     @property
     def left(self) -> float:
-        """Seconds for its answer."""
+        """Seconds left for the answer."""
         return max(0.0, self._until - now())
 
     def packed(self, after: int) -> bytes:
-        """As bytes; ``after`` is the command before it that has not been answered yet, or 0."""
+        """The request as bytes; ``after`` is the number of the unanswered command before it, or 0."""
         return (replace(self.call, after=after) if after else self.call).pack()
 
     def add(self, copy: asyncio.Future[Reply | None], came_early: Callable[[], None]) -> None:
-        """It was said; ``came_early`` is called if it arrived, and one that was said before it did not."""
+        """Add a copy that was sent. ``came_early`` is called if it arrived before a preceding command."""
 
         def take(_: object) -> None:
             self._copies.discard(copy)
@@ -113,7 +119,7 @@ class PendingRequest:
             if reply is not None and self.may_repeat:
                 if self._is_stray(reply) and self._strays < STRAYS:
                     self._strays += 1
-                    return  # a copy went astray, or its answer: it is said again
+                    return  # the copy, or its answer, was misrouted: the request is repeated
                 if _came_early(reply):
                     came_early()
                     return
@@ -130,37 +136,34 @@ class PendingRequest:
         is_about_this = answer.to == self.call.to and answer.number == self.call.number
         return bool(answer.number) and not is_about_this
 
-    def repeat(self, say: Callable[[], None]) -> None:
-        """Have it said again if it is not answered in time."""
+    def repeat(self, send: Callable[[], None]) -> None:
+        """Call ``send`` if there is no answer in time."""
         self.stop_repeating()
         if self.may_repeat:
             pause = REPEAT_S if now() < self._until - self.timeout + REPEAT_SLOWLY_S else REPEAT_SLOWLY_S
-            self._timer = self._loop.call_later(pause, say)
+            self._timer = self._loop.call_later(pause, send)
 
     def stop_repeating(self) -> None:
-        """Say it no more."""
         if self._timer is not None:
             self._timer.cancel()
 
     def fail(self, error: RobotiqError) -> None:
-        """There will be no answer."""
         if not self.answered.done():
             self.answered.set_result(error)
 
     def end(self) -> None:
-        """Nobody waits for it."""
         self.stop_repeating()
         self.answered.cancel()
         for copy in list(self._copies):
             copy.cancel()
 
     async def ended(self) -> None:
-        """Wait until nothing of it is left."""
+        """Wait until all copies have ended."""
         await asyncio.gather(*self._copies, return_exceptions=True)
 
 
 def _came_early(reply: Reply) -> bool:
-    """Whether the agent waits for a request that was said before this one."""
+    """Whether the agent waits for a command that was sent before this one."""
     try:
         answer: Answer = unpack_answer(reply.payload)
     except RobotiqError:

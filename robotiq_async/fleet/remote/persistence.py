@@ -24,7 +24,7 @@ T = TypeVar("T")
 async def until_answered(attempt: Callable[[float], Awaitable[T]], limit: float) -> T:
     """Repeat an attempt; return the result of the first that succeeds.
 
-    Earlier attempts stay open: on a slow link each answer may take longer than the time between two attempts.
+    Earlier attempts stay open: on a slow link an answer may take longer than the time between two attempts.
 
     Args:
         attempt: asks once; its argument is the seconds that are left.
@@ -32,7 +32,7 @@ async def until_answered(attempt: Callable[[float], Awaitable[T]], limit: float)
 
     Raises:
         NotAllowedError: access was denied, and no attempt succeeded.
-        RobotiqError: the agent's answer; or, when the time is over, why there was none.
+        RobotiqError: the agent's answer; after the time limit, why there was none.
     """
     begun, deadline = now(), now() + limit
     under_way: set[asyncio.Future[T]] = set()
@@ -46,7 +46,7 @@ async def until_answered(attempt: Callable[[float], Awaitable[T]], limit: float)
                     under_way, timeout=due - now(), return_when=asyncio.FIRST_COMPLETED
                 )
                 for each in done:
-                    each.exception()  # seen: of two that end in the same turn one may say enough
+                    each.exception()  # retrieved, or asyncio would log the error of a second one in this turn
                 for each in done:
                     try:
                         return each.result()
@@ -63,7 +63,7 @@ async def until_answered(attempt: Callable[[float], Awaitable[T]], limit: float)
 
 
 async def _last(under_way: set[asyncio.Future[T]], failure: Exception | None) -> T:
-    # The time of those that are still open is over as well.
+    # The time of the attempts that are still open is over as well.
     for each in await asyncio.gather(*under_way, return_exceptions=True):
         if not isinstance(each, BaseException):
             return each

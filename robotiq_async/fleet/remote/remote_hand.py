@@ -37,13 +37,13 @@ from .requests import no_answer_as_lost_connection
 from .session import CONNECT_S, RemoteSession
 
 COMMAND_S: Final = 5.0
-"""Seconds for what ends when the gripper acknowledges it."""
+"""Seconds for commands that end with the acknowledgment of the gripper."""
 SEQUENCE_S: Final = 130.0
-"""Seconds for an activation, a reset or a release; the agent has limits of its own, and they are shorter."""
+"""Seconds for an activation, a reset or a release; the agent's own limits are shorter."""
 MOVE_S: Final = 100.0
-"""Seconds for a move without a timeout; the agent ends it by its own, which is shorter."""
+"""Seconds for a move without a timeout; the agent's own limit is shorter."""
 SLACK_S: Final = 5.0
-"""Seconds beyond a timeout that the agent watches over."""
+"""Seconds beyond a timeout that the agent applies."""
 MOTIONS: Final = ("move", "set_position")
 
 
@@ -52,18 +52,18 @@ class RemoteHand(Hand):
 
     What all hands promise is in :class:`~robotiq_async.hand.Hand`. Commanding takes a lease, which this
     hand acquires when it starts and renews from its own event loop. A program that hangs loses the lease, and
-    what it had set going is then held. What differs from a hand of this process:
+    what it had set in motion is then held. Differences from a hand of this process:
 
     * :meth:`start` looks for the agent (ConnectFailedError, NotAllowedError) and acquires the lease
       (ControlLostError: another client commands). Without the extra ``fleet`` it raises ImportError. A hand
       that only reads activates nothing.
-    * :meth:`stop` gives the lease back; the agent's hand goes on. A hand without the lease stops no fingers.
+    * :meth:`stop` releases the lease; the agent's hand keeps running. Without the lease it stops no fingers.
       If the event loop was closed, the agent holds what moves.
     * Commands raise ControlLostError without the lease, and ConnectionLostError when the agent falls silent:
-      it may have carried them out, and holds what moves within its window. A command that the agent refuses
-      later than :meth:`command` returns is logged.
-    * :meth:`halt` takes no lease and asks again until it is answered. If another client commands the gripper,
-      that client loses the lease. ConnectionLostError means no answer within 2 s: the fingers MAY STILL MOVE.
+      it may have carried them out, and holds what moves within its window. If the agent refuses a command
+      after :meth:`command` has returned, the refusal is logged.
+    * :meth:`halt` needs no lease and is repeated until it is answered. If another client commands the
+      gripper, it loses the lease. ConnectionLostError means no answer within 2 s: the fingers MAY STILL MOVE.
     * :attr:`state` is DISCONNECTED also while the agent is silent; that is a transition, too. Some statuses
       may be missing, and :meth:`grip_events` follows those that arrived.
 
@@ -73,15 +73,15 @@ class RemoteHand(Hand):
     Args:
         address: ``zenoh://SITE/HOST/GRIPPER``; ``?connect=tls/HOST:7447&keys=FOLDER`` says how to get there.
             What the address leaves out comes from the environment (``ROBOTIQ_ASYNC_CONNECT``,
-            ``ROBOTIQ_ASYNC_KEYS``); without that it is an agent on this machine.
+            ``ROBOTIQ_ASYNC_KEYS``); the default is an agent on this machine.
         control: True acquires the lease when the hand starts, None with the first command that is awaited,
-            False not at all: it only reads (and halts) unless :meth:`acquire` is called.
+            False never: the hand only reads (and halts) unless :meth:`acquire` is called.
         connect_timeout: seconds for finding the agent, 0.1..60.
         bus: an open session to share; it stays open. None opens one.
         calibration: the speeds of :attr:`units`; default timeouts are the agent's. None for the thesis's
             gripper.
-        force_calibration: what :attr:`units` labels force values with. None for the manual's figures.
-        keep_grip: what :meth:`stop` and :meth:`release` do by default, and leaving the block does always.
+        force_calibration: the forces of :attr:`units`. None for the manual's figures.
+        keep_grip: the default of :meth:`stop` and :meth:`release`; leaving the block always uses it.
 
     Raises:
         TypeError: an option of the wrong type.
@@ -180,29 +180,29 @@ class RemoteHand(Hand):
         return self._session is not None and not self._session.is_over and self._session.keeper.is_in_control
 
     async def acquire(self) -> None:
-        """Get the lease, unless another client has it.
+        """Get the lease, unless another client holds it.
 
         Raises:
             ControlLostError: another client commands the gripper.
             RobotiqError: not started, or the agent does not answer.
         """
         with no_answer_as_lost_connection():
-            await self._asked().keeper.acquire()
+            await self._running_session().keeper.acquire()
 
     async def take(self) -> None:
-        """Get the lease, also from another client: what that client commanded and still moves is held.
+        """Get the lease, also from another client; what that client set in motion is held.
 
         Raises:
             RobotiqError: not started, or the agent does not answer.
         """
         with no_answer_as_lost_connection():
-            await self._asked().keeper.acquire(take=True)
+            await self._running_session().keeper.acquire(take=True)
 
     async def release(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:
-        """Give the lease back, and go on reading.
+        """Release the lease, and continue to read.
 
         Args:
-            halt: False leaves the fingers to what they do.
+            halt: False leaves the fingers moving.
             keep_grip: as for :meth:`stop`.
 
         Raises:
@@ -210,7 +210,7 @@ class RemoteHand(Hand):
         """
         check_flag("halt", halt)
         ending = Ending.of(halt=halt, keep_grip=self._keeps_grip(keep_grip))
-        keeper = self._asked().keeper
+        keeper = self._running_session().keeper
         keeper.release(ending)
         with no_answer_as_lost_connection():
             await keeper.released()
@@ -221,7 +221,7 @@ class RemoteHand(Hand):
         await self._ask(f"set_{what}", {"value": value, "fingers": int(axes)}, COMMAND_S)
 
     def _command(self, axes: Finger, position: int | None, speed: int | None, force: int | None) -> None:
-        session = self._asked()
+        session = self._running_session()
         session.check_control()
         if self.state not in RUNNING:
             raise refusal(Trigger.ASK_COMMAND, self.state, session.mirror.status)
@@ -250,7 +250,7 @@ class RemoteHand(Hand):
         await self._ask("hold", {"fingers": int(axes)}, COMMAND_S)
 
     async def _halt(self) -> None:
-        session = self._asked()
+        session = self._running_session()
         assert self._outbox is not None, "made with the session"
         self._outbox.clear()
         halting = session.stops.halt()
@@ -259,7 +259,7 @@ class RemoteHand(Hand):
                 await asyncio.shield(halting)
         except asyncio.CancelledError:
             if not halting.cancelled():
-                # It goes on; retrieving its error keeps asyncio from logging that it was never looked at.
+                # The halt continues. Its error is retrieved, or asyncio would log that it never was.
                 halting.add_done_callback(lambda task: task.cancelled() or task.exception())
             elif session.is_over:
                 raise NotStartedError("the hand was stopped") from None
@@ -278,14 +278,14 @@ class RemoteHand(Hand):
         await self._ask("recover", {"timeout": timeout}, SEQUENCE_S if timeout is None else timeout + SLACK_S)
 
     async def _ask(self, name: str, arguments: Fields, timeout: float) -> Fields:
-        """Have the agent's hand do something. If the call is cancelled, the agent calls it off."""
-        session, outbox = self._asked(), self._outbox
+        """Have the agent carry out a command; if this call is cancelled, cancel the command there."""
+        session, outbox = self._running_session(), self._outbox
         assert outbox is not None, "made with the session"
         if self._control is None and not session.keeper.is_in_control and session.keeper.lost is None:
             with no_answer_as_lost_connection():
                 await session.keeper.acquire()
         session.check_control()
-        # What command() asked before goes first.
+        # Commands that were asked for before are sent first.
         outbox.flush()
         call = session.call(arguments)
         try:
@@ -294,7 +294,7 @@ class RemoteHand(Hand):
                     call, f"cmd/{name}", timeout=timeout, urgency=Urgency.COMMAND
                 )
         except (asyncio.CancelledError, RobotiqConnectionError, NotAllowedError):
-            # Also after an answer that leaves open whether the request was carried out.
+            # Also after an error that leaves open whether the request was carried out.
             cancelling = session.stops.cancel_command(name, call)
             if cancelling is not None and name in MOTIONS:
                 outbox.count_motion(cancelling)
@@ -310,7 +310,7 @@ class RemoteHand(Hand):
 
     @property
     def statistics(self) -> Statistics:
-        """Figures of the agent's polling, at most a second old."""
+        """Figures of the agent's polling, at most 1 s old."""
         return Counters().snapshot(0) if self._session is None else self._session.statistics
 
     @property
@@ -324,7 +324,7 @@ class RemoteHand(Hand):
         return self._outbox.is_moving or (newest is not None and newest.is_moving)
 
     async def _wait_for_state(self, states: Collection[State], timeout: float | None) -> State:
-        with self._asked().waiters.watching(states, {}) as reached:
+        with self._running_session().waiters.watching(states, {}) as reached:
             try:
                 async with asyncio.timeout(timeout):
                     return await reached
@@ -334,8 +334,8 @@ class RemoteHand(Hand):
                     f"{names} was not reached within {timeout:g} s (now {self.state.name})"
                 ) from None
 
-    def _asked(self) -> RemoteSession:
-        """The present run, for a request: refused before the start, after stop(), and from another loop."""
+    def _running_session(self) -> RemoteSession:
+        # Refuses before start(), after stop(), and from another loop.
         self._check_running()
         assert self._session is not None, "it runs"
         self._session.check_loop()

@@ -1,4 +1,4 @@
-"""Requests: what one client asks of an agent, and what it makes of the answers and of silence."""
+"""Requests: sends the requests of one client, repeats them, and interprets answers and silence."""
 
 from __future__ import annotations
 
@@ -23,27 +23,27 @@ from .pending_request import PendingRequest, is_refusal, of_its_run
 from .settings import Settings
 
 IN_ANY_RUN: Final = ("info", "halt")
-"""What any run of the agent may answer."""
+"""Requests that any run of the agent may answer."""
 RECENT_S: Final = 0.5
-"""So soon the agent must be heard after an empty answer for that to mean that the request is not allowed."""
+"""Seconds in which a message of the agent must follow an empty reply to prove that access was denied."""
 AT_ONCE_S: Final = 0.25
-"""Sooner than any time is over: nobody was there for the request."""
+"""Seconds: an empty reply before that is no timeout, but means that no process received the request."""
 EARLY_S: Final = 0.005
-"""So soon all is said again when the agent waits for something that got lost."""
+"""Seconds until all commands are repeated when the agent waits for a lost one."""
 LAST_ANSWER_S: Final = 0.5
-"""For what the agent says of a command whose lease has ended."""
+"""Seconds for the answer to a command whose lease has ended."""
 
 
 class NoAnswerError(ConnectionLostError):
-    """No answer came; whether it was carried out is not known."""
+    """No answer arrived; whether the request was carried out is unknown."""
 
 
 @contextmanager
 def no_answer_as_lost_connection() -> Iterator[None]:
-    """Around what users call: that no answer came is a lost connection to them.
+    """Around public calls: report a missing answer as a lost connection.
 
     Raises:
-        ConnectionLostError: no answer came.
+        ConnectionLostError: no answer arrived.
     """
     try:
         yield
@@ -52,7 +52,7 @@ def no_answer_as_lost_connection() -> Iterator[None]:
 
 
 class Requests:
-    """Numbers requests, says each until it is answered, and ends the wait when the agent falls silent.
+    """Numbers requests, repeats each until it is answered, and ends the wait when the agent falls silent.
 
     Attributes:
         settings: the speeds and forces that were asked for.
@@ -66,44 +66,42 @@ class Requests:
         self._loop = asyncio.get_running_loop()
         self._silence: asyncio.Future[None] = self._loop.create_future()
         self._received: asyncio.Future[None] = self._loop.create_future()
-        """Done as soon as the agent is heard."""
+        """Done with the next message of the agent."""
         self._closed: asyncio.Future[None] = self._loop.create_future()
         self._has_ended = False
         self._pending: set[PendingRequest] = set()
         self._commands: dict[int, PendingRequest] = {}
-        """Those that have no answer yet, in the order in which they were asked."""
+        """Commands without an answer, in their order."""
         self._resending: asyncio.TimerHandle | None = None
         self.settings = Settings()
 
     @property
     def has_undelivered_hold(self) -> bool:
-        """Whether a hold was asked for that the agent has not answered for."""
         return any(each.verb == "cmd/hold" for each in self._commands.values())
 
     def receive(self) -> None:
-        """The agent is heard."""
         if not self._received.done():
             self._received.set_result(None)
 
     def fall_silent(self) -> None:
-        """The agent is not heard any more: nobody waits for the answers to what was asked until now."""
+        # Ends the waits of all requests until now.
         silence, self._silence = self._silence, self._loop.create_future()
         silence.set_result(None)
 
     def lose_lease(self, lease: int, error: RobotiqError) -> None:
-        """A lease has ended: the agent has a moment to say what became of the commands under it."""
+        # The agent needs a moment to report the outcome of the commands under the lease.
         for posted in self._commands.values():
             if posted.call.lease == lease:
                 posted.stop_repeating()
                 self._loop.call_later(LAST_ANSWER_S, posted.fail, copy_of(error))
 
     def end(self) -> None:
-        """The hand was stopped: nothing is asked from now on but for what ends motion."""
+        """The hand was stopped: from now on only requests that end motion are sent."""
         self._has_ended = True
         self.fall_silent()
 
     async def close(self) -> None:
-        """Nobody waits for any answer any more."""
+        """End all waits."""
         self._has_ended = True
         if not self._closed.done():
             self._closed.set_result(None)
@@ -113,20 +111,19 @@ class Requests:
         await asyncio.gather(*(posted.ended() for posted in pending))
 
     def make(self, mirror: Mirror, lease: int, arguments: Fields) -> Call:
-        """The next request."""
         self._number += 1
         return Call(self._name.base, self._client, mirror.epoch, lease, self._number, mirror.stamp, arguments)
 
     def post(
         self, call: Call, verb: str, *, timeout: float, urgency: Urgency = Urgency.COMMAND
     ) -> PendingRequest:
-        """Send a request: before whatever is posted after it. Wait for its answer with :meth:`answer`.
+        """Send a request, before any that is posted later. Wait for its answer with :meth:`answer`.
 
         Args:
             call: the request.
-            verb: the last part of the key it goes to.
+            verb: the last part of its key.
             timeout: seconds for its answer.
-            urgency: the answer to a halt is waited for also when the agent falls silent.
+            urgency: with STOP, the wait continues if the agent falls silent.
 
         Raises:
             NotStartedError: the hand was stopped.
@@ -154,7 +151,7 @@ class Requests:
         posted.repeat(lambda: self._resend(posted))
 
     def _resend(self, posted: PendingRequest) -> None:
-        """It may have been dropped on the way, or its answer: on a full network either is."""
+        # A full network drops requests and answers.
         if (
             posted.left
             and not posted.answered.done()
@@ -163,7 +160,7 @@ class Requests:
             self._send(posted)
 
     def _resend_all_soon(self) -> None:
-        """A command was lost, and those after it wait for it: in their order, and soon."""
+        # A command was lost, and the agent refuses those after it: repeat all, in their order.
         if self._resending is None:
             self._resending = self._loop.call_later(EARLY_S, self._resend_all)
 
@@ -181,10 +178,10 @@ class Requests:
         """Wait for the answer to a request; returns it, and the status that came with it.
 
         Raises:
-            NoAnswerError: no answer; it may have been carried out.
-            NotAllowedError: nobody answers to that, and the agent is there.
-            AgentError: the answer was another gripper's, or of another version.
-            ProtocolError: it is none.
+            NoAnswerError: no answer; the request may have been carried out.
+            NotAllowedError: no reply, although the agent is there: access was denied.
+            AgentError: the answer of another gripper, or of another version.
+            ProtocolError: the answer is malformed.
         """
         is_refused = False
         try:
@@ -200,43 +197,33 @@ class Requests:
                 f"{self._name}: another answer came to {posted.verb}; it may have been carried out"
             )
         if posted.call.epoch not in (0, answer.epoch) and posted.verb not in IN_ANY_RUN:
-            # That one has done nothing. What became of it where it was meant for nobody says.
+            # That run did nothing. Whether the addressed run carried it out is unknown.
             raise NoAnswerError(
                 f"{self._name}: another run of its agent answered; {posted.verb} may have been carried out"
             )
         return answer, reply.attachment
 
     async def _reply(self, posted: PendingRequest) -> Reply:
-        """Wait for a reply.
-
-        Raises:
-            RobotiqError: there is none; as :meth:`answer`.
-        """
         reply, at_once = await self._wait(posted)
         if reply is None and at_once and await self._is_agent_present():
-            # Just after a link has come up nobody seems to be there. Nothing is done twice: the number is the
-            # same, and so is what had been heard when it was asked.
+            # Just after a link has come up, zenoh may not know the agent yet. The second request is carried
+            # out once at most: its number and its stamp are the same.
             posted.begin()
             self._resend(posted)
             reply, at_once = await self._wait(posted)
             if reply is None and at_once and await self._is_agent_present():
-                raise NotAllowedError(f"{self._name}: nobody there answers to {posted.verb}: access denied")
+                raise NotAllowedError(f"{self._name}: no reply to {posted.verb}: access denied")
         if reply is None:
             raise NoAnswerError(f"{self._name}: no answer in time; {posted.verb} may have been carried out")
         return reply
 
     async def _wait(self, posted: PendingRequest) -> tuple[Reply | None, bool]:
-        """Wait for a reply; returns it, and whether it came at once: as where access rules say no.
-
-        Raises:
-            NoAnswerError: the agent fell silent, or the run ended.
-            RobotiqError: the lease has ended, and the agent said nothing.
-        """
+        """A reply, and whether the wait ended at once: then the access rules denied the request."""
         answered = posted.answered
         awaited: set[asyncio.Future[Any]] = {answered, self._closed}
         if not posted.is_allowed_after_stop:
             awaited.add(self._silence)
-        # The bus says when the time is over; that nobody waits for longer does not hang on it.
+        # The bus ends the wait in time; the limit holds even if it does not.
         limit = posted.left + LAST_ANSWER_S
         done, _ = await asyncio.wait(awaited, timeout=limit, return_when=asyncio.FIRST_COMPLETED)
         if not done:
@@ -251,7 +238,7 @@ class Requests:
         return reply, now() - posted.asked_at < min(AT_ONCE_S, posted.timeout / 2)
 
     async def _is_agent_present(self) -> bool:
-        """Whether the agent is heard from now on; a link that is down may have been up a moment ago."""
+        # By a message from now on: a link that is down now may have delivered one just before.
         if self._received.done():
             self._received = self._loop.create_future()
         sign = self._received
@@ -260,9 +247,9 @@ class Requests:
 
 
 def label() -> str:
-    """What this client is called by people."""
+    """What this client calls itself for people: user, host, process."""
     try:
         user = getpass.getuser()
     except (OSError, KeyError):
-        user = "somebody"
+        user = "unknown"
     return f"{user}@{socket.gethostname()}:{os.getpid()}"

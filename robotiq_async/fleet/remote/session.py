@@ -1,4 +1,4 @@
-"""One run of a remote hand, from its start to its stop: what it hears, what it asks, and its lease."""
+"""RemoteSession: one run of a remote hand, from its start to its stop."""
 
 from __future__ import annotations
 
@@ -46,22 +46,23 @@ from .requests import NoAnswerError, Requests
 from .stops import Stops
 
 CONNECT_S: Final = 5.0
+"""Seconds to find the agent."""
 OWN: Final = ("info", "lease", "halt", "cmd/cancel")
-"""Requests whose arguments no user has chosen: they are nobody's TypeError."""
+"""Requests whose arguments come from this library: a TypeError in the answer is not the user's."""
 
 
 class RemoteSession:
-    """One run. Everything happens in the event loop it was made in.
+    """One run. It belongs to the event loop that it was made in.
 
     Attributes:
-        log: for what happens to the hand.
-        mirror: what has been heard.
+        log: of the hand.
+        mirror: the state of the hand.
         keeper: the lease.
-        stops: halts, and requests that are called off.
-        agents: which ones serve the gripper.
-        waiters: who waits for a state.
-        is_over: whether the run has ended, or is about to.
-        has_ended: whether nothing of it is left.
+        stops: halts and cancellations under way.
+        agents: the agents that serve the gripper.
+        waiters: calls that wait for a state.
+        is_over: whether the run has ended, or is ending.
+        has_ended: whether all of it has ended.
         window: of the leases, in seconds.
     """
 
@@ -75,15 +76,15 @@ class RemoteSession:
         owns_bus: bool = False,
         before: Mirror | None = None,
     ) -> None:
-        """Begin to listen.
+        """Subscribe to the gripper.
 
         Args:
             name: the gripper's.
             bus: an open session.
-            channels: of the hand: they were opened before, perhaps, and are read afterwards.
-            wants_control: whether the lease is acquired, and again when the agent was lost.
-            owns_bus: whether the bus is closed at the end.
-            before: what the run before this one has heard.
+            channels: the streams of the hand, which outlive the run.
+            wants_control: whether to acquire the lease, and reacquire it after a lost connection.
+            owns_bus: whether to close the bus at the end.
+            before: the mirror of the previous run.
         """
         self.name = name
         self.log = Log(str(name))
@@ -99,7 +100,7 @@ class RemoteSession:
         self._closing: asyncio.Task[None] | None = None
         self.window = WINDOW_S
         self._arrived_at = 0.0
-        """When anything was heard, be it current or not."""
+        """Arrival of the last message, current or not."""
         self._requests = Requests(name, bus)
         self.settings = self._requests.settings
         self._tasks: set[asyncio.Task[Any]] = set()
@@ -112,18 +113,19 @@ class RemoteSession:
         channels.reopen(self.loop)
         self.mirror.begin(now())
         self._unreadable, self._misrouted = LimitedLog(self.log), LimitedLog(self.log)
-        # One wildcard, and every payload says what it is about: samples may come under the wrong key.
+        # One wildcard, not a subscription for each key: with those, zenoh has delivered samples under wrong
+        # keys (docs/decisions/fleet.md). So every payload identifies its gripper, too.
         self._undo: Undo = bus.subscribe(name.key("*"), self._receive)
         self.agents = Agents(name, bus, self.keeper.forbid_reacquiring)
 
     # -- start and end ---------------------------------------------------------------------------------
 
     async def connect(self, timeout: float) -> None:
-        """Wait until the agent is heard, and acquire the lease if that is wanted.
+        """Wait for the agent, and acquire the lease if wanted.
 
         Raises:
-            ConnectFailedError: nobody there, or the agent does not reach the gripper.
-            NotAllowedError: the agent is there, and does not answer.
+            ConnectFailedError: no agent was found, or it cannot reach the gripper.
+            NotAllowedError: the agent is running, but does not answer.
             ControlLostError: another client commands the gripper.
         """
         deadline = now() + timeout
@@ -136,11 +138,6 @@ class RemoteSession:
         await self._wait_for_gripper(deadline)
 
     async def _wait_for_gripper(self, deadline: float) -> None:
-        """Wait until the agent has reached the gripper.
-
-        Raises:
-            ConnectFailedError: it has not.
-        """
         known = set(State) - {State.DISCONNECTED, State.SHUTDOWN, State.DO_SHUTDOWN}
         if self.mirror.state in known:
             return
@@ -148,16 +145,15 @@ class RemoteSession:
             try:
                 async with asyncio.timeout(max(ANSWER_S, deadline - now())):
                     await reached
-                # A change of state is heard before the status that shows it; an answer carries both.
+                # An event arrives before the status that shows it; an answer brings the newest status.
                 await self.ask("info", timeout=ANSWER_S)
             except TimeoutError:
                 problem = (await self.ask("info", timeout=ANSWER_S))["problem"]
                 raise ConnectFailedError(
-                    str(self.name), f"its agent does not reach the gripper: {problem or 'the link is down'}"
+                    str(self.name), f"its agent cannot reach the gripper: {problem or 'the link is down'}"
                 ) from None
 
     async def _ask_info(self, deadline: float) -> bool:
-        """Whether the agent has answered."""
         try:
             info = await self.ask("info", timeout=min(ANSWER_S, max(0.05, deadline - now())))
         except (NoAnswerError, NotAllowedError):
@@ -168,18 +164,17 @@ class RemoteSession:
         return True
 
     async def _give_up(self) -> None:
-        """Say what can be told apart of why nobody answered."""
         keys = await self._bus.announced(self.name.key("alive", "*"), timeout=ANSWER_S)
         if keys:
-            raise NotAllowedError(f"{self.name}: the agent is there, and does not answer: access denied")
-        why = "no agent of it is heard: none runs, or the network or a certificate is in the way"
+            raise NotAllowedError(f"{self.name}: the agent is running, but does not answer: access denied")
+        why = "no agent was found: none is running, or the network or a certificate prevents the connection"
         raise ConnectFailedError(str(self.name), why)
 
     async def close(self, ending: Ending) -> None:
-        """End the run; within two seconds, also when cancelled meanwhile, and whoever asks waits for it.
+        """End the run within 2 s, also if the caller is cancelled; every caller waits for the end.
 
-        From this call on nothing is asked but for what ends motion. Of several calls the strongest counts,
-        whichever comes first; a hold or a halt that is not acknowledged yet makes a gentle one stronger.
+        From this call on only requests that end motion are sent. Of several calls the strongest ending
+        applies. A hold or a halt that is not acknowledged yet makes a gentle ending stronger.
         """
         if self._closing is None:
             self.is_over = True
@@ -196,7 +191,7 @@ class RemoteSession:
         try:
             await self.keeper.released()
         except RobotiqError as error:
-            self.log.warning("the end was not acknowledged (%s): the agent holds what moves", error)
+            self.log.warning("the release was not acknowledged (%s): the agent holds what moves", error)
         finally:
             await self.stops.halted()
             self._undo()
@@ -217,21 +212,21 @@ class RemoteSession:
 
     @property
     def lost_its_loop(self) -> bool:
-        """Whether the loop was closed under it: its tasks can never end then."""
+        """Whether its event loop was closed: its tasks can never end then."""
         return not self.has_ended and self.loop.is_closed()
 
     def abandon(self) -> None:
-        """Count as over when the loop was closed under it; the agent holds what moves by itself."""
+        """Give up a run whose event loop was closed. Without renewals the agent holds what moves."""
         self.log.warning("the event loop was closed before stop()")
         self.keeper.abandon()
         self.waiters = StateWaiters()
         self._end()
 
     def check_running(self) -> None:
-        """Refuse what only a hand that runs can do.
+        """Refuse calls that need a running hand.
 
         Raises:
-            NotStartedError: it does not.
+            NotStartedError: it is not running.
         """
         if self.is_over and not self.has_ended:
             raise NotStartedError("the hand was stopped")
@@ -241,18 +236,13 @@ class RemoteSession:
             raise NotStartedError("the event loop that the hand ran in was closed: start() it again")
 
     def check_loop(self, what: str = "the hand") -> None:
-        """Refuse a call from another thread or event loop.
-
-        Raises:
-            RuntimeError: it is one.
-        """
         check_loop(self.loop, what)
 
-    # -- what is heard ---------------------------------------------------------------------------------
+    # -- messages -------------------------------------------------------------------------------------
 
     def _receive(self, _key: str, payload: bytes) -> None:
         try:
-            with reading("news"):
+            with reading("a message"):
                 if payload[:1] == b"{":
                     self._receive_fields(json.loads(payload))
                 else:
@@ -260,7 +250,7 @@ class RemoteSession:
         except RobotiqError as error:
             self._unreadable.warn("a message was dropped: %s", error)
         if self.mirror.has_missed() and not self.is_over:
-            self._missed.fetch()  # an event was dropped on the way
+            self._missed.fetch()  # an event was dropped by the network
 
     def _is_about_another(self, mark: object) -> bool:
         if not self.mirror.is_about_another(mark):
@@ -269,18 +259,18 @@ class RemoteSession:
         return True
 
     def _receive_status(self, payload: bytes, *, in_turn: bool, asked: float | None = None) -> bool:
-        """A status has arrived; returns whether it is about the gripper as it is."""
+        """Take over a status; returns whether it is about this gripper."""
         message, arrival = unpack(payload), now()
         if self._is_about_another(message.mark):
             return False
         if self.mirror.is_of_another_run(message, arrival, self.window):
             return False
         if self.mirror.epoch not in (0, message.epoch):
-            self.keeper.lose("closed", "the agent was started anew")
-            self._requests.fall_silent()  # what the former one was asked it does not answer
+            self.keeper.lose("closed", "the agent was restarted")
+            self._requests.fall_silent()  # requests to the previous run will not be answered
         self._arrived_at = arrival
         if not self.mirror.receive(message, arrival, in_turn=in_turn, window=self.window, asked=asked):
-            return True  # it has been on its way for so long that it says nothing about now
+            return True  # about this gripper, but too old
         self._requests.receive()
         if in_turn:
             self.keeper.receive(message.lease)
@@ -296,13 +286,13 @@ class RemoteSession:
             self.mirror.receive_events(fields["events"])
 
     async def _supervise(self) -> None:
-        """Look for silence, renew the lease, and acquire it again when that is due."""
+        """Detect silence, and renew or reacquire the lease."""
         interval = self.window / RENEWALS
         while True:
             due = now() + interval
             await asyncio.sleep(interval)
             woken = now()
-            # After a hold-up of this loop, what has arrived meanwhile is heard first.
+            # After a delay of this loop, messages that arrived meanwhile are handled first.
             if woken - due < interval and woken - self.mirror.received_at > self.window:
                 self._fall_silent(woken)
             if self.mirror.is_silent and woken - self._arrived_at < interval:
@@ -310,7 +300,8 @@ class RemoteSession:
             self.keeper.maintain()
 
     def _query_agent(self) -> None:
-        """What is heard seems to be old: it is, or the agent's clock stood still. An answer tells."""
+        # All that arrives seems old: it is, or the clock of the agent stopped. The answer to a question
+        # decides.
         if self._querying is None or self._querying.done():
             self._querying = self.spawn(self.ask_quietly("info", {}, ANSWER_S))
 
@@ -323,17 +314,16 @@ class RemoteSession:
         self._requests.fall_silent()
 
     def fail_calls(self, lease: int, error: ControlLostError) -> None:
-        """A lease has ended: who waits for something that was asked under it is told."""
         self._requests.lose_lease(lease, error)
 
     # -- control ---------------------------------------------------------------------------------------
 
     def check_control(self) -> None:
-        """Refuse commands of a hand that only reads, or has lost the lease.
+        """Refuse commands without the lease, or without the agent.
 
         Raises:
             ConnectionLostError: the agent is silent.
-            ControlLostError: the hand does not hold the lease.
+            ControlLostError: this hand does not hold the lease.
         """
         if self.mirror.is_silent:
             raise ConnectionLostError(f"{self.name}: the agent is silent: nothing was asked")
@@ -342,35 +332,32 @@ class RemoteSession:
     # -- asking ----------------------------------------------------------------------------------------
 
     async def ask(self, verb: str, arguments: Fields | None = None, **how: Any) -> Any:  # noqa: ANN401
-        """Ask the agent, once; see :meth:`Requests.post` for what else it takes and raises."""
+        """Ask the agent, once; keywords and errors as :meth:`Requests.post` and :meth:`answer`."""
         return await self.send(self.call(arguments), verb, **how)
 
     def call(self, arguments: Fields | None = None) -> Call:
-        """The next request, under the present lease."""
         return self._requests.make(self.mirror, self.keeper.lease, arguments or {})
 
     def post(self, call: Call, verb: str, **how: Any) -> PendingRequest:  # noqa: ANN401
-        """Send a request; see :meth:`Requests.post`."""
         return self._requests.post(call, verb, **how)
 
     async def send(self, call: Call, verb: str, **how: Any) -> Any:  # noqa: ANN401
-        """Send a request and wait for its answer; see :meth:`answer`."""
         return await self.answer(self.post(call, verb, **how))
 
     async def answer(self, posted: PendingRequest) -> Any:  # noqa: ANN401
-        """Wait for the answer to a request; see :meth:`Requests.answer`.
+        """Wait for the answer to a request; errors also as :meth:`Requests.answer`.
 
         Raises:
             NotStartedError: the run has ended meanwhile.
         """
         try:
-            answer, news = await self._requests.answer(posted)
+            answer, status = await self._requests.answer(posted)
         except NoAnswerError:
             if not posted.is_allowed_after_stop:
                 self.check_running()
             raise
-        if news:
-            self._receive_status(news, in_turn=False, asked=posted.asked_at)
+        if status:
+            self._receive_status(status, in_turn=False, asked=posted.asked_at)
         try:
             return answer.outcome(self.mirror.clock)
         except (TypeError, ValueError) as error:
@@ -388,12 +375,12 @@ class RemoteSession:
             raise
 
     async def ask_quietly(self, verb: str, arguments: Fields, timeout: float) -> None:
-        """Ask for what the answer does by itself."""
+        """Ask, and ignore errors: the answer itself has the effect."""
         with suppress(RobotiqError):
             await self.ask(verb, arguments, timeout=timeout)
 
     def spawn(self, work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
-        """Do something beside; it ends with the run."""
+        """Run a task that ends with the run."""
         task = self.loop.create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)

@@ -1,4 +1,4 @@
-"""Stops: halts, and requests that are called off, until they are acknowledged."""
+"""Stops: halts and cancellations of one run, until they are acknowledged."""
 
 from __future__ import annotations
 
@@ -16,27 +16,26 @@ from .persistence import HALT_S, until_answered
 from .requests import label
 
 TRIES: Final = 2
-"""How many times a request is called off in a window."""
+"""Attempts to cancel a command, within one window."""
 CONTINUES: Final = frozenset({"activate", "reset", "atr", "recover"})
-"""What the gripper carries on with when the call is cancelled, as with a hand of this process."""
+"""Commands that continue when their call is cancelled, as with a hand of this process."""
 
 
 class AgentClient(Protocol):
-    """What is needed of a run."""
+    """The part of a run that stops use."""
 
     keeper: LeaseKeeper
     is_over: bool
     window: float
 
     async def ask(self, verb: str, arguments: Fields | None = None, **how: Any) -> Any:  # noqa: ANN401
-        """Ask the agent, once."""
+        ...
 
-    def spawn(self, work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
-        """Do something beside; it ends with the run."""
+    def spawn(self, work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]: ...
 
 
 class Stops:
-    """What one run has asked for that ends motion."""
+    """Halts and cancellations of one run."""
 
     def __init__(self, run: AgentClient) -> None:
         self._run = run
@@ -45,21 +44,21 @@ class Stops:
 
     @property
     def undelivered(self) -> Ending:
-        """What a gentle end of the run has to make up for."""
+        """The ending that a run needs at least, because of stops that are not acknowledged yet."""
         if self._halts:
             return Ending.HALT
         return Ending.KEEP if self._cancels else Ending.LEAVE
 
     def halt(self) -> asyncio.Task[Any]:
-        """Halt, again and again until that is answered."""
+        """Halt; repeated until it is answered."""
         return self._begin(self._halts, until_answered(self._halt_once, HALT_S))
 
     async def halted(self) -> None:
-        """Wait until halts under way have ended, well or not."""
+        """Wait until halts under way have ended, successfully or not."""
         await asyncio.gather(*self._halts, return_exceptions=True)
 
     def cancel_command(self, name: str, call: Call) -> asyncio.Task[Any] | None:
-        """The call of a command was cancelled: what it set going is to be held, unless it goes on."""
+        """The call of a command was cancelled: hold what it set in motion, unless the command continues."""
         if not self._run.keeper.is_in_control or self._run.is_over:
             return None
         if name in CONTINUES:
@@ -76,9 +75,9 @@ class Stops:
             except RobotiqError as error:
                 if getattr(error, "reason", "late") == "late":
                     continue
-            return  # or the lease has ended: nothing is left to call off
-        # Without renewals the lease ends, and the agent holds what moves by itself.
-        self._run.keeper.lose("expired", "a request could not be called off")
+            return  # acknowledged; or the lease has ended, and the agent cancelled all
+        # Without renewals the lease ends, and the agent holds what moves.
+        self._run.keeper.lose("expired", "a command could not be cancelled")
 
     def _begin(self, others: set[asyncio.Task[Any]], work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
         task = self._run.spawn(work)

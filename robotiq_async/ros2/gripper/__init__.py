@@ -1,1 +1,1 @@
-"""What a configured node has: one gripper, its goals and its commands. In the event loop; knows no ROS."""
+"""The gripper of a configured node, its goals and commands. In the event loop; does not import ROS."""

@@ -1,4 +1,4 @@
-"""What a configured node has: a hand, its goals and its commands."""
+"""Connection: the hand of a configured node, its goals and its commands."""
 
 from __future__ import annotations
 
@@ -17,33 +17,33 @@ from .goals import GoalRunner, Outcome
 from .pending_stop import PendingStop
 
 COMMANDS: Final = ("activate", "reset", "halt", "recover", "release")
-"""What the services are called, and the actions behind them."""
+"""Names of the services, and of the actions that they carry out."""
 MOST_CALLS: Final = 16
-"""Commands that may be under way at once; halts are no part of them, and never one too many."""
+"""Commands under way at a time, without halts, which are always accepted."""
 
 
 class RefusedError(RobotiqError):
-    """The node does not carry out what it is asked now."""
+    """The node does not accept the request now."""
 
 
 class Connection:
     """A hand, from the configuration of the node to its cleanup.
 
-    What was asked before a stop neither begins nor goes on after it, and a stop is answered before anything
-    else is taken.
+    A stop ends all requests that came before it, also those that have not begun, and no other request is
+    accepted until the stop is answered.
 
     Attributes:
         hand: the hand.
-        takes_commands: whether the node is active. A halt is taken whether or not it is.
-        stops: how many stops there were; a goal that was accepted before the last one is not begun.
+        takes_commands: whether the node is active. Halts are accepted in any case.
+        stops: number of stops; a goal that was accepted before the last one does not begin.
     """
 
     def __init__(self, hand: Hand, settings: Settings) -> None:
-        """Prepare; opens nothing. Belongs to the loop of the hand; others may read its attributes.
+        """Opens nothing. Belongs to the loop of the hand; other threads may read its attributes.
 
         Args:
             hand: not started.
-            settings: what the hand was made with.
+            settings: those that the hand was made with.
         """
         self.hand = hand
         self.takes_commands = False
@@ -56,38 +56,38 @@ class Connection:
         self._took_commands = False
         self._is_closed = False
 
-    # -- its life --------------------------------------------------------------------------------------
+    # -- lifetime -------------------------------------------------------------------------------------
 
     async def open(self) -> None:
-        """Connect and read; nothing is written to the gripper.
+        """Connect and read; write nothing to the gripper.
 
         Raises:
-            RefusedError: it has been closed already.
-            RobotiqError: no gripper there, or a link that failed.
+            RefusedError: the connection has been closed.
+            RobotiqError: there is no gripper, or the link failed.
         """
         self._check_open()
         await self.hand.start(activate=False)
 
     async def permit(self) -> None:
-        """Take commands from now on. Moves nothing.
+        """Accept commands from now on. Moves nothing.
 
         Raises:
-            RefusedError: it has been closed.
+            RefusedError: the connection has been closed.
         """
         self._check_open()
         self.takes_commands = self._took_commands = True
 
     async def forbid(self, reason: str) -> bool:
-        """Take no commands any more, and halt; returns whether the gripper has shown that it stands.
+        """Refuse commands from now on, and halt; returns whether the gripper has confirmed that it stopped.
 
-        A halt that does not reach the gripper is an error in the log and no failure: what matters is that
-        nothing else is commanded. If the link comes back soon, the gripper is halted then.
+        A halt that does not reach the gripper is logged as an error, but does not fail: the node must refuse
+        commands in any case. If the link comes back soon, the gripper is halted then.
         """
         self.takes_commands = False
         try:
             await self._stop(reason)
         except NotStartedError:
-            return False  # the end of the hand stops them
+            return False  # the end of the hand stops the fingers
         except RobotiqError as error:
             Log(self.hand.name).error("no halt, the fingers MAY STILL MOVE: %s", error)
             if isinstance(error, RobotiqConnectionError):
@@ -96,12 +96,12 @@ class Connection:
         return True
 
     def refuse(self, reason: str) -> None:
-        """Take no more commands, and end those under way: :meth:`close` follows."""
+        """Refuse commands from now on, and end those under way: :meth:`close` follows."""
         self.takes_commands, self._is_closed = False, True
         self._end_all(reason)
 
     async def close(self, reason: str) -> None:
-        """Disconnect; the fingers are stopped if commands were ever taken. Idempotent."""
+        """Disconnect; the fingers are stopped if commands were ever accepted. Idempotent."""
         self.refuse(reason)
         try:
             await self.hand.stop(halt=self._took_commands)
@@ -111,16 +111,16 @@ class Connection:
     # -- commands --------------------------------------------------------------------------------------
 
     async def command(self, name: str) -> str:
-        """Carry out one of :data:`COMMANDS`; returns how it ended, in words.
+        """Carry out one of :data:`COMMANDS`; returns its outcome as a text.
 
         Raises:
-            RefusedError: the node is not active, too much is under way, or a stop took over.
-            RobotiqError: it could not be carried out.
+            RefusedError: the node is not active, too many commands are under way, or a stop took over.
+            RobotiqError: the command failed.
         """
         if name == "halt":
             return await self._stop("a halt took over")
         self._check_active()
-        self._check_standing()
+        self._check_stopped()
         if len(self._calls) >= MOST_CALLS:
             raise RefusedError(f"{MOST_CALLS} commands are under way")
         call = asyncio.ensure_future(self._operator.act(ACTIONS[name]))
@@ -131,21 +131,21 @@ class Connection:
             call.cancel()
             self._calls.discard(call)
         if call.cancelled():
-            raise RefusedError(f"a stop took over: {name} does not go on")
+            raise RefusedError(f"a stop took over: {name} was aborted")
         return call.result()
 
     async def check_goal(self) -> None:
-        """Refuse a goal that cannot be begun now.
+        """Refuse a goal that cannot begin now.
 
         Raises:
-            RefusedError: the node is not active, the link is down, the gripper is in no state to move, or it
-                is being stopped.
+            RefusedError: the node is not active, the link is down, the gripper is not in a state to move, or
+                it is being stopped.
         """
         self._check_active()
         reason = why_not(self.hand)
         if reason is not None:
             raise RefusedError(reason)
-        self._check_standing()
+        self._check_stopped()
 
     async def run_goal(
         self, key: bytes, targets: Targets, settings: Settings, feedback: Callable[[], object], stops: int
@@ -153,14 +153,14 @@ class Connection:
         """Carry out a goal; see :meth:`GoalRunner.run`.
 
         Args:
-            key: which goal, for :meth:`cancel_goal`.
-            targets: where its axes go.
-            settings: as they are now.
-            feedback: is called while it is under way.
-            stops: how many there were when the goal was accepted.
+            key: identifies the goal for :meth:`cancel_goal`.
+            targets: of its axes.
+            settings: the present ones.
+            feedback: called while it is under way.
+            stops: :attr:`stops` at the time when the goal was accepted.
 
         Raises:
-            RefusedError: as :meth:`check_goal`, for things may have changed since; or a stop came between.
+            RefusedError: as :meth:`check_goal`, whose conditions may have changed; or a stop came between.
         """
         if stops != self.stops:
             raise RefusedError("a stop took over before it began")
@@ -175,17 +175,11 @@ class Connection:
         )
 
     async def cancel_goal(self, key: bytes) -> None:
-        """End a goal for its client."""
         self._goals.cancel(key)
 
     # -- stops -----------------------------------------------------------------------------------------
 
     async def _stop(self, reason: str) -> str:
-        """Halt; returns how that ended, in words.
-
-        Raises:
-            RobotiqError: it did not reach the gripper.
-        """
         self._end_all(reason)
         self._stopping += 1
         try:
@@ -194,13 +188,13 @@ class Connection:
             self._stopping -= 1
 
     def _end_all(self, reason: str) -> None:
-        """Whatever was asked before ends, also what has not reached the hand yet."""
+        # Also what has not reached the hand yet: run_goal() compares the number of stops.
         self.stops += 1
         self._goals.abort(reason)
         for call in self._calls:
             call.cancel()
 
-    # -- what is refused -------------------------------------------------------------------------------
+    # -- checks ----------------------------------------------------------------------------------------
 
     def _check_open(self) -> None:
         if self._is_closed:
@@ -210,7 +204,7 @@ class Connection:
         if not self.takes_commands:
             raise RefusedError("the node is not active: activate it first (that moves nothing)")
 
-    def _check_standing(self) -> None:
+    def _check_stopped(self) -> None:
         if self._stopping:
             raise RefusedError("a halt is under way")
         if self._pending_stop.is_pending:

@@ -16,11 +16,11 @@ from ...values.move_result import MoveResult
 from ..translation.joints import Targets
 
 FEEDBACK_S: Final = 0.05
-"""From one feedback to the next: 20 Hz."""
+"""Seconds between two feedbacks: 20 Hz."""
 
 
 class Ending(Enum):
-    """How a goal ended, in the words of ROS's actions."""
+    """The final state of a goal, as the actions of ROS name it."""
 
     SUCCEEDED = "succeeded"
     CANCELED = "canceled"
@@ -32,10 +32,10 @@ class Outcome:
     """How a goal ended.
 
     Attributes:
-        ending: the state that the goal ends in.
+        ending: the final state of the goal.
         stalled: whether a contact stopped at least one addressed axis.
-        reached: whether every addressed axis is where it was asked to be.
-        reason: in words.
+        reached: whether every addressed axis has reached its target.
+        reason: for the log and the client.
     """
 
     ending: Ending
@@ -45,20 +45,18 @@ class Outcome:
 
 
 class _Goal:
-    """A goal under way."""
-
     def __init__(self, key: bytes) -> None:
         self.key = key
         self.work: asyncio.Task[Sequence[MoveResult]] | None = None
         self.ended: tuple[Ending, str] | None = None
-        """How somebody else has ended it."""
+        """Final state and reason, if the goal was ended before its moves."""
         self.hold: asyncio.Future[str] | None = None
-        """Done when its axes have been told to stay: empty, or why they have not been."""
+        """Done when the gripper has acknowledged the hold of its axes: empty, or why it has not."""
         self.is_over = asyncio.Event()
-        """Its axes belong to whoever comes next."""
+        """Set when the next goal may use its axes."""
 
     def end(self, ending: Ending, reason: str) -> None:
-        """Give it up: axes that still move are held. The first reason counts."""
+        # The first reason counts. Its task then holds the axes that still move.
         if self.ended is None and not self.is_over.is_set():
             self.ended = ending, reason
             if self.work is not None:
@@ -66,15 +64,14 @@ class _Goal:
 
 
 class GoalRunner:
-    """Carries out goals on a hand; a new one takes the place of the one before, all of its axes."""
+    """Carries out goals on a hand, one at a time. A new goal replaces the one before, and all its axes.
+
+    Args:
+        hand: the hand; it moves only while a goal runs.
+        lost: called with the axes of a goal that a lost link has ended: they may still move.
+    """
 
     def __init__(self, hand: Hand, lost: Callable[[Finger], object] = lambda _: None) -> None:
-        """Begin with none.
-
-        Args:
-            hand: the hand; it moves only while a goal is run.
-            lost: is called with the axes of a goal that a lost link has ended: they may still move.
-        """
         self._hand = hand
         self._lost = lost
         self._newest: _Goal | None = None
@@ -89,26 +86,24 @@ class GoalRunner:
         allow_stalling: bool,
         feedback: Callable[[], object] = lambda: None,
     ) -> Outcome:
-        """Move the axes of a goal until they have stopped, or until somebody ends the goal.
-
-        When cancelled, those that still move are held.
+        """Move the axes of a goal until they stop or the goal is ended. If cancelled, hold them.
 
         Args:
-            key: which goal, for :meth:`cancel`.
-            targets: where its axes go.
-            speed: of its axes.
-            force: of its axes.
+            key: identifies the goal for :meth:`cancel`.
+            targets: of its axes.
+            speed: of its axes, 0..255.
+            force: of its axes, 0..255.
             allow_stalling: whether a contact is a success.
-            feedback: is called twenty times a second meanwhile.
+            feedback: called 20 times a second while the axes move.
         """
         goal, before = _Goal(key), self._newest
         self._newest = goal
         if before is not None:
             before.end(Ending.ABORTED, "another goal took over")
-            # Its holds are left with the hand by then, and the new targets go over them.
+            # By then its holds have been passed to the hand, and the new targets replace them.
             await before.is_over.wait()
         try:
-            results = await self._moved(goal, targets, speed, force, feedback)
+            results = await self._move_axes(goal, targets, speed, force, feedback)
         except RobotiqError as error:
             if isinstance(error, RobotiqConnectionError):
                 self._lost(targets.axes)
@@ -117,29 +112,23 @@ class GoalRunner:
             assert goal.ended is not None
             ending, reason = goal.ended
             if goal.hold is not None and (problem := await goal.hold):
-                # Canceled would say that its axes are to stay.
+                # A canceled goal has its axes held, so a failed hold aborts it instead.
                 ending, reason = Ending.ABORTED, f"{reason}, but {problem}"
             return Outcome(ending, stalled=False, reached=False, reason=reason)
-        return _judged(results, allow_stalling=allow_stalling)
+        return _judge(results, allow_stalling=allow_stalling)
 
     def cancel(self, key: bytes, reason: str = "canceled by its client") -> None:
-        """End a goal for its client."""
         if self._newest is not None and self._newest.key == key:
             self._newest.end(Ending.CANCELED, reason)
 
     def abort(self, reason: str) -> None:
-        """End whatever is under way, for a reason of our own."""
         if self._newest is not None:
             self._newest.end(Ending.ABORTED, reason)
 
-    async def _moved(
+    async def _move_axes(
         self, goal: _Goal, targets: Targets, speed: int, force: int, feedback: Callable[[], object]
     ) -> Sequence[MoveResult] | None:
-        """How the moves of a goal ended; None if the goal was ended before.
-
-        Raises:
-            RobotiqError: a move failed.
-        """
+        """The results of the moves; None if the goal was ended first."""
         try:
             if goal.ended is not None:
                 return None
@@ -152,22 +141,22 @@ class GoalRunner:
             finally:
                 work.cancel()
                 await asyncio.wait({work})
-            # What had arrived before it was ended has arrived.
+            # Moves that were done before the goal was ended count.
             if not work.cancelled():
                 return work.result()
             if goal.ended is not None and goal.ended[0] is Ending.CANCELED:
-                # Asked for now: later it would hold what the next goal moves.
-                goal.hold = asyncio.ensure_future(self._held(goal, targets.axes))
+                # Now: a later hold would stop the axes of the next goal.
+                goal.hold = asyncio.ensure_future(self._hold_axes(goal, targets.axes))
             return None
         finally:
             goal.is_over.set()
 
-    async def _held(self, goal: _Goal, axes: Finger) -> str:
-        """Wait until the gripper has acknowledged that axes are to stay; returns why it has not."""
+    async def _hold_axes(self, goal: _Goal, axes: Finger) -> str:
+        """Hold axes; returns why the gripper has not acknowledged it, empty if it has."""
         try:
             await self._hand.hold(axes)
         except RobotiqError as error:
-            if self._newest is goal:  # or else the next goal has them
+            if self._newest is goal:  # otherwise the next goal moves them
                 problem = f"the hold was not acknowledged: {error}"
                 Log(self._hand.name).error("a goal was canceled, and %s", problem)
                 return problem
@@ -175,7 +164,8 @@ class GoalRunner:
 
 
 async def _move(hand: Hand, targets: Targets, speed: int, force: int) -> Sequence[MoveResult]:
-    """All at once, for what is asked for in one turn of the loop is one write; a failure ends the others."""
+    # Requests of one turn of the loop are written in one image, so all axes start together. A failure ends
+    # all of them.
     moves = [
         asyncio.ensure_future(hand.move(position, axes, speed=speed, force=force))
         for position, axes in targets.counts
@@ -188,9 +178,9 @@ async def _move(hand: Hand, targets: Targets, speed: int, force: int) -> Sequenc
         await asyncio.gather(*moves, return_exceptions=True)
 
 
-def _judged(results: Sequence[MoveResult], *, allow_stalling: bool) -> Outcome:
+def _judge(results: Sequence[MoveResult], *, allow_stalling: bool) -> Outcome:
     touched = [str(result.contacts) for result in results if result.contacts]
     if not touched:
-        return Outcome(Ending.SUCCEEDED, stalled=False, reached=True, reason="every axis is there")
+        return Outcome(Ending.SUCCEEDED, stalled=False, reached=True, reason="every axis reached its target")
     ending = Ending.SUCCEEDED if allow_stalling else Ending.ABORTED
     return Outcome(ending, stalled=True, reached=False, reason=f"contact: {'|'.join(touched)}")

@@ -1,4 +1,4 @@
-"""The hand that the parameters name."""
+"""The hand that the parameters select."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..translation.settings import Settings
 
 
 def make_hand(settings: Settings) -> Hand:
-    """A hand that is not started. Nothing else in the node knows what kind of hand it is.
+    """A hand that is not started. Only this function knows which kind of hand it is.
 
     A hand on another host acquires its lease with the first command: connecting only reads.
 

@@ -1,4 +1,4 @@
-"""A stop that a lost link kept from the gripper: sent when the link is back."""
+"""PendingStop: a stop that could not be sent while the link was down, and is sent when it is back."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from ...values.errors import (
 )
 
 PENDING_S: Final = 60.0
-"""By then every motion has ended that ran when the link was lost; the longest is an automatic release."""
+"""Seconds after which every motion from before the loss has ended; the longest is an automatic release."""
 RETRY_S: Final = 0.05
-"""Between two attempts."""
+"""Seconds between two attempts."""
 _REACHED: Final = tuple(set(State) - {State.DISCONNECTED, State.DO_SHUTDOWN, State.SHUTDOWN})
 
 
 class PendingStop:
-    """Sends the stop as soon as the link is back. A stop moves nothing, so it may come late."""
+    """Sends the stop as soon as the link is back. A stop moves nothing, so it may be late."""
 
     def __init__(self, hand: Hand) -> None:
         self._hand = hand
@@ -34,21 +34,15 @@ class PendingStop:
 
     @property
     def is_pending(self) -> bool:
-        """Whether a stop still has to reach the gripper."""
         return bool(self._tasks)
 
     def schedule(self, stop: Callable[[], Awaitable[None]]) -> None:
-        """Await a stop when the link is back, within PENDING_S.
-
-        Args:
-            stop: raises RobotiqConnectionError if the link is down again.
-        """
+        """Send a stop when the link is back, within PENDING_S; again after RobotiqConnectionError."""
         task = asyncio.ensure_future(self._send(stop, now() + PENDING_S))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
     async def cancel(self) -> None:
-        """Give the stop up: the hand itself has been stopped."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -61,7 +55,7 @@ class PendingStop:
             except RobotiqConnectionError:
                 await asyncio.sleep(RETRY_S)
             except (NotStartedError, StateTimeoutError, ControlLostError):
-                return  # the end of the hand stops it, as does the end of a lease; or it is too late
+                return  # the hand or its lease has ended, which stops the fingers; or it is too late
             except RobotiqError as error:
                 Log(self._hand.name).error("the link is back, and the fingers MAY STILL MOVE: %s", error)
                 return

@@ -1,1 +1,1 @@
-"""The lifecycle node: everything that touches rclpy. The hand is asked across the bridge."""
+"""The lifecycle node: all that imports rclpy. The hand is reached across the bridge."""

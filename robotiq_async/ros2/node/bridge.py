@@ -1,4 +1,4 @@
-"""From the thread of ROS's executor into the event loop, and back."""
+"""Bridge: from the thread of ROS's executor into the event loop, and back."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ T = TypeVar("T")
 
 
 class ClosedError(Exception):
-    """The node ends: nothing is asked of the loop any more."""
+    """The node is shutting down: the loop accepts no more work."""
 
 
 class Bridge:
-    """Three ways across. None blocks the loop, and only :meth:`wait` blocks the executor.
+    """Three ways to run work in the loop. None blocks the loop, and only :meth:`wait` blocks the executor.
 
-    What is asked of the loop begins in the order in which it was asked.
+    Work begins in the order of the calls.
     """
 
     def __init__(self, loop: asyncio.AbstractEventLoop, executor: Executor) -> None:
@@ -30,48 +30,44 @@ class Bridge:
         self._under_way: set[concurrent.futures.Future[Any]] = set()
 
     def close(self) -> None:
-        """Let nothing more across; what is under way ends as it does."""
+        """Accept no more work; work under way ends normally."""
         self._is_closed = True
 
     async def drained(self, timeout: float) -> None:
-        """Wait, in the loop, until it has done what it was asked, or the time is over.
-
-        Args:
-            timeout: seconds.
-        """
+        """Wait, in the loop, until all work is done, or for ``timeout`` seconds."""
         under_way = [asyncio.wrap_future(each) for each in self._under_way]
         if under_way:
             await asyncio.wait(under_way, timeout=timeout)
             await asyncio.gather(*(each for each in under_way if each.done()), return_exceptions=True)
 
     async def ask(self, work: Coroutine[Any, Any, T]) -> T:
-        """Have the loop do something, from a callback of ROS; other callbacks run meanwhile.
+        """Run work in the loop, from a callback of ROS; other callbacks run meanwhile.
 
         Raises:
-            ClosedError: the node ends.
-            Exception: what the work raised.
+            ClosedError: the node is shutting down.
+            Exception: from the work.
         """
-        # An asyncio future would kill the executor. One of ROS's wakes it only through a callback.
+        # Awaiting an asyncio future would end the executor. A future of ROS wakes it only with a callback.
         answer = Future(executor=self._executor)
         answer.add_done_callback(lambda _: None)
-        self._begin(work).add_done_callback(lambda done: _hand_over(done, answer))
+        self._begin(work).add_done_callback(lambda done: _copy_result(done, answer))
         result: T = await answer
         return result
 
-    def tell(self, work: Coroutine[Any, Any, object]) -> None:
-        """Have the loop do something that nobody waits for, and that does not fail.
+    def submit(self, work: Coroutine[Any, Any, object]) -> None:
+        """Run work in the loop without waiting for it. It must not raise.
 
         Raises:
-            ClosedError: the node ends.
+            ClosedError: the node is shutting down.
         """
         self._begin(work)
 
     def wait(self, work: Coroutine[Any, Any, T]) -> T:
-        """The same, blocking the executor: for transitions, whose callbacks must be synchronous.
+        """Run work in the loop and block the executor: for transitions, whose callbacks must be synchronous.
 
         Raises:
-            ClosedError: the node ends.
-            Exception: what the work raised.
+            ClosedError: the node is shutting down.
+            Exception: from the work.
         """
         return self._begin(work).result()
 
@@ -85,7 +81,7 @@ class Bridge:
         return future
 
 
-def _hand_over(done: concurrent.futures.Future[Any], answer: Future) -> None:
+def _copy_result(done: concurrent.futures.Future[Any], answer: Future) -> None:
     if done.cancelled():
         answer.set_exception(ClosedError("the node is shutting down"))
         return

@@ -1,7 +1,7 @@
 """The action ``~/gripper_cmd`` of ``control_msgs/action/ParallelGripperCommand``.
 
-Callbacks run in the executor's thread. What concerns the hand is asked of the loop, and a callback that
-raised would end the executor: every one catches all.
+Callbacks run in the executor's thread and reach the hand across the bridge. An exception in a callback would
+end the executor, so each one catches all.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Configured = tuple[Connection, JointStates, Settings]
 
 
 class GripperAction:
-    """Takes goals, runs them on whatever the node is connected to, tells how they go and end."""
+    """Accepts goals, runs them on the present connection, and reports feedback and results."""
 
     def __init__(
         self, node: Node, group: CallbackGroup, bridge: Bridge, configured: Callable[[], Configured]
@@ -35,17 +35,17 @@ class GripperAction:
         """Offer the action.
 
         Args:
-            node: of which.
-            group: in which callbacks may overlap.
+            node: the node of the action.
+            group: a callback group whose callbacks may overlap.
             bridge: into the loop.
-            configured: what the node has; raises RefusedError while it is not configured.
+            configured: returns what the node is configured with; raises RefusedError if it is not.
         """
         self._log = node.get_logger()
         self._bridge = bridge
         self._configured = configured
         self._warned = False
         self._accepted: dict[bytes, tuple[Configured, int]] = {}
-        """By the key of the goal: what it was accepted for, and how many stops there had been."""
+        """By the key of the goal: what it was accepted for, and the number of stops at that time."""
         self._server = ActionServer(
             node,
             ParallelGripperCommand,
@@ -58,7 +58,7 @@ class GripperAction:
         )
 
     async def _check(self, request: ParallelGripperCommand.Goal) -> GoalResponse:
-        """Accept a goal that can be begun now; else the log says why not, for the answer has no words."""
+        # A rejection has no text in ROS, so the log gives the reason.
         try:
             connection, _, settings = self._configured()
             _targets(request, settings)
@@ -73,7 +73,8 @@ class GripperAction:
         return GoalResponse.ACCEPT
 
     def _begin(self, handle: ServerGoalHandle) -> None:
-        """A goal was accepted: for what the node is connected to now, and no stop may come between."""
+        # The goal belongs to the present connection and number of stops: a later stop ends it before it
+        # begins.
         try:
             configured = self._configured()
             self._accepted[_key(handle)] = configured, configured[0].stops
@@ -82,22 +83,19 @@ class GripperAction:
         handle.execute()
 
     def _cancel(self, handle: ServerGoalHandle) -> CancelResponse:
-        """Accept. The goal hears of it afterwards: this thread has to mark it as canceling first.
-
-        Whatever the node's state: of a cancel for several goals rclpy skips the one after one that refuses.
-        """
+        # Always accept: of a request that cancels several goals, rclpy skips the goal after one that refuses.
+        # Submitted, not awaited: this thread must mark the goal as canceling before it ends.
         try:
             connection, _, _ = self._configured()
-            self._bridge.tell(connection.cancel_goal(_key(handle)))
+            self._bridge.submit(connection.cancel_goal(_key(handle)))
         except Exception as error:  # noqa: BLE001  # would end the executor
             self._log.warning(f"cancel of a goal that ends anyway: {error}")
         return CancelResponse.ACCEPT
 
     async def _execute(self, handle: ServerGoalHandle) -> ParallelGripperCommand.Result:
-        """Run a goal to its end."""
         result = ParallelGripperCommand.Result()
         try:
-            if handle.is_cancel_requested:  # between its acceptance and now
+            if handle.is_cancel_requested:  # since it was accepted
                 outcome = Outcome(Ending.CANCELED, stalled=False, reached=False, reason="canceled at once")
             else:
                 outcome = await self._run(handle, result)
@@ -122,13 +120,13 @@ class GripperAction:
             try:
                 return await connection.run_goal(_key(handle), asked, settings, feedback, stops)
             finally:
-                with suppress(NotStartedError):  # nothing has been read
+                with suppress(NotStartedError):  # no status has been read
                     result.state = joints.message(connection.hand.status)
 
         return await self._bridge.ask(work())
 
     def _finish(self, handle: ServerGoalHandle, outcome: Outcome) -> None:
-        """Enter the goal's last state. Canceled is legal only if its client has asked for it."""
+        # ROS permits the state canceled only if the client asked for it.
         if outcome.ending is Ending.SUCCEEDED:
             self._log.info(f"goal succeeded: {outcome.reason}")
             handle.succeed()

@@ -1,4 +1,4 @@
-"""The lifecycle node: what its transitions and services do.
+"""GripperNode: the lifecycle node, with its transitions and services.
 
 Configure connects and reads, activate permits commands and moves nothing, deactivate halts, cleanup
 disconnects. All callbacks run in the executor's thread; the hand belongs to the loop, across the bridge.
@@ -30,29 +30,28 @@ from .publishing import Publishing
 
 NAME: Final = "gripper"
 _CALLS: Final = QoSProfile(depth=100)
-"""Calls that wait for the executor. Of ROS's usual ten a client that hammers would push out the others'."""
+"""Calls that may wait for the executor. With ROS's default of 10 a busy client displaces those of others."""
 _SUCCESS, _FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
 
 class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
-    """A gripper as a ROS 2 node. Begins unconfigured, and has no hand then."""
+    """A gripper as a ROS 2 lifecycle node. It begins unconfigured, without a hand.
+
+    Args:
+        context: of ROS.
+        bridge: into the loop.
+        failed: called, in the loop, with an error that must end the process.
+    """
 
     def __init__(self, context: Context, bridge: Bridge, failed: Callable[[BaseException], object]) -> None:
-        """Declare parameters and offer services, action and topics; connects to nothing.
-
-        Args:
-            context: of ROS.
-            bridge: into the loop.
-            failed: is called, in the loop, with what must end the process.
-        """
         super().__init__(NAME, context=context)
         self._bridge = bridge
-        self._now: Configured | None = None
-        """What the node has while it is configured; the loop reads it too."""
+        self._current: Configured | None = None
+        """Set while the node is configured; the loop reads it too."""
         parameters.declare(self)
-        parameters.guard(self, lambda: self._now is not None, self._change)
+        parameters.guard(self, lambda: self._current is not None, self._apply_live_parameters)
         parameters.warn_of_unknown(self)
-        # In the default group a halt would wait for the activation before it.
+        # In the default group a halt would wait until an activation has ended.
         group = ReentrantCallbackGroup()
         self._publishing = Publishing(self, failed)
         self._action = GripperAction(self, group, bridge, self._configured)
@@ -68,47 +67,47 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
         return self._transition("configure", self._configure)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002
-        """Permit commands. Nothing moves."""
+        """Accept commands. Moves nothing."""
         return self._transition("activate", self._activate)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002
-        """Halt, and take no commands any more."""
+        """Halt, and refuse commands."""
         return self._transition("deactivate", self._deactivate)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002
-        """Disconnect."""
+        """Disconnect; halt first if commands were accepted."""
         return self._transition("clean up", self._clean_up)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002
-        """Halt if need be, and disconnect. The process goes on until it is told to stop."""
+        """Disconnect; halt first if commands were accepted. The process continues until a signal ends it."""
         return self._transition("shut down", self._clean_up)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002
-        """Disconnect: the node is unconfigured then."""
+        """Disconnect; the node is unconfigured then."""
         return self._transition("clean up after an error", self._clean_up)
 
-    def start_by_itself(self) -> None:
-        """Configure and activate if the parameter ``autostart`` says so. In the executor's thread only."""
+    def start_automatically(self) -> None:
+        """Configure and activate if the parameter ``autostart`` is set. Call it in the executor's thread."""
         try:
             wanted = parameters.read(self).autostart
         except ValueError:
-            wanted = True  # the configuration tells what is wrong
+            wanted = True  # the configuration fails and reports the error
         if wanted and self.trigger_configure() == _SUCCESS:
             self.trigger_activate()
 
     async def close(self) -> None:
-        """Disconnect, in the loop: the process ends. Goals under way are aborted, fingers stop."""
-        if self._now is not None:
-            await self._disconnect(self._now[0], "the node is shutting down")
+        """Disconnect, in the loop, because the process ends. Goals are aborted and the fingers stop."""
+        if self._current is not None:
+            await self._disconnect(self._current[0], "the node is shutting down")
 
     def _transition(self, what: str, work: Callable[[], str]) -> TransitionCallbackReturn:
-        """Do the work of a transition. ROS would swallow what it raises."""
+        # ROS would swallow the error of a transition.
         try:
             self.get_logger().info(work())
         except (RobotiqError, ValueError, OSError, ClosedError) as error:
             self.get_logger().error(f"cannot {what}: {error}")
             return _FAILURE
-        except Exception as error:  # noqa: BLE001  # nobody else would tell
+        except Exception as error:  # noqa: BLE001  # ROS would swallow it
             self.get_logger().error(f"cannot {what}: {error!r}")
             return _FAILURE
         return _SUCCESS
@@ -118,11 +117,11 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
         urdf = robot_description(settings.urdf, settings.joint_prefix)
         connection = Connection(make_hand(settings), settings)
         joints = JointStates(self.get_clock(), settings.joint_prefix, settings.frame_id)
-        self._now = connection, joints, settings
+        self._current = connection, joints, settings
         try:
             self._bridge.wait(self._connect(connection, joints, settings.publish_rate))
         except BaseException:
-            self._now = None
+            self._current = None
             raise
         self._publishing.describe(urdf)
         return f"connected to {connection.hand.address}: {connection.hand.state.name}"
@@ -138,11 +137,11 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
         return f"no commands are taken; {'halted' if is_halted else 'NOT halted'}"
 
     def _clean_up(self) -> str:
-        if self._now is None:
+        if self._current is None:
             return "not connected"
-        self._bridge.wait(self._disconnect(self._now[0], "the node was cleaned up"))
-        # Not before: if the process is told to end meanwhile, it has to know what to stop.
-        self._now = None
+        self._bridge.wait(self._disconnect(self._current[0], "the node was cleaned up"))
+        # Not earlier: if the process ends meanwhile, close() must stop the hand.
+        self._current = None
         return "disconnected"
 
     async def _connect(self, connection: Connection, joints: JointStates, rate: float) -> None:
@@ -156,15 +155,15 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
             raise
 
     async def _disconnect(self, connection: Connection, reason: str) -> None:
-        connection.refuse(reason)  # first: nothing is begun while the rest ends
+        connection.refuse(reason)  # first: nothing must begin meanwhile
         await self._publishing.stop()
         await connection.close(reason)
-        self._publishing.tell_status(connection)  # the newest one is kept for whoever comes later
+        self._publishing.publish_status(connection)  # the last message is kept for late subscribers
 
     # -- services --------------------------------------------------------------------------------------
 
     async def _serve(self, name: str, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Carry out a command. The answer says how it ended, and so does the log if it did not go well."""
+        # The response has the outcome; a failure is also logged.
         try:
             connection, _, _ = self._configured()
             response.message = await self._bridge.ask(connection.command(name))
@@ -178,21 +177,18 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
     # -- inside ----------------------------------------------------------------------------------------
 
     def _configured(self) -> Configured:
-        if self._now is None:
+        if self._current is None:
             raise RefusedError("the node is not configured")
-        return self._now
+        return self._current
 
-    def _change(self, values: dict[str, object]) -> None:
-        """Parameters that count at once."""
-        if self._now is not None:
-            connection, joints, settings = self._now
-            self._now = connection, joints, replace(settings, **values)  # type: ignore[arg-type]
+    def _apply_live_parameters(self, values: dict[str, object]) -> None:
+        if self._current is not None:
+            connection, joints, settings = self._current
+            self._current = connection, joints, replace(settings, **values)  # type: ignore[arg-type]
 
     def _answer_illegal_transitions(self) -> None:
-        """Answer a transition that is not possible now with a no.
-
-        In rclpy before Kilted it raises in the executor, and its client waits for ever.
-        """
+        # Before Kilted, rclpy raises in the executor for a transition that is not possible now, and its
+        # client waits forever. This answers with a failure.
         service = self._service_change_state
         answer = service.callback
 

@@ -1,4 +1,4 @@
-"""The library's log in that of the node."""
+"""Forwards the library's log to that of the node."""
 
 from __future__ import annotations
 
@@ -9,20 +9,19 @@ from contextlib import contextmanager
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 LOGGERS = {"robotiq_async": logging.INFO, "asyncio": logging.WARNING}
-"""Whose records are handed on, from which level."""
+"""Forwarded loggers, with the lowest level."""
 
 
 class NodeHandler(logging.Handler):
-    """Hands records to the logger of a node."""
+    """Forwards records to the logger of a node."""
 
     def __init__(self, logger: RcutilsLogger) -> None:
         super().__init__()
         self._logger = logger
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Hand a record on."""
         text = self.format(record)
-        # A line for each level: ROS's logger remembers the level of the line it is called from.
+        # A call for each level: ROS's logger permits only one level for each line that calls it.
         if record.levelno >= logging.CRITICAL:
             self._logger.fatal(text)
         elif record.levelno >= logging.ERROR:
@@ -36,8 +35,8 @@ class NodeHandler(logging.Handler):
 
 
 @contextmanager
-def handed_to(logger: RcutilsLogger) -> Iterator[None]:
-    """Hand the records of :data:`LOGGERS` to a logger of ROS meanwhile."""
+def forwarded_to(logger: RcutilsLogger) -> Iterator[None]:
+    """Forward the records of :data:`LOGGERS` to a logger of ROS during a block."""
     handler = NodeHandler(logger)
     for name, level in LOGGERS.items():
         source = logging.getLogger(name)

@@ -1,4 +1,4 @@
-"""Messages of ROS from what a hand shows."""
+"""Messages of ROS from the statuses of a hand."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ class JointStates:
         self._velocities: Sequence[float] = (0.0,) * len(self._names)
 
     def encoded(self, status: RobotiqStatus) -> bytes:
-        """A message as it goes out, to be published: building one costs four times as much."""
+        """A serialized message for publishing: building one as an object takes four times as long."""
         positions, self._velocities = self._motion.of(status)
         nanoseconds = stamp(self._clock, status.timestamp)
         return self._encoder.encode(nanoseconds, positions, self._velocities, _UNKNOWN)
 
     def message(self, status: RobotiqStatus) -> JointState:
-        """A message, for feedback and results. Its velocities are those last published."""
+        """A message for feedback and results, with the velocities that were published last."""
         message = JointState()
         seconds, nanoseconds = divmod(stamp(self._clock, status.timestamp), 1_000_000_000)
         message.header.stamp = Time(sec=seconds, nanosec=nanoseconds)
@@ -51,17 +51,17 @@ class JointStates:
         return message
 
     def forget(self) -> None:
-        """The link was down: what comes next is no motion since."""
+        # After a lost link the next position is not a motion since the last one.
         self._motion.forget()
 
 
 _UNKNOWN: Final = (math.nan,) * len(JOINTS)
-"""Efforts. Currents are known, torques are not: no number is better than a wrong one."""
+"""Efforts are NaN: the gripper reports currents, and no torque is known for them."""
 
 
 def stamp(clock: ROSClock, timestamp: float) -> int:
-    """The time of ROS in nanoseconds for a timestamp in monotonic seconds: now, less its age."""
-    # Unless somebody simulates it, it is that of the system; asked of ROS it costs as much as the message.
+    """The ROS time, in nanoseconds, of a timestamp in monotonic seconds: the present time less its age."""
+    # Without simulated time it is the system time; reading it through ROS costs as much as the message.
     ros = int(clock.now().nanoseconds) if clock.ros_time_is_active else time.time_ns()
     return max(0, ros - round((now() - timestamp) * 1e9))
 
@@ -69,12 +69,11 @@ def stamp(clock: ROSClock, timestamp: float) -> int:
 def diagnostic_array(
     clock: Clock, node_name: str, hardware_id: str, diagnoses: tuple[Diagnosis, ...]
 ) -> DiagnosticArray:
-    """Diagnoses for ``/diagnostics``."""
     message = DiagnosticArray()
     message.header.stamp = clock.now().to_msg()
     message.status = [
         DiagnosticStatus(
-            level=bytes([each.level]),  # a byte, and no int
+            level=bytes([each.level]),  # ROS wants a byte, not an int
             name=f"{node_name}: {each.what}",
             message=each.message,
             hardware_id=hardware_id,

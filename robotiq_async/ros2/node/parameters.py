@@ -1,4 +1,4 @@
-"""The parameters as ROS has them: declared, read, and refused with a reason."""
+"""The parameters in ROS: declares, reads and guards them."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from ..translation.settings import PARAMETERS, Parameter, Settings, check_parame
 
 
 def declare(node: Node) -> None:
-    """Declare all parameters, whatever the node was started with: a wrong value fails the configuration.
+    """Declare all parameters, whatever values the node was started with: a wrong one fails the configuration.
 
-    Their types are checked here and not by ROS: for it 50 is no publish_rate, and the node would not start.
+    Types are checked here, not by ROS, which would reject the integer 50 for publish_rate and not start the
+    node.
     """
     for name, parameter in PARAMETERS.items():
         try:
@@ -26,10 +27,10 @@ def declare(node: Node) -> None:
 
 
 def read(node: Node) -> Settings:
-    """The parameters, checked.
+    """The checked parameters.
 
     Raises:
-        ValueError: a value that will not do.
+        ValueError: an invalid value.
     """
     return check_settings({name: node.get_parameter(name).value for name in PARAMETERS})
 
@@ -37,12 +38,12 @@ def read(node: Node) -> Settings:
 def guard(
     node: Node, is_configured: Callable[[], bool], changed: Callable[[dict[str, object]], object]
 ) -> None:
-    """Refuse values that will not do, and changes that would come too late; the log says why.
+    """Reject invalid values, and changes that need a new configuration; log the reason.
 
     Args:
-        node: of which.
-        is_configured: whether the node has been configured with what is there.
-        changed: is called with those that may be changed then, once all that came with them were accepted.
+        node: the node of the parameters.
+        is_configured: whether the node is configured.
+        changed: called with the accepted parameters of one request, once all of them are accepted.
     """
 
     def check(given: Sequence[RosParameter]) -> SetParametersResult:
@@ -52,7 +53,7 @@ def guard(
             except ValueError as error:
                 return _refused(node, str(error))
             if is_configured() and not PARAMETERS[each.name].live:
-                return _refused(node, f"{each.name} counts when the node is configured: clean it up first")
+                return _refused(node, f"{each.name} is read when the node is configured: clean it up first")
         return SetParametersResult(successful=True)
 
     def take(given: Sequence[RosParameter]) -> None:
@@ -63,14 +64,14 @@ def guard(
 
 
 def warn_of_unknown(node: Node) -> None:
-    """Tell of parameters that the node was started with and does not have: a slip may leave the default."""
+    # A misspelled parameter would silently leave the default.
     unknown = [name for name in getattr(node, "_parameter_overrides", ()) if not node.has_parameter(name)]
     if unknown:
         node.get_logger().warning(f"this node has no parameter {', '.join(sorted(unknown))}")
 
 
 def _ours(given: Sequence[RosParameter]) -> list[RosParameter]:
-    """Without those of ROS's own."""
+    # Without those of ROS, such as use_sim_time.
     return [each for each in given if each.name in PARAMETERS]
 
 

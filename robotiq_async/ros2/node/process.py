@@ -1,6 +1,6 @@
-"""The process of the node: the event loop in the main thread, ROS's executor in one beside it, and the end.
+"""The process of the node: the event loop in the main thread, ROS's executor in a second one.
 
-The end has an order: the hand stops, results go out, the executor ends, the node, ROS.
+It ends in this order: the hand stops, results are sent, the executor ends, then the node, then ROS.
 """
 
 from __future__ import annotations
@@ -21,39 +21,38 @@ from rclpy.signals import SignalHandlerOptions
 from ...runtime.log import log
 from .bridge import Bridge
 from .gripper_node import GripperNode
-from .logs import handed_to
+from .logs import forwarded_to
 
 ANSWERS_S: Final = 0.5
-"""For the answers to what the end has ended; they take milliseconds."""
+"""Seconds to answer the requests that the end has aborted; this takes milliseconds."""
 LINGER_S: Final = 0.1
-"""For what has been sent to leave: ROS does not tell when it has."""
+"""Seconds for sent messages to leave: ROS does not report when they have."""
 JOIN_S: Final = 2.0
+"""Seconds for the executor to shut down, and for its thread to end."""
 MOST_FAILURES: Final = 20
-"""Callbacks that may fail in a second. More, and the executor is broken, and not what it was asked."""
+"""Failing callbacks per second: with more, the executor itself is broken."""
 
 
 class Spinner(threading.Thread):
-    """Runs an executor. A callback of ROS's own that raises is logged, and does not end it."""
+    """Runs an executor. An error in a callback of ROS itself is logged and does not end it.
+
+    Args:
+        executor: the executor.
+        died: called, in this thread, if it cannot continue.
+    """
 
     def __init__(self, executor: SingleThreadedExecutor, died: Callable[[BaseException], object]) -> None:
-        """Prepare.
-
-        Args:
-            executor: is spun.
-            died: is called, in this thread, if it cannot go on.
-        """
         super().__init__(name="robotiq_async executor", daemon=True)
         self._executor = executor
         self._died = died
         self._is_ending = threading.Event()
 
     def run(self) -> None:
-        """Spin until told to end."""
         failures: list[float] = []
         while not self._is_ending.is_set():
             try:
                 self._executor.spin_once()
-            except BaseException as error:  # noqa: BLE001  # nobody could halt any more if it ended unheard
+            except BaseException as error:  # noqa: BLE001  # if the thread ended unnoticed, no halt would get through
                 if self._is_ending.is_set():
                     return
                 moment = time.monotonic()
@@ -65,30 +64,30 @@ class Spinner(threading.Thread):
                 log.error("a callback of ROS failed: %r", error)
 
     async def end(self) -> None:
-        """End it, from the loop."""
+        """End the executor and the thread; call it in the loop."""
         self._is_ending.set()
         await asyncio.to_thread(self._executor.shutdown, JOIN_S)
         await asyncio.to_thread(self.join, JOIN_S)
 
 
 async def serve(arguments: Sequence[str]) -> None:
-    """Run the node until a signal comes.
+    """Run the node until a signal arrives.
 
     Args:
         arguments: the command line with the program's name, for ROS: ``--ros-args ...``.
 
     Raises:
-        RuntimeError: the executor died, or publishing did; the hand has been stopped then.
+        RuntimeError: the executor, or publishing, failed; the hand has been stopped.
     """
     loop = asyncio.get_running_loop()
     ended: asyncio.Future[None] = loop.create_future()
 
     def fail(error: BaseException) -> None:
         if not ended.done():
-            ended.set_exception(RuntimeError(f"the node cannot go on: {error!r}"))
+            ended.set_exception(RuntimeError(f"the node cannot continue: {error!r}"))
 
     context = Context()
-    # ROS's own handlers would end the context before the results are out.
+    # ROS's own handlers would end the context before the results are sent.
     rclpy.init(args=list(arguments), context=context, signal_handler_options=SignalHandlerOptions.NO)
     try:
         with _signals(loop, ended):
@@ -97,8 +96,8 @@ async def serve(arguments: Sequence[str]) -> None:
             node = GripperNode(context, bridge, fail)
             executor.add_node(node)
             spinner = Spinner(executor, lambda error: loop.call_soon_threadsafe(fail, error))
-            with handed_to(node.get_logger()):
-                executor.create_task(node.start_by_itself)
+            with forwarded_to(node.get_logger()):
+                executor.create_task(node.start_automatically)
                 spinner.start()
                 try:
                     await ended
@@ -121,8 +120,7 @@ async def _end(node: GripperNode, bridge: Bridge, spinner: Spinner) -> None:
 
 @contextmanager
 def _signals(loop: asyncio.AbstractEventLoop, ended: asyncio.Future[None]) -> Iterator[None]:
-    """The first signal ends the node well; further ones are not heard, for launchers send several."""
-
+    # The first signal ends the node in order. Further ones are ignored, because launchers send several.
     def end() -> None:
         if not ended.done():
             ended.set_result(None)
@@ -130,7 +128,7 @@ def _signals(loop: asyncio.AbstractEventLoop, ended: asyncio.Future[None]) -> It
     numbers = [
         number
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-        # A SIGINT that is ignored stays so: that is how a shell keeps Ctrl-C from its background jobs.
+        # An ignored SIGINT stays ignored: that is how a shell keeps Ctrl-C from its background jobs.
         if signal.getsignal(number) is not signal.SIG_IGN
     ]
     for number in numbers:

@@ -1,7 +1,7 @@
-"""What the node publishes while it is configured: joint states, its status, diagnoses.
+"""Publishes joint states, the status and diagnoses while the node is configured.
 
-Published from the event loop, and what a poll has shown in the turn of that poll: to wake the executor
-or the loop for it would cost more than the messages do.
+In the event loop, and the result of a poll in the turn of that poll: waking the executor, or the loop again,
+would cost more than the messages do.
 """
 
 from __future__ import annotations
@@ -25,22 +25,21 @@ from .messages import JointStates, diagnostic_array
 from .timer import Timer
 
 STATUS_RATE_HZ: Final = 10.0
-"""Of the status while the gripper is heard, else the rate below; a change of state is published at once."""
+"""Rate of the status while connected, else the rate below. A change of state is published at once."""
 DIAGNOSTICS_RATE_HZ: Final = 1.0
 _LATEST: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""Whoever comes later gets the newest one."""
+"""Late subscribers get the last message."""
 
 
 class Publishing:
-    """The publishers of a node. They stay; what they publish begins and ends with a connection."""
+    """The publishers of a node. They exist all the time, but publish only while there is a connection.
+
+    Args:
+        node: the node of the topics.
+        failed: called, in the loop, if publishing ends with an unexpected error.
+    """
 
     def __init__(self, node: Node, failed: Callable[[BaseException], object]) -> None:
-        """Advertise the topics.
-
-        Args:
-            node: of which.
-            failed: is called, in the loop, if publishing ends for a reason that nobody has thought of.
-        """
         self._node = node
         self._failed = failed
         self._joint_states = node.create_publisher(JointState, "joint_states", 10)
@@ -51,11 +50,10 @@ class Publishing:
         self._readers: list[asyncio.Task[None]] = []
 
     def describe(self, urdf: str) -> None:
-        """Publish the robot description."""
         self._description.publish(String(data=urdf))
 
     async def start(self, connection: Connection, joint_states: JointStates, rate: float) -> None:
-        """Publish what the hand of a connection shows."""
+        """Publish the hand of a connection; ``rate`` is in joint states a second."""
         self._timer = Timer(1 / DIAGNOSTICS_RATE_HZ, lambda: self._publish_rarely(connection), self._failed)
         readers = (
             self._publish_statuses(connection, joint_states, rate),
@@ -63,7 +61,7 @@ class Publishing:
         )
         self._readers = [asyncio.ensure_future(reader) for reader in readers]
         for reader in self._readers:
-            reader.add_done_callback(self._look)
+            reader.add_done_callback(self._check_reader)
 
     async def stop(self) -> None:
         """Publish nothing more. Idempotent."""
@@ -74,32 +72,31 @@ class Publishing:
             reader.cancel()
         await asyncio.gather(*readers, return_exceptions=True)
 
-    def _look(self, reader: asyncio.Task[None]) -> None:
+    def _check_reader(self, reader: asyncio.Task[None]) -> None:
         if not reader.cancelled() and (error := reader.exception()) is not None:
             self._failed(error)
 
     async def _publish_statuses(self, connection: Connection, joints: JointStates, rate: float) -> None:
-        joint_states, told = Pace(rate), Pace(STATUS_RATE_HZ)
+        joint_states, status_pace = Pace(rate), Pace(STATUS_RATE_HZ)
         async for status in connection.hand.statuses():
             if joint_states.takes(status.timestamp):
                 self._joint_states.publish(joints.encoded(status))
-            if told.takes(status.timestamp):
-                self.tell_status(connection)
+            if status_pace.takes(status.timestamp):
+                self.publish_status(connection)
 
     async def _publish_transitions(self, connection: Connection, joints: JointStates) -> None:
         async for _ in connection.hand.transitions():
-            self.tell_status(connection)
+            self.publish_status(connection)
             if not is_connected(connection.hand):
                 joints.forget()
 
-    def tell_status(self, connection: Connection) -> None:
-        """Publish the status as it is now."""
+    def publish_status(self, connection: Connection) -> None:
         text = status_text(connection.hand, takes_commands=connection.takes_commands)
         self._status.publish(String(data=text))
 
     def _publish_rarely(self, connection: Connection) -> None:
-        """What comes also while nothing is heard of the gripper."""
-        self.tell_status(connection)
+        # Also while the link is down: readers must learn of that.
+        self.publish_status(connection)
         hand = connection.hand
         self._diagnostics.publish(
             diagnostic_array(

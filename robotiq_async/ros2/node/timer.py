@@ -1,4 +1,4 @@
-"""Doing something at a rate in the event loop. Needs no ROS."""
+"""Timer: periodic work in the event loop. Does not import ROS."""
 
 from __future__ import annotations
 
@@ -10,32 +10,30 @@ from ...values.errors import NotStartedError
 
 
 class Timer:
-    """Does something at a rate, from now on; what is missed is missed."""
+    """Calls a function periodically, at once and then until cancelled. Missed calls are skipped.
+
+    Args:
+        period: seconds.
+        work: the function; NotStartedError, of a hand that was just stopped, is ignored.
+        failed: called with any other exception; the timer ends then.
+    """
 
     def __init__(
         self, period: float, work: Callable[[], object], failed: Callable[[BaseException], object]
     ) -> None:
-        """Begin at once, in the running loop.
-
-        Args:
-            period: seconds.
-            work: is done; a hand that was stopped in this moment does not matter.
-            failed: is called with what else it raises, and then it ends.
-        """
         self._loop = asyncio.get_running_loop()
         self._period, self._work, self._failed = period, work, failed
         self._due = self._loop.time()
         self._next = self._loop.call_soon(self._tick)
 
     def cancel(self) -> None:
-        """End it."""
         self._next.cancel()
 
     def _tick(self) -> None:
         try:
             with suppress(NotStartedError):
                 self._work()
-        except Exception as error:  # noqa: BLE001  # whatever it is: nobody else would hear of it
+        except Exception as error:  # noqa: BLE001  # reported to the node, or it would be lost
             self._failed(error)
             return
         self._due += self._period

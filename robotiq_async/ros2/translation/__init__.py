@@ -1,1 +1,1 @@
-"""Between the words of ROS and those of the hand. Pure: knows no ROS and no event loop."""
+"""Converts between ROS and the hand. Pure: imports neither ROS nor the event loop."""

@@ -9,19 +9,19 @@ from typing import Final
 from ...tools.description import urdf
 
 _REFERENCES: Final = {"parent": "link", "child": "link", "mimic": "joint"}
-"""Elements of a joint that name another part, and how."""
+"""Elements of a joint that refer to another part, with the attribute that has its name."""
 
 
 def robot_description(path: str, prefix: str) -> str:
-    """The URDF of a file as it is, or the packaged one with the prefix before its links and joints.
+    """The URDF in a file, unchanged; without a file the packaged one, with the prefix on all names.
 
     Args:
-        path: of a file; empty for the packaged one.
-        prefix: of the joints.
+        path: of the file; empty for the packaged one.
+        prefix: of the names.
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: the file is no URDF.
+        ValueError: the file is not a URDF.
     """
     if not path:
         return prefixed(urdf(), prefix)
@@ -31,10 +31,10 @@ def robot_description(path: str, prefix: str) -> str:
 
 
 def prefixed(text: str, prefix: str) -> str:
-    """A URDF whose links and joints have a prefix before their names.
+    """A URDF with a prefix on the names of its links and joints.
 
     Raises:
-        ValueError: it is no URDF.
+        ValueError: not a URDF.
     """
     if not prefix:
         return text

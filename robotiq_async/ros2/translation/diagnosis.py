@@ -1,4 +1,4 @@
-"""What is told of a hand: diagnoses, and its state as JSON; nothing that is not known."""
+"""Diagnoses of a hand, and its state as JSON. Values that are unknown are left out."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ _LEVELS = {
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """One thing that is well or not.
+    """The condition of one part.
 
     Attributes:
-        what: the thing.
-        level: how well it is.
-        message: in words.
+        what: the part.
+        level: how serious the condition is.
+        message: the condition as a text.
         values: figures.
     """
 
@@ -49,12 +49,7 @@ class Diagnosis:
 
 
 def diagnose(hand: Hand, now: float) -> tuple[Diagnosis, Diagnosis]:
-    """The link, and the gripper behind it.
-
-    Args:
-        hand: the hand.
-        now: monotonic seconds.
-    """
+    """The diagnoses of the link and of the gripper; ``now`` is in monotonic seconds."""
     return _link(hand, now), _gripper(hand)
 
 
@@ -92,11 +87,13 @@ def _gripper(hand: Hand) -> Diagnosis:
 
 
 def status_text(hand: Hand, *, takes_commands: bool) -> str:
-    """The state as a JSON object: with a connection all of the newest status, in the words of recordings.
+    """The state as a JSON object; while connected, it includes the newest status.
+
+    The fields of the status have the names of recordings.
 
     Args:
         hand: the hand.
-        takes_commands: whether the node carries out commands.
+        takes_commands: whether the node accepts commands.
     """
     fields: dict[str, object] = {
         "state": hand.state.name,

@@ -1,8 +1,8 @@
-"""Joints in radians, as ROS has them, from the axes in counts, and back.
+"""Converts joints in radians, for ROS, from and to axes in counts.
 
 A finger has one motor for three joints, so a goal for a finger is a goal for one of them: the base joint
-(``joint_1``) as far as it turns alone, the middle one (``joint_2``) beyond. The third joint and the second
-palm joint only follow. See :mod:`robotiq_async.tools.description.kinematics` for where the angles come from.
+(``joint_1``) as far as it turns alone, the middle one (``joint_2``) beyond that. The third joint and the
+second palm joint only follow. The source of the angles is :mod:`robotiq_async.tools.description.kinematics`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ...values.enums import Finger
 from ...values.status import RobotiqStatus
 
 FINGERS: Final = "fingers"
-"""The name of what stands for all three fingers in a goal: one angle, base and middle joint together."""
+"""Name for all three fingers in a goal: one angle, the sum of base and middle joint."""
 _PALM_JOINT: Final = "palm_finger_1_joint"
 _BASE_LIMITS: Final = (0.0495, 1.2217)
 _MIDDLE_LIMITS: Final = (0.0, 1.5708)
@@ -33,12 +33,12 @@ LIMITS: Final = MappingProxyType(
     | {name: _TIP_LIMITS for name in JOINTS if name.endswith("_joint_3")}
     | {_PALM_JOINT: (-0.1784, 0.1919), "palm_finger_2_joint": (-0.1919, 0.1784)}
 )
-"""Lower and upper end of each joint in radians. Inside those of the packaged URDF, and of the one that users
-of ROS have (robotiq_3f_gripper_visualization of ros-industrial): that is narrower where a finger is open and
-where the scissor pinches.
+"""Lower and upper limit of each joint in radians. Within the limits of the packaged URDF, and of the one in
+ros-industrial (robotiq_3f_gripper_visualization), which are narrower for open fingers and for the pinching
+scissor.
 
-The angles leave them at the ends: a finger that reads less than 6 counts, a scissor that reads more than 232.
-Consumers refuse a joint outside its limits, so what is published stays inside.
+The angles exceed them at the ends: a finger below 6 counts, a scissor above 232. Consumers reject a joint
+outside its limits, so published angles are clamped.
 """
 _LIMITS: Final = tuple(LIMITS[name] for name in JOINTS)
 _STILL: Final = (0.0,) * len(JOINTS)
@@ -46,61 +46,60 @@ _STILL: Final = (0.0,) * len(JOINTS)
 CLOSING_END: Final = 2.8
 """End of the closing angle of all fingers: 70 degrees of the base and 90 of the middle joint, rounded up."""
 TOLERANCE: Final = 1e-3
-"""Radians that a goal may lie outside of its range: others round, too."""
+"""Radians that a goal may be outside its range, because clients round."""
 _STOP_TOLERANCE: Final = 0.1
-"""Radians that the base joint may be asked to stand off its stop while the middle one bends."""
+"""Radians that the base joint of a goal may be off its stop while the middle one bends."""
 
 LONGEST_NAME: Final = 80
-"""So much of a wrong name is told."""
+"""Characters of an unknown name that an error shows."""
 
 VELOCITY_S: Final = 0.04
-"""Velocities are taken over at least this time: a count is half a degree."""
+"""Seconds over which a velocity is computed, at least: one count is half a degree."""
 
 
 class GoalError(ValueError):
-    """A goal that asks for something which is not there, or cannot be."""
+    """A goal that names an unknown joint, or cannot be reached."""
 
 
 @dataclass(frozen=True, slots=True)
 class Targets:
-    """Where axes are to go.
+    """Target positions of axes.
 
     Attributes:
-        counts: for each position the axes that are to go there; no axis twice.
+        counts: each position, 0..255, with the axes that move there; no axis twice.
     """
 
     counts: tuple[tuple[int, Finger], ...]
 
     @property
     def axes(self) -> Finger:
-        """All addressed axes."""
         return Finger(sum(int(axes) for _, axes in self.counts))
 
 
 def joint_names(prefix: str = "") -> list[str]:
-    """The eleven names, each behind the prefix."""
+    """The names of the eleven joints, with the prefix."""
     return [prefix + name for name in JOINTS]
 
 
 def positions(status: RobotiqStatus) -> tuple[float, ...]:
-    """The eleven joints in radians, inside their limits."""
+    """The eleven joints in radians, within their limits."""
     return _inside(joint_angles(status))
 
 
 @lru_cache(maxsize=16)
 def _inside(angles: tuple[float, ...]) -> tuple[float, ...]:
-    # Kept, for most of the time the fingers stand.
+    # Cached, because the fingers are still most of the time.
     return tuple(min(max(angle, low), high) for angle, (low, high) in zip(angles, _LIMITS, strict=True))
 
 
 class Motion:
-    """Positions and velocities of the joints from one status to the next."""
+    """Positions and velocities of the joints over consecutive statuses."""
 
     def __init__(self) -> None:
         self._seen: deque[tuple[float, Sequence[float]]] = deque()
 
     def of(self, status: RobotiqStatus) -> tuple[Sequence[float], Sequence[float]]:
-        """Radians, and radians a second over the last hundredths of a second; those are 0 at first."""
+        """Radians, and radians per second over the last VELOCITY_S; velocities are 0 at first."""
         seen, at, there = self._seen, status.timestamp, positions(status)
         if not seen or at > seen[-1][0]:
             seen.append((at, there))
@@ -112,20 +111,20 @@ class Motion:
         return there, [(new - old) / (at - before) for old, new in zip(past, there, strict=True)]
 
     def forget(self) -> None:
-        """What comes next has nothing to do with what was: the link was down."""
+        # After a lost link the next position is not a motion since the last one.
         self._seen.clear()
 
 
 def targets(names: Sequence[str], angles: Sequence[float], prefix: str = "") -> Targets:
-    """What a goal asks of the axes.
+    """The targets of a goal.
 
     Args:
-        names: of joints, behind the prefix; none with one angle for all fingers.
+        names: of joints, with the prefix; empty with one angle for all fingers.
         angles: radians, one for each name.
         prefix: of the joints of this hand.
 
     Raises:
-        GoalError: the goal cannot be carried out as it stands; nothing is rounded into shape.
+        GoalError: the goal is invalid; angles are never adjusted to fit.
     """
     asked = _pairs(names, angles, prefix)
     counts: dict[Finger, int] = {}
@@ -151,11 +150,10 @@ def targets(names: Sequence[str], angles: Sequence[float], prefix: str = "") -> 
 
 
 def _pairs(names: Sequence[str], angles: Sequence[float], prefix: str) -> dict[str, float]:
-    """Names without the prefix, and finite angles."""
     if not names and len(angles) == 1:
         names = [prefix + FINGERS]
     if not names:
-        raise GoalError(f"no joint is named, and not one position but {len(angles)} given")
+        raise GoalError(f"no joint is named, so one position is needed, got {len(angles)}")
     if len(names) != len(angles):
         raise GoalError(f"{len(names)} joints and {len(angles)} positions")
     asked: dict[str, float] = {}
@@ -176,19 +174,19 @@ def _plain_name(name: str, prefix: str) -> str:
     commanded = ", ".join(prefix + each for each in _COMMANDED)
     if name.startswith(prefix) and plain in JOINTS:
         raise GoalError(f"{name!r} follows other joints and takes no goal; these do: {commanded}")
-    shown = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."  # anybody can send anything
+    shown = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."  # of any length
     raise GoalError(f"there is no joint {shown!r}; these take goals: {commanded}")
 
 
 def _finger_counts(name: str, base: float | None, middle: float | None) -> int:
-    """One motor turns both: the base joint up to its stop, the middle one from there on."""
+    # One motor turns both: the base joint up to its stop, the middle one beyond that.
     if middle is not None:
         counts = _counts(f"{name}_joint_2", middle, _MIDDLE_LIMITS, MIDDLE)
         if middle > TOLERANCE:
             if base is not None and base < radians(BASE[-1][1]) - _STOP_TOLERANCE:
                 raise GoalError(
                     f"two positions for one finger: {name}_joint_2 bends only once {name}_joint_1 is at its "
-                    f"stop ({radians(BASE[-1][1]):.2f} rad), and not at {base:.2f} rad"
+                    f"stop ({radians(BASE[-1][1]):.2f} rad), not at {base:.2f} rad"
                 )
             if base is not None:
                 _counts(f"{name}_joint_1", base, _BASE_RANGE, BASE)
@@ -220,7 +218,7 @@ def _between(angle: float, points: Points) -> int:
 
 
 _BASE_RANGE: Final = (0.0, _BASE_LIMITS[1])
-"""Of goals: 0 for an open finger is what people write, although it reads a little more there."""
+"""Range of goals: people write 0 for an open finger, although it reads a little more."""
 _COMMANDED: Final = (
     *(f"{name}_joint_{number}" for name in FINGER_NAMES.values() for number in (1, 2)),
     _PALM_JOINT,

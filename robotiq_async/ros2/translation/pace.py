@@ -1,4 +1,4 @@
-"""Which of the statuses are published, at a rate that is lower than theirs."""
+"""Pace: selects statuses for publishing at a lower rate than theirs."""
 
 from __future__ import annotations
 
@@ -6,19 +6,18 @@ import math
 
 
 class Pace:
-    """Takes those that are due. After a gap it goes on from there, and makes up for nothing."""
+    """Selects the statuses that are due. After a gap it continues from there, without catching up.
+
+    Args:
+        rate: statuses per second.
+    """
 
     def __init__(self, rate: float) -> None:
-        """Take the first one.
-
-        Args:
-            rate: so many a second.
-        """
         self._period = 1 / rate
         self._due = -math.inf
 
     def takes(self, timestamp: float) -> bool:
-        """Whether a status of this time is due, in monotonic seconds."""
+        """Whether the status of this time, in monotonic seconds, is due."""
         if timestamp < self._due:
             return False
         self._due += self._period

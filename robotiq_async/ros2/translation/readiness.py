@@ -1,4 +1,4 @@
-"""Whether a hand is connected, and why it takes no goals now."""
+"""Whether a hand is connected, and why it accepts no goals now."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from ...values.enums import State
 
 
 def is_connected(hand: Hand) -> bool:
-    """Whether what the hand shows is what the gripper does now."""
+    """Whether the status of the hand is current."""
     return hand.state not in (State.DISCONNECTED, State.DO_SHUTDOWN, State.SHUTDOWN)
 
 
 def why_not(hand: Hand) -> str | None:
-    """Why the hand takes no goal now; None if it does."""
+    """Why the hand accepts no goal now; None if it does."""
     state = hand.state
     if state in RUNNING:
         return None

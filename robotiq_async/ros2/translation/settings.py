@@ -1,4 +1,4 @@
-"""The parameters of the node: names, meaning, ranges and checks. Those of the hand come from its options."""
+"""The parameters of the node: names, descriptions, ranges and checks. Some are options of the hand."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ...values.checks import check_int, check_number
 
 Value = str | int | float | bool
 USUAL: Final = -1
-"""A parameter of ROS always has a value: this one stands for None."""
+"""Represents None: a parameter of ROS always has a value."""
 OF_HAND: Final = offered(Place.ROS)
 """The parameters that are options of the hand."""
 
@@ -24,11 +24,11 @@ class Parameter:
     """One parameter.
 
     Attributes:
-        default: its value unless another is given, of the parameter's type.
+        default: its default, of the parameter's type.
         description: for ``ros2 param describe``.
         low: the lowest value of a number.
         high: the highest value of a number.
-        live: whether it may be changed while the node is connected.
+        live: whether it may be changed while the node is configured.
     """
 
     default: Value
@@ -43,7 +43,7 @@ def _of_hand(name: str, option: Option) -> Parameter:
     if default is None:  # it depends on the link
         text += f"; {USUAL} stands for {option.tcp} over TCP, {option.rtu} on a serial line"
         low = default = USUAL
-    # A plain figure: ROS does not know subclasses of float.
+    # A plain float: ROS does not accept subclasses.
     default = float(default) if isinstance(default, float) else default
     return Parameter(default, f"{text}.", low, option.high, live=name in ("speed", "force"))  # type: ignore[arg-type]
 
@@ -77,9 +77,9 @@ class Settings:
     """The parameters, checked.
 
     Attributes:
-        options: of the hand, as :class:`~robotiq_async.RobotiqHand` takes them, besides the next three.
+        options: of the hand, as keywords of :class:`~robotiq_async.RobotiqHand`, without the next three.
 
-    The others are the parameters of the same name.
+    The others are the parameters by the same names.
     """
 
     options: Mapping[str, Any]
@@ -95,7 +95,7 @@ class Settings:
 
 
 def check_settings(values: Mapping[str, object]) -> Settings:
-    """Check the value of every parameter.
+    """Check all parameters.
 
     Raises:
         ValueError: a value out of range or of the wrong type; names the parameter, the value and the range.
@@ -107,12 +107,12 @@ def check_settings(values: Mapping[str, object]) -> Settings:
 
 
 def _option_value(name: str, value: Value) -> object:
-    # The default itself for a value that equals it: on a serial line the default poll_interval is another.
+    # The default of the option, which may be None: on a serial line the default poll_interval differs.
     return OF_HAND[name].default if value == PARAMETERS[name].default else value
 
 
 def check_parameter(name: str, value: object) -> Value:
-    """A value of a parameter, in its type. An integer may stand for a float: people write 50 for 50.0.
+    """Check a value, and return it in the parameter's type. An integer is accepted for a float: 50 for 50.0.
 
     Raises:
         ValueError: out of range or of the wrong type.
@@ -143,18 +143,17 @@ def _check_kind(name: str, value: object, kind: type[Value], what: str) -> Value
 
 
 def _check_address(address: str) -> str:
-    """Refuse a malformed address before anything is opened."""
     parse = parse_remote_address if is_remote(address) else parse_address
     parse(address)
     return address
 
 
 def _check_prefix(prefix: str) -> str:
-    """Refuse characters that names in a URDF and names of frames cannot have."""
+    # Other characters are invalid in the names of a URDF or of frames.
     if not re.fullmatch(r"[A-Za-z0-9_./-]*", prefix):
         raise ValueError(f"joint_prefix may have letters, digits, _ . / and -, got {prefix!r}")
     return prefix
 
 
 _CHECKS: Final = {"address": _check_address, "joint_prefix": _check_prefix}
-"""Of the strings that are restricted."""
+"""Checks of strings, by parameter."""

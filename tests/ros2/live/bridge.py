@@ -25,7 +25,7 @@ async def test_what_is_asked_begins_in_the_order_in_which_it_was_asked() -> None
 
     def ask() -> None:
         for what in ("goal", "cancel", "another goal"):
-            bridge.tell(note(what))
+            bridge.submit(note(what))
 
     thread = threading.Thread(target=ask)
     thread.start()

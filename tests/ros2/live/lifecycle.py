@@ -90,7 +90,7 @@ def test_parameters(simulator: Simulator) -> None:
         assert client.set("poll_interval", 0.01).successful
         assert client.change("configure")
         refused = client.set("address", "sim://")
-        assert "address counts when the node is configured: clean it up first" in refused.reason
+        assert "address is read when the node is configured: clean it up first" in refused.reason
         assert client.set("force", 20).successful
         for name, described in zip(PARAMETERS, client.describe(*PARAMETERS), strict=True):
             assert described.description == PARAMETERS[name].description
