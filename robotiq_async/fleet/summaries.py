@@ -45,7 +45,7 @@ class Summaries:
             if not math.isfinite(seen):
                 raise ValueError(f"no time: {stamp}, {age}")
             what = {
-                "state": State(fields["state"]),
+                "state": State[fields["state"]],
                 "fault": None if fault is None else model_of(fields.get("model")).fault(fault),
                 "is_moving": bool(fields["is_moving"]),
                 "holder": None if fields["holder"] is None else words(fields["holder"]),

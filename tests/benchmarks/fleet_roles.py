@@ -25,7 +25,6 @@ from robotiq_async.fleet.network.configuration import agent_configuration, clien
 from robotiq_async.fleet.network.zenoh_bus import ZenohBus, open_bus
 from robotiq_async.fleet.wire.envelope import Answer, unpack_call
 from robotiq_async.fleet.wire.status_message import StatusMessage
-from robotiq_async.fleet.wire.values import statistics_fields
 from robotiq_async.hand import Hand
 from robotiq_async.session.counters import Counters
 from robotiq_async.values.statistics import percentile
@@ -277,7 +276,7 @@ def summary(of: GripperName) -> Figures:
         "is_moving": False,
         "holder": None,
         "problem": "",
-        "statistics": statistics_fields(Counters().snapshot(0)),
+        "statistics": Counters().snapshot(0).as_dict(),
     }
 
 

@@ -169,7 +169,7 @@ def info(**changes: object) -> dict[str, object]:
         "window": 1.0,
         "statistics": {"period_p99": 0.005},
         "problem": "",
-        "state": "running_idle",
+        "state": "RUNNING_IDLE",
         "address": "sim://",
         "holder": None,
     }
@@ -209,7 +209,7 @@ async def test_one_that_does_not_answer() -> None:
 
 @virtual
 @pytest.mark.parametrize(
-    "said", [b"?", b'{"version": 2}', b'{"version": 1}', {"state": "running_idle"}], ids=str
+    "said", [b"?", b'{"version": 2}', b'{"version": 1}', {"state": "RUNNING_IDLE"}], ids=str
 )
 async def test_one_of_another_version(said: Any) -> None:
     found = await examined_beside(said)

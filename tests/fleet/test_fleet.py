@@ -29,7 +29,7 @@ def summary(stamp: float, age: object = 0.0, **fields: Any) -> bytes:
         "epoch": 7,
         "stamp": stamp,
         "age": age,
-        "state": "running_idle",
+        "state": "RUNNING_IDLE",
         "fault": 0,
         "is_moving": False,
         "holder": None,
@@ -58,7 +58,7 @@ def test_the_age_counts_from_when_the_agent_saw_the_gripper() -> None:
 def test_one_that_was_overtaken_shows_nothing_and_another_run_has_a_clock_of_its_own() -> None:
     summaries = Summaries()
     assert seen_at(summaries, summary(10.0), 10.0 + AHEAD) == 10.0 + AHEAD
-    assert summaries.read(summary(9.0, state="fault"), 10.1 + AHEAD) is None
+    assert summaries.read(summary(9.0, state="FAULT"), 10.1 + AHEAD) is None
     assert seen_at(summaries, summary(3.0, 1.0, epoch=8), 20.0 + AHEAD) == 19.0 + AHEAD
 
 

@@ -21,7 +21,7 @@ from ..control.lease import Lease
 from ..network.bus import Bus, Urgency
 from ..wire.names import GripperName
 from ..wire.status_message import StatusMessage
-from ..wire.values import Fields, request_fields, statistics_fields, transition_fields
+from ..wire.values import Fields, request_fields, transition_fields
 
 KEPT: Final = 2000
 """Events that are kept for clients that missed them: some seconds of a loop that commands at 200 Hz."""
@@ -110,12 +110,12 @@ class HandPublisher:
             "age": None if status is None else stamp - status.timestamp,
             "address": self._hand.address,
             "model": self._hand.model.name,
-            "state": self._hand.state.value,
+            "state": self._hand.state.name,
             "fault": None if status is None else int(status.fault),
             "is_moving": self._is_moving(),
             "holder": None if holder is None else holder.label,
             "problem": self.problem,
-            "statistics": statistics_fields(self._hand.statistics),
+            "statistics": self._hand.statistics.as_dict(),
         }
 
     def _head(self) -> dict[str, Any]:

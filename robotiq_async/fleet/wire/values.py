@@ -1,4 +1,8 @@
-"""JSON encoding of statuses, errors, results, transitions, requests and statistics."""
+"""What crosses the network as JSON: the fields of ``as_dict()``, less those that the receiver works out.
+
+Enumerations are names, but a fault is its code, because a gripper may show one that has no name. A status or
+a request is its registers and its model.
+"""
 
 from __future__ import annotations
 
@@ -99,7 +103,7 @@ def error_fields(error: Exception) -> Fields:
     status: RobotiqStatus | None = getattr(error, "status", None)
     if state is not None:
         allowed = getattr(error, "allowed", frozenset[State]())
-        fields |= {"state": state.value, "allowed": sorted(each.value for each in allowed)}
+        fields |= {"state": state.name, "allowed": sorted(each.name for each in allowed)}
     if fault is not None:
         fields["fault"] = fault.value
     if status is not None:
@@ -127,8 +131,8 @@ def _error(fields: Fields, clock: Clock) -> Exception:
     error.args = (message,)
     known: dict[str, object] = {}
     if issubclass(kind, InvalidStateError):
-        known["state"] = State(fields["state"])
-        known["allowed"] = frozenset(map(State, fields["allowed"]))
+        known["state"] = State[fields["state"]]
+        known["allowed"] = frozenset(State[name] for name in fields["allowed"])
     if issubclass(kind, GripperFaultError):
         value = fields["fault"]
         known["fault"] = Fault(tuple(value) if isinstance(value, list) else value)  # type: ignore[arg-type]
@@ -146,25 +150,17 @@ def _error(fields: Fields, clock: Clock) -> Exception:
 
 
 def result_fields(result: MoveResult | None) -> Fields | None:
-    if result is None:
-        return None
-    return {
-        "outcomes": {str(int(axis)): int(how) for axis, how in result.outcomes.items()},
-        "positions": {str(int(axis)): at for axis, at in result.positions.items()},
-        "contacts": int(result.contacts),
-        "duration": result.duration,
-        "peak_current_ma": {str(int(axis)): peak for axis, peak in result.peak_current_ma.items()},
-        "status": status_fields(result.status),
-    }
+    return None if result is None else {**result.as_dict(), "status": status_fields(result.status)}
 
 
 def read_result(fields: Mapping[str, Any], clock: Clock) -> MoveResult:
+    axes = {axis: fields[str(axis.name)] for axis in Finger.ALL if axis.name in fields}
     return MoveResult(
-        outcomes={Finger(int(axis)): ObjectStatus(how) for axis, how in fields["outcomes"].items()},
-        positions={Finger(int(axis)): int(at) for axis, at in fields["positions"].items()},
-        contacts=Finger(fields["contacts"]),
+        outcomes={axis: ObjectStatus[end["outcome"]] for axis, end in axes.items()},
+        positions={axis: int(end["position"]) for axis, end in axes.items()},
+        contacts=Finger(sum(Finger[name] for name in fields["contacts"])),
         duration=float(fields["duration"]),
-        peak_current_ma={Finger(int(axis)): int(peak) for axis, peak in fields["peak_current_ma"].items()},
+        peak_current_ma={axis: int(end["peak_current_ma"]) for axis, end in axes.items()},
         status=read_status(fields["status"], clock),
     )
 
@@ -173,19 +169,13 @@ def read_result(fields: Mapping[str, Any], clock: Clock) -> MoveResult:
 
 
 def transition_fields(transition: Transition) -> Fields:
-    return {
-        "kind": "transition",
-        "source": transition.source.value,
-        "target": transition.target.value,
-        "trigger": transition.trigger.name,
-        "timestamp": transition.timestamp,
-    }
+    return {"kind": "transition", **transition.as_dict()}
 
 
 def read_transition(fields: Mapping[str, Any], clock: Clock) -> Transition:
     return Transition(
-        source=State(fields["source"]),
-        target=State(fields["target"]),
+        source=State[fields["source"]],
+        target=State[fields["target"]],
         trigger=Trigger[fields["trigger"]],
         timestamp=clock(fields["timestamp"]),
     )
@@ -207,10 +197,6 @@ def read_request(fields: Mapping[str, Any], clock: Clock) -> SentRequest:
         timestamp=clock(fields["timestamp"]),
         acknowledged=bool(fields["acknowledged"]),
     )
-
-
-def statistics_fields(statistics: Statistics) -> Fields:
-    return statistics.as_dict()
 
 
 def read_statistics(fields: Mapping[str, Any]) -> Statistics:
