@@ -6,6 +6,7 @@
 PYTHON ?= python3
 ADDRESS ?= sim://
 MINUTES ?= 30
+MODEL ?= 3f
 LINK ?= tcp
 HABITS ?= status-lag; silence-fault; write-spacing
 DISTROS ?= jazzy kilted
@@ -60,8 +61,8 @@ pythons: $(RELEASE)/.complete  ## Test the library on other Pythons (PYTHONS="3.
 canary: $(RELEASE)/.complete  ## Test with the newest of all dependencies, in an environment that is thrown away
 	@$(RELEASE)/bin/python -m tests.release.canary
 
-soak: $(STAMP)  ## Move under random faults for MINUTES=30 over LINK=tcp (or rtu), and print figures
-	@$(BIN)/python -m tests.adversity.soak --minutes $(MINUTES) --link $(LINK)
+soak: $(STAMP)  ## Move a MODEL=3f under random faults for MINUTES=30 over LINK=tcp (or rtu), and print figures
+	@$(BIN)/python -m tests.adversity.soak --minutes $(MINUTES) --link $(LINK) --model $(MODEL)
 
 habits: $(STAMP)  ## Everything under fault once more, with HABITS="status-lag; silence-fault; write-spacing"
 	@HABITS="$(HABITS)" $(BIN)/python -m pytest tests/adversity

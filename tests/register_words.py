@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import Request
 from robotiq_async.values.status import RobotiqStatus
@@ -55,9 +54,10 @@ def with_object_status(status: Registers, old: Registers) -> Registers:
 
 def only_holds(gripper: SimulatedGripper, since: int) -> bool:
     """Whether all that was written after so many writes only asks axes to stay where they have stayed."""
-    images = [Request.from_registers(write.registers) for write in gripper.writes[max(since - 1, 0) :]]
+    writes = gripper.writes[max(since - 1, 0) :]
+    images = [Request.from_registers(write.registers, gripper.model) for write in writes]
     for before, image in pairwise(images):
-        for axis in THREE_FINGER.axes:
+        for axis in gripper.model.axes:
             is_asked_anew = image.position(axis) != before.position(axis)
             if is_asked_anew and abs(image.position(axis) - gripper.position(axis)) > 2:
                 return False

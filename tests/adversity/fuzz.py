@@ -3,7 +3,7 @@
     python -m tests.adversity.fuzz --help
 
 The tests run a small part of it (test_fuzz.py); figures of a long run are in docs/under-fault.md. HABITS in
-the environment gives the gripper of the live link habits, as ``make habits`` does.
+the environment gives the gripper of the live link habits, as ``make habits`` does, and MODEL another model.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ from robotiq_async.link.frames import expected_reply
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
 from robotiq_async.simulator.troubles.corruption import unchanged
 from robotiq_async.values.errors import ProtocolError
-from tests.adversity.world import HABITS
+from robotiq_async.values.model import MODELS
+from tests.adversity.world import HABITS, MODEL
 
 READ, WRITE = 4, 16
 
@@ -146,11 +147,12 @@ def _verdict(rng: random.Random, request: bytes, reply: bytes, serial: bool) -> 
 def check_possible(payload: bytes) -> None:
     """A status made of these sixteen bytes says what they say."""
     registers = tuple(int.from_bytes(payload[i : i + 2], "big") for i in range(0, 16, 2))
-    status = RobotiqStatus.from_registers(registers)
-    assert status.registers == registers
-    assert int(status.fault) == payload[2] & 0x0F
-    assert bool(status.fault) == bool(payload[2] & 0x0F), "a fault was read as none"
-    assert repr(status)
+    for model in MODELS.values():
+        status = RobotiqStatus.from_registers(registers, model=model)
+        assert status.registers == registers
+        assert int(status.fault) == payload[2] & 0x0F
+        assert bool(status.fault) == bool(payload[2] & 0x0F), "a fault was read as none"
+        assert repr(status)
 
 
 # -- the live link -------------------------------------------------------------------------------------
@@ -205,7 +207,9 @@ async def live(
     """
     server.policy = line
     policy = ReconnectPolicy(first_delay=0.0, max_delay=0.01)
-    hand = RobotiqHand(address, poll_interval=0.001, response_timeout=0.02, reconnect=policy)
+    hand = RobotiqHand(
+        address, poll_interval=0.001, response_timeout=0.02, reconnect=policy, model=server.gripper.model
+    )
 
     async def command() -> None:
         while True:
@@ -257,7 +261,7 @@ def resident() -> int:
 
 
 async def _live_over_tcp(count: int, seed: int) -> dict[str, float]:
-    async with SimulatorServer(SimulatedGripper(speedup=50)) as server:
+    async with SimulatorServer(SimulatedGripper(speedup=50, model=MODEL)) as server:
         for habit in HABITS:
             await server.fault_injector.begin(habit)
         line = Line(random.Random(seed), serial=False, share=0.25)

@@ -25,12 +25,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from robotiq_async import Finger, MoveResult, RobotiqError, RobotiqHand, State
+from robotiq_async import JAW, Finger, Model, MoveResult, RobotiqError, RobotiqHand, State
 from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.simulator import Trouble
+from robotiq_async.values.model import MODELS, model_of
 from tests.adversity.fuzz import resident
 from tests.adversity.watch import LoopWatch, WriteWatch, check
-from tests.adversity.world import RtuServer, StampedGripper, TcpServer, World
+from tests.adversity.world import MODEL, RtuServer, StampedGripper, TcpServer, World
 from tests.serial_line import SerialLine
 
 SPEEDUP = 5.0
@@ -50,6 +51,7 @@ ON_TCP = [Trouble(kind) for kind in ("reset", "close", "refuse", "accept-silence
     *(Trouble("multiplexer", seconds) for seconds in (0.02, 0.3, 0.7)),
 ]
 MOVES_EVERYTHING = ("foreign", "release")
+OF_A_SCISSOR = "interference"
 
 
 @dataclass
@@ -60,7 +62,7 @@ class Soak:
     line: SerialLine | None
     rng: random.Random
     loop: LoopWatch
-    writes: WriteWatch = field(default_factory=WriteWatch)
+    writes: WriteWatch
     figures: Counter[str] = field(default_factory=Counter)
     broken: list[str] = field(default_factory=list)
     longest_stall: float = 0.0
@@ -76,13 +78,13 @@ class Soak:
 
     async def cycle(self) -> None:
         """Some seconds of use and trouble, then rest, then a look at everything."""
-        axes = Finger(self.rng.randrange(1, 16))
+        axes = Finger(self.rng.randrange(1, 16)) & self.hand.model.all_axes or JAW
         before = self.world.travels()
         self.writes.forget()
         self.everything_moved = False
         ends = time.monotonic() + self.rng.uniform(*CYCLE_S)
-        # Two users, on axes of their own where there are enough: who shares an axis supersedes the other.
-        masks = [axes & pair or axes for pair in (Finger.A | Finger.B, Finger.C | Finger.SCISSOR)]
+        # Two users, on axes of their own where there are enough, else one: sharing an axis supersedes.
+        masks = {axes & pair or axes for pair in (Finger.A | Finger.B, Finger.C | Finger.SCISSOR)}
         users = [self.user(mask, ends) for mask in masks]
         await asyncio.gather(*users, self.fault_injector(ends), self.application(ends))
         await self.bounded("rest", 60.0, self.rest())
@@ -162,6 +164,8 @@ class Soak:
     async def fault_injector(self, ends: float) -> None:
         """One trouble after the other."""
         kinds = ON_ANY_LINK + (ON_TCP if self.line is None else [])
+        if Finger.SCISSOR not in self.hand.model.all_axes:
+            kinds = [kind for kind in kinds if kind.kind != OF_A_SCISSOR]
         while time.monotonic() < ends:
             await asyncio.sleep(self.rng.uniform(0.1, 1.5))
             if self.line is not None and self.rng.random() < 0.1:
@@ -222,9 +226,9 @@ class Soak:
 
 
 @contextlib.asynccontextmanager
-async def soak(link: str, seed: int, loop: LoopWatch) -> AsyncIterator[Soak]:
+async def soak(link: str, model: Model, seed: int, loop: LoopWatch) -> AsyncIterator[Soak]:
     """Everything in place, the hand started."""
-    gripper = StampedGripper(speedup=SPEEDUP, device_cycle=0.005 * SPEEDUP)
+    gripper = StampedGripper(speedup=SPEEDUP, device_cycle=0.005 * SPEEDUP, model=model)
     async with contextlib.AsyncExitStack() as stack:
         line: SerialLine | None = None
         server: TcpServer | RtuServer
@@ -237,22 +241,22 @@ async def soak(link: str, seed: int, loop: LoopWatch) -> AsyncIterator[Soak]:
         else:
             server, address = TcpServer(gripper), ""
         await stack.enter_async_context(server)
-        hand = await stack.enter_async_context(RobotiqHand(address or server.address))
+        hand = await stack.enter_async_context(RobotiqHand(address or server.address, model=model))
         world = World(gripper, server, None, hand)
         watching = asyncio.create_task(world.watch())
-        yield Soak(world, line, random.Random(seed), loop)
+        yield Soak(world, line, random.Random(seed), loop, WriteWatch(model))
         watching.cancel()
         await asyncio.gather(watching, return_exceptions=True)
 
 
-async def run(minutes: float, link: str, seed: int, loop: LoopWatch) -> int:
+async def run(minutes: float, link: str, model: Model, seed: int, loop: LoopWatch) -> int:
     """Run it and print the figures as a table.
 
     Returns:
         The exit code.
     """
     began, memory = time.monotonic(), 0
-    async with soak(link, seed, loop) as it:
+    async with soak(link, model, seed, loop) as it:
         last_word = began
         while time.monotonic() - began < 60 * minutes:
             await it.cycle()
@@ -273,7 +277,8 @@ async def run(minutes: float, link: str, seed: int, loop: LoopWatch) -> int:
         ("longest hold by library, simulator and checks, ms", f"{1000 * loop.hold.longest:.1f}"),
         ("memory growth in the last three quarters, MiB", f"{(resident() - memory) / 2**20:.1f}"),
     ]
-    print("\n".join(f"| {name} | {value} |" for name, value in [("figure", link), ("--", "--"), *rows]))  # noqa: T201
+    head = [(f"{model.title}, {link}", "figure"), ("--", "--")]
+    print("\n".join(f"| {name} | {value} |" for name, value in head + rows))  # noqa: T201
     return 1 if it.broken else 0
 
 
@@ -286,6 +291,7 @@ def main() -> int:
     parser.add_argument(
         "--link", choices=("tcp", "rtu"), default="tcp", help="Modbus TCP or a pseudo terminal"
     )
+    parser.add_argument("--model", type=model_of, default=MODEL, help=f"one of {', '.join(MODELS)}")
     parser.add_argument("--seed", type=int, default=int(time.time()), help="of everything that is random")
     options = parser.parse_args()
     print(f"seed {options.seed}", flush=True)  # noqa: T201
@@ -295,7 +301,7 @@ def main() -> int:
     gc.disable()
     loop = LoopWatch()
     with asyncio.Runner(loop_factory=loop.make_loop) as runner:
-        return runner.run(run(options.minutes, options.link, options.seed, loop))
+        return runner.run(run(options.minutes, options.link, options.model, options.seed, loop))
 
 
 if __name__ == "__main__":

@@ -15,12 +15,12 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from robotiq_async import Fault, Finger, MoveResult, ObjectStatus, RobotiqError, State
+from robotiq_async import JAW, Fault, Finger, MoveResult, ObjectStatus, RobotiqError, State
 from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.simulator import Trouble
-from robotiq_async.values.model import THREE_FINGER
+from robotiq_async.values.model import TWO_FINGER_85, Model
 from robotiq_async.values.request import Request
-from tests.adversity.world import World, world
+from tests.adversity.world import MODEL, World, world
 from tests.register_words import only_holds
 from tests.virtual import VirtualLoop
 
@@ -68,10 +68,10 @@ class LiveUse(RuleBasedStateMachine):
     def run(self, work: Coroutine[Any, Any, Any]) -> Any:
         return self.runner.run(work)
 
-    @initialize()
-    def begin(self) -> None:
+    @initialize(model=st.sampled_from([MODEL, TWO_FINGER_85]))
+    def begin(self, model: Model) -> None:
         async def enter() -> World:
-            here = await self.stack.enter_async_context(world())
+            here = await self.stack.enter_async_context(world(model=model))
             await here.activate_beforehand()
             await here.hand.start()
             return here
@@ -109,21 +109,28 @@ class LiveUse(RuleBasedStateMachine):
     def running(self) -> bool:
         return self.hand.state in RUNNING
 
+    def of_the_model(self, axes: Finger) -> Finger:
+        return axes & self.gripper.model.all_axes or JAW
+
     # -- what users do ---------------------------------------------------------------------------------
 
     @rule(axes=masks, position=values, speed=st.sampled_from([None, 0, 255]))
     def move(self, axes: Finger, position: int, speed: int | None) -> None:
+        axes = self.of_the_model(axes)
         self.may_move |= axes
         self.call(self.hand.move(position, axes, speed=speed))
 
     @rule(axes=masks, position=values)
     def set_position(self, axes: Finger, position: int) -> None:
+        axes = self.of_the_model(axes)
         self.may_move |= axes
         self.call(self.hand.set_position(position, axes))
 
     @rule(axes=masks, positions=st.lists(values, min_size=1, max_size=5), pause=st.sampled_from([0, 0.004]))
     @precondition(lambda self: self.running)
     def control_loop(self, axes: Finger, positions: list[int], pause: float) -> None:
+        axes = self.of_the_model(axes)
+
         async def loop() -> None:
             for position in positions:
                 if self.hand.state in RUNNING:
@@ -135,10 +142,12 @@ class LiveUse(RuleBasedStateMachine):
 
     @rule(axes=masks, force=values)
     def set_force(self, axes: Finger, force: int) -> None:
+        axes = self.of_the_model(axes)
         self.call(self.hand.set_force(force, axes))
 
     @rule(axes=masks)
     def hold(self, axes: Finger) -> None:
+        axes = self.of_the_model(axes)
         self.call(self.hand.hold(axes))
 
     @rule()
@@ -209,6 +218,7 @@ class LiveUse(RuleBasedStateMachine):
 
     @rule(axes=masks, position=st.integers(20, 230))
     def something_is_in_the_way(self, axes: Finger, position: int) -> None:
+        axes = self.of_the_model(axes)
         self.gripper.place_object(axes, position)
 
     @rule(seconds=st.sampled_from([0.05, 0.3, 1.0]))
@@ -234,6 +244,9 @@ class LiveUse(RuleBasedStateMachine):
 
     @rule(trouble=st.sampled_from(LASTING_TROUBLES), seconds=st.sampled_from([0.02, 0.7]))
     def something_goes_wrong(self, trouble: Trouble, seconds: float) -> None:
+        if trouble.kind == "interference" and Finger.SCISSOR not in self.gripper.model.all_axes:
+            return
+
         async def go() -> None:
             async with self.world.server.fault_injector.making(trouble):
                 await asyncio.sleep(seconds)
@@ -281,7 +294,7 @@ class LiveUse(RuleBasedStateMachine):
         """The hand knows what the gripper really is, and has no wrong idea of others."""
         status = self.hand.status
         assert self.world.loop.time() - status.timestamp < 0.1
-        for axis in THREE_FINGER.axes:
+        for axis in self.gripper.model.axes:
             assert status.position(axis) == self.gripper.position(axis)
         if self.hand.state is State.RUNNING_IDLE:
             assert not self.hand.is_moving
@@ -294,7 +307,7 @@ class LiveUse(RuleBasedStateMachine):
     @invariant()
     def only_axes_with_a_reason_have_moved(self) -> None:
         if hasattr(self, "world"):
-            for axis in THREE_FINGER.axes:
+            for axis in self.gripper.model.axes:
                 if axis not in self.may_move:
                     assert self.gripper.travel(axis) == self.travels[axis], f"{axis!r} moved"
 
@@ -302,7 +315,7 @@ class LiveUse(RuleBasedStateMachine):
     def every_write_is_a_full_image_under_individual_control(self) -> None:
         if hasattr(self, "world"):
             for write in self.gripper.writes[-5:]:
-                image = Request.from_registers(write.registers)
+                image = Request.from_registers(write.registers, self.gripper.model)
                 assert image.individual_fingers
                 assert image.individual_scissor
                 assert image.registers == write.registers

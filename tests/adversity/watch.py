@@ -8,7 +8,7 @@ import selectors
 import time
 from collections.abc import Iterator
 
-from robotiq_async.values.model import THREE_FINGER
+from robotiq_async.values.model import Model
 from robotiq_async.values.request import AxisRequest, Request
 from tests.adversity.world import LONGEST_HOLD_S, World
 from tests.virtual import HoldWatch
@@ -58,7 +58,8 @@ class WriteWatch:
     speed, force) never comes back once it was followed by something else.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, model: Model) -> None:
+        self._model = model
         self._past: list[set[AxisRequest]] = []
         self._number = 0
         self.forget()
@@ -70,25 +71,25 @@ class WriteWatch:
 
     def forget(self) -> None:
         """Somebody else has written, or everything is at rest: begin anew."""
-        self._past = [set() for _ in THREE_FINGER.axes]
-        self._last: list[AxisRequest | None] = [None] * len(THREE_FINGER.axes)
+        self._past = [set() for _ in self._model.axes]
+        self._last: list[AxisRequest | None] = [None] * len(self._model.axes)
 
     def check(self, world: World) -> Iterator[str]:
         """What was wrong with the writes since the last look."""
         images, world.gripper.images = world.gripper.images, []
         for registers, positions in images:
-            image = Request.from_registers(registers)
+            image = Request.from_registers(registers, self._model)
             if not image.go:
                 # Nobody is asked to move; and what comes after must not be what was halted.
-                self._last = [None] * len(THREE_FINGER.axes)
+                self._last = [None] * len(self._model.axes)
                 continue
             for at, (request, position) in enumerate(zip(image.axes, positions, strict=True)):
                 if request == self._last[at]:
                     continue
                 # To be asked to stay is no motion, however often.
-                stays = THREE_FINGER.has_reached(request.position, position)
+                stays = self._model.has_reached(request.position, position)
                 if request in self._past[at] and not stays:
-                    axis = THREE_FINGER.axes[at]
+                    axis = self._model.axes[at]
                     yield f"{axis!r}, at {position}, was asked again for what it was before: {request}"
                 self._past[at].add(request)
                 self._last[at] = request

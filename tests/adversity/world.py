@@ -12,11 +12,11 @@ from typing import Any
 
 import pytest
 
-from robotiq_async import Finger, RobotiqConnectionError, RobotiqHand, RobotiqStatus, State
+from robotiq_async import JAW, Finger, RobotiqConnectionError, RobotiqHand, RobotiqStatus, State
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, parse_troubles
 from robotiq_async.simulator.server.framing import Frame
 from robotiq_async.simulator.troubles.fault_injector import FaultInjector
-from robotiq_async.values.model import THREE_FINGER
+from robotiq_async.values.model import Model, model_of
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import Request
 from tests.grippers import activate_beforehand
@@ -26,6 +26,8 @@ from tests.virtual_line import VirtualLine
 LONGEST_HOLD_S = 0.020
 HABITS = parse_troubles(os.environ.get("HABITS", ""))
 """Troubles that every gripper here has besides, as the environment says. The promises stay the same."""
+MODEL = model_of(os.environ.get("MODEL"))
+"""The gripper of every world that names no other, as the environment says. Some scenes need three fingers."""
 SPEEDUP = 5.0
 """Of the gripper only: the link and the hand keep to their own times."""
 
@@ -56,7 +58,7 @@ class StampedGripper(SimulatedGripper):
 
     def write(self, address_offset: int, registers: Sequence[int]) -> None:
         super().write(address_offset, registers)
-        self.images.append((self.request_registers, tuple(self.position(axis) for axis in THREE_FINGER.axes)))
+        self.images.append((self.request_registers, tuple(map(self.position, self.model.axes))))
 
 
 class Heard:
@@ -123,8 +125,13 @@ class World:
     async def until_state(self, state: State) -> None:
         await self.hand.wait_for_state(state, timeout=30)
 
+    @property
+    def holds(self) -> Finger:
+        """What holds the part while the rest moves: two fingers beside A, or the jaw that there is."""
+        return self.gripper.model.all_axes & (Finger.B | Finger.C) or JAW
+
     def travels(self) -> dict[Finger, float]:
-        return {axis: self.gripper.travel(axis) for axis in THREE_FINGER.axes}
+        return {axis: self.gripper.travel(axis) for axis in self.gripper.model.axes}
 
     async def nothing_moves_for(self, seconds: float, tolerance: float = 0.0) -> None:
         before = self.travels()
@@ -134,7 +141,8 @@ class World:
 
     def motions(self, since: int = 0) -> list[tuple[int, ...]]:
         """The positions asked by each write that set the axes going, from a number of writes on."""
-        images = [Request.from_registers(write.registers) for write in self.gripper.writes[since:]]
+        model = self.gripper.model
+        images = [Request.from_registers(write.registers, model) for write in self.gripper.writes[since:]]
         return [tuple(axis.position for axis in image.axes) for image in images if image.go]
 
     def check_no_stale_status(self) -> None:
@@ -173,7 +181,12 @@ class World:
 
 @asynccontextmanager
 async def world(
-    link: str = "tcp", *, patch: pytest.MonkeyPatch | None = None, speedup: float = SPEEDUP, **options: object
+    link: str = "tcp",
+    *,
+    patch: pytest.MonkeyPatch | None = None,
+    speedup: float = SPEEDUP,
+    model: Model = MODEL,
+    **options: object,
 ) -> AsyncIterator[World]:
     """A world whose gripper was just switched on, and a hand that is not started.
 
@@ -181,10 +194,11 @@ async def world(
         link: tcp or rtu.
         patch: for rtu, where the fake serial ports are put in place.
         speedup: of the gripper.
+        model: of the gripper, and of the hand.
         options: for the hand.
     """
     loop = asyncio.get_running_loop()
-    gripper = StampedGripper(loop.time, speedup=speedup, device_cycle=0.005 * speedup)
+    gripper = StampedGripper(loop.time, speedup=speedup, device_cycle=0.005 * speedup, model=model)
     line: VirtualLine | None = None
     server: TcpServer | RtuServer
     if link == "rtu":
@@ -194,7 +208,7 @@ async def world(
     else:
         server, address = TcpServer(gripper), ""
     async with server:
-        options = {"poll_interval": 0.01} | options  # the manual has 200 for RTU
+        options = {"poll_interval": 0.01, "model": model} | options  # the manual has 200 for RTU
         if any(habit.kind == "function-3-only" for habit in HABITS):
             options = {"read_function": 3} | options
         hand = RobotiqHand(address or server.address, **options)  # type: ignore[arg-type]

@@ -14,9 +14,9 @@ from robotiq_async.control.controller import Controller
 from robotiq_async.control.motion import Move
 from robotiq_async.control.requests.pending import Command
 from robotiq_async.control.state_machine import StateMachine
+from robotiq_async.session.options import units_of
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.values.calibration.closing_time import closing_time
-from robotiq_async.values.model import THREE_FINGER
+from robotiq_async.values.model import THREE_FINGER, Model
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import Request
 from robotiq_async.values.trigger import Trigger
@@ -38,6 +38,7 @@ class Scan:
         speed: int = 128,
         after: Scan | None = None,
         lag: int = LAG,
+        model: Model = THREE_FINGER,
     ) -> None:
         """``after`` is the program before this one: the gripper is its, and so is the time.
 
@@ -48,10 +49,14 @@ class Scan:
         self.gripper: SimulatedGripper
         if after is not None:
             gripper = after.gripper
-        self.gripper = gripper or SimulatedGripper(lambda: self.now, device_cycle=device_cycle, spread=False)
+        self.gripper = gripper or SimulatedGripper(
+            lambda: self.now, device_cycle=device_cycle, spread=False, model=model
+        )
         self.transitions: list[tuple[State, State, Trigger]] = []
         self.machine = StateMachine(lambda *change: self.transitions.append(change))
-        self.controller = Controller(self.machine, speed, 64, closing_time)
+        self.controller = Controller(
+            self.machine, speed, 64, units_of(None, None, model).closing_s, model=model
+        )
         self.written: list[Registers] = []
         self.polls = 0
 
@@ -68,7 +73,9 @@ class Scan:
     def status(self) -> RobotiqStatus:
         self.polls += 1
         self._late.append(self.gripper.status_registers())
-        return RobotiqStatus(with_object_status(self._late[-1], self._late[0]), self.now, self.polls)
+        return RobotiqStatus(
+            with_object_status(self._late[-1], self._late[0]), self.now, self.polls, self.gripper.model
+        )
 
     def connect(self, *, activate: bool = True) -> None:
         self.controller.activates = activate
@@ -168,14 +175,14 @@ class Scan:
 
     @property
     def last_image(self) -> Request:
-        return Request.from_registers(self.written[-1])
+        return Request.from_registers(self.written[-1], self.gripper.model)
 
     def travels(self) -> dict[Finger, float]:
-        return {axis: self.gripper.travel(axis) for axis in THREE_FINGER.axes}
+        return {axis: self.gripper.travel(axis) for axis in self.gripper.model.axes}
 
     def positions(self) -> dict[Finger, int]:
         status = self.status()
-        return {axis: status.position(axis) for axis in THREE_FINGER.axes}
+        return {axis: status.position(axis) for axis in self.gripper.model.axes}
 
 
 def started(device_cycle: float = 0.005, *, lag: int = LAG) -> Scan:

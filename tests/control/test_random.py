@@ -6,11 +6,10 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from robotiq_async import Finger, MoveResult, ObjectStatus, State
+from robotiq_async import JAW, Finger, MoveResult, ObjectStatus, State
 from robotiq_async.control.motion import Move
 from robotiq_async.control.state_machine import RUNNING
-from robotiq_async.values.model import THREE_FINGER, TOLERANCE
-from robotiq_async.values.request import Request
+from robotiq_async.values.model import THREE_FINGER, TOLERANCE, TWO_FINGER_85, Model
 from tests.control.outcome import Outcome
 from tests.control.scan import Scan
 from tests.register_words import only_holds
@@ -22,13 +21,16 @@ values = st.integers(0, 255)
 class RandomUse(RuleBasedStateMachine):
     """Whatever is done to the hand, it does what was asked and nothing else."""
 
-    @initialize(device_cycle=st.sampled_from([0.0, 0.005, 0.03, 0.2]))
-    def begin(self, device_cycle: float) -> None:
-        self.scan = Scan(device_cycle=device_cycle)
+    @initialize(
+        device_cycle=st.sampled_from([0.0, 0.005, 0.03, 0.2]),
+        model=st.sampled_from([THREE_FINGER, TWO_FINGER_85]),
+    )
+    def begin(self, device_cycle: float, model: Model) -> None:
+        self.scan, self.model = Scan(device_cycle=device_cycle, model=model), model
         self.scan.start()
         self.asked: set[Finger] = set()
         """Axes that were ever addressed by a position since the last activation."""
-        self.travel = {axis: self.scan.gripper.travel(axis) for axis in THREE_FINGER.axes}
+        self.travel = {axis: self.scan.gripper.travel(axis) for axis in self.model.axes}
         self.told: list[tuple[Move | None, Outcome]] = []
 
     def teardown(self) -> None:
@@ -46,14 +48,16 @@ class RandomUse(RuleBasedStateMachine):
     @rule(axes=masks, position=values, speed=st.none() | values)
     @precondition(lambda self: self.running)
     def move(self, axes: Finger, position: int, speed: int | None) -> None:
-        self.asked |= {axis for axis in THREE_FINGER.axes if axis in axes}
+        axes = axes & self.model.all_axes or JAW
+        self.asked |= {axis for axis in self.model.axes if axis in axes}
         self.told.append(self.scan.move(position, axes, speed=speed))
 
     @rule(axes=masks, position=st.none() | values, force=values)
     @precondition(lambda self: self.running)
     def command(self, axes: Finger, position: int | None, force: int) -> None:
+        axes = axes & self.model.all_axes or JAW
         if position is not None:
-            self.asked |= {axis for axis in THREE_FINGER.axes if axis in axes}
+            self.asked |= {axis for axis in self.model.axes if axis in axes}
         self.told.append((None, self.scan.command(axes, position=position, force=force)))
 
     @rule(which=st.integers(0, 1000))
@@ -67,6 +71,7 @@ class RandomUse(RuleBasedStateMachine):
     @rule(axes=masks)
     @precondition(lambda self: self.running)
     def hold(self, axes: Finger) -> None:
+        axes = axes & self.model.all_axes or JAW
         self.told.append((None, self.scan.hold(axes)))
 
     @rule()
@@ -80,6 +85,7 @@ class RandomUse(RuleBasedStateMachine):
 
     @rule(axes=masks, position=st.integers(20, 230))
     def place(self, axes: Finger, position: int) -> None:
+        axes = axes & self.model.all_axes or JAW
         self.scan.gripper.place_object(axes, position)
 
     @rule(answered=st.booleans(), away=st.sampled_from([0.0, 0.01, 1.0]))
@@ -104,12 +110,12 @@ class RandomUse(RuleBasedStateMachine):
         assert self.scan.state is State.FAULT
         self.scan.run(1.0)
         assert all(told.is_told for _, told in self.told), "somebody waits for ever"
-        at = {axis: self.scan.gripper.position(axis) for axis in THREE_FINGER.axes}
+        at = {axis: self.scan.gripper.position(axis) for axis in self.model.axes}
         contacts = self.scan.latest.contacts
         self.scan.gripper.clear_faults()
         self.scan.run(1.0)
         assert self.scan.state is State.RUNNING_IDLE
-        for axis in THREE_FINGER.axes:
+        for axis in self.model.axes:
             if axis not in contacts:
                 # One that close to where it was asked to go has arrived, and keeps its request.
                 assert abs(self.scan.gripper.position(axis) - at[axis]) <= TOLERANCE, f"{axis!r} resumed"
@@ -130,7 +136,7 @@ class RandomUse(RuleBasedStateMachine):
     def only_addressed_axes_have_moved(self) -> None:
         if not hasattr(self, "asked"):
             return
-        for axis in THREE_FINGER.axes:
+        for axis in self.model.axes:
             if axis not in self.asked:
                 assert self.scan.gripper.travel(axis) == self.travel[axis], f"{axis!r} moved"
 
@@ -141,7 +147,7 @@ class RandomUse(RuleBasedStateMachine):
     @invariant()
     def every_write_is_a_full_image_under_individual_control(self) -> None:
         if hasattr(self, "scan") and self.scan.written:
-            image = Request.from_registers(self.scan.written[-1])
+            image = self.scan.last_image
             assert image.individual_fingers
             assert image.individual_scissor
             assert image.registers == self.scan.written[-1]
