@@ -1,0 +1,130 @@
+"""Drivers of others, and the manual's frames, which drive real two-finger grippers, on a simulated one."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import minimalmodbus
+import pytest
+import serial
+from pyrobotiqgripper import RobotiqGripper
+
+from robotiq_async import JAW, TWO_FINGER_85, RobotiqStatus
+from robotiq_async.simulator import RtuOverTcpSimulatorServer, SerialSimulatorServer, SimulatedGripper
+from tests.serial_line import SerialLine
+
+
+@pytest.fixture
+def gripper() -> SimulatedGripper:
+    return SimulatedGripper(speedup=20, spread=False, model=TWO_FINGER_85)
+
+
+@pytest.fixture
+async def port(gripper: SimulatedGripper, tmp_path: Path) -> AsyncIterator[str]:
+    with SerialLine(tmp_path) as line:
+        async with SerialSimulatorServer(line.far, gripper):
+            yield str(line.near)
+
+
+def use(driver: RobotiqGripper) -> list[tuple[int, int, float]]:
+    """Activate, close, open; the object status, the reading and the stroke left, each time."""
+    driver.activate()
+    driver.calibrate_mm(closemm=0, openmm=85)  # moves to both ends
+    seen = []
+    for position in (255, 0):
+        driver.move(position, speed=255, force=100)
+        seen.append((driver.objectDetection(), driver.position(), driver.position_mm()))
+    driver.disconnect()
+    return seen
+
+
+async def test_pyrobotiqgripper_on_a_serial_line(gripper: SimulatedGripper, port: str) -> None:
+    seen = await asyncio.to_thread(lambda: use(RobotiqGripper(com_port=port)))
+    assert [(status, position) for status, position, _ in seen] == [(3, 228), (3, 3)]
+    assert [millimetres for *_, millimetres in seen] == pytest.approx([0, 85], abs=0.5)
+
+
+async def test_pyrobotiqgripper_grips_a_part_through_the_port_of_a_tool(gripper: SimulatedGripper) -> None:
+    """RTU through a TCP socket, as an arm's tool port passes it on; writes and reads are function 23."""
+
+    def grip(port: int) -> tuple[int, int]:
+        driver = RobotiqGripper(connection_type="RTU_VIA_TCP", tcp_port=port)
+        driver.activate()
+        gripper.place_object(JAW, 120)
+        driver.close(speed=255, force=100)
+        found = driver.objectDetection(), driver.position()
+        driver.disconnect()
+        return found
+
+    async with RtuOverTcpSimulatorServer(gripper) as server:
+        status, position = await asyncio.to_thread(grip, server.port)
+    assert (status, position) == (2, pytest.approx(120, abs=5))
+
+
+async def test_minimalmodbus(gripper: SimulatedGripper, port: str) -> None:
+    """Register by register: what scripts without a driver do."""
+
+    def grip() -> RobotiqStatus:
+        driver = minimalmodbus.Instrument(port, 9)
+        driver.serial.baudrate, driver.serial.timeout = 115200, 0.2
+
+        def status() -> RobotiqStatus:
+            return RobotiqStatus((*driver.read_registers(2000, 3), 0, 0, 0, 0, 0), model=TWO_FINGER_85)
+
+        driver.write_registers(1000, [0, 0, 0])
+        driver.write_registers(1000, [0x0100, 0, 0])
+        while not status().is_activated:
+            pass
+        gripper.place_object(JAW, 120)
+        driver.write_registers(1000, [0x0900, 255, 0xFF40])
+        while status().requested_position(JAW) != 255 or status().is_moving:
+            pass
+        held = status()
+        driver.serial.close()
+        return held
+
+    assert (await asyncio.to_thread(grip)).contacts == JAW
+
+
+RESET = "09 10 03 E8 00 03 06 00 00 00 00 00 00 73 30"
+ACTIVATE = "09 10 03 E8 00 03 06 01 00 00 00 00 00 72 E1"
+CLOSE = "09 10 03 E8 00 03 06 09 00 00 FF FF FF 42 29"
+OPEN = "09 10 03 E8 00 03 06 09 00 00 00 FF FF 72 19"
+WRITTEN = "09 10 03 E8 00 03 01 30"
+READ_ONE, ACTIVATING, ACTIVE = "09 03 07 D0 00 01 85 CF", "09 03 02 11 00 55 D5", "09 03 02 31 00 4C 15"
+READ_THREE = "09 03 07 D0 00 03 04 0E"
+CLOSING, HELD = "09 03 06 39 00 00 FF", "09 03 06 B9 00 00 FF"
+OPENING, OPENED = "09 03 06 39 00 00 00", "09 03 06 F9 00 00 00"
+
+
+async def test_the_frames_of_the_manual(gripper: SimulatedGripper, port: str) -> None:
+    """Manual of the 2F-85 and 2F-140, a grasp over RTU: the requests, and the replies that it prints.
+
+    Position and current, the last two bytes of a status, depend on the part.
+    """
+
+    def play() -> None:
+        with serial.Serial(port, 115200, timeout=2) as line:
+
+            def replied(request: str, size: int) -> str:
+                line.write(bytes.fromhex(request))
+                return str(line.read(size).hex(" ").upper())
+
+            assert replied(RESET, 8) == WRITTEN
+            assert replied(ACTIVATE, 8) == WRITTEN
+            assert replied(READ_ONE, 7) == ACTIVATING
+            while (reply := replied(READ_ONE, 7)) == ACTIVATING:
+                pass
+            assert reply == ACTIVE
+            gripper.place_object(JAW, 0xBD)
+            for request, moving, ended in ((CLOSE, CLOSING, HELD), (OPEN, OPENING, OPENED)):
+                assert replied(request, 8) == WRITTEN
+                seen = {replied(READ_THREE, 11)[: len(moving)]}
+                while ended not in seen:
+                    seen.add(replied(READ_THREE, 11)[: len(moving)])
+                assert moving in seen
+
+    async with asyncio.timeout(10):
+        await asyncio.to_thread(play)
