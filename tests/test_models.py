@@ -390,7 +390,9 @@ async def test_a_recording_has_the_one_axis_and_can_be_read(tmp_path: Path) -> N
             await hand.close()
         assert recorder.recorded > 3
     entries = [*read_recording(path)]
-    assert {entry.topic for entry in entries} == {"/gripper/status", "/gripper/command", "/gripper/event"}
+    assert {entry.topic for entry in entries} == {
+        *("/gripper/status", "/gripper/command", "/gripper/event", "/joint_states")
+    }
     (last,) = [entry for entry in entries if entry.topic == "/gripper/status"][-1:]
     row = Table("status").row("status", last.nanoseconds, last.fields)
     assert row is not None

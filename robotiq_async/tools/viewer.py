@@ -34,6 +34,7 @@ from ..runtime.concurrency import in_a_thread, wait_shielded
 from ..values.checks import check_int
 from ..values.enums import State
 from ..values.errors import ViewerError
+from ..values.model import THREE_FINGER
 from .description.robot_description import (
     SCHEMA,
     SCHEMA_NAME,
@@ -150,12 +151,15 @@ class Viewer:
         if message.topic is EVENT and self._hand.state not in (self._published_state, State.RUNNING_CC):
             self._publish_state()
 
-        if message.topic is JOINTS and message.nanoseconds - self._transformed_at >= TRANSFORMS_S * 1e9:
+        is_due = message.nanoseconds - self._transformed_at >= TRANSFORMS_S * 1e9
+        if message.topic is JOINTS and is_due and self._hand.model is THREE_FINGER:
             self._transformed_at = message.nanoseconds
             data = compact(transforms(self._hand.status, message.nanoseconds))
             self._channels[TRANSFORMS].log(data, log_time=message.nanoseconds)
 
     def _describe(self) -> None:
+        if self._hand.model is not THREE_FINGER:
+            return  # the description is that of the 3-Finger
         self._channels[DESCRIPTION].log(description_message())
 
     def _publish_state(self) -> None:

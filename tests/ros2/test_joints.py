@@ -9,7 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async import Finger, RobotiqStatus
+from robotiq_async import (
+    HAND_E,
+    JAW,
+    TWO_FINGER_85,
+    TWO_FINGER_140,
+    Finger,
+    Model,
+    RobotiqStatus,
+)
 from robotiq_async.ros2.translation.joints import (
     LIMITS,
     GoalError,
@@ -100,6 +108,58 @@ def test_velocities_forget_what_was_before_a_lost_link() -> None:
     motion.of(reading(a=6, at=0.0))
     motion.forget()
     assert set(motion.of(reading(a=200, at=0.1))[1]) == {0.0}
+
+
+# -- a jaw -------------------------------------------------------------------------------------------------
+
+JAW_RANGES = [
+    (TWO_FINGER_85, "robotiq_85_left_knuckle_joint", 0.0, 0.7929, "rad"),
+    (TWO_FINGER_140, "finger_joint", 0.0, 0.7, "rad"),
+    (HAND_E, "robotiq_hande_left_finger_joint", 0.025, 0.0, "m"),
+]
+jaws = pytest.mark.parametrize(("model", "name", "wide", "shut", "unit"), JAW_RANGES)
+
+
+def jaw(model: Model, position: int, at: float = 0.0) -> RobotiqStatus:
+    return RobotiqStatus((0xF900, position, position << 8, 0, 0, 0, 0, 0), at, model=model)
+
+
+@jaws
+def test_a_jaw_has_the_joint_of_its_public_description(
+    model: Model, name: str, wide: float, shut: float, unit: str
+) -> None:
+    assert joint_names("left_", model) == [f"left_{name}"]
+    assert positions(jaw(model, 0)) == positions(jaw(model, 3)) == (wide,)
+    assert positions(jaw(model, 228)) == positions(jaw(model, 255)) == (shut,)
+    motion = Motion()
+    assert motion.of(jaw(model, 50, 1.0)) == (positions(jaw(model, 50)), (0.0,))
+    (there,), (velocity,) = motion.of(jaw(model, 60, 1.5))
+    assert velocity == pytest.approx(2 * (there - positions(jaw(model, 50))[0]))
+    assert targets([], [wide], model=model).counts == ((3, JAW),)
+    assert targets([name], [shut], model=model).counts == ((228, JAW),)
+    beyond = max(wide, shut) * 1.02
+    for names, value, why in (
+        ([name], beyond, rf"must be in 0.0..{max(wide, shut)} {unit}, got"),
+        ([name], -0.001 - beyond / 50, "must be in"),
+        ([name], math.nan, "is nan"),
+        (["fingers"], 0.0, f"there is no joint 'fingers'; these take goals: {name}"),
+        (["finger_1_joint_3"], 0.0, "there is no joint"),
+    ):
+        with pytest.raises(GoalError, match=why):
+            targets(names, [value], model=model)
+
+
+@jaws
+@given(position=st.integers(3, 228))
+def test_a_joint_state_of_a_jaw_sent_back_leads_there(
+    model: Model, name: str, wide: float, shut: float, unit: str, position: int
+) -> None:
+    assert targets([name], positions(jaw(model, position)), model=model).counts == ((position, JAW),)
+
+
+def test_a_jaw_closes_to_the_limit_of_its_joint() -> None:
+    """Public descriptions limit it at 0.8, and clients close to that."""
+    assert targets([], [0.8], model=TWO_FINGER_85).counts == ((228, JAW),)
 
 
 # -- goals -------------------------------------------------------------------------------------------------

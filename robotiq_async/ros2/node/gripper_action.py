@@ -61,7 +61,7 @@ class GripperAction:
         # A rejection has no text in ROS, so the log gives the reason.
         try:
             connection, _, settings = self._configured()
-            _targets(request, settings)
+            _targets(request, connection, settings)
             await self._bridge.ask(connection.check_goal())
         except (GoalError, RefusedError) as error:
             self._log.warning(f"goal rejected: {error}")
@@ -110,7 +110,7 @@ class GripperAction:
         if _key(handle) not in self._accepted:
             raise RefusedError("the node is not configured")
         (connection, joints, settings), stops = self._accepted[_key(handle)]
-        asked = _targets(handle.request, settings)
+        asked = _targets(handle.request, connection, settings)
 
         def feedback() -> None:
             state = joints.message(connection.hand.status)
@@ -149,5 +149,6 @@ def _key(handle: ServerGoalHandle) -> bytes:
     return bytes(handle.goal_id.uuid)
 
 
-def _targets(request: ParallelGripperCommand.Goal, settings: Settings) -> Targets:
-    return targets(request.command.name, request.command.position, settings.joint_prefix)
+def _targets(request: ParallelGripperCommand.Goal, connection: Connection, settings: Settings) -> Targets:
+    command, model = request.command, connection.hand.model
+    return targets(command.name, command.position, settings.joint_prefix, model)

@@ -123,7 +123,11 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
         except BaseException:
             self._current = None
             raise
-        self._publishing.describe(urdf)
+        model = connection.hand.model
+        if model is THREE_FINGER or settings.urdf:
+            self._publishing.describe(urdf)
+        else:
+            self.get_logger().info(f"no robot description: the packaged one is not of a {model.title}")
         return f"connected to {connection.hand.address}: {connection.hand.state.name}"
 
     def _activate(self) -> str:
@@ -147,8 +151,6 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
     async def _connect(self, connection: Connection, joints: JointStates, rate: float) -> None:
         try:
             await connection.open()
-            if (model := connection.hand.model) is not THREE_FINGER:
-                raise RobotiqError(f"this is a {model.title}: the node has the joints of the 3-Finger")
             await self._publishing.start(connection, joints, rate)
         except BaseException:
             await self._disconnect(connection, "the configuration failed")

@@ -1,4 +1,4 @@
-"""Converts joints in radians, for ROS, from and to axes in counts.
+"""Converts joints in radians, or of a Hand-E in metres, for ROS, from and to axes in counts.
 
 A finger has one motor for three joints, so a goal for a finger is a goal for one of them: the base joint
 (``joint_1``) as far as it turns alone, the middle one (``joint_2``) beyond that. The third joint and the
@@ -16,8 +16,19 @@ from math import degrees, radians
 from types import MappingProxyType
 from typing import Final
 
-from ...tools.description.kinematics import BASE, FINGER_NAMES, JOINTS, MIDDLE, PALM, Points, joint_angles
-from ...values.enums import Finger
+from ...tools.description import kinematics
+from ...tools.description.kinematics import (
+    BASE,
+    FINGER_NAMES,
+    JAW_JOINTS,
+    JOINTS,
+    MIDDLE,
+    PALM,
+    Points,
+    joint_angles,
+)
+from ...values.enums import JAW, Finger
+from ...values.model import HAND_E, THREE_FINGER, Model
 from ...values.status import RobotiqStatus
 
 FINGERS: Final = "fingers"
@@ -41,12 +52,14 @@ The angles exceed them at the ends: a finger below 6 counts, a scissor above 232
 outside its limits, so published angles are clamped.
 """
 _LIMITS: Final = tuple(LIMITS[name] for name in JOINTS)
-_STILL: Final = (0.0,) * len(JOINTS)
 
 CLOSING_END: Final = 2.8
 """End of the closing angle of all fingers: 70 degrees of the base and 90 of the middle joint, rounded up."""
 TOLERANCE: Final = 1e-3
 """Radians that a goal may be outside its range, because clients round."""
+JAW_TOLERANCE: Final = 0.01
+"""Share of its range that a goal for a jaw may be outside. Clients round, and close a 2F-85 to 0.8, the limit of
+its joint in public descriptions."""
 _STOP_TOLERANCE: Final = 0.1
 """Radians that the base joint of a goal may be off its stop while the middle one bends."""
 
@@ -76,14 +89,15 @@ class Targets:
         return Finger(sum(int(axes) for _, axes in self.counts))
 
 
-def joint_names(prefix: str = "") -> list[str]:
-    """The names of the eleven joints, with the prefix."""
-    return [prefix + name for name in JOINTS]
+def joint_names(prefix: str = "", model: Model = THREE_FINGER) -> list[str]:
+    """The names of the joints, with the prefix."""
+    return [prefix + name for name in kinematics.joint_names(model)]
 
 
 def positions(status: RobotiqStatus) -> tuple[float, ...]:
-    """The eleven joints in radians, within their limits."""
-    return _inside(joint_angles(status))
+    """The joints in radians, or a Hand-E's in metres, within their limits."""
+    angles = joint_angles(status)
+    return _inside(angles) if status.model is THREE_FINGER else angles
 
 
 @lru_cache(maxsize=16)
@@ -99,7 +113,7 @@ class Motion:
         self._seen: deque[tuple[float, Sequence[float]]] = deque()
 
     def of(self, status: RobotiqStatus) -> tuple[Sequence[float], Sequence[float]]:
-        """Radians, and radians per second over the last VELOCITY_S; velocities are 0 at first."""
+        """Positions, and velocities per second over the last VELOCITY_S; these are 0 at first."""
         seen, at, there = self._seen, status.timestamp, positions(status)
         if not seen or at > seen[-1][0]:
             seen.append((at, there))
@@ -107,7 +121,7 @@ class Motion:
             seen.popleft()
         before, past = seen[0]
         if past is there or before >= at:
-            return there, _STILL
+            return there, (0.0,) * len(there)
         return there, [(new - old) / (at - before) for old, new in zip(past, there, strict=True)]
 
     def forget(self) -> None:
@@ -115,18 +129,23 @@ class Motion:
         self._seen.clear()
 
 
-def targets(names: Sequence[str], angles: Sequence[float], prefix: str = "") -> Targets:
+def targets(
+    names: Sequence[str], angles: Sequence[float], prefix: str = "", model: Model = THREE_FINGER
+) -> Targets:
     """The targets of a goal.
 
     Args:
-        names: of joints, with the prefix; empty with one angle for all fingers.
-        angles: radians, one for each name.
+        names: of joints, with the prefix; empty with one angle for all fingers, or for the jaw.
+        angles: radians, or metres for a Hand-E; one for each name.
         prefix: of the joints of this hand.
+        model: of the gripper.
 
     Raises:
         GoalError: the goal is invalid; angles are never adjusted to fit.
     """
-    asked = _pairs(names, angles, prefix)
+    if model is not THREE_FINGER:
+        return _jaw_targets(names, angles, prefix, model)
+    asked = _pairs(names, angles, prefix, _COMMANDED)
     counts: dict[Finger, int] = {}
     for name, angle in asked.items():
         if name == FINGERS:
@@ -149,16 +168,30 @@ def targets(names: Sequence[str], angles: Sequence[float], prefix: str = "") -> 
     )
 
 
-def _pairs(names: Sequence[str], angles: Sequence[float], prefix: str) -> dict[str, float]:
+def _jaw_targets(names: Sequence[str], values: Sequence[float], prefix: str, model: Model) -> Targets:
+    joint = JAW_JOINTS[model]
+    (value,) = _pairs(names, values, prefix, (joint.name,)).values()
+    low, high = sorted((joint.open, joint.closed))
+    reached = min(max(value, low), high)
+    if abs(value - reached) > JAW_TOLERANCE * high:
+        unit = "m" if model is HAND_E else "rad"
+        raise GoalError(f"{joint.name!r} must be in {low}..{high} {unit}, got {value:.4f}")
+    opening = (reached - joint.closed) / (joint.open - joint.closed)
+    return Targets(((model.stroke.position_of(opening * model.stroke.mm), JAW),))
+
+
+def _pairs(
+    names: Sequence[str], angles: Sequence[float], prefix: str, commanded: Sequence[str]
+) -> dict[str, float]:
     if not names and len(angles) == 1:
-        names = [prefix + FINGERS]
+        names = [prefix + commanded[-1]]
     if not names:
         raise GoalError(f"no joint is named, so one position is needed, got {len(angles)}")
     if len(names) != len(angles):
         raise GoalError(f"{len(names)} joints and {len(angles)} positions")
     asked: dict[str, float] = {}
     for name, angle in zip(names, angles, strict=True):
-        plain = _plain_name(name, prefix)
+        plain = _plain_name(name, prefix, commanded)
         if plain in asked:
             raise GoalError(f"two positions for one joint: {name!r}")
         if not math.isfinite(angle):
@@ -167,15 +200,15 @@ def _pairs(names: Sequence[str], angles: Sequence[float], prefix: str) -> dict[s
     return asked
 
 
-def _plain_name(name: str, prefix: str) -> str:
+def _plain_name(name: str, prefix: str, commanded: Sequence[str]) -> str:
     plain = name.removeprefix(prefix)
-    if name.startswith(prefix) and plain in _COMMANDED:
+    if name.startswith(prefix) and plain in commanded:
         return plain
-    commanded = ", ".join(prefix + each for each in _COMMANDED)
-    if name.startswith(prefix) and plain in JOINTS:
-        raise GoalError(f"{name!r} follows other joints and takes no goal; these do: {commanded}")
+    these = ", ".join(prefix + each for each in commanded)
+    if name.startswith(prefix) and plain in JOINTS and FINGERS in commanded:
+        raise GoalError(f"{name!r} follows other joints and takes no goal; these do: {these}")
     shown = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."  # of any length
-    raise GoalError(f"there is no joint {shown!r}; these take goals: {commanded}")
+    raise GoalError(f"there is no joint {shown!r}; these take goals: {these}")
 
 
 def _finger_counts(name: str, base: float | None, middle: float | None) -> int:

@@ -1,4 +1,6 @@
-"""Joint angles of the hand from the positions of its four axes, as ROS's joint states name them.
+"""Joint angles of a gripper from the positions of its axes, as ROS's joint states name them.
+
+A 3-Finger has eleven joints, a sibling the one that drives its jaw.
 
 Each finger has three phalanges and one motor: up to about 110 counts the base turns and the tip stays
 parallel to itself, to 140 the base turns alone, from there to 240 the middle one, and beyond nothing moves
@@ -19,10 +21,11 @@ from collections.abc import Iterator, Sequence
 from functools import cache, lru_cache
 from math import radians
 from types import MappingProxyType
-from typing import Final
+from typing import Final, NamedTuple
 
 from ...values.checks import check_byte
-from ...values.enums import Finger
+from ...values.enums import JAW, Finger
+from ...values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model, Stroke
 from ...values.status import RobotiqStatus
 
 Points = tuple[tuple[int, float], ...]
@@ -60,6 +63,41 @@ JOINTS: Final = tuple(_joints())
 """The eleven names, in the order of :func:`joint_angles`: the palm joint of a finger before its own three."""
 
 
+class JawJoint(NamedTuple):
+    """The joint of a two-finger gripper that the others of its description follow.
+
+    Attributes:
+        name: in the public description.
+        open: radians, or metres of one finger, of an open jaw.
+        closed: the same of a closed one.
+    """
+
+    name: str
+    open: float
+    closed: float
+
+    def at(self, stroke: Stroke, position: int) -> float:
+        """Radians or metres at a position in counts; linear in between, as PickNik's driver has it."""
+        return self.closed + (self.open - self.closed) * stroke.opening_mm(position) / stroke.mm
+
+
+JAW_JOINTS: Final = MappingProxyType(
+    {
+        # PickNik, ros2_robotiq_gripper: the closed position of the driver. The limit of the joint is 0.8.
+        TWO_FINGER_85: JawJoint("robotiq_85_left_knuckle_joint", 0.0, 0.7929),
+        # ros-industrial, robotiq_2f_140: the limit of the joint.
+        TWO_FINGER_140: JawJoint("finger_joint", 0.0, 0.7),
+        # AGH-CEAI, robotiq_hande_description: each finger travels half of the stroke.
+        HAND_E: JawJoint("robotiq_hande_left_finger_joint", 0.025, 0.0),
+    }
+)
+
+
+def joint_names(model: Model) -> tuple[str, ...]:
+    """The names of a model's joints, in the order of :func:`joint_angles`."""
+    return JOINTS if model is THREE_FINGER else (JAW_JOINTS[model].name,)
+
+
 def finger_angles(position: int) -> tuple[float, float, float]:
     """The three joints of a finger in radians, from the palm on.
 
@@ -94,7 +132,9 @@ def palm_angle(scissor: int) -> float:
 
 
 def joint_angles(status: RobotiqStatus) -> tuple[float, ...]:
-    """The eleven joints in radians, in the order of :data:`JOINTS`."""
+    """The joints in radians, or a Hand-E's in metres, in the order of :func:`joint_names`."""
+    if (model := status.model) is not THREE_FINGER:
+        return (JAW_JOINTS[model].at(model.stroke, status.position(JAW)),)
     return _joint_angles(*(status.position(axis) for axis in (Finger.SCISSOR, *FINGER_NAMES)))
 
 
@@ -107,7 +147,7 @@ def _joint_angles(scissor: int, *fingers: int) -> tuple[float, ...]:
 
 
 def joint_velocities(before: RobotiqStatus, after: RobotiqStatus) -> tuple[float, ...]:
-    """Joint velocities between two statuses in rad/s, in the order of :data:`JOINTS`.
+    """Joint velocities between two statuses in rad/s, or m/s, in the order of :func:`joint_names`.
 
     A count is 0.5 degrees, so that between two polls this is either nothing or a lot: take statuses that are
     some tens of milliseconds apart.

@@ -22,7 +22,7 @@ from ...values.events import SentRequest, Transition
 from ...values.model import THREE_FINGER
 from ...values.status import RobotiqStatus
 from ..description.joint_states import SCHEMA, SCHEMA_NAME, JointStateEncoder
-from ..description.kinematics import joint_angles, joint_velocities
+from ..description.kinematics import joint_angles, joint_names, joint_velocities
 from .payloads import SCHEMAS, Fields, efforts, fault_event, initial_state_fields, transition_fields
 
 BUFFER: Final = 100_000
@@ -129,6 +129,7 @@ class Feed:
         """
         self._hand = hand
         self._publish = publish
+        self._model = THREE_FINGER
         self._encoder = JointStateEncoder()
         self._before: list[RobotiqStatus] = []
         self._epoch = 0.0
@@ -183,12 +184,12 @@ class Feed:
         self._publish(Message(STATUS, stamp, data, status.sequence))
         if event := fault_event(status, next(reversed(self._before), None)):
             self._publish_json(EVENT, status.timestamp, event)
-        if status.model is THREE_FINGER:  # the joints of its siblings have no description yet
-            self._publish_joints(status)
-        else:
-            self._before = [status]
+        self._publish_joints(status)
 
     def _publish_joints(self, status: RobotiqStatus) -> None:
+        if self._model is not status.model:  # a remote hand learns it when it starts
+            self._model, self._before = status.model, []
+            self._encoder = JointStateEncoder(names=joint_names(status.model))
         while len(self._before) > 1 and status.timestamp - self._before[1].timestamp >= VELOCITY_S:
             del self._before[0]
         self._before.append(status)

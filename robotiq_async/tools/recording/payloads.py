@@ -8,9 +8,10 @@ from __future__ import annotations
 from typing import Any, Final
 
 from ...hand import Hand
-from ...values.enums import Fault, Finger, State
+from ...values.enums import JAW, Fault, Finger, State
 from ...values.errors import NotStartedError
 from ...values.events import Transition
+from ...values.model import THREE_FINGER
 from ...values.status import RobotiqStatus
 from ..description.kinematics import FINGER_NAMES
 
@@ -182,6 +183,8 @@ def state_fields(hand: Hand, now: float) -> Fields:
 
 def efforts(status: RobotiqStatus) -> list[float]:
     """Motor currents in ampere, each at the first joint of its motor; torques are not known."""
+    if status.model is not THREE_FINGER:
+        return [status.current_ma(JAW) / 1000]
     scissor = status.current_ma(Finger.SCISSOR) / 1000
     one, two, middle = (status.current_ma(finger) / 1000 for finger in FINGER_NAMES)
     return [scissor, one, 0.0, 0.0, scissor, two, 0.0, 0.0, middle, 0.0, 0.0]

@@ -27,9 +27,8 @@ from typing import Final, Protocol, Self
 from ...hand import Hand
 from ...runtime.concurrency import in_a_thread, wait_shielded
 from ...values.errors import RecordingError
-from ...values.model import THREE_FINGER
 from .csv_file import CsvFile
-from .feed import JOINTS, STATUS, Feed, Message
+from .feed import JOINTS, Feed, Message
 from .raw_output import write_all
 
 _missing = ""
@@ -107,7 +106,6 @@ class Recorder:
             raise ValueError(f"ros2 is for MCAP files, and {path} is a table")
         self.path = Path(path)
         self.recorded = 0
-        self._last_of_a_poll = JOINTS if hand.model is THREE_FINGER else STATUS
         self.saved = 0
         self._hand = hand
         self._feed = Feed(hand, self._take)
@@ -186,7 +184,7 @@ class Recorder:
         if self._failed.done():
             return
         self._format.take(message)
-        self.recorded += message.topic is self._last_of_a_poll
+        self.recorded += message.topic is JOINTS  # the last of a poll
 
     # -- the disk --------------------------------------------------------------------------------------
 

@@ -14,6 +14,7 @@ from multiprocessing.connection import Connection
 from typing import Any, Final, Self
 
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.values.model import Model, model_of
 from robotiq_async.values.request import Request
 from tests.ros2.live.processes import PATIENCE_S
 
@@ -23,9 +24,9 @@ SPAWN: Final = multiprocessing.get_context("spawn")  # a fork would take over wh
 class Simulator:
     """A simulated gripper behind Modbus TCP."""
 
-    def __init__(self, *, speedup: float = 4.0) -> None:
+    def __init__(self, *, speedup: float = 4.0, model: str = "3f") -> None:
         self._pipe, self._theirs = SPAWN.Pipe()
-        self._child = SPAWN.Process(target=_run, args=(self._theirs, speedup), daemon=True)
+        self._child = SPAWN.Process(target=_run, args=(self._theirs, speedup, model), daemon=True)
 
     def __enter__(self) -> Self:
         self._child.start()
@@ -70,13 +71,13 @@ class Simulator:
 # -- in its process ----------------------------------------------------------------------------------------
 
 
-def _run(pipe: Connection, speedup: float) -> None:
-    asyncio.run(_serve(pipe, speedup))
+def _run(pipe: Connection, speedup: float, model: str) -> None:
+    asyncio.run(_serve(pipe, speedup, model_of(model)))
 
 
-async def _serve(pipe: Connection, speedup: float) -> None:
+async def _serve(pipe: Connection, speedup: float, model: Model) -> None:
     """Do what comes through the pipe, until the other end is closed."""
-    gripper = SimulatedGripper(speedup=speedup, device_cycle=0.005 * speedup, spread=False)
+    gripper = SimulatedGripper(speedup=speedup, device_cycle=0.005 * speedup, spread=False, model=model)
     async with SimulatorServer(gripper) as server:
         pipe.send(server.address)
         while True:

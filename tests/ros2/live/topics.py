@@ -40,6 +40,25 @@ def test_a_prefix_is_before_every_joint(simulator: Simulator) -> None:
         left.prints("goal rejected: there is no joint 'right_fingers'")
 
 
+def test_a_jaw_has_one_joint() -> None:
+    with (
+        Simulator(model="2f85") as jaw,
+        node(address=jaw.address, autostart=True) as process,
+        Client() as client,
+    ):
+        process.prints("no robot description: the packaged one is not of a 2F-85")
+        process.prints("commands are taken")
+        assert client.call("activate").success
+        status, result = client.move(0.8, names=["robotiq_85_left_knuckle_joint"]).ends()
+        assert status == SUCCEEDED
+        assert list(result.state.name) == ["robotiq_85_left_knuckle_joint"]
+        assert result.state.position[0] == pytest.approx(0.7929, abs=0.01)
+        state = client.joint_states().wait()
+        assert len(state.name) == len(state.position) == len(state.velocity) == len(state.effort) == 1
+        assert client.send(["fingers"], [0.0]) is None
+        process.prints("goal rejected: there is no joint 'fingers'; these take goals: robotiq_85_left_kn")
+
+
 def test_topics(simulator: Simulator, tmp_path_factory: pytest.TempPathFactory) -> None:
     urdf = tmp_path_factory.mktemp("urdf") / "hand.urdf"
     urdf.write_text("<robot name='hand'/>", encoding="utf-8")
