@@ -148,20 +148,29 @@ def status_fields() -> str:
 
 
 def _fields(prefix: str) -> str:
-    found = sorted(_named(prefix), key=lambda each: (each[1].byte, each[1].shift))
+    found = sorted(_named(prefix), key=lambda each: (each[1][0].byte, each[1][0].shift))
     return table(
         ["byte", "bits", "name", "meaning"],
-        ([str(field.byte), _bits(field), name, field.doc] for name, field in found),
+        (
+            [
+                ", ".join(dict.fromkeys(str(field.byte) for field in fields)),
+                ", ".join(dict.fromkeys(_bits(field) for field in fields)),
+                name,
+                fields[0].doc if len(fields) == 1 else re.sub(r"^A: | of A\b", "", fields[0].doc),
+            ]
+            for name, fields in found
+        ),
     )
 
 
-def _named(prefix: str) -> Iterator[tuple[str, Field]]:
-    """The fields of a block with the names of the manual."""
+def _named(prefix: str) -> Iterator[tuple[str, Sequence[Field]]]:
+    """The fields of a block with the names of the manual; those that every axis has are one row."""
     for name, value in vars(registers).items():
         if re.fullmatch(f"{prefix}[A-Z]{{2,3}}", name):
-            fields = (value,) if isinstance(value, Field) else value
-            axes = ("",) if isinstance(value, Field) else "ABCS"
-            yield from zip((name + axis for axis in axes), fields, strict=True)
+            if isinstance(value, Field):
+                yield name, (value,)
+            else:
+                yield f"{name}A to {name}S", value
 
 
 def _bits(field: Field) -> str:
@@ -305,10 +314,15 @@ def _arguments(documented: Callable[..., object], section: str) -> str:
     return table(
         ["option", "default", "meaning"],
         (
-            [f"`{name}`", f"`{_default(parameters[name].default)}`", _plain(meaning)]
+            [f"`{name}`", f"`{_default(parameters[name].default)}`", _first_sentence(_plain(meaning))]
             for name, meaning in entries
         ),
     )
+
+
+def _first_sentence(text: str) -> str:
+    """The rest is on the page of the API."""
+    return re.split(r"(?<=\.) (?=[A-Z])", text)[0]
 
 
 def _default(value: object) -> str:
