@@ -17,10 +17,14 @@ def rows(heading: str) -> list[list[str]]:
 
 
 HABITS = rows("A gripper with another habit")
+STAGES = ((1,), (2,), (3,), range(4, 9), (9,))
+"""Those of each column."""
 EVENTS = [
-    (trouble, stage, cell)
-    for trouble, *cells in rows("Something happens in a stage")
-    for stage, cell in enumerate(cells, 1)
+    (trouble.strip(" `"), stage, cell)
+    for troubles, *cells in rows("Something happens in a stage")
+    for trouble in troubles.split(",")
+    for stages, cell in zip(STAGES, cells, strict=True)
+    for stage in stages
 ]
 
 
