@@ -14,7 +14,7 @@ import re
 import sys
 import tomllib
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -106,23 +106,11 @@ def is_on_the_way(state: State) -> bool:
 
 def asked() -> str:
     """What each state answers to each call."""
-    return _entries([trigger for trigger in Trigger if trigger.name.startswith("ASK_")])
-
-
-def seen() -> str:
-    """Where each state goes with what a status shows, and with what becomes of a request or the link."""
-    return _entries(
-        [trigger for trigger in Trigger if not trigger.name.startswith("ASK_")],
-        dict.fromkeys(Verdict, ""),
-    )
-
-
-def _entries(triggers: Sequence[Trigger], words: Mapping[Verdict, str] | None = None) -> str:
-    """The table's columns for some triggers; what leads to no state is said in these words, or in its own."""
+    triggers = [trigger for trigger in Trigger if trigger.name.startswith("ASK_")]
 
     def cell(source: State, to: State | Verdict) -> str:
         if isinstance(to, Verdict):
-            return to.value if words is None else words[to]
+            return to.value
         return "stays" if source is to else to.name
 
     return table(
@@ -337,7 +325,7 @@ def _plain(text: str) -> str:
 
 PAGES: Final[dict[str, dict[str, Callable[[], str]]]] = {
     "architecture.md": {"layers": layers},
-    "state-machine.md": {"diagram": diagram, "asked": asked, "seen": seen},
+    "state-machine.md": {"diagram": diagram, "asked": asked},
     "registers.md": {
         "request": request_fields,
         "status": status_fields,
