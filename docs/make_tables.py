@@ -31,7 +31,6 @@ from robotiq_async.values.enums import (  # noqa: E402
     Initialization,
     Mode,
     ObjectStatus,
-    Severity,
     State,
 )
 from robotiq_async.values.model import MODELS  # noqa: E402
@@ -205,14 +204,8 @@ def progress_codes() -> str:
 
 def faults() -> str:
     """The codes of gFLT."""
-    state = {
-        Severity.NONE: "",
-        Severity.PRIORITY: "no change, no error",
-        Severity.MINOR: "FAULT, until it clears",
-        Severity.MAJOR: "FAULT, until a reset",
-    }
     return table(
-        ["gFLT", "`Fault`", "models", "severity", "meaning", "the hand is in"],
+        ["gFLT", "`Fault`", "models", "severity", "meaning"],
         (
             [
                 f"0x{int(fault):02X}",
@@ -220,7 +213,6 @@ def faults() -> str:
                 _models_with(fault),
                 fault.severity.value,
                 fault.description,
-                "ATR_DONE, until a reset" if fault is Fault.AUTOMATIC_RELEASE_DONE else state[fault.severity],
             ]
             for fault in Fault
         ),
