@@ -1,4 +1,4 @@
-"""The tables of docs/verify-under-trouble.md."""
+"""The tables of docs/hardware.md."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 
 from tests.docs.pages import DOCS
 
-PAGE = DOCS / "verify-under-trouble.md"
+PAGE = DOCS / "hardware.md"
 
 
 def rows(heading: str) -> list[list[str]]:
