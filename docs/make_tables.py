@@ -14,7 +14,7 @@ import re
 import sys
 import tomllib
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -31,7 +31,6 @@ from robotiq_async.values.enums import (  # noqa: E402
     Initialization,
     Mode,
     ObjectStatus,
-    Severity,
     State,
 )
 from robotiq_async.values.model import MODELS  # noqa: E402
@@ -106,23 +105,11 @@ def is_on_the_way(state: State) -> bool:
 
 def asked() -> str:
     """What each state answers to each call."""
-    return _entries([trigger for trigger in Trigger if trigger.name.startswith("ASK_")])
-
-
-def seen() -> str:
-    """Where each state goes with what a status shows, and with what becomes of a request or the link."""
-    return _entries(
-        [trigger for trigger in Trigger if not trigger.name.startswith("ASK_")],
-        dict.fromkeys(Verdict, ""),
-    )
-
-
-def _entries(triggers: Sequence[Trigger], words: Mapping[Verdict, str] | None = None) -> str:
-    """The table's columns for some triggers; what leads to no state is said in these words, or in its own."""
+    triggers = [trigger for trigger in Trigger if trigger.name.startswith("ASK_")]
 
     def cell(source: State, to: State | Verdict) -> str:
         if isinstance(to, Verdict):
-            return to.value if words is None else words[to]
+            return to.value
         return "stays" if source is to else to.name
 
     return table(
@@ -148,20 +135,29 @@ def status_fields() -> str:
 
 
 def _fields(prefix: str) -> str:
-    found = sorted(_named(prefix), key=lambda each: (each[1].byte, each[1].shift))
+    found = sorted(_named(prefix), key=lambda each: (each[1][0].byte, each[1][0].shift))
     return table(
         ["byte", "bits", "name", "meaning"],
-        ([str(field.byte), _bits(field), name, field.doc] for name, field in found),
+        (
+            [
+                ", ".join(dict.fromkeys(str(field.byte) for field in fields)),
+                ", ".join(dict.fromkeys(_bits(field) for field in fields)),
+                name,
+                fields[0].doc if len(fields) == 1 else re.sub(r"^A: | of A\b", "", fields[0].doc),
+            ]
+            for name, fields in found
+        ),
     )
 
 
-def _named(prefix: str) -> Iterator[tuple[str, Field]]:
-    """The fields of a block with the names of the manual."""
+def _named(prefix: str) -> Iterator[tuple[str, Sequence[Field]]]:
+    """The fields of a block with the names of the manual; those that every axis has are one row."""
     for name, value in vars(registers).items():
         if re.fullmatch(f"{prefix}[A-Z]{{2,3}}", name):
-            fields = (value,) if isinstance(value, Field) else value
-            axes = ("",) if isinstance(value, Field) else "ABCS"
-            yield from zip((name + axis for axis in axes), fields, strict=True)
+            if isinstance(value, Field):
+                yield name, (value,)
+            else:
+                yield f"{name}A to {name}S", value
 
 
 def _bits(field: Field) -> str:
@@ -208,14 +204,8 @@ def progress_codes() -> str:
 
 def faults() -> str:
     """The codes of gFLT."""
-    state = {
-        Severity.NONE: "",
-        Severity.PRIORITY: "no change, no error",
-        Severity.MINOR: "FAULT, until it clears",
-        Severity.MAJOR: "FAULT, until a reset",
-    }
     return table(
-        ["gFLT", "`Fault`", "models", "severity", "meaning", "the hand is in"],
+        ["gFLT", "`Fault`", "models", "severity", "meaning"],
         (
             [
                 f"0x{int(fault):02X}",
@@ -223,7 +213,6 @@ def faults() -> str:
                 _models_with(fault),
                 fault.severity.value,
                 fault.description,
-                "ATR_DONE, until a reset" if fault is Fault.AUTOMATIC_RELEASE_DONE else state[fault.severity],
             ]
             for fault in Fault
         ),
@@ -305,10 +294,15 @@ def _arguments(documented: Callable[..., object], section: str) -> str:
     return table(
         ["option", "default", "meaning"],
         (
-            [f"`{name}`", f"`{_default(parameters[name].default)}`", _plain(meaning)]
+            [f"`{name}`", f"`{_default(parameters[name].default)}`", _first_sentence(_plain(meaning))]
             for name, meaning in entries
         ),
     )
+
+
+def _first_sentence(text: str) -> str:
+    """The rest is on the page of the API."""
+    return re.split(r"(?<=\.) (?=[A-Z])", text)[0]
 
 
 def _default(value: object) -> str:
@@ -323,7 +317,7 @@ def _plain(text: str) -> str:
 
 PAGES: Final[dict[str, dict[str, Callable[[], str]]]] = {
     "architecture.md": {"layers": layers},
-    "state-machine.md": {"diagram": diagram, "asked": asked, "seen": seen},
+    "state-machine.md": {"diagram": diagram, "asked": asked},
     "registers.md": {
         "request": request_fields,
         "status": status_fields,

@@ -1,4 +1,4 @@
-"""The tables of docs/verify-under-trouble.md."""
+"""The tables of docs/hardware.md."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 
 from tests.docs.pages import DOCS
 
-PAGE = DOCS / "verify-under-trouble.md"
+PAGE = DOCS / "hardware.md"
 
 
 def rows(heading: str) -> list[list[str]]:
@@ -17,10 +17,14 @@ def rows(heading: str) -> list[list[str]]:
 
 
 HABITS = rows("A gripper with another habit")
+STAGES = ((1,), (2,), (3,), range(4, 9), (9,))
+"""Those of each column."""
 EVENTS = [
-    (trouble, stage, cell)
-    for trouble, *cells in rows("Something happens in a stage")
-    for stage, cell in enumerate(cells, 1)
+    (trouble.strip(" `"), stage, cell)
+    for troubles, *cells in rows("Something happens in a stage")
+    for trouble in troubles.split(",")
+    for stages, cell in zip(STAGES, cells, strict=True)
+    for stage in stages
 ]
 
 

@@ -297,17 +297,16 @@ def test_the_page_names_every_check() -> None:
     assert first_cells("## What is checked") == list(CATALOGUE)
 
 
-def test_the_page_answers_every_question_that_no_source_settles() -> None:
-    """With a check, or with the reason why there is none."""
+def test_every_question_that_no_source_settles_has_an_answer() -> None:
+    """A check, or the reason why there is none."""
     registers = (
         (DOCS / "registers.md").read_text(encoding="utf-8").partition("## What no public source settles")[2]
     )
     asked = re.findall(r"^\| ([^|]+\?) \|", registers, re.MULTILINE)
-    section = HARDWARE.partition("### What no public source settles\n")[2].partition("\n## ")[0]
-    answers = dict(re.findall(r"^\| ([^|]+\?) \| ([^|]+) \|", section, re.MULTILINE))
+    answers = re.findall(r"^\| [^|]+\? \|.* \| ([^|]+) \|$", registers, re.MULTILINE)
     assert asked
-    assert list(answers) == asked
-    for answer in answers.values():
+    assert len(answers) == len(asked)
+    for answer in answers:
         assert answer.startswith("none: ") or {*re.findall(r"`(\w+\.\w+)`", answer)} & {*CATALOGUE}
 
 

@@ -1,4 +1,4 @@
-"""Each trouble alone is found as what it is: the tables of docs/verify-under-trouble.md, row by row."""
+"""Each trouble alone is found as what it is: the tables of docs/hardware.md, row by row."""
 
 from __future__ import annotations
 
