@@ -24,7 +24,6 @@ from robotiq_async import (
     WIDTH_NORMAL,
     WIDTH_PINCH,
     WIDTH_WIDE,
-    Fault,
     Finger,
     InvalidStateError,
     MoveResult,
@@ -40,10 +39,12 @@ from robotiq_async.cli.output.log_capture import forget
 from robotiq_async.fleet.network.route import is_remote
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.hand import Hand
+from robotiq_async.link.address import parse_address
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.values.model import model_of
 
 WARNING = """ALL its fingers MOVE. It is activated (they open and close to their stops), then
-fingers and scissor open and close for about half a minute, at full speed and at full force too.
+fingers and scissor, or the jaw, open and close for about half a minute, at full speed and at full force too.
 What the hand holds will drop. Keep hands and cables away; Ctrl-C stops the fingers."""
 
 COLUMN = 54
@@ -87,15 +88,19 @@ async def gripper(address: str) -> AsyncIterator[tuple[str, SimulatedGripper | N
         yield address, None
         return
     # RobotiqHand("sim://") starts a server as well; with our own we can put an object between the fingers.
-    async with SimulatorServer(port=0) as server:
+    simulated = SimulatedGripper(model=model_of(parse_address(address).model))
+    async with SimulatorServer(simulated, port=0) as server:
         yield server.address, server.gripper
 
 
 async def movements(hand: Hand) -> None:
-    """Part 1: the fingers, and the scissor that sets the width between B and C."""
+    """Part 1: the fingers, and the scissor, if there is one, that sets the width between B and C."""
     title("1. Basic movements")
     await call(hand.set_speed, 255)
     await call(hand.open)
+    if Finger.SCISSOR not in hand.model.all_axes:
+        await call(hand.move, 90)
+        return
     for width in (WIDTH_NORMAL, WIDTH_PINCH, WIDTH_WIDE):
         # The width changes with open fingers only: closed ones are in each other's way.
         await call(hand.move, width, Finger.SCISSOR)
@@ -109,11 +114,12 @@ async def movements(hand: Hand) -> None:
 async def speeds(hand: Hand) -> None:
     """Part 2: a speed for each finger, then one for the group."""
     title("2. Speeds")
-    await call(hand.set_speed, 255, Finger.A)
-    await call(hand.set_speed, 160, Finger.B)
-    await call(hand.set_speed, 96, Finger.C)
-    note("three moves at once; each returns when its own finger has stopped")
-    await together(*(partial(hand.move, 120, finger) for finger in (Finger.A, Finger.B, Finger.C)))
+    fingers = [finger for finger in hand.model.axes if finger in Finger.ABC]
+    for finger, speed in zip(fingers, (255, 160, 96), strict=False):
+        await call(hand.set_speed, speed, finger)
+    if len(fingers) > 1:
+        note("three moves at once; each returns when its own finger has stopped")
+    await together(*(partial(hand.move, 120, finger) for finger in fingers))
     await call(hand.set_speed, 200, Finger.ABC)
     await call(hand.open)
 
@@ -125,7 +131,8 @@ async def forces(hand: Hand, simulated: SimulatedGripper | None) -> None:
         note("server.gripper.place_object(Finger.ABC, position=120)  # something to grasp")
         simulated.place_object(Finger.ABC, position=120)
     await call(hand.set_force, 0, Finger.A)
-    await call(hand.set_force, 128, Finger.B | Finger.C)
+    if others := hand.model.all_axes & (Finger.B | Finger.C):
+        await call(hand.set_force, 128, others)
     grasp(await call(hand.close))
     await call(hand.open)
     note("speed and force can be part of the move, too")
@@ -148,7 +155,7 @@ async def status(hand: Hand) -> None:
     read("hand.state", hand.state)
     read("hand.is_activated, hand.is_moving", (hand.is_activated, hand.is_moving))
     read("hand.status.fault", hand.status.fault.name)
-    for axis in (Finger.A, Finger.B, Finger.C, Finger.SCISSOR):
+    for axis in hand.model.axes:
         read(f"hand.status.position({literal(axis)})", hand.status.position(axis))
     note("async for status in hand.statuses():  # every poll; two a second of them here")
     await asyncio.gather(hand.move(150), watch(hand))
@@ -176,8 +183,9 @@ async def faults(hand: Hand, simulated: SimulatedGripper | None) -> None:
     with suppress(InvalidStateError):
         await call(hand.atr)
     if simulated is not None:
-        note("server.gripper.inject_fault(Fault.SCISSOR_BLOCKED)")
-        simulated.inject_fault(Fault.SCISSOR_BLOCKED)
+        blocked = hand.model.fault(0x0E)
+        note(f"server.gripper.inject_fault(Fault.{blocked.name})")
+        simulated.inject_fault(blocked)
         await call(hand.wait_for_state, State.FAULT)
         read("hand.status.fault.description", hand.status.fault.description)
         note("recover() resets and activates again; a gripper that holds something drops it")

@@ -18,13 +18,13 @@ PARTS = ("1. Basic movements", "2. Speeds", "3. Forces", "4. Status and faults")
 SPEEDUP = 20.0
 
 
+@pytest.mark.parametrize("address", ["sim://", "sim://?model=hand-e"])
 async def test_on_a_simulated_gripper(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    address: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     program = _program()
-    fast = partial(SimulatorServer, SimulatedGripper(speedup=SPEEDUP))
-    monkeypatch.setattr(program, "SimulatorServer", fast)
-    await program.run("sim://")
+    monkeypatch.setattr(program, "SimulatedGripper", partial(SimulatedGripper, speedup=SPEEDUP))
+    await program.run(address)
     out = capsys.readouterr().out
     for words in (*PARTS, "place_object", "contact", "inject_fault", "FAULT -> DO_RESET", "-> SHUTDOWN"):
         assert words in out

@@ -25,6 +25,7 @@ from robotiq_async import OPEN, WIDTH_NORMAL, Fault, Finger, RobotiqHand, Roboti
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.description import hand_model
 from robotiq_async.tools.description.kinematics import JOINTS, joint_angles
+from robotiq_async.tools.web.page.widgets.positions import ROWS
 from robotiq_async.tools.web.server import PageServer
 from robotiq_async.values.enums import DEFAULT_SPEED
 from robotiq_async.values.model import THREE_FINGER
@@ -192,6 +193,19 @@ async def test_the_joints_move_when_the_gripper_moves(browser: Browser, hand: Ro
 
 def is_at(browser: Browser, link: str, position: tuple[float, float, float]) -> bool:
     return bool(browser.link(link) == pytest.approx(position, abs=1e-4))
+
+
+async def test_a_page_says_that_it_draws_no_sibling(window: Browser) -> None:
+    async with RobotiqHand("sim://?model=2f85&speedup=20") as jaw, shown(jaw) as page:
+        await window.open(page.url)
+        await window.in_touch()
+        await window.until(lambda: "There is no drawing of a 2F-85 yet." in window.driver.page_source)
+        assert await window.says("state", "ready")
+        shown_rows = [
+            name for name, *_ in ROWS if await window.do(window.find(f"position-{name}").is_displayed)
+        ]
+        assert shown_rows == ["A"]
+        assert not await window.do(window.find("pinch").is_displayed)
 
 
 async def test_what_it_holds_is_drawn_and_what_touches_glows(browser: Browser, stage: Stage) -> None:

@@ -11,7 +11,6 @@ from types import ModuleType
 from typing import Final
 
 from ...hand import Hand
-from ..addresses import check_three_finger
 from ..arguments import Address, Flag, Yes, need
 from ..browser import opened
 from ..consent import consent
@@ -40,7 +39,6 @@ def demo(
         yes: Do not ask.
         show: Show the hand on a page in the browser while it moves; it only looks.
     """
-    check_three_finger(address)
     program = _program()
     if show:
         need("nicegui", "web")

@@ -58,8 +58,8 @@ CLOSING_END: Final = 2.8
 TOLERANCE: Final = 1e-3
 """Radians that a goal may be outside its range, because clients round."""
 JAW_TOLERANCE: Final = 0.01
-"""Share of its range that a goal for a jaw may be outside. Clients round, and close a 2F-85 to 0.8, the limit of
-its joint in public descriptions."""
+"""Share of its range that a goal for a jaw may be outside. Clients round, and close a 2F-85 to 0.8, the limit
+of its joint in public descriptions."""
 _STOP_TOLERANCE: Final = 0.1
 """Radians that the base joint of a goal may be off its stop while the middle one bends."""
 

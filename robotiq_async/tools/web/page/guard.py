@@ -31,12 +31,12 @@ HEADERS: Final = {
     "x-content-type-options": "nosniff",
     "x-frame-options": "DENY",
 }
-_PAGE: Final = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Robotiq 3-Finger</title>
+_PAGE: Final = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Robotiq gripper</title>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta name="color-scheme" content="light dark">
 <style>body{font:1.1em sans-serif;max-width:30em;margin:15vh auto;padding:0 1em}
 input,button{font:inherit;padding:.4em}
-</style><h1>Robotiq 3-Finger</h1>"""
+</style><h1>Robotiq gripper</h1>"""
 _FORM: Final = """<form method="post" action="/"><label>Password <input type="password"
  name="password" autofocus autocomplete="current-password"></label> <button>Enter</button></form>"""
 

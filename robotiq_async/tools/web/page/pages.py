@@ -133,7 +133,7 @@ def _frame(title: str, mirror: Mirror, *, home: bool) -> None:
             ui.button(icon="arrow_back", on_click=lambda: ui.navigate.to("/")).props(
                 "flat round dense color=white"
             )
-        ui.label("Robotiq 3-Finger").classes("text-base font-bold whitespace-nowrap max-sm:hidden")
+        ui.label("Robotiq gripper").classes("text-base font-bold whitespace-nowrap max-sm:hidden")
         ui.label(title).classes("text-sm opacity-80 truncate").props("data-testid=address")
         ui.space()
         with ui.button_group().props("flat"):

@@ -81,7 +81,7 @@ def _application(settings: PageSettings, mirror: Mirror) -> FastAPI:
     ui.run_with(
         app,
         mount_path=settings.folder,
-        title="Robotiq 3-Finger",
+        title="Robotiq gripper",
         dark=None,
         show_welcome_message=False,
         binding_refresh_interval=None,

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from nicegui import events, ui
 
-from .....values.enums import FORCE_MAX, SPEED_MAX
+from .....values.enums import FORCE_MAX, SPEED_MAX, Finger
 from ....actions import ACTIONS, Action
 from ..heartbeat import PRESS, PRESS_WITH_VALUE, Heartbeat
 from ..mirror import HandMirror, Mirror
@@ -17,7 +17,9 @@ from .slider import Slider
 
 ARMED_S: Final = 0.3
 """A yes counts only after this time: an earlier one was clicked before the question could be read."""
-DIRECT: Final = ("open", "close", "wide", "normal", "pinch")
+WIDTHS: Final = ("wide", "normal", "pinch")
+"""Of the scissor."""
+DIRECT: Final = ("open", "close", *WIDTHS)
 ASKED: Final = tuple(name for name, action in ACTIONS.items() if action.warning)
 
 
@@ -39,8 +41,8 @@ class Controls:
         self._heartbeat, self._report = heartbeat, report
         self._dialogs: list[ui.dialog] = []
         with ui.row().classes("w-full gap-2"):
-            for name in DIRECT:
-                self._button(ACTIONS[name])
+            buttons = {name: self._button(ACTIONS[name]) for name in DIRECT}
+        self._widths = [buttons[name] for name in WIDTHS]
         self._positions = Positions(hand, self._pressed)
         with ui.grid(columns="auto 1fr auto").classes("w-full items-center gap-x-3 gap-y-0"):
             self._slider("speed", SPEED_MAX, mirror.speed)
@@ -51,6 +53,10 @@ class Controls:
         self._outcome = ui.label("").classes("text-sm").props("data-testid=outcome")
 
     def show(self) -> None:
+        has_scissor = Finger.SCISSOR in self._hand.model.all_axes
+        for button in self._widths:
+            if button.visible is not has_scissor:
+                button.set_visibility(has_scissor)
         self._positions.show()
 
     def halt(self) -> None:
@@ -59,10 +65,11 @@ class Controls:
             dialog.close()
         self._ask("halt", {}, at=monotonic())
 
-    def _button(self, action: Action) -> None:
+    def _button(self, action: Action) -> ui.button:
         button = ui.button(action.name).props(f"data-testid={action.name} no-caps").classes("grow")
         button.tooltip(action.what)
         button.on("click", lambda e: self._pressed(action.name, {}, e.args), js_handler=PRESS)
+        return button
 
     def _question(self, action: Action) -> None:
         asked_at = 0.0

@@ -94,6 +94,8 @@ class Curves:
                 chart.options["series"][index]["data"] = [
                     list(point) for point in zip(ages, values, strict=True)
                 ]
+        for chart in (self._positions, self._currents):
+            chart.options["legend"]["data"] = NAMES[: len(hand.model.axes)]
         highest = max((max(each.currents) for each in hand.samples), default=0)
         self._currents.options["yAxis"]["max"] = max(CURRENT_MAX, -(-highest // 200) * 200)
         self._positions.update()

@@ -31,6 +31,7 @@ class Positions:
     def __init__(self, hand: HandMirror, pressed: Callable[[str, dict[str, Any], object], None]) -> None:
         self._hand, self._pressed = hand, pressed
         self._sliders: dict[str, Slider] = {}
+        self._rows: dict[str, tuple[ui.element, ...]] = {}
         self._targets: dict[str, object] = {}
         """The value at which each slider was released: the server knows its value a little later."""
         self._touched: set[str] = set()
@@ -44,7 +45,14 @@ class Positions:
     def show(self) -> None:
         """Let untouched sliders follow their axes, so that sending them moves nothing."""
         status = self._hand.status
-        if status is None or status.is_moving:
+        if status is None:
+            return
+        for name, axes, _ in ROWS:
+            is_there = axes in status.model.all_axes  # of a jaw the row of its one axis alone
+            for element in self._rows[name]:
+                if element.visible is not is_there:
+                    element.set_visibility(is_there)
+        if status.is_moving:
             return
         self._is_placing = True
         for name, axes, _ in ROWS:
@@ -68,12 +76,13 @@ class Positions:
             self._pressed("move", {"position": self._targets.get(name), "fingers": words}, event.args)
             self._touched.discard(name)
 
-        ui.label(name).classes("font-bold").style(f"color:{color}")
+        title = ui.label(name).classes("font-bold").style(f"color:{color}")
         slider = Slider(min=OPEN, max=CLOSED, value=OPEN).props(f"data-testid=position-{name}")
         slider.on_value_change(touch)
         slider.on("change", let_go, js_handler=PRESS_WITH_VALUE)
-        ui.label().bind_text_from(slider, "value", lambda each: f"{each:.0f}").classes("text-right")
+        number = ui.label().bind_text_from(slider, "value", lambda each: f"{each:.0f}").classes("text-right")
         button = ui.button("move").props(f"dense no-caps data-testid=move-{name}").classes("px-3")
         button.tooltip(f"{name} to this position: 0 is open, 255 closed")
         button.on("click", send, js_handler=PRESS)
         self._sliders[name] = slider
+        self._rows[name] = title, slider, number, button

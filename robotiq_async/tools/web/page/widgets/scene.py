@@ -10,7 +10,7 @@ from nicegui import ui
 from nicegui.elements.scene.scene_object3d import Object3D
 
 from .....values.enums import Finger, ObjectStatus
-from .....values.model import THREE_FINGER
+from .....values.model import THREE_FINGER, Model
 from .....values.status import RobotiqStatus
 from ....description import HandModel, Pose, Shape, hand_model
 from ....description.geometry import turned
@@ -136,6 +136,7 @@ class HandScene:
             if not compact:
                 self._labels()
         self._model = model
+        self._is_left_out = False
         scene.move_camera(0.8, -2.2, 2.1, 0, 0, 1.05, duration=0)
 
     def show(self, hand: HandMirror) -> None:
@@ -143,8 +144,8 @@ class HandScene:
         if hand.status is None:
             self._figure.look_all(None, STALE)
             return
-        if hand.model is not THREE_FINGER:  # the drawing is of that one alone
-            self._figure.show(self._model.root, is_shown=False)
+        if hand.model is not THREE_FINGER:
+            self._leave_out(hand.model)
             return
         angles, thing = grasp(self._model, hand.status)
         calls = self._figure.turn(angles)
@@ -154,6 +155,17 @@ class HandScene:
             self.scene.run_method("run_methods", calls)
         self._show_contacts(hand, hand.status)
         self._show_held(None if hand.is_lost else thing)
+
+    def _leave_out(self, model: Model) -> None:
+        # The drawing is that of the 3-Finger.
+        if not self._is_left_out:
+            self._is_left_out = True
+            self._figure.show(self._model.root, is_shown=False)
+            if self._ghost is not None:
+                self._ghost.show(self._model.root, is_shown=False)
+            words = f"There is no drawing of a {model.title} yet."
+            with self.scene:
+                ui.scene.text(words, f"{LETTER};{HALO}").move(0, 0, LIFT)
 
     def _show_ghost(self, ghost: Figure, hand: HandMirror, status: RobotiqStatus) -> Calls:
         away = _away(status) if status.go_echo and status.is_activated and not hand.is_lost else Finger(0)
