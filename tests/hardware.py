@@ -20,7 +20,7 @@ from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.simulator.physics.habits import Habits
 from robotiq_async.tools.recording.recordings import read_recording
 from robotiq_async.values import registers as reg
-from robotiq_async.values.model import THREE_FINGER
+from robotiq_async.values.model import Model, model_of
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
 
@@ -42,6 +42,9 @@ EXACT: Final = {
     "gFLT": reg.gFLT,
     **{f"gDT{name}": field for name, field in zip("ABCS", reg.gDT, strict=True)},
     **{f"gPR{name}": field for name, field in zip("ABCS", reg.gPR, strict=True)},
+}
+EXACT_OF_A_JAW: Final = {name: EXACT[name] for name in ("gACT", "gGTO", "gIMC", "gFLT", "gPRA")} | {
+    "gOBJ": reg.gOBJ
 }
 NEAR: Final = {f"gPO{name}": field for name, field in zip("ABCS", reg.gPO, strict=True)}
 
@@ -70,6 +73,7 @@ class Segment:
 
     stage: int
     began: float
+    model: Model
     statuses: list[tuple[float, dict[str, Any]]] = field(default_factory=list)
     commands: list[tuple[float, dict[str, Any]]] = field(default_factory=list)
 
@@ -80,7 +84,8 @@ def segments(path: str) -> list[Segment]:
     for entry in read_recording(path):
         fields, seconds = json.loads(entry.data), entry.nanoseconds / 1e9
         if entry.topic == "/gripper/event" and str(fields.get("target", "")).startswith("verify stage "):
-            found.append(Segment(int(fields["target"].rpartition(" ")[2]), seconds))
+            model = model_of(fields.get("model"))
+            found.append(Segment(int(fields["target"].rpartition(" ")[2]), seconds, model))
         elif found and entry.topic == "/gripper/status":
             found[-1].statuses.append((seconds, fields))
         elif found and entry.topic == "/gripper/command":
@@ -100,7 +105,8 @@ def differences(path: str, habits: Habits) -> Iterator[Difference]:
 
 def _decoded(stage: Segment) -> Iterator[Difference]:
     for seconds, fields in stage.statuses:
-        status = RobotiqStatus(tuple(fields["registers"]), fields["timestamp"], fields["sequence"])
+        registers = tuple(fields["registers"])
+        status = RobotiqStatus(registers, fields["timestamp"], fields["sequence"], stage.model)
         now = status.as_dict()
         wrong = {name: fields.get(name) for name in now if now[name] != fields.get(name)}
         if wrong:
@@ -112,8 +118,10 @@ def _simulated(stages: list[Segment], habits: Habits) -> Iterator[Difference]:
     """The stages are in one piece: what an axis shows at the beginning of one is from the one before."""
     times = [seconds for stage in stages for seconds, _ in stage.statuses]
     moment = [times[0] - EARLIER_S]
-    gripper = SimulatedGripper(lambda: moment[0], habits=habits)
-    _bring(gripper, moment, RobotiqStatus(tuple(stages[0].statuses[0][1]["registers"])), times[0])
+    model = stages[0].model
+    gripper = SimulatedGripper(lambda: moment[0], habits=habits, model=model)
+    first_status = RobotiqStatus(tuple(stages[0].statuses[0][1]["registers"]), model=model)
+    _bring(gripper, moment, first_status, times[0])
     looks = {seconds + apart for seconds in times for apart in (-APART_S, 0.0, APART_S)}
     events: list[tuple[float, Sequence[int] | None]] = [(look, None) for look in looks if look >= times[0]]
     events += [(seconds, fields["registers"]) for stage in stages for seconds, fields in stage.commands]
@@ -132,7 +140,7 @@ def _simulated(stages: list[Segment], habits: Habits) -> Iterator[Difference]:
             near = [
                 registers for at, registers in _from(shown, first) if at <= seconds + APART_S + ROUNDING_S
             ]
-            yield from _compare(stage.stage, seconds - stage.began, fields["registers"], near)
+            yield from _compare(stage, seconds - stage.began, fields["registers"], near)
 
 
 def _from(shown: list[tuple[float, reg.Registers]], first: int) -> Iterator[tuple[float, reg.Registers]]:
@@ -145,30 +153,33 @@ def _from(shown: list[tuple[float, reg.Registers]], first: int) -> Iterator[tupl
 
 def _bring(gripper: SimulatedGripper, moment: list[float], status: RobotiqStatus, until: float) -> None:
     """Let the gripper stand where a recorded one stood."""
-    asked = tuple(AxisRequest(status.requested_position(axis), 255) for axis in THREE_FINGER.axes)
-    here = tuple(AxisRequest(status.position(axis), 255) for axis in THREE_FINGER.axes)
+    asked = tuple(AxisRequest(status.requested_position(axis), 255) for axis in status.model.axes)
+    here = tuple(AxisRequest(status.position(axis), 255) for axis in status.model.axes)
     if status.activation_echo:
-        gripper.write(0, Request(activate=True, mode=status.mode).registers)
+        gripper.write(0, Request(activate=True, mode=status.mode, model=status.model).registers)
         moment[0] += EARLIER_S / 2
-        if any(abs(gripper.position(axis) - status.position(axis)) > COUNTS for axis in THREE_FINGER.axes):
-            gripper.write(0, Request(activate=True, go=True, mode=status.mode, axes=here).registers)
+        if any(abs(gripper.position(axis) - status.position(axis)) > COUNTS for axis in status.model.axes):
+            image = Request(activate=True, go=True, mode=status.mode, axes=here, model=status.model)
+            gripper.write(0, image.registers)
             moment[0] += EARLIER_S / 4
-    image = Request(activate=status.activation_echo, go=status.go_echo, mode=status.mode, axes=asked)
+    image = Request(
+        activate=status.activation_echo, go=status.go_echo, mode=status.mode, axes=asked, model=status.model
+    )
     gripper.write(0, image.registers)
     moment[0] = until
 
 
 def _compare(
-    stage: int, seconds: float, recorded: Sequence[int], near: list[reg.Registers]
+    stage: Segment, seconds: float, recorded: Sequence[int], near: list[reg.Registers]
 ) -> Iterator[Difference]:
-    for name, where in EXACT.items():
+    for name, where in (EXACT if len(stage.model.axes) > 1 else EXACT_OF_A_JAW).items():
         shown = [where.read(registers) for registers in near]
         if where.read(recorded) not in shown:
-            yield Difference(stage, seconds, name, where.read(recorded), shown[len(shown) // 2])
+            yield Difference(stage.stage, seconds, name, where.read(recorded), shown[len(shown) // 2])
     for name, where in NEAR.items():
         shown = [where.read(registers) for registers in near]
         if all(abs(where.read(recorded) - each) > COUNTS for each in shown):
-            yield Difference(stage, seconds, name, where.read(recorded), shown[len(shown) // 2])
+            yield Difference(stage.stage, seconds, name, where.read(recorded), shown[len(shown) // 2])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from ..fleet.network.route import is_remote, parse_remote_address
 from ..link.address import parse_address
-from ..values.model import THREE_FINGER
-from .failures import UsageError, usage
+from .failures import usage
 
 
 def full_address(address: str) -> str:
@@ -27,17 +26,3 @@ def gripper_words(address: str) -> str:
 def is_simulated(address: str) -> bool:
     """Whether the gripper is simulated inside the command."""
     return full_address(address).startswith("sim:")
-
-
-def check_three_finger(address: str) -> None:
-    """Refuse a sibling of the 3-Finger where a command needs three fingers.
-
-    Raises:
-        UsageError: the address names one.
-    """
-    if is_remote(address):
-        return  # it is found out once the agent answers
-    with usage():
-        model = parse_address(address).model
-    if model not in (None, THREE_FINGER):
-        raise UsageError(f"this command is for the 3-Finger, and {address} names a {model}")

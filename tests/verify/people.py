@@ -11,9 +11,9 @@ from typing import Any
 from robotiq_async.link.address import parse_address
 from robotiq_async.simulator import RtuOverTcpSimulatorServer, SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.tools.verify import ENTER, Lengths, Plan, Report, Runner, Verdict
-from robotiq_async.tools.verify.catalogue import CATALOGUE, LAST
+from robotiq_async.tools.verify.catalogue import LAST, checks_of
 from robotiq_async.tools.verify.recorded_link import Frame
-from robotiq_async.tools.verify.stages import loss, soft_part
+from robotiq_async.tools.verify.stages import loss, single_axis, soft_part
 from robotiq_async.values.enums import Finger
 from tests.grippers import activate_beforehand
 
@@ -77,7 +77,7 @@ class Helper:
         self.has_stopped = False
         self.before: Callable[[str], object] = lambda _: None
         self._server = server
-        self._travel = dict.fromkeys(Finger.ALL, 0.0)
+        self._travel = dict.fromkeys(server.gripper.model.axes, 0.0)
 
     def tell(self, words: str) -> None:
         assert not self._server.gripper.is_moving, f"said while fingers move: {words}"
@@ -111,7 +111,7 @@ class Helper:
             await self._meanwhile(Trouble("e-stop"))
         elif question == loss.POWER:
             await self._meanwhile(Trouble("power-cut"))
-        elif "Which finger" in question:
+        elif question in (single_axis.QUESTION, single_axis.JAW_QUESTION):
             return WHICH[max(gone, key=lambda axis: gone[axis])]
         return ENTER
 
@@ -123,8 +123,8 @@ class Helper:
         """Note a question; how far each axis has gone since the one before."""
         self.asked.append(question)
         before = self._travel
-        self._travel = {axis: self._server.gripper.travel(axis) for axis in Finger.ALL}
-        return {axis: self._travel[axis] - before[axis] for axis in Finger.ALL}
+        self._travel = {axis: self._server.gripper.travel(axis) for axis in before}
+        return {axis: self._travel[axis] - before[axis] for axis in before}
 
 
 @contextlib.asynccontextmanager
@@ -170,4 +170,5 @@ def assert_as_assumed(report: Report) -> None:
     assert report.why == "done", report.words
     wrong = {name: check for name, check in report.checks.items() if check.verdict is not Verdict.AS_ASSUMED}
     assert not wrong
-    assert report.checks.keys() == {name for name, each in CATALOGUE.items() if each.stage in report.stages}
+    expected = {name for name, each in checks_of(report.model).items() if each.stage in report.stages}
+    assert report.checks.keys() == expected

@@ -18,6 +18,7 @@ from robotiq_async.tools.verify import Plan, Runner, pictures
 from robotiq_async.tools.verify.files import Folder
 from robotiq_async.tools.verify.recording import NAME, segments
 from robotiq_async.values.enums import ObjectStatus
+from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
 from tests import hardware
 from tests.verify.people import SHORT, Helper, served, threads
 from tests.virtual import run
@@ -25,10 +26,12 @@ from tests.virtual import run
 Change = Callable[[str, dict[str, Any]], None]
 
 
-async def record(folder: Path, *, like_hardware: bool = False, last: int = 6) -> None:
+async def record(
+    folder: Path, *, like_hardware: bool = False, last: int = 6, model: Model = THREE_FINGER
+) -> None:
     troubles = [habit.kind for habit in LIKE_HARDWARE] if like_hardware else []
     habits = OWN_HABITS if like_hardware else None
-    async with served(*troubles, habits=habits) as server, threads():
+    async with served(*troubles, habits=habits, model=model) as server, threads():
         address = parse_address(server.address)
         into = Folder(folder, address)
         plan = Plan(address, last=last, lengths=SHORT)
@@ -57,6 +60,24 @@ def hardware_like(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("like hardware")
     run(lambda: record(folder, like_hardware=True))
     return folder / NAME
+
+
+@pytest.fixture(scope="module")
+def jaw(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("jaw")
+    run(lambda: record(folder, model=TWO_FINGER_85))
+    return folder / NAME
+
+
+def test_a_recording_of_a_sibling_knows_its_model_and_differs_in_nothing(jaw: Path) -> None:
+    assert not [*hardware.differences(str(jaw), Habits())]
+    (segment,) = segments(jaw, (6,))
+    assert {status.model for _, status in segment.statuses} == {TWO_FINGER_85}
+    report = json.loads((jaw.parent / "report.json").read_text())
+    assert report["model"] == "2f85"
+    assert "stroke.scissor" not in {check["name"] for check in report["checks"]}
+    pictures_of_it = sorted(picture.name for picture in jaw.parent.glob("*.png"))
+    assert pictures_of_it == ["activation.png", "echo.png", "round_trips.png", "strokes.png"]
 
 
 def test_each_measured_curve_has_its_picture(plain: Path, short: Path) -> None:

@@ -4,14 +4,25 @@ from __future__ import annotations
 
 import pytest
 
+from robotiq_async.values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model
 from tests.verify.people import Helper, Roll, assert_as_assumed, served, verified
 
 pytestmark = pytest.mark.virtual_time
 
 
-@pytest.mark.parametrize("serial", [False, True], ids=["tcp", "paced serial line"])
-async def test_a_plain_gripper_is_as_assumed_in_every_stage(serial: bool) -> None:
-    async with served(serial=serial) as server:
+@pytest.mark.parametrize(
+    ("serial", "model"),
+    [
+        (False, THREE_FINGER),
+        (True, THREE_FINGER),
+        (False, TWO_FINGER_140),
+        (True, TWO_FINGER_85),
+        (True, HAND_E),
+    ],
+    ids=lambda value: "serial" if value is True else "tcp" if value is False else value.name,
+)
+async def test_a_plain_gripper_is_as_assumed_in_every_stage(serial: bool, model: Model) -> None:
+    async with served(serial=serial, model=model) as server:
         helper, roll = Helper(server), Roll()
         report = await verified(server, helper, roll)
         assert_as_assumed(report)

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ...fleet.network.route import is_remote
+from ...link.address import Address as GripperAddress
 from ...link.address import parse_address
-from ...link.simulation import Simulation
 from ...runtime.concurrency import wait_shielded
-from ..addresses import check_three_finger, gripper_words
+from ...values.model import model_of
+from ..addresses import gripper_words
 from ..arguments import Address, Stage, need
 from ..failures import CommandError, UsageError, usage
 from ..keyboard import Keyboard, has_terminal, wrapped
@@ -79,7 +80,6 @@ async def verify(
         raise UsageError(
             "without a terminal to ask at, and to stop at, this needs --up-to and --yes-to, both at most 2"
         )
-    check_three_finger(address)
     with usage():
         parsed = parse_address(address)
     need("mcap", "record")
@@ -89,7 +89,7 @@ async def verify(
     print(gripper_words(address), flush=True)
     async with AsyncExitStack() as stack:
         if parsed.kind == "sim":
-            parsed = parse_address(await stack.enter_async_context(_simulated(parsed.simulation)))
+            parsed = parse_address(await stack.enter_async_context(_simulated(parsed)))
         with usage():
             plan = Plan(parsed, first=from_, last=last, agreed=agreed, label=label)
         try:
@@ -102,11 +102,11 @@ async def verify(
 
 
 @asynccontextmanager
-async def _simulated(simulation: Simulation) -> AsyncIterator[str]:
+async def _simulated(address: GripperAddress) -> AsyncIterator[str]:
     from ...link.sim_transport import new_gripper
     from ...simulator import SimulatorServer
 
-    async with SimulatorServer(new_gripper(simulation)) as server:
+    async with SimulatorServer(new_gripper(address.simulation, model_of(address.model))) as server:
         yield server.address
 
 

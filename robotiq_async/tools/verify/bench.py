@@ -9,6 +9,7 @@ from typing import Final
 from ...link.address import Address
 from ...link.modbus import ModbusTransport
 from ...session.options import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S, SERIAL_POLL_INTERVAL_S
+from ...values.enums import Finger
 from ...values.model import Model, model_of
 from ...values.registers import RegisterMap
 from ...values.status import RobotiqStatus
@@ -76,6 +77,16 @@ class Bench:
         return model_of(self.address.model)
 
     @property
+    def fingers(self) -> tuple[Finger, ...]:
+        """A, B and C, or the jaw."""
+        return tuple(axis for axis in self.model.axes if axis in Finger.ABC)
+
+    @property
+    def first(self) -> str:
+        """What moves in stages that move one finger, for a sentence."""
+        return "finger A" if len(self.fingers) > 1 else "the jaw"
+
+    @property
     def interval(self) -> float:
         """The usual seconds between two reads on such a link."""
         return SERIAL_POLL_INTERVAL_S if self.address.is_rtu else float(POLL_INTERVAL_S)
@@ -87,7 +98,7 @@ class Bench:
         transport = ModbusTransport(
             self.address, registers, connect_timeout=CONNECT_S, response_timeout=RESPONSE_TIMEOUT_S
         )
-        return RecordedLink(transport, keep or self.keep)
+        return RecordedLink(transport, keep or self.keep, self.model)
 
     def watch(self, seconds: float) -> Watch:
         """Look after the gripper for some seconds."""

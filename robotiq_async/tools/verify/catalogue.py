@@ -8,6 +8,8 @@ from enum import Enum
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
+from ...values.model import Model
+
 
 class Assumption(NamedTuple):
     """One thing that the library takes for granted of every gripper.
@@ -16,11 +18,13 @@ class Assumption(NamedTuple):
         stage: the stage that checks it.
         assumed: what is assumed, in a sentence.
         is_safety: whether nothing further is done when it does not hold.
+        of_several: whether it is about a gripper with several axes: a jaw has none of it.
     """
 
     stage: int
     assumed: str
     is_safety: bool = False
+    of_several: bool = False
 
 
 CATALOGUE: Final[dict[str, Assumption]] = {
@@ -40,18 +44,22 @@ CATALOGUE: Final[dict[str, Assumption]] = {
     "activation.time": Assumption(3, "An activation takes at most 20 s."),
     "activation.words": Assumption(3, "After it no go is echoed, and every gDT is 0."),
     "axis.finger": Assumption(
-        4, "A is the finger that stands alone; B, C and the scissor are as named.", True
+        4, "A is the finger that stands alone, or the jaw; B, C and the scissor are as named.", True
     ),
-    "axis.alone": Assumption(4, "An axis that is asked alone moves alone.", True),
+    "axis.alone": Assumption(4, "An axis that is asked alone moves alone.", True, of_several=True),
     "axis.lag": Assumption(4, "gDT shows a motion as soon as its request is echoed."),
     "axis.end": Assumption(4, "An axis stops within 2 counts of its request."),
     "stop.halt": Assumption(5, "rGTO = 0 stops a motion within 10 counts.", True),
     "stop.resume": Assumption(5, "Setting rGTO again goes on to the same request."),
     "stop.target": Assumption(5, "A new request in the middle of a motion is followed at once."),
     "stop.hold": Assumption(5, "Requesting the present position stops within 10 counts.", True),
-    "stroke.time": Assumption(6, "A full stroke takes what the thesis measured, within a fifth."),
-    "stroke.readings": Assumption(6, "Open fingers read 6 or 7, closed ones 240 or more."),
-    "stroke.scissor": Assumption(6, "The scissor echoes what it is asked, also beyond its limits."),
+    "stroke.time": Assumption(
+        6, "A full stroke takes what the thesis measured, or a sibling's manual says, within a fifth."
+    ),
+    "stroke.readings": Assumption(6, "Open and closed fingers read what those of the model read."),
+    "stroke.scissor": Assumption(
+        6, "The scissor echoes what it is asked, also beyond its limits.", of_several=True
+    ),
     "soft.contact": Assumption(7, "A contact while closing is gDT = 2."),
     "soft.current": Assumption(7, "A finger at rest draws no current."),
     "soft.halt": Assumption(7, "rGTO = 0 leaves the part held."),
@@ -65,6 +73,13 @@ CATALOGUE: Final[dict[str, Assumption]] = {
     "soak.commands": Assumption(9, "Commands at 10 to 100 Hz are followed to the last one."),
 }
 """By name, in the order in which they are checked."""
+
+
+def checks_of(model: Model) -> dict[str, Assumption]:
+    """The assumptions about a model, by name."""
+    several = len(model.axes) > 1
+    return {name: each for name, each in CATALOGUE.items() if several or not each.of_several}
+
 
 LAST: Final = 9
 """The last stage."""

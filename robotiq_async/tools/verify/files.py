@@ -10,6 +10,7 @@ from typing import Final, TypeVar, cast
 
 from ...link.address import Address
 from ...runtime.concurrency import in_a_thread
+from ...values.model import model_of
 from .page import page
 from .recording import NAME, Recording
 from .report import Report
@@ -68,7 +69,7 @@ class Folder:
         self._pictures: tuple[str, ...] = ()
         self._why_no_pictures = ""
         path.mkdir(parents=True, exist_ok=True)
-        self.recording = Recording(path, self._scrubber.clean)
+        self.recording = Recording(path, self._scrubber.clean, model_of(address.model))
 
     def save(self, report: Report) -> None:
         """Write the report as it is now.

@@ -7,6 +7,7 @@ from typing import Final
 
 from ...session.gripper_link import registers_of
 from ...values.enums import Fault
+from ...values.model import THREE_FINGER
 from ...values.registers import STATUS_RESERVED
 from ...values.status import RobotiqStatus
 from ..doctor.answer import find_gripper
@@ -45,21 +46,23 @@ async def find(bench: Bench) -> None:
 
 
 def why_no_gripper(status: RobotiqStatus) -> str:
-    """What a status shows that none of a 3-Finger does; empty if there is nothing."""
+    """What a status shows that none of the model does; empty if there is nothing."""
     words = " ".join(f"{word:04X}" for word in status.registers)
     if not any(status.registers):
         return "all registers read 0; the gripper may be without power behind its fieldbus"
-    if any(field.read(status.registers) for field in STATUS_RESERVED):
+    if shown := status.model.contradiction(status.registers):
+        return f"this is no {status.model.title}: its registers show {shown}"
+    # The old controller of the siblings has faults of its own in byte 2 (kFLT).
+    reserved = STATUS_RESERVED if status.model is THREE_FINGER else STATUS_RESERVED[1:]
+    if any(field.read(status.registers) for field in reserved):
         return f"bits are set that are 0 in a gripper: {words}"
     if status.fault.name.startswith("UNKNOWN"):
         return f"a fault code that the manual does not assign: {words}"
     if not status.activation_echo and not status.is_reset:
         return f"gIMC says active or activating while gACT is 0: {words}"
     axes = status.model.axes
-    if (
-        len({status.position(axis) for axis in axes} | {status.requested_position(axis) for axis in axes})
-        == 1
-    ):
+    values = {read(axis) for axis in axes for read in (status.position, status.requested_position)}
+    if len(axes) > 1 and len(values) == 1:
         return f"every position and every request read the same: {words}"
     return ""
 

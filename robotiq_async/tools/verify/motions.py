@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -39,9 +39,18 @@ def way(status: RobotiqStatus, targets: Mapping[Finger, int]) -> dict[Finger, tu
     for axis in status.model.axes:
         now = status.position(axis)
         target = targets.get(axis, now)
-        aside = MARGIN if axis in targets else ASIDE
-        envelope[axis] = (min(now, target) - aside, max(now, target) + aside)
+        beside = MARGIN if axis in targets else ASIDE
+        envelope[axis] = (min(now, target) - beside, max(now, target) + beside)
     return envelope
+
+
+def aside(status: RobotiqStatus, moving: Sequence[Finger]) -> dict[Finger, tuple[int, int]]:
+    """The envelope of the axes that are not in ``moving``: they stay."""
+    return {
+        axis: (status.position(axis) - ASIDE, status.position(axis) + ASIDE)
+        for axis in status.model.axes
+        if axis not in moving
+    }
 
 
 def are_near(status: RobotiqStatus, targets: Mapping[Finger, int], counts: int) -> bool:
@@ -56,7 +65,7 @@ async def reset(watch: Watch) -> None:
         EndError: it does not show, or what :meth:`Watch.look` raises.
     """
     watch.needs_active = False
-    await watch.write(Request())
+    await watch.write(Request(model=watch.model))
     if await watch.until(lambda status: not status.activation_echo and status.is_reset, 2.0) is None:
         raise EndError("inactive", "rACT = 0 was acknowledged, and the gripper does not show it")
 
@@ -69,7 +78,7 @@ async def activate(watch: Watch) -> float:
     """
     watch.envelope = ANYWHERE
     await reset(watch)
-    began = await watch.write(Request(activate=True))
+    began = await watch.write(Request(activate=True, model=watch.model))
     if await watch.until(lambda status: status.is_activated, ACTIVATION_S, 0.02) is None:
         shown = f": it reads {words_of(watch.last)}" if watch.last else ""
         raise EndError("time", f"the activation was not over within {ACTIVATION_S:g} s{shown}")

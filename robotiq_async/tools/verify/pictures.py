@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from statistics import fmean
 from typing import TYPE_CHECKING, Final
 
 try:
@@ -15,6 +16,7 @@ except ModuleNotFoundError as error:
     raise ImportError(f"pictures need matplotlib: {install('plot')}") from error
 
 from ...values.enums import CLOSED, Finger, ObjectStatus
+from ...values.model import Model
 from ...values.request import Request
 from ...values.status import RobotiqStatus
 from .recording import Segment, segments
@@ -23,7 +25,6 @@ from .report import Report
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FINGERS: Final = (Finger.A, Finger.B, Finger.C)
 FAR: Final = 10
 """Counts that make a motion: more than an axis ends beside its request."""
 BEFORE_S: Final = 0.05
@@ -146,6 +147,10 @@ def _motion_from_rest(segment: Segment) -> tuple[float, Finger] | None:
     return fallback
 
 
+def _fingers(model: Model) -> list[Finger]:
+    return [axis for axis in model.axes if axis in Finger.ABC]
+
+
 def _strokes(axes: tuple[Axes, ...], segment: Segment) -> bool:
     (axis,) = axes
     found = list(_closings(segment))
@@ -153,9 +158,9 @@ def _strokes(axes: tuple[Axes, ...], segment: Segment) -> bool:
         inside = [
             (seconds - began, status) for seconds, status in segment.statuses if began <= seconds < until
         ]
-        means = [sum(status.position(each) for each in FINGERS) / len(FINGERS) for _, status in inside]
+        means = [fmean(status.position(each) for each in _fingers(status.model)) for _, status in inside]
         axis.plot([seconds for seconds, _ in inside], means, label=f"speed {request.axes[0].speed}")
-    axis.set_ylabel("mean position of A, B, C")
+    axis.set_ylabel("mean position of the fingers")
     axis.legend()
     return bool(found)
 
@@ -164,7 +169,7 @@ def _closings(segment: Segment) -> Iterator[tuple[float, float, Request]]:
     """When the fingers were asked to close, and when the next was asked."""
     ends = [seconds for seconds, _ in segment.commands[1:]] + [segment.statuses[-1][0]]
     for (seconds, request), end in zip(segment.commands, ends, strict=True):
-        if request.go and all(request.position(each) == CLOSED for each in FINGERS):
+        if request.go and all(request.position(each) == CLOSED for each in _fingers(request.model)):
             yield seconds, end, request
 
 

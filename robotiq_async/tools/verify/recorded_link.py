@@ -12,6 +12,7 @@ from typing import Any, Final, TypeVar
 from ...link.transport import Link
 from ...runtime.concurrency import wait_shielded
 from ...values.errors import RobotiqConnectionError
+from ...values.model import Model
 from ...values.registers import Echo, Registers
 from ...values.request import Request
 from ...values.status import RobotiqStatus
@@ -48,19 +49,22 @@ class RecordedLink:
     stop that follows would have to make a new one first.
 
     Attributes:
+        model: of the gripper.
         written: the last image that was written; None before the first.
         shown: the last status that was read; None before the first.
         asked: when that was asked for, in the loop's time.
         wrote: when the last write was sent, in the loop's time.
     """
 
-    def __init__(self, link: Link, keep: Callable[[Frame], None]) -> None:
+    def __init__(self, link: Link, keep: Callable[[Frame], None], model: Model) -> None:
         """Use a link, open or not.
 
         Args:
             link: leads to the gripper.
             keep: is given every frame.
+            model: of the gripper.
         """
+        self.model = model
         self.link = link
         self.written: Request | None = None
         self.shown: RobotiqStatus | None = None
@@ -102,7 +106,7 @@ class RecordedLink:
         ended = loop.time()
         self._keep(Frame(began, ended, "status", registers))
         self.asked = began
-        self.shown = RobotiqStatus.from_registers(registers, timestamp=ended)
+        self.shown = RobotiqStatus.from_registers(registers, timestamp=ended, model=self.model)
         return self.shown
 
     async def write(self, request: Request) -> float:

@@ -18,6 +18,7 @@ from typing import Final
 
 from ...runtime.concurrency import in_a_thread
 from ...values.events import SentRequest
+from ...values.model import THREE_FINGER, Model, model_of
 from ...values.request import Request
 from ...values.status import RobotiqStatus
 from ..recording.feed import COMMAND, EVENT, STATUS, Message, Topic, compact
@@ -46,20 +47,22 @@ class Segment:
 def segments(path: Path, stages: tuple[int, ...]) -> list[Segment]:
     """Some stages of a recording, in their order."""
     found: list[Segment] = []
+    model = THREE_FINGER
     for entry in read_recording(path):
         seconds = entry.nanoseconds / 1e9
         if entry.topic == EVENT.name:
-            target = str(json.loads(entry.data).get("target", ""))
+            fields = json.loads(entry.data)
+            target = str(fields.get("target", ""))
             if target.startswith(STAGE):
+                model = model_of(fields.get("model"))
                 found.append(Segment(int(target.removeprefix(STAGE)), seconds))
         elif found and found[-1].stage in stages:
             registers = tuple(json.loads(entry.data)["registers"])
             if entry.topic == STATUS.name:
-                found[-1].statuses.append(
-                    (seconds, RobotiqStatus.from_registers(registers, timestamp=seconds))
-                )
+                status = RobotiqStatus.from_registers(registers, timestamp=seconds, model=model)
+                found[-1].statuses.append((seconds, status))
             elif entry.topic == COMMAND.name:
-                found[-1].commands.append((seconds, Request.from_registers(registers)))
+                found[-1].commands.append((seconds, Request.from_registers(registers, model)))
     return [segment for segment in found if segment.stage in stages]
 
 
@@ -70,12 +73,13 @@ class Recording:
         failure: why nothing is written any more; empty as long as it is.
     """
 
-    def __init__(self, folder: Path, clean: Callable[[str], str]) -> None:
+    def __init__(self, folder: Path, clean: Callable[[str], str], model: Model) -> None:
         """Create the file.
 
         Args:
             folder: where it goes.
             clean: takes out of a text what must not be in it.
+            model: of the gripper.
 
         Raises:
             OSError: that is not possible.
@@ -86,6 +90,7 @@ class Recording:
         self._count = 0
         self._format = McapFile(self, name="verify", address="")
         self._clean = clean
+        self._model = model
         self._epoch = time.time() - asyncio.get_running_loop().time()
         self._counts = {STATUS: 0, COMMAND: 0, EVENT: 0}
         self._over = asyncio.Event()
@@ -113,10 +118,11 @@ class Recording:
         if self.failure:
             return
         if frame.kind == "status":
-            status = RobotiqStatus(frame.registers, frame.ended, self._counts[STATUS] + 1)
+            status = RobotiqStatus(frame.registers, frame.ended, self._counts[STATUS] + 1, self._model)
             self._add(STATUS, frame.ended, status.as_dict())
         elif frame.registers:
-            sent = SentRequest(Request.from_registers(frame.registers), frame.began, frame.kind == "command")
+            image = Request.from_registers(frame.registers, self._model)
+            sent = SentRequest(image, frame.began, frame.kind == "command")
             self._add(COMMAND, frame.began, sent.as_dict())
         if frame.words:
             words = {"kind": "log", "timestamp": frame.ended, "message": self._clean(frame.words)}
@@ -125,7 +131,8 @@ class Recording:
     def begin(self, stage: int) -> None:
         """Note that a stage begins."""
         now = asyncio.get_running_loop().time()
-        self._add(EVENT, now, {"kind": "state", "timestamp": now, "target": f"{STAGE}{stage}"})
+        fields = {"kind": "state", "timestamp": now, "target": f"{STAGE}{stage}", "model": self._model.name}
+        self._add(EVENT, now, fields)
 
     def _add(self, topic: Topic, seconds: float, fields: Fields) -> None:
         self._counts[topic] += 1

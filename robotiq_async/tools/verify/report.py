@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any, Final, TypeVar
 
 from ...runtime.version import __version__
+from ...values.model import THREE_FINGER, Model
 from ...values.registers import RegisterMap
 from ...values.status import RobotiqStatus
-from .catalogue import CATALOGUE, Check, Verdict
+from .catalogue import CATALOGUE, Check, Verdict, checks_of
 
 T = TypeVar("T")
 
@@ -23,6 +24,7 @@ class Report:
 
     Attributes:
         link: "tcp", "rtu" or "rtu+tcp".
+        model: of the gripper.
         stages: those that have come to their end.
         entered: those that have begun.
         checks: by name.
@@ -35,6 +37,7 @@ class Report:
     """
 
     link: str
+    model: Model = THREE_FINGER
     stages: list[int] = field(default_factory=list)
     entered: list[int] = field(default_factory=list)
     checks: dict[str, Check] = field(default_factory=dict)
@@ -47,7 +50,7 @@ class Report:
 
     def complete(self) -> None:
         """Say of the checks of stages that have begun and were not reached that they could not be told."""
-        for name, assumption in CATALOGUE.items():
+        for name, assumption in checks_of(self.model).items():
             if assumption.stage in self.entered and name not in self.checks:
                 self.checks[name] = Check(name, Verdict.UNTOLD, "not reached")
 
@@ -88,6 +91,7 @@ class Report:
             "system": platform.system(),
             "machine": platform.machine(),
             "link": self.link,
+            "model": self.model.name,
             "registers": registers
             and {
                 "device_id": registers.device_id,

@@ -11,6 +11,7 @@ from typing import Final, Protocol
 from ...link.address import Address
 from ...runtime.concurrency import wait_shielded
 from ...values.errors import RobotiqConnectionError
+from ...values.model import model_of
 from ...values.request import Request
 from .bench import Bench, Lengths
 from .catalogue import HARMLESS, LAST, EndError
@@ -93,7 +94,7 @@ class Runner:
             tape: takes every frame.
             save: is called with the report after each stage, while nothing moves; an OSError ends the run.
         """
-        self.report = Report(plan.address.kind, label=plan.label)
+        self.report = Report(plan.address.kind, model_of(plan.address.model), label=plan.label)
         self._plan = plan
         self._person = person
         self._tape = tape
@@ -159,7 +160,7 @@ class Runner:
     async def _look_first(self, stage: Stage) -> Request:
         """See that the stage may begin; returns the image that would stop everything now."""
         if stage.number < HARMLESS:
-            return Request()
+            return Request(model=self._bench.model)
         if not self._is_found:
             await self._find()
         status = await see_that_it_may_be_written_to(self._bench)
@@ -182,8 +183,8 @@ class Runner:
 
     async def _ask(self, stage: Stage) -> None:
         if stage.number <= self._plan.agreed:
-            self._person.tell(stage.as_text())
-        elif not await self._person.consents(stage.as_text()):
+            self._person.tell(stage.as_text(self._bench.model))
+        elif not await self._person.consents(stage.as_text(self._bench.model)):
             raise EndError("declined", f"stage {stage.number} was not agreed to")
 
     async def _find(self) -> None:

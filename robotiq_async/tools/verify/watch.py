@@ -34,6 +34,7 @@ class Watch:
     """Looks after one stage.
 
     Attributes:
+        model: of the gripper.
         envelope: where each axis may be; changed by the stage before each motion.
         needs_active: whether the gripper must be active.
         bears_faults: whether faults are what the stage is about.
@@ -56,6 +57,7 @@ class Watch:
         self.needs_active = True
         self.bears_faults = False
         self.last: RobotiqStatus | None = None
+        self.model = link.model
         self._link = link
         self._person = person
         self._interval = interval
@@ -159,7 +161,8 @@ class Watch:
             self._check_fault(status)
         if self.needs_active and not status.is_activated:
             raise EndError("inactive", f"the gripper is not active any more: it reads {words_of(status)}")
-        for axis, (low, high) in self.envelope.items():
+        for axis in self.model.axes:
+            low, high = self.envelope.get(axis, (0, 255))
             if not low <= status.position(axis) <= high:
                 where = f"{axis.name} is at {status.position(axis)}, and may be in {low}..{high} only"
                 raise EndError("envelope", where)

@@ -6,18 +6,17 @@ import asyncio
 from dataclasses import replace
 from typing import Final
 
-from ....values.calibration.closing_time import closing_time
+from ....session.options import units_of
 from ....values.enums import CLOSED, OPEN, Finger, ObjectStatus
 from ....values.request import Request
 from ....values.status import RobotiqStatus
 from ..bench import Bench
 from ..catalogue import EndError, Figure
-from ..motions import ASIDE, standing
+from ..motions import aside, standing
 from ..watch import Watch
 
 SECONDS: Final = 180.0
 SPEEDS: Final = (0, 64, 255)
-FINGERS: Final = (Finger.A, Finger.B, Finger.C)
 STROKE_S: Final = 20.0
 """Twice what the slowest one takes."""
 READ_S: Final = 0.01
@@ -32,28 +31,28 @@ async def full_strokes(bench: Bench) -> None:
     watch = bench.watch(SECONDS)
     start = await watch.look()
     await watch.write(standing(start))
-    await _fingers_to(watch, start, OPEN, 64)
-    await _scissor(bench, watch, start.position(Finger.SCISSOR))
+    await _fingers_to(bench, watch, start, OPEN, 64)
+    if Finger.SCISSOR in bench.model.all_axes:
+        await _scissor(bench, watch, start.position(Finger.SCISSOR))
     times: dict[int, float] = {}
     readings: list[list[int]] = []
     for speed in SPEEDS:
         before = await watch.look()
-        closed, took = await _fingers_to(watch, before, CLOSED, speed)
-        opened, _ = await _fingers_to(watch, closed, OPEN, speed)
+        closed, took = await _fingers_to(bench, watch, before, CLOSED, speed)
+        opened, _ = await _fingers_to(bench, watch, closed, OPEN, speed)
         times[speed] = took
-        readings.append([each.position(finger) for each in (opened, closed) for finger in FINGERS])
+        readings.append([each.position(finger) for each in (opened, closed) for finger in bench.fingers])
     _judge_times(bench, times)
     _judge_readings(bench, readings)
 
 
 async def _fingers_to(
-    watch: Watch, start: RobotiqStatus, goal: int, speed: int
+    bench: Bench, watch: Watch, start: RobotiqStatus, goal: int, speed: int
 ) -> tuple[RobotiqStatus, float]:
     """Where they end, and for how many seconds a finger was seen to move."""
-    scissor = start.position(Finger.SCISSOR)
-    watch.envelope = {Finger.SCISSOR: (scissor - ASIDE, scissor + ASIDE)}
-    image = replace(standing(start, speed=speed), go=True).with_positions(dict.fromkeys(FINGERS, goal))
-    return await _stroke(watch, image, FINGERS)
+    watch.envelope = aside(start, bench.fingers)
+    image = replace(standing(start, speed=speed), go=True).with_positions(dict.fromkeys(bench.fingers, goal))
+    return await _stroke(watch, image, bench.fingers)
 
 
 async def _stroke(watch: Watch, image: Request, axes: tuple[Finger, ...]) -> tuple[RobotiqStatus, float]:
@@ -82,8 +81,7 @@ async def _scissor(bench: Bench, watch: Watch, home: int) -> None:
     readings: list[Figure] = []
     for goal in (0, 255, home):
         start = await watch.look()
-        fingers = {f: (start.position(f) - ASIDE, start.position(f) + ASIDE) for f in FINGERS}
-        watch.envelope = fingers
+        watch.envelope = aside(start, (Finger.SCISSOR,))
         image = replace(standing(start, speed=SCISSOR_SPEED), go=True).with_positions({Finger.SCISSOR: goal})
         status, _ = await _stroke(watch, image, (Finger.SCISSOR,))
         if goal != home:
@@ -99,20 +97,21 @@ async def _scissor(bench: Bench, watch: Watch, home: int) -> None:
 
 def _judge_times(bench: Bench, times: dict[int, float]) -> None:
     figures: dict[str, Figure] = {f"speed_{speed}_s": took for speed, took in times.items()}
-    share = max(abs(took / closing_time(speed) - 1) for speed, took in times.items())
+    usual = units_of(None, None, bench.model).closing_s
+    share = max(abs(took / usual(speed) - 1) for speed, took in times.items())
     words = ", ".join(f"{took:.2f} s at speed {speed}" for speed, took in times.items())
     if share <= SHARE:
         bench.as_assumed("stroke.time", words, **figures)
     else:
-        words += f"; up to {100 * share:.0f} % beside the thesis"
+        words += f"; up to {100 * share:.0f} % beside what is assumed"
         follows = "Run robotiq-async measure speed, and give its table to the hand as calibration."
         bench.differs("stroke.time", words, follows, **figures)
 
 
 def _judge_readings(bench: Bench, readings: list[list[int]]) -> None:
     model = bench.model
-    opened = sorted({each for row in readings for each in row[: len(FINGERS)]})
-    closed = sorted({each for row in readings for each in row[len(FINGERS) :]})
+    opened = sorted({each for row in readings for each in row[: len(bench.fingers)]})
+    closed = sorted({each for row in readings for each in row[len(bench.fingers) :]})
     words = f"open {opened[0]} to {opened[-1]}, closed {closed[0]} to {closed[-1]}"
     figures: dict[str, Figure] = {"open": list(opened), "closed": list(closed)}
     is_usual = opened[0] >= model.stroke.open_reading and opened[-1] <= model.open_reading_max
@@ -120,7 +119,7 @@ def _judge_readings(bench: Bench, readings: list[list[int]]) -> None:
     if is_usual:
         bench.as_assumed("stroke.readings", words, **figures)
     elif closed[0] - opened[-1] < PART_OF_STROKE * model.stroke.counts:
-        bench.untold("stroke.readings", f"{words}: something was in the way, or the scissor was", **figures)
+        bench.untold("stroke.readings", f"{words}: something was in the way", **figures)
     else:
         follows = "Nothing is to be set: a hand goes by gDT and not by readings. Please report."
         bench.differs("stroke.readings", words, follows, **figures)

@@ -73,17 +73,17 @@ async def _client(bench: Bench) -> None:
     away = replace(image, go=True).with_positions(far)
     await watch.write(away)
     if await watch.until(lambda status: not are_near(status, home, MARGIN), 3.0) is None:
-        raise EndError("time", "finger A did not begin to move within 3 s")
+        raise EndError("time", f"{bench.first} did not begin to move within 3 s")
     await bench.link.close()
     await watch.rest(GONE_S)
     await bench.link.open()
     status = await watch.look()
     where = status.position(Finger.A)
     if are_near(status, far, MARGIN):
-        bench.as_assumed("loss.client", f"finger A went on to {where}")
+        bench.as_assumed("loss.client", f"{bench.first} went on to {where}")
     else:
         follows = "It stops by itself when it loses its client; that is safer than assumed."
-        bench.differs("loss.client", f"finger A stands at {where}, asked {far[Finger.A]}", follows)
+        bench.differs("loss.client", f"{bench.first} stopped at {where}, asked {far[Finger.A]}", follows)
     await _wake(bench, watch, image, home)
 
 
@@ -106,7 +106,7 @@ async def _wake(bench: Bench, watch: Watch, image: Request, home: dict[Finger, i
         follows = "The first move after a connection raises MoveIgnoredError: call it again."
         bench.differs("loss.wake", "the first motion was echoed and not followed; the second was", follows)
     if await watch.until(lambda status: are_near(status, home, MARGIN), 6.0) is None:
-        raise EndError("time", "finger A did not come back within 6 s")
+        raise EndError("time", f"{bench.first} did not come back within 6 s")
     await watch.until_still(2.0)
     assert watch.last is not None
     await watch.write(standing(watch.last))

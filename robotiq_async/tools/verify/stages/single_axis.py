@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from ....values.enums import Finger, ObjectStatus
@@ -24,6 +24,7 @@ LAG_S: Final = 0.25
 """So long a hand does not believe an object status that nothing else speaks for."""
 END_COUNTS: Final = 2
 
+QUESTION: Final = "Which finger has moved, there and back?"
 ANSWERS: Final = {
     "a": "the finger that stands alone",
     "p": "one finger of the pair",
@@ -31,6 +32,8 @@ ANSWERS: Final = {
     "s": "the pair came together or spread",
     "n": "none, or more than one of these",
 }
+JAW_QUESTION: Final = "What has moved, there and back?"
+JAW_ANSWERS: Final = {"a": "the jaw", "n": "nothing, or something else"}
 RIGHT: Final = {Finger.A: "a", Finger.B: "p", Finger.C: "o", Finger.SCISSOR: "s"}
 
 
@@ -45,17 +48,19 @@ class _Found:
 async def single_axis(bench: Bench) -> None:
     """Each axis there and back; the person says which finger it was."""
     found = _Found()
+    has_several = len(bench.model.axes) > 1
+    question, answers = (QUESTION, ANSWERS) if has_several else (JAW_QUESTION, JAW_ANSWERS)
     for axis in bench.model.axes:
         await _there_and_back(bench, axis, found)
-        question = "Which finger has moved, there and back?"
-        answer = await bench.person.chooses(question, ANSWERS)
+        answer = await bench.person.chooses(question, answers)
         if answer is None:
-            raise EndError("declined", "the finger was not named")
+            raise EndError("declined", "what moved was not named")
         if answer != RIGHT[axis]:
-            seen = f"the register of {axis.name} moves: {ANSWERS[answer]}"
+            seen = f"the register of {axis.name} moves: {answers[answer]}"
             bench.differs("axis.finger", seen, "Do not use this gripper with names of fingers; report this.")
     bench.as_assumed("axis.finger", "each as named by the person")
-    bench.as_assumed("axis.alone", "the other axes stood still each time")
+    if has_several:
+        bench.as_assumed("axis.alone", "the other axes stood still each time")
     _judge(bench, found)
 
 
@@ -70,7 +75,7 @@ async def _there_and_back(bench: Bench, axis: Finger, found: _Found) -> None:
         for goal in (target, position):
             await _one_way(watch, image, axis, goal, found)
     except EndError as end:
-        if end.why == "envelope":
+        if end.why == "envelope" and len(bench.model.axes) > 1:
             bench.differs("axis.alone", end.words, "Do not use this gripper before that is understood.")
         raise
     await watch.write(standing(await watch.look()))
@@ -80,8 +85,7 @@ async def _there_and_back(bench: Bench, axis: Finger, found: _Found) -> None:
 async def _one_way(watch: Watch, image: Request, axis: Finger, goal: int, found: _Found) -> None:
     start = await watch.look()
     watch.envelope = way(start, {axis: goal})
-    asked = Request(activate=True, go=True, mode=image.mode, axes=image.with_positions({axis: goal}).axes)
-    await watch.write(asked)
+    await watch.write(replace(image, go=True).with_positions({axis: goal}))
     if start.go_echo and start.finger_status(axis) is ObjectStatus.AT_POSITION:
         lag = await _lag(watch, axis, goal)
         found.lags += [] if lag is None else [lag]

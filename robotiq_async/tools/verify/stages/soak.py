@@ -13,7 +13,7 @@ from ....values.request import Request
 from ....values.statistics import percentile
 from ..bench import Bench
 from ..catalogue import EndError, Figure
-from ..motions import ASIDE, MARGIN, are_near, go, standing
+from ..motions import MARGIN, are_near, aside, go, standing
 from ..watch import Watch
 
 RATES: Final = (10, 20, 50, 100)
@@ -81,10 +81,7 @@ async def _command(bench: Bench) -> None:
     home = start.position(Finger.A)
     step = 1 if home < 128 else -1
     reached = [home - MARGIN, home + MARGIN, home + step * (SWING + MARGIN)]
-    watch.envelope = {
-        axis: (start.position(axis) - ASIDE, start.position(axis) + ASIDE)
-        for axis in (Finger.B, Finger.C, Finger.SCISSOR)
-    } | {Finger.A: (min(reached), max(reached))}
+    watch.envelope = aside(start, (Finger.A,)) | {Finger.A: (min(reached), max(reached))}
     envelope = watch.envelope
     achieved: list[Figure] = []
     for rate in RATES:
@@ -97,7 +94,7 @@ async def _command(bench: Bench) -> None:
             bench.differs("soak.commands", found, follows, options, rates=achieved)
             return
     if await go(watch, image, {Finger.A: home}, 5.0) is None:
-        raise EndError("time", "finger A did not come back within 5 s")
+        raise EndError("time", f"{bench.first} did not come back within 5 s")
     watch.envelope = envelope
     bench.as_assumed("soak.commands", "followed to the last one at each rate", rates=achieved)
 

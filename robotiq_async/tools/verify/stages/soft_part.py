@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from ....values.enums import CLOSED, Finger, ObjectStatus
+from ....values.enums import CLOSED, ObjectStatus
 from ....values.status import RobotiqStatus
 from ..bench import Bench
 from ..catalogue import EndError
-from ..motions import ASIDE, MARGIN, are_near, standing
+from ..motions import MARGIN, are_near, aside, standing
 from ..watch import Watch
 
 SECONDS: Final = 60.0
-FINGERS: Final = (Finger.A, Finger.B, Finger.C)
 CLOSE_S: Final = 15.0
 LEFT_S: Final = 5.0
 
@@ -33,12 +32,11 @@ async def soft_part(bench: Bench) -> None:
         raise EndError("declined", "nothing was closed on")
     watch = bench.watch(SECONDS)
     start = await watch.look()
-    home = {finger: start.position(finger) for finger in FINGERS}
-    scissor = start.position(Finger.SCISSOR)
-    watch.envelope = {Finger.SCISSOR: (scissor - ASIDE, scissor + ASIDE)}
-    held = await _close(watch, start)
+    home = {finger: start.position(finger) for finger in bench.fingers}
+    watch.envelope = aside(start, bench.fingers)
+    held = await _close(bench, watch, start)
     _judge_contact(bench, held)
-    await watch.write(replace(standing(held)).with_positions(dict.fromkeys(FINGERS, CLOSED)))
+    await watch.write(replace(standing(held)).with_positions(dict.fromkeys(bench.fingers, CLOSED)))
     left = await watch.pass_by(LEFT_S)
     answer = await person.chooses(STAYS, ANSWERS) if held.contacts else "?"
     if answer is None or not await person.consents(RELEASE):
@@ -52,15 +50,15 @@ async def soft_part(bench: Bench) -> None:
     await watch.until_still(2.0)
 
 
-async def _close(watch: Watch, start: RobotiqStatus) -> RobotiqStatus:
+async def _close(bench: Bench, watch: Watch, start: RobotiqStatus) -> RobotiqStatus:
     """Close, and wait until every finger rests; the status in which all of them have for a while."""
     await watch.write(standing(start))
-    await watch.write(replace(standing(start), go=True).with_positions(dict.fromkeys(FINGERS, CLOSED)))
+    await watch.write(replace(standing(start), go=True).with_positions(dict.fromkeys(bench.fingers, CLOSED)))
     # What gDT shows just after a write may be from before it.
     await watch.pass_by(0.3)
 
     def rest(status: RobotiqStatus) -> bool:
-        return all(status.finger_status(finger) is not ObjectStatus.IN_MOTION for finger in FINGERS)
+        return all(status.finger_status(finger) is not ObjectStatus.IN_MOTION for finger in bench.fingers)
 
     if await watch.until(rest, CLOSE_S) is None:
         raise EndError("time", f"the fingers did not come to rest within {CLOSE_S:g} s")
@@ -68,7 +66,7 @@ async def _close(watch: Watch, start: RobotiqStatus) -> RobotiqStatus:
 
 
 def _judge_contact(bench: Bench, held: RobotiqStatus) -> None:
-    shown = {finger: held.finger_status(finger) for finger in FINGERS}
+    shown = {finger: held.finger_status(finger) for finger in bench.fingers}
     words = ", ".join(f"{finger.name} {what.name}" for finger, what in shown.items())
     if ObjectStatus.CONTACT_OPENING in shown.values():
         follows = (
@@ -79,7 +77,7 @@ def _judge_contact(bench: Bench, held: RobotiqStatus) -> None:
         bench.as_assumed("soft.contact", words)
     else:
         bench.untold("soft.contact", f"no finger has touched anything: {words}")
-    drawn = max(held.current_ma(finger) for finger in FINGERS)
+    drawn = max(held.current_ma(finger) for finger in bench.fingers)
     if not held.contacts:
         bench.untold("soft.current", "nothing was held")
     elif drawn == 0:
@@ -90,7 +88,7 @@ def _judge_contact(bench: Bench, held: RobotiqStatus) -> None:
 
 
 def _judge_halt(bench: Bench, answer: str, held: RobotiqStatus, left: RobotiqStatus) -> None:
-    moved = max(abs(left.position(finger) - held.position(finger)) for finger in FINGERS)
+    moved = max(abs(left.position(finger) - held.position(finger)) for finger in bench.fingers)
     if answer == "y":
         bench.as_assumed("soft.halt", f"held for {LEFT_S:g} s; fingers moved by {moved} counts", counts=moved)
     elif answer == "n":

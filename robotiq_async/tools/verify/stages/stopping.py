@@ -1,4 +1,4 @@
-"""Stage 5: stopping in the middle of slow motions of the three fingers."""
+"""Stage 5: stopping in the middle of slow motions of the fingers, or of the jaw."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ SECONDS: Final = 90.0
 SPEED: Final = 64
 STROKE: Final = 80
 LEG_S: Final = 12.0
-FINGERS: Final = (Finger.A, Finger.B, Finger.C)
 COUNTS: Final = 10
 
 
@@ -27,12 +26,12 @@ async def stopping(bench: Bench) -> None:
     """RGTO = 0, rGTO = 1 again, a new request, and a hold, each half way."""
     watch = bench.watch(SECONDS)
     start = await watch.look()
-    if any(start.position(finger) > 100 for finger in FINGERS):
+    if any(start.position(finger) > 100 for finger in bench.fingers):
         raise EndError("refused", "the fingers are not open; begin with --from 3")
-    home = {finger: start.position(finger) for finger in FINGERS}
+    home = {finger: start.position(finger) for finger in bench.fingers}
     image = standing(start, speed=SPEED)
     await watch.write(image)
-    far = {finger: home[finger] + STROKE for finger in FINGERS}
+    far = {finger: home[finger] + STROKE for finger in bench.fingers}
     watch.envelope = way(start, far)
     away = replace(image, go=True).with_positions(far)
     await _halt(bench, watch, away, home)
@@ -53,8 +52,10 @@ async def _until_past(watch: Watch, is_past: Callable[[RobotiqStatus], bool]) ->
 
 async def _halt(bench: Bench, watch: Watch, away: Request, home: dict[Finger, int]) -> None:
     await watch.write(away)
-    status = await _until_past(watch, lambda s: all(s.position(f) >= home[f] + STROKE // 2 for f in FINGERS))
-    counts, seconds = await _stop(watch, replace(away, go=False), status)
+    status = await _until_past(
+        watch, lambda s: all(s.position(f) >= home[f] + STROKE // 2 for f in bench.fingers)
+    )
+    counts, seconds = await _stop(bench, watch, replace(away, go=False), status)
     words = f"{counts} counts and {1000 * seconds:.0f} ms at speed {SPEED}"
     if counts <= COUNTS:
         bench.as_assumed("stop.halt", words, counts=counts, seconds=seconds)
@@ -63,29 +64,29 @@ async def _halt(bench: Bench, watch: Watch, away: Request, home: dict[Finger, in
         bench.differs("stop.halt", words, follows, counts=counts, seconds=seconds)
 
 
-async def _stop(watch: Watch, image: Request, status: RobotiqStatus) -> tuple[int, float]:
+async def _stop(bench: Bench, watch: Watch, image: Request, status: RobotiqStatus) -> tuple[int, float]:
     """Write an image that stops; counts that a finger still goes, and seconds until the last moves."""
     loop = asyncio.get_running_loop()
-    before = {finger: status.position(finger) for finger in FINGERS}
+    before = {finger: status.position(finger) for finger in bench.fingers}
     began = moved = loop.time()
     await watch.write(image)
     at = before
 
     def stands(now: RobotiqStatus) -> bool:
         nonlocal at, moved
-        positions = {finger: now.position(finger) for finger in FINGERS}
+        positions = {finger: now.position(finger) for finger in bench.fingers}
         if positions != at:
             at, moved = positions, loop.time()
         return loop.time() - moved >= 0.3
 
     await watch.until(stands, 4.0)
-    return max(abs(at[finger] - before[finger]) for finger in FINGERS), moved - began
+    return max(abs(at[finger] - before[finger]) for finger in bench.fingers), moved - began
 
 
 async def _resume(bench: Bench, watch: Watch, away: Request, far: dict[Finger, int]) -> None:
     await watch.write(away)
     if await watch.until(lambda status: are_near(status, far, MARGIN), LEG_S) is None:
-        where = [watch.last.position(finger) for finger in FINGERS] if watch.last else []
+        where = [watch.last.position(finger) for finger in bench.fingers] if watch.last else []
         follows = "Nothing is to be set: a hand writes fresh requests after a stop. Please report."
         bench.differs("stop.resume", f"stands at {where} although rGTO is set again", follows)
     else:
@@ -95,10 +96,10 @@ async def _resume(bench: Bench, watch: Watch, away: Request, far: dict[Finger, i
 
 async def _new_target(bench: Bench, watch: Watch, image: Request, home: dict[Finger, int]) -> None:
     """Towards home; half way back out a little."""
-    near = {finger: home[finger] + 10 for finger in FINGERS}
+    near = {finger: home[finger] + 10 for finger in bench.fingers}
     await watch.write(replace(image, go=True).with_positions(near))
-    await _until_past(watch, lambda s: all(s.position(f) <= home[f] + STROKE - 30 for f in FINGERS))
-    turned = {finger: home[finger] + STROKE - 10 for finger in FINGERS}
+    await _until_past(watch, lambda s: all(s.position(f) <= home[f] + STROKE - 30 for f in bench.fingers))
+    turned = {finger: home[finger] + STROKE - 10 for finger in bench.fingers}
     await watch.write(replace(image, go=True).with_positions(turned))
     if await watch.until(lambda status: are_near(status, turned, MARGIN), LEG_S) is None:
         bench.differs(
@@ -110,11 +111,13 @@ async def _new_target(bench: Bench, watch: Watch, image: Request, home: dict[Fin
 
 
 async def _hold(bench: Bench, watch: Watch, image: Request, home: dict[Finger, int]) -> None:
-    near = {finger: home[finger] + 10 for finger in FINGERS}
+    near = {finger: home[finger] + 10 for finger in bench.fingers}
     await watch.write(replace(image, go=True).with_positions(near))
-    status = await _until_past(watch, lambda s: all(s.position(f) <= home[f] + STROKE - 30 for f in FINGERS))
-    here = {finger: status.position(finger) for finger in FINGERS}
-    counts, seconds = await _stop(watch, replace(image, go=True).with_positions(here), status)
+    status = await _until_past(
+        watch, lambda s: all(s.position(f) <= home[f] + STROKE - 30 for f in bench.fingers)
+    )
+    here = {finger: status.position(finger) for finger in bench.fingers}
+    counts, seconds = await _stop(bench, watch, replace(image, go=True).with_positions(here), status)
     words = f"within {counts} counts, {1000 * seconds:.0f} ms"
     if counts <= COUNTS:
         bench.as_assumed("stop.hold", words, counts=counts, seconds=seconds)
