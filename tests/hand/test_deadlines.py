@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from robotiq_async import (
+    ActivationTimeoutError,
     ConnectFailedError,
     ConnectionLostError,
     Finger,
@@ -20,7 +21,7 @@ from robotiq_async import (
 )
 from robotiq_async.simulator import SimulatorServer, parse_troubles
 from robotiq_async.values.request import Request
-from tests.hand.watching import until_moving
+from tests.grippers import until_moving
 
 ROOT = Path(__file__).parents[2]
 A = Finger.A
@@ -42,6 +43,16 @@ async def test_start_on_a_silent_gripper_ends_within_five_seconds(server: Simula
     with pytest.raises(ConnectFailedError):
         await RobotiqHand(server.address).start()
     assert time.monotonic() - began < 5.0
+
+
+@pytest.mark.virtual_time
+async def test_an_activation_that_takes_too_long_fails_the_start_and_is_taken_back() -> None:
+    async with SimulatorServer() as server:
+        hand = RobotiqHand(server.address, activation_timeout=0.2)
+        with pytest.raises(ActivationTimeoutError):
+            await hand.start()
+        assert not server.gripper.is_moving
+        assert not Request.from_registers(server.gripper.request_registers).activate
 
 
 @pytest.mark.parametrize("what", ["drop on write once", "silence once", "exception on write once", "reset"])
