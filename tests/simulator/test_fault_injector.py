@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-import functools
 import struct
-from collections.abc import AsyncIterator, Callable, Coroutine
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 from typing import Any
@@ -21,7 +20,7 @@ from robotiq_async.values.enums import AXES, Fault, Mode
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
 from tests.simulator.test_server import RawClient, raw_client
-from tests.virtual import run
+from tests.virtual import virtual
 from tests.virtual_line import VirtualLine
 
 READ = bytes.fromhex("04 0000 0001")
@@ -34,18 +33,6 @@ ONLY_ON = dict.fromkeys(
     ),
     "tcp",
 ) | {"wrong-checksum": "rtu"}
-
-Body = Callable[..., Coroutine[Any, Any, None]]
-
-
-def virtual(test: Body) -> Callable[..., None]:
-    """Run a test in a loop whose time is not real."""
-
-    @functools.wraps(test)
-    def in_virtual_time(**arguments: Any) -> None:
-        run(lambda: test(**arguments))
-
-    return in_virtual_time
 
 
 @asynccontextmanager
