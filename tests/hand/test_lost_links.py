@@ -1,4 +1,4 @@
-"""A link that is lost: nothing is sent again, nothing is begun, and nothing is activated unasked."""
+"""A hand without its link; what else a lost link does to it: tests/adversity/test_matrix.py."""
 
 from __future__ import annotations
 
@@ -14,48 +14,8 @@ from robotiq_async import (
     State,
 )
 from robotiq_async.simulator import SimulatorServer
-from robotiq_async.simulator.troubles.corruption import unchanged
-from robotiq_async.values.request import Request
-from tests.contract.bench import at_rest
-from tests.grippers import until_moving
 
 A = Finger.A
-
-
-async def test_a_command_that_was_not_acknowledged_is_never_sent_again(
-    hand: RobotiqHand, server: SimulatorServer
-) -> None:
-    server.policy = lambda _: []
-    with pytest.raises(ConnectionLostError):
-        await hand.set_position(200, A)
-    sent = [
-        write for write in server.gripper.writes if Request.from_registers(write.registers).position(A) == 200
-    ]
-    assert len(sent) <= 1
-    server.policy = unchanged
-    await hand.wait_for_state(State.RUNNING_IDLE)
-    writes = len(server.gripper.writes)
-    await at_rest(hand)
-    assert len(server.gripper.writes) == writes
-
-
-async def test_a_cut_link_ends_a_move_and_comes_back_without_a_write(
-    hand: RobotiqHand, server: SimulatorServer
-) -> None:
-    moving = asyncio.create_task(hand.move(255, speed=0))
-    await until_moving(server, hand)
-    writes = len(server.gripper.writes)
-    transitions = hand.transitions()
-    server.cut()
-    with pytest.raises(ConnectionLostError):
-        await moving
-    lost = await anext(transitions)
-    back = await anext(transitions)
-    assert (lost.target, back.target) == (State.DISCONNECTED, State.RUNNING_IDLE)
-    assert back.timestamp - lost.timestamp < 0.2
-    assert len(server.gripper.writes) == writes
-    assert hand.statistics.reconnects == 1
-    assert hand.statistics.foreign_commands == 0
 
 
 async def test_nothing_can_be_asked_for_while_it_connects(server: SimulatorServer) -> None:
