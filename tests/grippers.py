@@ -1,4 +1,4 @@
-"""Simulated grippers as a client before has left them: active and open."""
+"""Simulated grippers: active and open, as a client before has left them; and one that never rests."""
 
 from __future__ import annotations
 
@@ -6,7 +6,11 @@ import asyncio
 import time
 from typing import Any, Final
 
-from robotiq_async.simulator import SimulatedGripper
+from robotiq_async import RobotiqHand
+from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
+from robotiq_async.values import registers as reg
+from robotiq_async.values.enums import ObjectStatus
+from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import AxisRequest, Request
 
 _OPEN: Final = (AxisRequest(0, 255, 64),) * 3 + (AxisRequest(128, 255, 64),)
@@ -34,3 +38,18 @@ async def activate_beforehand(gripper: SimulatedGripper) -> None:
     for go in (False, True):
         gripper.write(0, Request(activate=True, go=go, axes=axes, model=gripper.model).registers)
         await asyncio.sleep(_ACTIVATION_S)
+
+
+async def until_moving(server: SimulatorServer | SerialSimulatorServer, hand: RobotiqHand) -> None:
+    async for _ in hand.statuses():
+        if server.gripper.is_moving:
+            return
+
+
+class Restless(SimulatedGripper):
+    """Its scissor is always in motion, if it is to be believed."""
+
+    def status_registers(self) -> Registers:
+        block = list(super().status_registers())
+        reg.gDT[3].write(block, ObjectStatus.IN_MOTION)
+        return tuple(block)

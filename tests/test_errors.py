@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import pickle
-
-import pytest
-
 from robotiq_async.values import errors
 from robotiq_async.values.enums import Fault, State
-from tests.register_words import status_of
 
 TREE: dict[str, tuple[str, ...]] = {
     "RobotiqError": ("Exception",),
@@ -83,11 +78,6 @@ def test_a_fault_error_takes_a_message_of_its_own() -> None:
     assert str(errors.GripperFaultError(Fault.ACTIVATION_FAULT, "as told")) == "as told"
 
 
-def test_a_timed_out_move_tells_the_last_status() -> None:
-    status = status_of(0x39, 0xC0)
-    assert errors.MoveTimeoutError("too slow", status).status is status
-
-
 def test_a_failed_connection_tells_address_and_reason() -> None:
     error = errors.ConnectFailedError("tcp://192.168.1.11:502", "refused")
     assert error.address == "tcp://192.168.1.11:502"
@@ -108,29 +98,3 @@ def test_time_outs_and_lost_links_are_caught_by_the_names_python_has_for_them() 
         "ProtocolError",
         "AgentError",
     }
-
-
-@pytest.mark.parametrize(
-    "name", ["NotStartedError", "NotActivatedError", "ConnectionLostError", "ProtocolError"]
-)
-def test_a_plain_error_survives_pickling(name: str) -> None:
-    error = pickle.loads(pickle.dumps(classes()[name]("why")))
-    assert type(error) is classes()[name]
-    assert str(error) == "why"
-
-
-@pytest.mark.parametrize(
-    "error",
-    [
-        errors.InvalidStateError("not now", State.RESET, [State.FAULT]),
-        errors.GripperFaultError(Fault.SCISSOR_BLOCKED),
-        errors.MoveTimeoutError("too slow", status_of(0x39, 0xC0)),
-        errors.ConnectFailedError("tcp://192.168.1.11:502", "refused"),
-    ],
-    ids=lambda error: type(error).__name__,
-)
-def test_an_error_with_attributes_survives_pickling(error: errors.RobotiqError) -> None:
-    again = pickle.loads(pickle.dumps(error))
-    assert type(again) is type(error)
-    assert str(again) == str(error)
-    assert vars(again) == vars(error)

@@ -179,16 +179,12 @@ def copies(value: Any) -> Iterator[Any]:
 
 
 @pytest.mark.parametrize("value", named(VALUES))
-def test_a_value_is_equal_to_its_copies_and_hashes_like_them(value: object) -> None:
+def test_a_value_is_equal_to_its_copies_hashes_like_them_and_is_told_in_one_line(value: object) -> None:
     for again in copies(value):
         assert type(again) is type(value)
         assert again == value
         assert hash(again) == hash(value)
         assert repr(again) == repr(value)
-
-
-@pytest.mark.parametrize("value", named(VALUES))
-def test_a_value_is_told_in_one_line(value: object) -> None:
     assert "\n" not in repr(value)
     assert " object at 0x" not in repr(value)
 

@@ -21,12 +21,16 @@ from asyncio.subprocess import DEVNULL, PIPE, Process
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import pytest
+from mcap.writer import Writer
 
+from robotiq_async import Finger, RobotiqHand, State
 from robotiq_async.cli import main
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.tools.recording.recorder import Recorder
 from tests.cli.terminal import ROOT, Terminal
 from tests.virtual import VirtualLoop
 
@@ -298,3 +302,42 @@ def no_terminal_is_left() -> Iterator[None]:
             os.kill(process, signal.SIGKILL)
             os.waitpid(process, 0)
     Terminal.running.clear()
+
+
+# -- recordings -------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+async def grasp(tmp_path: Path) -> Path:
+    """A recording of a grasp with a fault."""
+    gripper, file = SimulatedGripper(speedup=20), tmp_path / "grasp.mcap"
+    gripper.place_object(Finger.ABC, 150)
+    async with (
+        SimulatorServer(gripper) as server,
+        RobotiqHand(server.address) as hand,
+        Recorder(hand, file),
+    ):
+        await hand.close(speed=200)
+        gripper.inject_fault(9)
+        await hand.wait_for_state(State.FAULT)
+        gripper.clear_faults()
+        await hand.wait_for_state(State.RUNNING_IDLE)
+    return file
+
+
+@pytest.fixture
+def foreign(tmp_path: Path) -> Callable[..., Path]:
+    """Makes a recording that no recorder has written."""
+
+    def write(*messages: bytes, topic: str = "/gripper/event", channel: int = 1) -> Path:
+        file = tmp_path / "foreign.mcap"
+        with file.open("wb") as stream:
+            writer = Writer(stream)
+            writer.start()
+            writer.register_channel(topic, "json", 0)
+            for data in messages:
+                writer.add_message(channel, 10**18, data, 10**18)
+            writer.finish()  # type: ignore[no-untyped-call]
+        return file
+
+    return write

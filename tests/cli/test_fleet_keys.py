@@ -82,11 +82,6 @@ def test_it_overwrites_nothing_and_makes_nothing_then(
     assert not (tmp_path / "read-alice").exists()
 
 
-def test_its_help_gives_examples(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["fleet", "keys", "--help"]) == 0
-    assert "robotiq-async fleet keys" in capsys.readouterr().out.partition("For example:")[2]
-
-
 def test_without_the_extra_one_line_names_it(
     call: Call, without: Callable[[str], None], tmp_path: Path
 ) -> None:

@@ -207,14 +207,6 @@ def test_a_bad_table_is_refused(
     assert table.read_text(encoding="utf-8") == text
 
 
-@pytest.mark.parametrize("what", ["speed", "force"])
-def test_help(what: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["measure", what, "--help"]) == 0
-    out = capsys.readouterr().out
-    assert "FINGERS MOVE" in " ".join(out.split())
-    assert f"robotiq-async measure {what}" in out.partition("For example:")[2]
-
-
 QUICK = ("--runs", "1", "--no-plot")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import json
 import os
 import re
@@ -21,32 +22,13 @@ from mcap.records import Chunk, Header
 from mcap.writer import Writer
 from rosbags.highlevel import AnyReader
 
-from robotiq_async import Finger, RobotiqHand, State
+from robotiq_async import RobotiqHand, State
 from robotiq_async.cli import main
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.tools.recording.recorder import Recorder
 from robotiq_async.tools.recording.recordings import read_recording
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Call, Shell
-
-
-@pytest.fixture
-async def grasp(tmp_path: Path) -> Path:
-    """A recording of a grasp with a fault."""
-    gripper, file = SimulatedGripper(speedup=20), tmp_path / "grasp.mcap"
-    gripper.place_object(Finger.ABC, 150)
-    async with (
-        SimulatorServer(gripper) as server,
-        RobotiqHand(server.address) as hand,
-        Recorder(hand, file),
-    ):
-        await hand.close(speed=200)
-        gripper.inject_fault(9)
-        await hand.wait_for_state(State.FAULT)
-        gripper.clear_faults()
-        await hand.wait_for_state(State.RUNNING_IDLE)
-    return file
 
 
 async def test_ctrl_c_ends_a_recording_that_is_whole_and_touches_nothing(
@@ -157,9 +139,9 @@ def test_replay_draws_it_too(grasp: Path, capsys: pytest.CaptureFixture[str]) ->
     assert grasp.with_suffix(".svg").exists()
 
 
-@pytest.mark.parametrize("command", ["replay", "recover", "plot"])
-@pytest.mark.parametrize("content", [None, b"", b"no recording"])
-def test_what_is_no_recording_is_one_line(
+@pytest.mark.parametrize("command", ["replay", "recover", "plot", "export"])
+@pytest.mark.parametrize("content", [None, b"", b"hello", b"no recording"])
+def test_what_is_no_recording_is_one_line_and_nothing_is_written(
     command: str, content: bytes | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "it.mcap"
@@ -168,7 +150,8 @@ def test_what_is_no_recording_is_one_line(
     assert main([command, str(file)]) == 1
     err = capsys.readouterr().err
     assert err.count("\n") == 1
-    assert "not an MCAP file" in err or "No such file" in err
+    assert ("No such file" if content is None else "not an MCAP file") in err
+    assert [*tmp_path.iterdir()] == [file] * (content is not None)
 
 
 @pytest.mark.parametrize(
@@ -225,16 +208,6 @@ async def test_a_disk_that_is_full_is_one_line(shell: Shell, server: SimulatorSe
     assert "0 lost" not in outcome.out
 
 
-@pytest.mark.parametrize("command", ["replay", "recover", "plot"])
-def test_a_very_short_file_is_no_recording(
-    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = tmp_path / "it.mcap"
-    file.write_bytes(b"hello")
-    assert main([command, str(file)]) == 1
-    assert "not an MCAP file" in capsys.readouterr().err
-
-
 def test_a_picture_that_cannot_be_written(grasp: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plot", str(grasp), str(grasp.parent / "nowhere" / "it")]) == 1
     assert "No such file or directory" in capsys.readouterr().err
@@ -270,44 +243,27 @@ OTHER_NAMES = {
 """As they were recorded before, each with what it lacks first."""
 
 
-@pytest.fixture
-def foreign(tmp_path: Path) -> Callable[..., Path]:
-    """Makes a recording that no recorder has written."""
-
-    def write(*messages: bytes, topic: str = "/gripper/event", channel: int = 1) -> Path:
-        file = tmp_path / "foreign.mcap"
-        with file.open("wb") as stream:
-            writer = Writer(stream)
-            writer.start()
-            writer.register_channel(topic, "json", 0)
-            for data in messages:
-                writer.add_message(channel, 10**18, data, 10**18)
-            writer.finish()  # type: ignore[no-untyped-call]
-        return file
-
-    return write
+SHOWS = {
+    "replay": ("/gripper/event", "/gripper/status", "/gripper/command"),
+    "plot": ("/gripper/event", "/gripper/status"),
+    "export": ("/gripper/status",),
+}
+"""What each command looks at."""
 
 
-@pytest.mark.parametrize("what", HOSTILE)
-@pytest.mark.parametrize("topic", ["/gripper/event", "/gripper/status", "/gripper/command"])
-def test_replay_refuses_what_is_not_ours_in_one_line(
-    foreign: Callable[..., Path], what: str, topic: str, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("command", SHOWS)
+def test_what_is_not_ours_is_refused_in_one_line_and_nothing_is_written(
+    foreign: Callable[..., Path], command: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["replay", str(foreign(HOSTILE[what], topic=topic))]) == 1
-    err = capsys.readouterr().err
-    assert err.count("\n") == 1
-    assert f"foreign.mcap: a message on '{topic}' is no" in err
-
-
-@pytest.mark.parametrize("what", [name for name in HOSTILE if "code" not in name])
-@pytest.mark.parametrize("topic", ["/gripper/event", "/gripper/status"])
-def test_plot_refuses_what_is_not_ours_in_one_line(
-    foreign: Callable[..., Path], what: str, topic: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["plot", str(foreign(HOSTILE[what], topic=topic))]) == 1
-    err = capsys.readouterr().err
-    assert err.count("\n") == 1
-    assert f"foreign.mcap: a message on '{topic}' is no" in err
+    for topic, (what, data) in itertools.product(SHOWS[command], HOSTILE.items()):
+        if command != "replay" and "code" in what:
+            continue
+        file = foreign(data, topic=topic)
+        assert main([command, str(file)]) == 1
+        err = capsys.readouterr().err
+        assert err.count("\n") == 1
+        assert f"foreign.mcap: a message on '{topic}' is no" in err, what
+        assert [*file.parent.iterdir()] == [file]
 
 
 @pytest.mark.parametrize("topic", OTHER_NAMES)
@@ -359,8 +315,11 @@ def test_an_error_does_not_steer_the_terminal_either(
     assert r"\x1b[2J" in err
 
 
-def test_nothing_to_show_is_said(foreign: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["replay", str(foreign(b"{}", topic="/odometry"))]) == 1
+@pytest.mark.parametrize("options", [[], ["--brief"]])
+def test_nothing_to_show_is_said(
+    foreign: Callable[..., Path], options: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["replay", *options, str(foreign(b"{}", topic="/odometry"))]) == 1
     assert "foreign.mcap: it contains nothing that this command shows" in capsys.readouterr().err
 
 

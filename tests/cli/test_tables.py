@@ -11,34 +11,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from mcap.writer import Writer
 
-from robotiq_async import Finger, RobotiqHand, State
+from robotiq_async import RobotiqHand
 from robotiq_async.cli import main
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.simulator import SimulatorServer
 from robotiq_async.tools.recording.recorder import Recorder
 from robotiq_async.tools.recording.recordings import read_recording
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Call
-
-
-@pytest.fixture
-async def grasp(tmp_path: Path) -> Path:
-    """A recording of a grasp with a fault."""
-    gripper, file = SimulatedGripper(speedup=20), tmp_path / "grasp.mcap"
-    gripper.place_object(Finger.ABC, 150)
-    async with (
-        SimulatorServer(gripper) as server,
-        RobotiqHand(server.address) as hand,
-        Recorder(hand, file),
-    ):
-        await hand.close(speed=200)
-        gripper.inject_fault(9)
-        await hand.wait_for_state(State.FAULT)
-        gripper.clear_faults()
-        await hand.wait_for_state(State.RUNNING_IDLE)
-    return file
 
 
 def rows_of(file: Path) -> list[dict[str, str]]:
@@ -114,53 +95,18 @@ def test_wrong_usage(arguments: list[str], words: str, capsys: pytest.CaptureFix
     assert words in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("content", [None, b"", b"no recording"])
-def test_what_is_no_recording_makes_no_table(
-    content: bytes | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = tmp_path / "it.mcap"
-    if content is not None:
-        file.write_bytes(content)
-    assert main(["export", str(file)]) == 1
-    assert capsys.readouterr().err.count("\n") == 1
-    assert not file.with_suffix(".csv").exists()
-
-
-def write_foreign(file: Path, topic: str, *messages: bytes) -> None:
-    with file.open("wb") as stream:
-        writer = Writer(stream)
-        writer.start()
-        writer.register_channel(topic, "json", 0)
-        for data in messages:
-            writer.add_message(1, 10**18, data, 10**18)
-        writer.finish()  # type: ignore[no-untyped-call]
-
-
-@pytest.mark.parametrize("message", [b"{}", b"[]", b'{"A": 3}', b'{"\xff": 1}', b"[" * 100_000])
-def test_a_message_that_is_not_ours_makes_no_table(
-    message: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = tmp_path / "foreign.mcap"
-    write_foreign(file, "/gripper/status", message)
-    assert main(["export", str(file)]) == 1
-    err = capsys.readouterr().err
-    assert err.count("\n") == 1
-    assert "foreign.mcap: a message on '/gripper/status' is no" in err
-    assert [each.name for each in tmp_path.iterdir()] == ["foreign.mcap"]
-
-
-def test_words_of_others_are_no_formulas(tmp_path: Path) -> None:
-    file = tmp_path / "foreign.mcap"
+def test_words_of_others_are_no_formulas(foreign: Callable[..., Path]) -> None:
     words = '=HYPERLINK("http://192.0.2.1")\n,"'
-    write_foreign(file, "/gripper/event", json.dumps({"kind": "state", "target": words}).encode())
+    file = foreign(json.dumps({"kind": "state", "target": words}).encode())
     assert main(["export", str(file), "--of", "events"]) == 0
-    [row] = rows_of(tmp_path / "foreign.csv")
+    [row] = rows_of(file.with_suffix(".csv"))
     assert row["target"] == f"'{words}"
 
 
-def test_a_recording_without_statuses_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = tmp_path / "foreign.mcap"
-    write_foreign(file, "/gripper/event", b'{"kind": "state", "target": "RESET"}')
+def test_a_recording_without_statuses_says_so(
+    foreign: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = foreign(b'{"kind": "state", "target": "RESET"}')
     assert main(["export", str(file)]) == 1
     assert "it contains no statuses" in capsys.readouterr().err
     assert not file.with_suffix(".csv").exists()
@@ -247,13 +193,6 @@ def test_in_brief_there_are_states_faults_and_contacts(
     assert any("fault    0x09" in line for line in lines)
     polls, commands = (len(recorded(grasp, f"/gripper/{each}")) for each in ("status", "command"))
     assert lines[-1].startswith(f"{polls} polls and {commands} commands in ")
-
-
-def test_in_brief_nothing_to_show_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = tmp_path / "foreign.mcap"
-    write_foreign(file, "/odometry", b"{}")
-    assert main(["replay", "--brief", str(file)]) == 1
-    assert "it contains nothing that this command shows" in capsys.readouterr().err
 
 
 # -- what is there already ---------------------------------------------------------------------------------

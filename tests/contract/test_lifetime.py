@@ -81,6 +81,18 @@ async def test_one_in_fault_is_left_there(where: str) -> None:
 
 
 @contract
+async def test_one_that_is_released_is_left_so(where: str) -> None:
+    async with bench(where) as here:
+        async with here.make() as hand:
+            here.gripper.emergency_release()
+            await hand.wait_for_state(State.ATR_DONE)
+        async with here.make() as hand:
+            assert hand.state is State.ATR_DONE
+            await hand.recover()
+            assert hand.state is State.RUNNING_IDLE
+
+
+@contract
 async def test_an_activation_under_way_is_waited_for(where: str) -> None:
     async with bench(where, active=False) as here:
         first = here.make()
@@ -106,7 +118,9 @@ async def test_an_activation_that_ends_in_a_fault_fails_the_start(where: str) ->
         assert caught.value.fault is Fault.ACTIVATION_FAULT
         assert hand.state is State.SHUTDOWN
         await hand.start()
-        assert hand.state is State.FAULT
+        assert hand.state is State.FAULT, "one that is there already is not start()'s business"
+        await hand.recover()
+        assert hand.state is State.RUNNING_IDLE
         await hand.stop()
 
 
@@ -141,6 +155,7 @@ async def test_it_may_be_started_again(where: str) -> None:
             await hand.stop()
             assert hand.state is State.SHUTDOWN
             assert hand.status.sequence >= newest, "the last status stays"
+        assert hand.statistics.foreign_commands == 0
 
 
 @contract
@@ -343,6 +358,7 @@ async def test_what_it_was_told_while_it_did_not_run(where: str) -> None:
                 lambda: hand.set_position(3),
                 lambda: hand.set_speed(3),
                 lambda: hand.set_force(3),
+                lambda: hand.hold(),
                 lambda: hand.halt(),
                 lambda: hand.reset(),
                 lambda: hand.atr(),

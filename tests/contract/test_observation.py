@@ -86,6 +86,7 @@ async def test_while_the_link_is_down(where: str) -> None:
         for call in (
             lambda: hand.move(3),
             lambda: hand.set_speed(3),
+            lambda: hand.hold(),
             lambda: hand.halt(),
             lambda: hand.reset(),
             lambda: hand.activate(),

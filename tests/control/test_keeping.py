@@ -11,7 +11,7 @@ from robotiq_async import Fault, Finger, NotStartedError, RobotiqStatus
 from robotiq_async.control.grip_keeper import KEEP_S, REST_S
 from tests.control.other_client import image
 from tests.control.scan import POLL_S, Scan, started
-from tests.restless import Restless
+from tests.grippers import Restless
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 CYCLES = pytest.mark.parametrize("device_cycle", [0.0, 0.005, 0.03, 0.2])

@@ -28,8 +28,7 @@ from tests.control.walks import Recorded, path_to
 from tests.register_words import status_of
 
 SEEN = [trigger for trigger in Trigger if trigger.is_seen]
-STOPPABLE = [state for state in State if state not in (State.DO_SHUTDOWN, State.SHUTDOWN)]
-CONNECTED = [state for state in STOPPABLE if state is not State.DISCONNECTED]
+CONNECTED = [*set(State) - {State.DISCONNECTED, State.DO_SHUTDOWN, State.SHUTDOWN}]
 ABOUT_TO_SEND = [state for state in State if state.name.startswith("DO_")]
 PAIRS = list(itertools.product(State, Trigger))
 
@@ -45,24 +44,20 @@ def test_every_trigger_leads_somewhere() -> None:
     assert leading == set(Trigger)
 
 
-@pytest.mark.parametrize("state", State)
-def test_every_state_can_be_reached(state: State) -> None:
-    assert path_to(state) is not None
+def test_every_state_can_be_reached_and_shut_down() -> None:
+    for state in State:
+        assert path_to(state) is not None, state
+        assert path_to(State.SHUTDOWN, state) is not None, state
 
 
-@pytest.mark.parametrize("state", State)
-def test_from_every_state_the_hand_can_be_shut_down(state: State) -> None:
-    assert path_to(State.SHUTDOWN, state) is not None
+def test_every_state_but_the_last_two_can_be_stopped() -> None:
+    assert {TABLE[state][Trigger.ASK_STOP] for state in (State.DISCONNECTED, *CONNECTED)} == {
+        State.DO_SHUTDOWN
+    }
 
 
-@pytest.mark.parametrize("state", STOPPABLE)
-def test_every_state_but_the_last_two_can_be_stopped(state: State) -> None:
-    assert TABLE[state][Trigger.ASK_STOP] is State.DO_SHUTDOWN
-
-
-@pytest.mark.parametrize("state", CONNECTED)
-def test_a_connected_hand_that_loses_its_link_is_disconnected(state: State) -> None:
-    assert TABLE[state][Trigger.LINK_LOST] is State.DISCONNECTED
+def test_a_connected_hand_that_loses_its_link_is_disconnected() -> None:
+    assert {TABLE[state][Trigger.LINK_LOST] for state in CONNECTED} == {State.DISCONNECTED}
 
 
 def test_the_states_that_take_a_command_a_release_a_start_are_those_of_the_contract() -> None:
@@ -89,9 +84,9 @@ def test_an_emergency_is_heard_in_every_state_of_a_hand_that_has_its_link() -> N
     assert TABLE[State.DO_RESET][Trigger.ASK_RESET] is Verdict.IGNORED
 
 
-@pytest.mark.parametrize("state", [*ABOUT_TO_SEND, State.SHUTDOWN])
-def test_what_is_seen_before_a_request_was_acknowledged_changes_nothing(state: State) -> None:
-    assert {TABLE[state][trigger] for trigger in SEEN} == {Verdict.IGNORED}
+def test_what_is_seen_before_a_request_was_acknowledged_changes_nothing() -> None:
+    for state in (*ABOUT_TO_SEND, State.SHUTDOWN):
+        assert {TABLE[state][trigger] for trigger in SEEN} == {Verdict.IGNORED}, state
 
 
 def test_nothing_that_is_seen_leads_to_a_state_that_sends_something() -> None:
@@ -113,22 +108,17 @@ def test_what_the_gripper_does_is_never_refused() -> None:
 # -- every pair of a state and a trigger -------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("state", "trigger"), PAIRS)
-def test_a_pair_leads_on_is_ignored_or_is_refused(state: State, trigger: Trigger) -> None:
-    recorded = Recorded(state)
-    target = TABLE[state][trigger]
-    if isinstance(target, State):
-        assert recorded.machine.fire(trigger) is True
-        assert recorded.machine.state is target
-        assert recorded.changes == ([(state, target, trigger)] if target is not state else [])
-        return
-    if target is Verdict.IGNORED:
-        assert recorded.machine.fire(trigger) is False
-    else:
-        with pytest.raises(RobotiqError):
-            recorded.machine.fire(trigger)
-    assert recorded.machine.state is state
-    assert not recorded.changes
+def test_a_pair_leads_on_is_ignored_or_is_refused() -> None:
+    for state, trigger in PAIRS:
+        recorded, target = Recorded(state), TABLE[state][trigger]
+        if target is Verdict.IGNORED or isinstance(target, State):
+            assert recorded.machine.fire(trigger) is (target is not Verdict.IGNORED), (state, trigger)
+        else:
+            with pytest.raises(RobotiqError):
+                recorded.machine.fire(trigger)
+        to = target if isinstance(target, State) else state
+        assert recorded.machine.state is to, (state, trigger)
+        assert recorded.changes == ([(state, to, trigger)] if to is not state else []), (state, trigger)
 
 
 # -- every refusal -----------------------------------------------------------------------------------------
@@ -187,34 +177,34 @@ def test_the_contract_has_every_state_and_everything_that_can_be_asked() -> None
     assert set(ASKED) == {trigger for trigger in Trigger if trigger.name.startswith("ASK_")}
 
 
-@pytest.mark.parametrize(("state", "trigger"), ANSWERS)
-def test_what_is_asked_goes_is_nothing_to_do_or_is_refused_with_the_error_that_says_why(
-    state: State, trigger: Trigger
-) -> None:
-    recorded, answer = Recorded(state), ANSWERS[state, trigger]
-    machine, status = recorded.machine, status_of(0x31, fault=0x0E)
-    if answer in ERRORS:
-        with pytest.raises(RobotiqError) as caught:
-            machine.fire(trigger, status)
-        assert type(caught.value) is ERRORS[answer]
-        if isinstance(caught.value, GripperFaultError):
-            assert caught.value.fault is status.fault
-        if isinstance(caught.value, InvalidStateError):
-            assert caught.value.state is state
-            would_do = {each for each in State if ANSWERS[each, trigger] not in ERRORS}
-            assert caught.value.allowed == would_do
-    else:
-        assert machine.fire(trigger, status) is (answer == "goes")
-    if answer != "goes":
-        assert machine.state is state
-        assert not recorded.changes
+@pytest.mark.parametrize("state", State)
+def test_what_is_asked_goes_is_nothing_to_do_or_is_refused_with_the_error_that_says_why(state: State) -> None:
+    status = status_of(0x31, fault=0x0E)
+    for trigger in ASKED:
+        recorded, answer = Recorded(state), ANSWERS[state, trigger]
+        machine = recorded.machine
+        if answer in ERRORS:
+            with pytest.raises(RobotiqError) as caught:
+                machine.fire(trigger, status)
+            assert type(caught.value) is ERRORS[answer], trigger
+            if isinstance(caught.value, GripperFaultError):
+                assert caught.value.fault is status.fault
+            if isinstance(caught.value, InvalidStateError):
+                assert caught.value.state is state
+                would_do = {each for each in State if ANSWERS[each, trigger] not in ERRORS}
+                assert caught.value.allowed == would_do, trigger
+        else:
+            assert machine.fire(trigger, status) is (answer == "goes"), trigger
+        if answer != "goes":
+            assert machine.state is state
+            assert not recorded.changes
 
 
-@pytest.mark.parametrize(("state", "trigger"), PAIRS)
-def test_a_verdict_is_named_after_the_error_it_means(state: State, trigger: Trigger) -> None:
-    verdict = TABLE[state][trigger]
-    if isinstance(verdict, Verdict) and verdict is not Verdict.IGNORED:
-        assert type(refusal(trigger, state)).__name__ == verdict.value
+def test_a_verdict_is_named_after_the_error_it_means() -> None:
+    for state, trigger in PAIRS:
+        verdict = TABLE[state][trigger]
+        if isinstance(verdict, Verdict) and verdict is not Verdict.IGNORED:
+            assert type(refusal(trigger, state)).__name__ == verdict.value, (state, trigger)
 
 
 def test_a_fault_that_nobody_has_seen_is_refused_all_the_same() -> None:
@@ -223,12 +213,10 @@ def test_a_fault_that_nobody_has_seen_is_refused_all_the_same() -> None:
     assert error.fault is Fault.NONE
 
 
-@pytest.mark.parametrize("trigger", Trigger)
-def test_a_refusal_names_what_was_asked_the_state_and_the_states_that_would_do(trigger: Trigger) -> None:
-    if TABLE[State.WF_ATR][trigger] is not Verdict.NOT_NOW:
-        return
-    message = str(refusal(trigger, State.WF_ATR))
-    assert trigger.value in message
-    assert "WF_ATR" in message
-    for state in states_allowing(trigger):
-        assert state.name in message
+def test_a_refusal_names_what_was_asked_the_state_and_the_states_that_would_do() -> None:
+    for trigger in Trigger:
+        if TABLE[State.WF_ATR][trigger] is Verdict.NOT_NOW:
+            message = str(refusal(trigger, State.WF_ATR))
+            assert trigger.value in message
+            assert "WF_ATR" in message
+            assert [state for state in states_allowing(trigger) if state.name not in message] == []

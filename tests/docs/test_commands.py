@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import shlex
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -16,14 +17,7 @@ import pytest
 from robotiq_async.cli.app import build
 from tests.docs.pages import PAGES, ROOT, blocks
 
-LINES = [
-    pytest.param(line.strip(), id=f"{page.name}:{block.line + number}")
-    for page in [*PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
-    for block in blocks(page.read_text(encoding="utf-8"))
-    if block.language == "sh"
-    for number, line in enumerate(block.text.replace("\\\n", " ").splitlines())
-    if line.strip() and not line.startswith("#")
-]
+READ = [*PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
 OTHERS = {"cp", "curl", "export", "python3", "ros2", "source", "sudo"}
 """Programs that are not ours: ``python3 -m venv``, and what ROS and the shell have."""
 TARGETS = set(re.findall(r"^([a-z0-9-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
@@ -41,8 +35,26 @@ def words_of(line: str) -> list[str]:
     return words[: min(ends, default=len(words))]
 
 
-@pytest.mark.parametrize("line", LINES)
-def test_it_can_be_typed(line: str) -> None:
+def lines(page: Path) -> Iterator[tuple[int, str]]:
+    """What a page has typed, with the numbers of its lines."""
+    for block in blocks(page.read_text(encoding="utf-8")):
+        if block.language == "sh":
+            for number, line in enumerate(block.text.replace("\\\n", " ").splitlines(), block.line):
+                if line.strip() and not line.startswith("#"):
+                    yield number, line.strip()
+
+
+@pytest.mark.parametrize("page", READ, ids=lambda page: str(page.relative_to(ROOT)))
+def test_it_can_be_typed(page: Path) -> None:
+    for number, line in lines(page):
+        try:
+            check(line)
+        except Exception as error:
+            error.add_note(f"line {number}: {line}")
+            raise
+
+
+def check(line: str) -> None:
     words = words_of(line)
     program = Path(words[0]).name
     if program == "robotiq-async":
@@ -77,6 +89,6 @@ def has(module: str) -> bool:
 
 def test_a_command_that_is_not_there_is_found() -> None:
     with pytest.raises(Exception, match="turbo"):
-        test_it_can_be_typed("robotiq-async move 255 --turbo")
+        check("robotiq-async move 255 --turbo")
     with pytest.raises(AssertionError):
-        test_it_can_be_typed("make coffee")
+        check("make coffee")

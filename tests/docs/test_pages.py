@@ -1,4 +1,4 @@
-"""Links lead somewhere, code runs, quoted messages are the library's, and what is generated is fresh."""
+"""Code runs, quoted messages are the library's, and what is generated is fresh. Links: ``make docs``."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from robotiq_async import Finger, RobotiqHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.docs import prompt
 from tests.docs.agents import ROOM, agent_of_the_pages
-from tests.docs.pages import DOCS, PAGES, ROOT, Block, blocks, outputs, prose, requirements
+from tests.docs.pages import DOCS, PAGES, ROOT, Block, blocks, outputs, requirements
 from tests.docs.test_tutorial import agree
 
 FRONT = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")]
@@ -46,50 +46,18 @@ def awaits_at_the_top(block: Block) -> bool:
     return bool(prompt.compiled(block.text, "page").co_flags & inspect.CO_COROUTINE)
 
 
-@pytest.mark.parametrize("page", [*PAGES, *FRONT], ids=name)
-def test_a_page_says_where_code_runs_that_awaits_at_the_top(page: Path) -> None:
-    found = blocks(read(page))
-    if any(map(awaits_at_the_top, found)):
-        said = read(page)[: read(page).index(next(filter(awaits_at_the_top, found)).text)]
-        assert "python -m asyncio" in said, f"{name(page)} has top-level await and does not say where it runs"
+def test_a_page_says_where_code_runs_that_awaits_at_the_top() -> None:
+    for page in [*PAGES, *FRONT]:
+        found = [block.text for block in blocks(read(page)) if awaits_at_the_top(block)]
+        said = read(page).partition(found[0])[0] if found else ""
+        assert not found or "python -m asyncio" in said, page
 
 
-# -- links ---------------------------------------------------------------------------------------------
-
-
-def links(page: Path) -> list[str]:
-    """The relative links of a page."""
-    targets = re.findall(r"\]\(([^)\s]+)\)", prose(read(page)))
-    return [target for target in targets if not re.match(r"[a-z]+:", target)]
-
-
-def anchors(page: Path) -> set[str]:
-    """The names that headings get: lower case, without punctuation, blanks as hyphens."""
-    headings = re.findall(r"^#+ (.+)$", prose(read(page)), re.MULTILINE)
-    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
-
-
-@pytest.mark.parametrize("page", [*PAGES, *FRONT], ids=name)
-def test_links_lead_somewhere(page: Path) -> None:
-    for target in links(page):
-        path, _, anchor = target.partition("#")
-        file = (page.parent / path).resolve() if path else page
-        assert file.exists(), f"{name(page)}: {target}"
-        if anchor:
-            assert anchor in anchors(file), f"{name(page)}: {target}"
-
-
-def test_every_page_can_be_reached() -> None:
-    seen, todo = set(), [ROOT / "README.md"]
-    while todo:
-        page = todo.pop()
-        if page in seen or page.suffix != ".md" or not page.exists():
-            continue
-        seen.add(page)
-        todo += [
-            (page.parent / target.partition("#")[0]).resolve() for target in links(page) if target[0] != "#"
-        ]
-    assert set(PAGES) <= seen
+def test_a_page_with_code_names_its_environment() -> None:
+    for page in {*(page for page, _ in CODE), FIXTURES}:
+        assert requirements(read(page)).startswith((".", "'.[")), page
+        is_for_the_prompt = any(map(awaits_at_the_top, blocks(read(page))))
+        assert ("`python -m asyncio`" in read(page)) == is_for_the_prompt, page
 
 
 # -- what is made from the code --------------------------------------------------------------------------
@@ -166,23 +134,6 @@ async def test_the_first_move_of_a_real_gripper_ends_wherever_its_fingers_are(cl
             await prompt.run(compiled(page, block, server.address), {})
     assert printed.getvalue().count("<MoveResult A=") == block.text.count("await hand.") > 0
     assert gripper.position(Finger.B) > 200 or not closed, "only A has moved"
-
-
-@pytest.mark.parametrize("page", dict.fromkeys([*(page for page, _ in CODE), FIXTURES]), ids=name)
-def test_a_page_with_code_names_its_environment(page: Path) -> None:
-    text = read(page)
-    assert requirements(text).startswith((".", "'.["))
-    code = [block.text for block in blocks(text) if block.language == "python"]
-    assert ("`python -m asyncio`" in text) == any(is_for_the_prompt(each) for each in code)
-
-
-def is_for_the_prompt(code: str) -> bool:
-    """Whether only a prompt that awaits takes it."""
-    try:
-        compile(code, "page", "exec", dont_inherit=True)
-    except SyntaxError:
-        return True
-    return False
 
 
 # -- messages ------------------------------------------------------------------------------------------

@@ -42,19 +42,17 @@ def test_what_makes_the_site_is_not_on_it() -> None:
     assert places()["docs/decisions/one-owner.md"] == "decisions/one-owner.md"
 
 
-@pytest.mark.parametrize(
-    "page", [*PAGES, *(ROOT / name for name in PROJECT)], ids=lambda path: str(path.relative_to(ROOT))
-)
-def test_a_page_is_the_same_in_every_dialect(page: Path) -> None:
+def test_a_page_is_the_same_in_every_dialect() -> None:
     """The site's Markdown is stricter: a list or a table after a line of prose is prose to it."""
-    text = page.read_text(encoding="utf-8")
-    for fence in re.findall(r"^( *)```\w*$", text, re.MULTILINE):
-        assert len(fence) % 4 == 0, "code within a list is indented by four"
-    before = ""
-    for line in prose(text).splitlines():
-        if re.match(r"([-*]|1\.) |\|", line) and before.strip():
-            assert re.match(r"\s*([-*]|\d+\.) |\||\s", before), f"{line!r} needs an empty line before it"
-        before = line
+    for page in [*PAGES, *(ROOT / name for name in PROJECT)]:
+        text = page.read_text(encoding="utf-8")
+        for fence in re.findall(r"^( *)```\w*$", text, re.MULTILINE):
+            assert len(fence) % 4 == 0, f"{page}: code within a list is indented by four"
+        before = ""
+        for line in prose(text).splitlines():
+            if re.match(r"([-*]|1\.) |\|", line) and before.strip():
+                assert re.match(r"\s*([-*]|\d+\.) |\||\s", before), f"{page}: {line!r} needs an empty line"
+            before = line
 
 
 # -- links -------------------------------------------------------------------------------------------------
@@ -165,30 +163,30 @@ def test_a_good_site_has_no_problems(site: Path) -> None:
     assert check.problems(site) == []
 
 
-@pytest.mark.parametrize(
-    "line",
-    [
-        '<script src="https://cdn.example.org/a.js"></script>',
-        '<script src="//cdn.example.org/a.js"></script>',
-        '<link rel="stylesheet" href="https://fonts.example.org/css">',
-        '<link rel="preconnect" href="https://fonts.example.org">',
-        '<link rel="icon" href="https://example.org/a.png">',
-        '<img src="https://img.example.org/badge.svg">',
-        '<img srcset="a.svg 1x, https://img.example.org/a.svg 2x">',
-        '<iframe src="https://example.org"></iframe>',
-        '<video poster="https://example.org/a.png"></video>',
-        '<svg><image href="https://example.org/a.png"/></svg>',
-        '<p style="background: url(https://example.org/a.png)"></p>',
-        "<style>@import 'https://example.org/a.css';</style>",
-        "<style>@font-face { src: url(//example.org/a.woff2) }</style>",
-        '<div class="mermaid">graph</div>',
-    ],
-)
-def test_what_would_come_from_another_host_is_found(site: Path, line: str) -> None:
-    (site / "index.html").write_text(GOOD.replace("</body>", f"{line}</body>"), encoding="utf-8")
-    (problem,) = check.problems(site)
-    assert problem.startswith("index.html: ")
-    assert "another host" in problem
+FOREIGN = [
+    '<script src="https://cdn.example.org/a.js"></script>',
+    '<script src="//cdn.example.org/a.js"></script>',
+    '<link rel="stylesheet" href="https://fonts.example.org/css">',
+    '<link rel="preconnect" href="https://fonts.example.org">',
+    '<link rel="icon" href="https://example.org/a.png">',
+    '<img src="https://img.example.org/badge.svg">',
+    '<img srcset="a.svg 1x, https://img.example.org/a.svg 2x">',
+    '<iframe src="https://example.org"></iframe>',
+    '<video poster="https://example.org/a.png"></video>',
+    '<svg><image href="https://example.org/a.png"/></svg>',
+    '<p style="background: url(https://example.org/a.png)"></p>',
+    "<style>@import 'https://example.org/a.css';</style>",
+    "<style>@font-face { src: url(//example.org/a.woff2) }</style>",
+    '<div class="mermaid">graph</div>',
+]
+
+
+def test_what_would_come_from_another_host_is_found(site: Path) -> None:
+    for line in FOREIGN:
+        (site / "index.html").write_text(GOOD.replace("</body>", f"{line}</body>"), encoding="utf-8")
+        (problem,) = check.problems(site)
+        assert problem.startswith("index.html: ")
+        assert "another host" in problem
 
 
 def test_so_is_what_a_style_or_a_picture_would_fetch(site: Path) -> None:
@@ -200,21 +198,21 @@ def test_so_is_what_a_style_or_a_picture_would_fetch(site: Path) -> None:
     ]
 
 
-@pytest.mark.parametrize(
-    ("link", "why"),
-    [
-        ("gone.html", "leads nowhere"),
-        ("a.md", "leads nowhere"),
-        ("folder/gone/", "leads nowhere"),
-        ("#gone", "has no such anchor"),
-        ("folder/#gone", "has no such anchor"),
-        ("../gone.html", "leads out of the site"),
-        ("/a.css", "leads out of the site"),
-    ],
-)
-def test_a_dead_link_is_found(site: Path, link: str, why: str) -> None:
-    (site / "index.html").write_text(f'{GOOD}<a href="{link}">x</a>', encoding="utf-8")
-    assert check.problems(site) == [f"index.html: {link} {why}"]
+DEAD = [
+    ("gone.html", "leads nowhere"),
+    ("a.md", "leads nowhere"),
+    ("folder/gone/", "leads nowhere"),
+    ("#gone", "has no such anchor"),
+    ("folder/#gone", "has no such anchor"),
+    ("../gone.html", "leads out of the site"),
+    ("/a.css", "leads out of the site"),
+]
+
+
+def test_a_dead_link_is_found(site: Path) -> None:
+    for link, why in DEAD:
+        (site / "index.html").write_text(f'{GOOD}<a href="{link}">x</a>', encoding="utf-8")
+        assert check.problems(site) == [f"index.html: {link} {why}"]
 
 
 def test_an_empty_site_is_a_problem(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import asyncio
 
 from robotiq_async import Finger
 from tests.fleet.lab import lab
-from tests.restless import Restless
+from tests.grippers import Restless
 from tests.virtual import virtual
 
 

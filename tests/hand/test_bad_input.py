@@ -1,82 +1,16 @@
-"""Bad input is refused with its name, value and range before anything is sent."""
+"""What a hand cannot be made with, or started with: refused with its name, value and range."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 
 from robotiq_async import ReconnectPolicy, RobotiqHand, State
-from robotiq_async.simulator import SimulatorServer
 
 pytestmark = pytest.mark.virtual_time
-
-BAD_BYTES = [256, -1, 1.0, True, "7", None, 1e300, float("nan")]
-BAD_MASKS = [0, 16, -1, True, 1.5, "A", None]
-
-
-async def refused(server: SimulatorServer, value: object, call: Callable[[], Any], name: str) -> None:
-    writes = len(server.gripper.writes)
-
-    async def run() -> None:
-        result = call()
-        if result is not None:
-            await result
-
-    with pytest.raises((TypeError, ValueError)) as caught:
-        await run()
-    message = str(caught.value)
-    assert name in message
-    assert repr(value) in message or str(value) in message
-    assert len(server.gripper.writes) == writes
-
-
-@pytest.mark.parametrize("value", BAD_BYTES, ids=repr)
-async def test_values(hand: RobotiqHand, server: SimulatorServer, value: Any) -> None:
-    await refused(server, value, lambda: hand.set_position(value), "value")
-    await refused(server, value, lambda: hand.set_speed(value), "value")
-    await refused(server, value, lambda: hand.set_force(value), "value")
-    await refused(server, value, lambda: hand.move(value), "position")
-    if value is not None:
-        await refused(server, value, lambda: hand.move(3, speed=value), "speed")
-        await refused(server, value, lambda: hand.move(3, force=value), "force")
-        await refused(server, value, lambda: hand.command(position=value), "position")
-        await refused(server, value, lambda: hand.open(speed=value), "speed")
-        await refused(server, value, lambda: hand.close(force=value), "force")
-    assert hand.state is State.RUNNING_IDLE
-
-
-@pytest.mark.parametrize("mask", BAD_MASKS, ids=repr)
-async def test_masks(hand: RobotiqHand, server: SimulatorServer, mask: Any) -> None:
-    await refused(server, mask, lambda: hand.set_position(3, mask), "fingers")
-    await refused(server, mask, lambda: hand.move(3, mask), "fingers")
-    await refused(server, mask, lambda: hand.command(mask, position=3), "fingers")
-    await refused(server, mask, lambda: hand.hold(mask), "fingers")
-
-
-@pytest.mark.parametrize("timeout", [0, -1, "1", True, float("inf"), float("nan")], ids=repr)
-async def test_timeouts(hand: RobotiqHand, server: SimulatorServer, timeout: Any) -> None:
-    await refused(server, timeout, lambda: hand.move(3, timeout=timeout), "timeout")
-    await refused(server, timeout, lambda: hand.recover(timeout=timeout), "timeout")
-    await refused(server, timeout, lambda: hand.wait_for_state(State.FAULT, timeout=timeout), "timeout")
-
-
-async def test_a_command_without_a_field(hand: RobotiqHand) -> None:
-    with pytest.raises(ValueError, match="at least one of position, speed and force"):
-        hand.command()
-
-
-async def test_states_and_buffers(hand: RobotiqHand) -> None:
-    with pytest.raises(ValueError, match="states"):
-        await hand.wait_for_state()
-    with pytest.raises(TypeError, match="states"):
-        await hand.wait_for_state("FAULT")  # type: ignore[arg-type]
-    for buffer in (0, -1, True, 1.5, "1", None):
-        with pytest.raises((TypeError, ValueError), match="buffer"):
-            hand.statuses(buffer=buffer)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Every call ends in its time, and the loop is never held up."""
+"""The loop is never held up, and a hand survives one that somebody else holds up; time limits: adversity."""
 
 from __future__ import annotations
 
@@ -12,65 +12,14 @@ from pathlib import Path
 import pytest
 
 from robotiq_async import (
-    ConnectFailedError,
-    ConnectionLostError,
     Finger,
     RobotiqHand,
     State,
 )
-from robotiq_async.simulator import SimulatorServer, parse_troubles
-from robotiq_async.values.request import Request
-from tests.hand.watching import until_moving
+from robotiq_async.simulator import SimulatorServer
 
 ROOT = Path(__file__).parents[2]
 A = Finger.A
-
-
-async def test_a_write_fails_within_a_second_on_a_silent_gripper(
-    hand: RobotiqHand, server: SimulatorServer
-) -> None:
-    server.policy = lambda _: []
-    began = time.monotonic()
-    with pytest.raises(ConnectionLostError):
-        await hand.set_position(200)
-    assert time.monotonic() - began < 1.0
-
-
-async def test_start_on_a_silent_gripper_ends_within_five_seconds(server: SimulatorServer) -> None:
-    server.policy = lambda _: []
-    began = time.monotonic()
-    with pytest.raises(ConnectFailedError):
-        await RobotiqHand(server.address).start()
-    assert time.monotonic() - began < 5.0
-
-
-@pytest.mark.parametrize("what", ["drop on write once", "silence once", "exception on write once", "reset"])
-async def test_a_stop_that_was_not_heard_is_sent_again(
-    hand: RobotiqHand, server: SimulatorServer, what: str
-) -> None:
-    await hand.set_position(255)
-    await until_moving(server, hand)
-    (trouble,) = parse_troubles(what)
-    await server.fault_injector.begin(trouble)
-    await hand.stop()
-    assert not server.gripper.is_moving
-    assert not Request.from_registers(server.gripper.request_registers).go
-
-
-@pytest.mark.parametrize("what", ["silence", "refuse"])
-async def test_stop_ends_within_two_seconds_on_a_dead_link(
-    hand: RobotiqHand, server: SimulatorServer, what: str
-) -> None:
-    if what == "silence":
-        server.policy = lambda _: []
-    else:
-        server.refuse()
-        server.cut()
-        await hand.wait_for_state(State.DISCONNECTED)
-    began = time.monotonic()
-    await hand.stop()
-    assert time.monotonic() - began < 2.0
-    assert hand.state is State.SHUTDOWN
 
 
 async def test_the_first_start_imports_nothing(server: SimulatorServer) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
 
 import pytest
 
@@ -21,6 +20,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import Request
 from tests.conftest import Clock
+from tests.hand.habits import Plain
 from tests.virtual import VirtualLoop
 
 pytestmark = pytest.mark.virtual_time
@@ -182,34 +182,27 @@ async def test_a_recovery_goes_on_when_the_minor_fault_clears(
 # -- a stop goes out before the next read -------------------------------------------------------------------
 
 
-class Wire:
-    """A gripper without a network, that notes what it is asked."""
+class Wire(Plain):
+    """Notes what the gripper is asked."""
 
     def __init__(self) -> None:
-        self.loop = asyncio.get_running_loop()
-        self.gripper = SimulatedGripper(self.loop.time, speedup=20)
-        self.is_open = False
+        super().__init__(speedup=20)
         self.asked: list[str] = []
         self.holds_up = 0.0
         """Seconds for which the next read keeps the loop, as a careless driver does."""
 
-    async def open(self) -> None:
-        self.is_open = True
-
-    async def close(self) -> None:
-        self.is_open = False
-
-    async def read(self) -> Registers:
+    def shown(self) -> Registers:
         self.asked.append("read")
-        assert isinstance(self.loop, VirtualLoop)
-        self.loop.hold_up(self.holds_up)
+        loop = asyncio.get_running_loop()
+        assert isinstance(loop, VirtualLoop)
+        loop.hold_up(self.holds_up)
         self.holds_up = 0.0
-        return self.gripper.status_registers()
+        return super().shown()
 
-    async def write(self, registers: Sequence[int]) -> None:
+    def take(self, registers: Registers) -> None:
         request = Request.from_registers(registers)
         self.asked.append("go" if request.go else "halt" if request.activate else "reset")
-        self.gripper.write(0, registers)
+        super().take(registers)
 
 
 @pytest.mark.parametrize("stop", ["halt", "reset", "stop"])

@@ -1,4 +1,4 @@
-"""A link that is lost: nothing is sent again, nothing is begun, and nothing is activated unasked."""
+"""A hand without its link; what else a lost link does to it: tests/adversity/test_matrix.py."""
 
 from __future__ import annotations
 
@@ -9,87 +9,13 @@ import pytest
 from robotiq_async import (
     ConnectionLostError,
     Finger,
-    NotActivatedError,
     NotStartedError,
-    ReconnectPolicy,
     RobotiqHand,
     State,
 )
 from robotiq_async.simulator import SimulatorServer
-from robotiq_async.simulator.troubles.corruption import unchanged
-from robotiq_async.values.request import Request
-from tests.hand.watching import settled, travels, until_moving
 
 A = Finger.A
-
-
-async def test_a_command_that_was_not_acknowledged_is_never_sent_again(
-    hand: RobotiqHand, server: SimulatorServer
-) -> None:
-    server.policy = lambda _: []
-    with pytest.raises(ConnectionLostError):
-        await hand.set_position(200, A)
-    sent = [
-        write for write in server.gripper.writes if Request.from_registers(write.registers).position(A) == 200
-    ]
-    assert len(sent) <= 1
-    server.policy = unchanged
-    await hand.wait_for_state(State.RUNNING_IDLE)
-    writes = len(server.gripper.writes)
-    await settled(hand)
-    assert len(server.gripper.writes) == writes
-
-
-async def test_a_cut_link_ends_a_move_and_comes_back_without_a_write(
-    hand: RobotiqHand, server: SimulatorServer
-) -> None:
-    moving = asyncio.create_task(hand.move(255, speed=0))
-    await until_moving(server, hand)
-    writes = len(server.gripper.writes)
-    transitions = hand.transitions()
-    server.cut()
-    with pytest.raises(ConnectionLostError):
-        await moving
-    lost = await anext(transitions)
-    back = await anext(transitions)
-    assert (lost.target, back.target) == (State.DISCONNECTED, State.RUNNING_IDLE)
-    assert back.timestamp - lost.timestamp < 0.2
-    assert len(server.gripper.writes) == writes
-    assert hand.statistics.reconnects == 1
-    assert hand.statistics.foreign_commands == 0
-
-
-async def test_while_the_link_is_down_nothing_is_known(hand: RobotiqHand, server: SimulatorServer) -> None:
-    server.refuse()
-    server.cut()
-    await hand.wait_for_state(State.DISCONNECTED)
-    with pytest.raises(ConnectionLostError):
-        hand.command(position=3)
-    with pytest.raises(ConnectionLostError):
-        await hand.move(3)
-    with pytest.raises(ConnectionLostError):
-        hand.is_moving  # noqa: B018
-    assert hand.status.sequence > 0, "the last status is still there, with its timestamp"
-    await server.accept()
-    await hand.wait_for_state(State.RUNNING_IDLE)
-    await hand.move(30, A)
-
-
-async def test_while_the_link_is_down_no_sequence_can_be_asked_for(
-    hand: RobotiqHand, server: SimulatorServer
-) -> None:
-    server.refuse()
-    server.cut()
-    await hand.wait_for_state(State.DISCONNECTED)
-    writes = len(server.gripper.writes)
-    for call in (hand.activate, hand.reset, hand.atr, hand.hold, hand.halt, hand.recover):
-        with pytest.raises(ConnectionLostError):
-            await call()
-    assert hand.state is State.DISCONNECTED
-    await server.accept()
-    await hand.wait_for_state(State.RUNNING_IDLE)
-    await settled(hand)
-    assert len(server.gripper.writes) == writes
 
 
 async def test_nothing_can_be_asked_for_while_it_connects(server: SimulatorServer) -> None:
@@ -103,33 +29,6 @@ async def test_nothing_can_be_asked_for_while_it_connects(server: SimulatorServe
     await starting
     assert hand.state is State.RESET
     await hand.stop()
-
-
-async def test_a_power_cycle_leaves_the_hand_in_reset_until_it_is_activated(
-    hand: RobotiqHand, server: SimulatorServer
-) -> None:
-    moving = asyncio.create_task(hand.move(255, speed=0))
-    await until_moving(server, hand)
-    await server.power_cycle(0.5)
-    with pytest.raises((ConnectionLostError, NotActivatedError)):
-        await moving
-    await hand.wait_for_state(State.RESET)
-    before = travels(server)
-    with pytest.raises(NotActivatedError):
-        await hand.move(0)
-    assert travels(server) == before
-    await hand.recover()
-    assert hand.state is State.RUNNING_IDLE
-
-
-async def test_the_policy_may_activate(server: SimulatorServer) -> None:
-    policy = ReconnectPolicy(activate=True)
-    async with RobotiqHand(server.address, reconnect=policy) as hand:
-        transitions = hand.transitions()
-        await server.power_cycle(0.5)
-        await hand.wait_for_state(State.DISCONNECTED, State.DO_ACTIVATION)
-        await hand.wait_for_state(State.RUNNING_IDLE)
-        assert State.RESET not in {(await anext(transitions)).target for _ in range(3)}
 
 
 async def test_a_hand_that_must_not_reconnect_gives_up(server: SimulatorServer) -> None:

@@ -20,7 +20,8 @@ from robotiq_async import (
 )
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
 from robotiq_async.values.request import AxisRequest, Request
-from tests.hand.watching import settled, until_moving
+from tests.contract.bench import at_rest
+from tests.grippers import until_moving
 from tests.serial_line import SerialLine
 
 A = Finger.A
@@ -163,7 +164,7 @@ async def test_another_client_is_noticed(
             await moving
     assert hand.statistics.foreign_commands == 1
     assert "another client" in caplog.text
-    await settled(hand)
+    await at_rest(hand)
     assert server.gripper.position(A) == pytest.approx(10, abs=2)
 
 

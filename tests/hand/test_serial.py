@@ -13,7 +13,7 @@ import pytest_asyncio
 from robotiq_async import ConnectFailedError, ConnectionLostError, Fault, Finger, RobotiqHand, State
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
 from tests.conftest import Clock
-from tests.hand.watching import until_moving
+from tests.grippers import until_moving
 from tests.serial_line import SerialLine
 
 A = Finger.A

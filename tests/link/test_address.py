@@ -216,11 +216,11 @@ def test_a_malformed_host_or_scheme_is_a_value_error_that_shows_it_and_the_forms
         "502\n",
     ],
 )
-@pytest.mark.parametrize("host", ["192.168.1.11", "tcp://gripper", "tcp://[::1]"])
-def test_a_malformed_port_is_a_value_error_that_shows_it_and_the_forms(host: str, port: str) -> None:
-    with pytest.raises(ValueError, match="malformed address") as caught:
-        parse_address(f"{host}:{port}")
-    assert FORMS in str(caught.value)
+def test_a_malformed_port_is_a_value_error_that_shows_it_and_the_forms(port: str) -> None:
+    for host in ("192.168.1.11", "tcp://gripper", "tcp://[::1]"):
+        with pytest.raises(ValueError, match="malformed address") as caught:
+            parse_address(f"{host}:{port}")
+        assert FORMS in str(caught.value)
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,7 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from tests.release.environments import ROOT, FailedError, installed, make
-from tests.release.suites import run_suite
+from tests.release.environments import ROOT, FailedError, installed, make, run_suite
 
 
 def pinned() -> dict[str, set[str]]:

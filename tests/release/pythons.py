@@ -14,8 +14,7 @@ import tempfile
 from pathlib import Path
 from typing import Final
 
-from tests.release.environments import CONSTRAINTS, ROOT, FailedError, make, uv
-from tests.release.suites import run_suite
+from tests.release.environments import CONSTRAINTS, ROOT, FailedError, make, run_suite, uv
 
 TOOLS: Final = (
     "hypothesis",

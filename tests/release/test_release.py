@@ -3,33 +3,11 @@
 from __future__ import annotations
 
 import sys
-import tomllib
-from fnmatch import fnmatch
-from pathlib import Path
 
 import pytest
 
-from tests.release import dist, pythons
 from tests.release.canary import news, pinned
-from tests.release.environments import ROOT, FailedError, run
-
-HERE = f"{sys.version_info[0]}.{sys.version_info[1]}"
-
-
-def test_what_the_sdist_has_to_hold_is_there_and_included() -> None:
-    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    included = settings["tool"]["hatch"]["build"]["targets"]["sdist"]["include"]
-    for name in dist.IN_THE_SDIST:
-        assert (ROOT / name).is_file()
-        # The license is taken in as such.
-        assert name == "LICENSE" or any(
-            fnmatch(f"/{name}", each) or f"/{name}".startswith(f"{each}/") for each in included
-        )
-
-
-def test_a_file_that_is_missing_is_named() -> None:
-    with pytest.raises(FailedError, match=r"a.whl has no \['b'\]"):
-        dist._need(Path("a.whl"), {"a"}, ("a", "b"))
+from tests.release.environments import FailedError, run
 
 
 def test_a_program_that_fails_is_told_with_what_it_printed() -> None:
@@ -55,8 +33,3 @@ def test_a_package_that_is_pinned_twice_may_be_either() -> None:
     versions = pinned()["numpy"]
     assert len(versions) == 2
     assert news(f"numpy=={each}" for each in versions) == []
-
-
-def test_a_python_is_found_by_its_version() -> None:
-    found = pythons._asked(sys.executable, HERE)
-    assert Path(found).samefile(sys.executable)

@@ -16,9 +16,10 @@ from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, Sim
 from robotiq_async.simulator.server.connection import MOST_UNREAD, MOST_WAITING
 from robotiq_async.simulator.server.endpoint import connections
 from robotiq_async.simulator.server.serial_connection import MOST_UNSENT
-from tests.simulator.test_fault_injector import simulator, virtual
+from tests.simulator.test_fault_injector import simulator
 from tests.simulator.test_serial_server import Line, with_crc
 from tests.simulator.test_server import RawClient, raw_client
+from tests.virtual import virtual
 from tests.virtual_line import VirtualLine
 
 REQUESTS = 15_000

@@ -20,9 +20,9 @@ from tests.simulator.test_fault_injector import (
     serial_simulator,
     simulator,
     status,
-    virtual,
 )
 from tests.simulator.test_server import RawClient, raw_client
+from tests.virtual import virtual
 
 READ_3 = bytes.fromhex("03 0000 0001")
 READ_4 = bytes.fromhex("04 0000 0001")

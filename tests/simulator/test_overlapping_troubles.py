@@ -9,8 +9,9 @@ import pytest
 from robotiq_async.simulator import SimulatorServer, Trouble, parse_troubles
 from robotiq_async.simulator import parse_troubles as plan_of
 from robotiq_async.values.enums import Fault
-from tests.simulator.test_fault_injector import cancelled, is_answered, is_let_in, simulator, status, virtual
+from tests.simulator.test_fault_injector import cancelled, is_answered, is_let_in, simulator, status
 from tests.simulator.test_server import raw_client
+from tests.virtual import virtual
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,8 @@ import serial
 
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
 from robotiq_async.simulator.server.framing import Frame
-from tests.simulator.test_fault_injector import virtual
 from tests.simulator.test_serial_server import with_crc
+from tests.virtual import virtual
 from tests.virtual_line import VirtualLine
 
 READ = with_crc(bytes.fromhex("09 03 07d0 0001"))

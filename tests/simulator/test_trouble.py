@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from typing import Any
@@ -195,18 +196,16 @@ def test_words_that_are_refused_say_why(words: str, message: str) -> None:
         parse_troubles(words)
 
 
-@pytest.mark.parametrize("direction", ["read", "write"])
-@pytest.mark.parametrize("kind", sorted(set(KINDS) - {*REPLIES, "wrong-echo"}))
-def test_on_means_nothing_where_no_reply_is_meant(kind: str, direction: str) -> None:
-    with pytest.raises(ValueError, match=f"^'on {direction}' means nothing for {kind}$"):
-        parse_troubles(f"{kind} on {direction}")
+def test_on_means_nothing_where_no_reply_is_meant() -> None:
+    for kind, direction in itertools.product(set(KINDS) - {*REPLIES, "wrong-echo"}, ["read", "write"]):
+        with pytest.raises(ValueError, match=f"^'on {direction}' means nothing for {kind}$"):
+            parse_troubles(f"{kind} on {direction}")
 
 
-@pytest.mark.parametrize("kind", CONDITIONS)
-@pytest.mark.parametrize("words", ["once", "for 0"])
-def test_a_condition_is_not_for_once(kind: str, words: str) -> None:
-    with pytest.raises(ValueError, match=f"^{kind} is a condition: say for how long"):
-        parse_troubles(f"{kind} {words}")
+def test_a_condition_is_not_for_once() -> None:
+    for kind, words in itertools.product(CONDITIONS, ["once", "for 0"]):
+        with pytest.raises(ValueError, match=f"^{kind} is a condition: say for how long"):
+            parse_troubles(f"{kind} {words}")
 
 
 # Values.
@@ -273,16 +272,12 @@ def test_a_value_replaces_the_usual_one(value: float) -> None:
     assert Trouble("delay", value).amount == value
 
 
-@pytest.mark.parametrize("kind", [*CONDITIONS, "delay", "pieces", "silence"])
-def test_conditions_last_for_ever(kind: str) -> None:
-    assert Trouble(kind).duration == INF
-    assert Trouble(kind, lasts=2).duration == 2
-
-
-@pytest.mark.parametrize("kind", ["late", "drop", "wrong-echo", "reset", "close", "foreign", "release"])
-def test_events_happen_once(kind: str) -> None:
-    assert Trouble(kind).duration == 0
-    assert Trouble(kind, lasts=2).duration == 2
+def test_conditions_last_for_ever_and_events_happen_once() -> None:
+    for_ever = dict.fromkeys([*CONDITIONS, "delay", "pieces", "silence"], INF)
+    events = ["late", "drop", "wrong-echo", "reset", "close", "foreign", "release"]
+    for kind, duration in (for_ever | dict.fromkeys(events, 0)).items():
+        assert Trouble(kind).duration == duration, kind
+        assert Trouble(kind, lasts=2).duration == 2, kind
 
 
 @pytest.mark.parametrize(

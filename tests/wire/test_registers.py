@@ -54,10 +54,10 @@ def fields_of(table: dict[str, object]) -> list[reg.Field]:
 ALL_FIELDS = [*fields_of({**REQUEST}), *fields_of({**STATUS})]
 
 
-@pytest.mark.parametrize(("name", "place"), [*REQUEST.items(), *STATUS.items()])
-def test_a_field_lies_where_the_manual_says(name: str, place: object) -> None:
-    places = [(each.byte, each.shift, each.width) for each in flat(getattr(reg, name))]
-    assert places == (place if isinstance(place, list) else [place])
+def test_a_field_lies_where_the_manual_says() -> None:
+    for name, place in [*REQUEST.items(), *STATUS.items()]:
+        places = [(each.byte, each.shift, each.width) for each in flat(getattr(reg, name))]
+        assert places == (place if isinstance(place, list) else [place]), name
 
 
 def test_no_other_fields_are_defined() -> None:
@@ -82,9 +82,8 @@ def test_the_request_fields_leave_the_reserved_bits_alone() -> None:
     assert tuple(0xFF ^ byte for byte in covered) == REQUEST_RESERVED
 
 
-@pytest.mark.parametrize("field", ALL_FIELDS)
-def test_every_field_says_what_it_means(field: reg.Field) -> None:
-    assert field.doc
+def test_every_field_says_what_it_means() -> None:
+    assert all(field.doc for field in ALL_FIELDS)
 
 
 def test_even_bytes_are_the_high_half_of_a_register_and_odd_ones_the_low_half() -> None:
@@ -120,12 +119,12 @@ def test_a_field_that_is_written_reads_the_same_and_changes_no_other_bit(
     assert all(0 <= register <= 0xFFFF for register in block)
 
 
-@pytest.mark.parametrize("field", ALL_FIELDS)
-def test_a_value_that_does_not_fit_is_refused_and_leaves_no_trace(field: reg.Field) -> None:
+def test_a_value_that_does_not_fit_is_refused_and_leaves_no_trace() -> None:
     block = [0x5A5A] * 8
-    for value in (-1, 1 << field.width):
-        with pytest.raises(ValueError, match=str(value)):
-            field.write(block, value)
+    for field in ALL_FIELDS:
+        for value in (-1, 1 << field.width):
+            with pytest.raises(ValueError, match=str(value)):
+                field.write(block, value)
     assert block == [0x5A5A] * 8
 
 
@@ -159,11 +158,3 @@ def test_any_other_number_of_registers_is_a_value_error(count: int) -> None:
 def test_a_register_beyond_sixteen_bits_is_a_value_error(register: int) -> None:
     with pytest.raises(ValueError, match=re.escape(f"registers[3] must be in 0..65535, got {register}")):
         reg.check_registers([0, 0, 0, register, 0, 0, 0, 0])
-
-
-@pytest.mark.parametrize("register", [1.0, True, "1", None])
-def test_a_register_that_is_not_an_integer_is_a_type_error(register: object) -> None:
-    block: list[object] = [0, 0, 0, 0, 0, 0, 0, register]
-    with pytest.raises(TypeError, match=re.escape("registers[7] must be an int in 0..65535")) as caught:
-        reg.check_registers(block)  # type: ignore[arg-type]
-    assert repr(register) in str(caught.value)

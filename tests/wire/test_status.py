@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import copy
-import pickle
+import itertools
 from collections.abc import Callable
 
 import pytest
@@ -111,21 +110,12 @@ def test_a_current_of_fifteen_counts_is_150_milliampere() -> None:
     assert [status.current_ma(axis) for axis in THREE_FINGER.axes] == [150, 0, 10, 2550]
 
 
-@pytest.mark.parametrize("mode", range(4))
-def test_the_mode_is_echoed_in_bits_one_and_two(mode: int) -> None:
-    assert status_of(0x31 | mode << 1).mode is Mode(mode)
-
-
-@pytest.mark.parametrize("initialization", range(4))
-@pytest.mark.parametrize("go", [0, 1])
-@pytest.mark.parametrize("what", range(4))
-def test_an_axis_moves_only_while_told_to_go_and_fully_active(
-    initialization: int, go: int, what: int
-) -> None:
-    status = status_of(0x01 | go << 3 | initialization << 4, what | 0b11_11_11_00)
-    moves = go == 1 and initialization == 3 and what == 0
-    assert status.is_moving == moves
-    assert status.moving == (A if moves else Finger(0))
+def test_an_axis_moves_only_while_told_to_go_and_fully_active() -> None:
+    for initialization, go, what in itertools.product(range(4), range(2), range(4)):
+        status = status_of(0x01 | go << 3 | initialization << 4, what | 0b11_11_11_00)
+        moves = (initialization, go, what) == (3, 1, 0)
+        assert status.is_moving == moves, (initialization, go, what)
+        assert status.moving == (A if moves else Finger(0))
 
 
 def test_a_contact_stays_visible_when_the_go_bit_is_cleared() -> None:
@@ -146,9 +136,9 @@ def test_any_eight_registers_are_a_status_that_answers_everything(block: tuple[i
         assert status.current_ma(axis) == 10 * content[5 + 3 * number]
         assert status.finger_status(axis) == content[1] >> 2 * number & 3
     assert status.activation_echo == bool(content[0] & 1)
-    assert status.mode == content[0] >> 1 & 3
+    assert status.mode is Mode(content[0] >> 1 & 3)
     assert status.go_echo == bool(content[0] & 8)
-    assert status.initialization == content[0] >> 4 & 3
+    assert status.initialization is Initialization(content[0] >> 4 & 3)
     assert status.motion == content[0] >> 6
     assert int(status.fault) == content[2] & 0x0F
     assert (status.fault is Fault.NONE) == (content[2] & 0x0F == 0)
@@ -166,17 +156,6 @@ def test_equal_registers_make_equal_statuses_and_different_ones_different(
     assert (first == second) == (one == other)
     assert first == RobotiqStatus.from_registers(one)
     assert hash(first) == hash(RobotiqStatus.from_registers(one))
-
-
-@pytest.mark.parametrize("high_nibble", range(16))
-@pytest.mark.parametrize("code", range(16))
-def test_the_high_nibble_of_the_fault_byte_is_no_part_of_the_code(high_nibble: int, code: int) -> None:
-    assert int(status_of(0x31, fault=high_nibble << 4 | code).fault) == code
-
-
-@pytest.mark.parametrize("code", range(1, 16))
-def test_no_code_but_zero_is_no_fault(code: int) -> None:
-    assert status_of(0x31, fault=code).fault is not Fault.NONE
 
 
 # -- a value object ----------------------------------------------------------------------------------------
@@ -204,10 +183,6 @@ def test_statuses_of_different_polls_differ() -> None:
     assert status != status.registers
 
 
-def test_a_status_can_be_a_member_of_a_set() -> None:
-    assert len({status_of(0x31), status_of(0x31), status_of(0x39)}) == 2
-
-
 @pytest.mark.parametrize(
     "name", ["registers", "timestamp", "sequence", "fault", "note", "_registers", "_sequence"]
 )
@@ -223,17 +198,6 @@ def test_a_status_cannot_be_made_anew_in_place() -> None:
     with pytest.raises(AttributeError):
         RobotiqStatus.__init__(status, (0,) * 8)
     assert status == status_of(0x39, 0xC0)
-
-
-def test_a_status_survives_copying_and_pickling() -> None:
-    status = status_of(0xB9, 0xEA, 0x0B, echo=255, position=(1, 2, 3, 4), current=5, at=1.5, sequence=9)
-    for again in (copy.copy(status), copy.deepcopy(status), pickle.loads(pickle.dumps(status))):
-        assert again == status
-        assert (again.registers, again.timestamp, again.sequence) == (
-            status.registers,
-            status.timestamp,
-            status.sequence,
-        )
 
 
 def test_the_repr_tells_what_a_person_looks_for_first() -> None:
@@ -257,31 +221,16 @@ def test_the_repr_tells_what_a_person_looks_for_first() -> None:
 
 
 @pytest.mark.parametrize("read", PER_AXIS)
-@pytest.mark.parametrize(
-    "mask", [Finger.ABC, Finger.ALL, Finger.A | Finger.SCISSOR, Finger(0), 3, 0, 16, -1], ids=repr
-)
-def test_a_mask_is_a_value_error(read: Callable[[RobotiqStatus, Finger | int], object], mask: int) -> None:
+def test_what_is_not_one_axis_is_refused(read: Callable[[RobotiqStatus, object], object]) -> None:
     with pytest.raises(ValueError, match="finger must be one of"):
-        read(status_of(0x31), mask)
-
-
-@pytest.mark.parametrize("read", PER_AXIS)
-@pytest.mark.parametrize("axis", [1.0, True, "A", None])
-def test_what_is_not_an_integer_is_a_type_error(
-    read: Callable[[RobotiqStatus, object], object], axis: object
-) -> None:
+        read(status_of(0x31), Finger.ABC)
     with pytest.raises(TypeError, match="finger must be one Finger"):
-        read(status_of(0x31), axis)
+        read(status_of(0x31), 1.0)
 
 
-@pytest.mark.parametrize("axis", THREE_FINGER.axes)
-def test_an_axis_may_be_given_as_its_number(axis: Finger) -> None:
+def test_an_axis_may_be_given_as_its_number() -> None:
     status = status_of(0x31, echo=(1, 2, 3, 4))
-    assert (
-        status.requested_position(int(axis))
-        == status.requested_position(axis)
-        == THREE_FINGER.axes.index(axis) + 1
-    )
+    assert [status.requested_position(axis) for axis in (1, 2, 4, 8)] == [1, 2, 3, 4]
 
 
 @pytest.mark.parametrize(
