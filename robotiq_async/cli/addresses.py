@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..fleet.network.route import is_remote, parse_remote_address
 from ..link.address import parse_address
+from ..values.model import Model, model_of
 from .failures import usage
 
 
@@ -26,3 +27,9 @@ def gripper_words(address: str) -> str:
 def is_simulated(address: str) -> bool:
     """Whether the gripper is simulated inside the command."""
     return full_address(address).startswith("sim:")
+
+
+def named_model(address: str) -> Model:
+    """The model that an address names. Of a remote gripper its agent knows it: the 3-Finger until then."""
+    with usage():
+        return model_of(None if is_remote(address) else parse_address(address).model)

@@ -111,6 +111,12 @@ def test_move_takes_fingers_speed_and_force(call: Call, there: SimulatorServer) 
     assert (reg.rSP[0].read(last), reg.rFR[0].read(last)) == (200, 10)
 
 
+def test_an_axis_that_the_model_lacks_is_wrong_usage_and_moves_nothing(call: Call) -> None:
+    outcome = call("move", "100", "sim://?model=hand-e&speedup=20", "--fingers", "B", "--yes")
+    outcome.assert_failed(2, "fingers must be axes of a Hand-E (A), got B")
+    assert "Activating" not in outcome.out
+
+
 def test_a_contact_is_a_success(call: Call, there: SimulatorServer) -> None:
     there.gripper.write(0, ACTIVATE)
     assert call("move", "0", "--yes", there.address).code == 0

@@ -86,6 +86,8 @@ async def _move(
 
     print(gripper_words(address), flush=True)
     async with connected(address, link, halt=True, keep_grip=keep) as hand:
+        with usage():
+            hand.model.mask(fingers)  # before an activation moves anything
         if not hand.is_activated:
             print("Activating: the fingers open and close.", flush=True)
             await hand.activate()

@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from ....link.address import parse_address
+from ....link.simulation import Simulation
 from ....values.errors import MeasuringError
-from ...addresses import full_address, is_simulated
+from ...addresses import is_simulated, named_model
 from ...arguments import Flag, need
 from ...consent import read_line
 from ...failures import CommandError, UsageError
@@ -49,8 +51,10 @@ def check(address: str, output: Path, speedup: float | None, runs: int, step: in
         raise UsageError(f"--step must be an integer in 1..255, got {step}")
     if speedup is not None and not simulated:
         raise UsageError("--speedup is for sim:// only: the time of a real gripper cannot be changed")
-    if simulated and full_address(address) != "sim://":
-        raise UsageError(f"the gripper to measure at {address} takes no options, but there is --speedup")
+    if simulated and parse_address(address).simulation != Simulation():
+        raise UsageError(
+            f"the gripper to measure at {address} takes no option but ?model=; there is --speedup"
+        )
     if speedup is not None and not 1 <= speedup <= 50:
         raise UsageError(f"--speedup must be a number in 1..50, got {speedup:g}")
     if plot:
@@ -77,7 +81,7 @@ async def gripper(
         return
     from ....simulator import SimulatedGripper, SimulatorServer
 
-    simulated = SimulatedGripper(speedup=speedup)
+    simulated = SimulatedGripper(speedup=speedup, model=named_model(address))
     interval = POLL_S if speedup > 1 else 5 * POLL_S
     async with (
         SimulatorServer(simulated) as server,

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from ....values.enums import DEFAULT_SPEED
-from ...addresses import full_address, gripper_words, is_simulated
+from ....values.model import THREE_FINGER
+from ...addresses import full_address, gripper_words, is_simulated, named_model
 from ...arguments import Address, Byte, Yes
 from ...consent import consent
 from ...failures import CommandError, UsageError
@@ -80,6 +81,8 @@ def force(
     path = output or Path(f"force_{surface}_grams.csv")
     if scale is not None and scale.resolve() == path.resolve():
         raise UsageError("--scale must be another file than --output")
+    if (model := named_model(address)) is not THREE_FINGER:
+        raise UsageError(f"forces are measured with three fingers, and {address} names a {model}")
     factor = check(address, path, speedup, runs, step, not no_plot)
     from ....tools.measure.campaigns import force_campaign
     from ....values.calibration.csv_tables import FORCE, read_table
