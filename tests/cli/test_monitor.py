@@ -29,7 +29,7 @@ from robotiq_async.control.state_machine import refusal
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import Operator
 from robotiq_async.tools.wording import refusal_words
-from robotiq_async.values.model import THREE_FINGER
+from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85
 from robotiq_async.values.trigger import Trigger
 from tests.grippers import active_gripper
 
@@ -326,6 +326,17 @@ async def test_any_axes_are_sent_to_any_position(active: Operator) -> None:
         assert positions == [60, 137, 60, 9]
 
 
+async def test_of_a_jaw_the_one_axis_is_chosen_and_no_other_can_be() -> None:
+    jaw = active_gripper(model=TWO_FINGER_85)
+    async with SimulatorServer(jaw) as server:
+        hand = RobotiqHand(server.address, poll_interval=SLOWLY)
+        async with hand, shown(Operator(hand)) as pilot:
+            await pilot.press("p", "b", "s", "6", "0", "enter")
+            await until(pilot, lambda: "A to 60: A at" in log(pilot))
+            await pilot.press("1")
+            await until(pilot, lambda: "a 2F-85 has no scissor" in log(pilot))
+
+
 @pytest.mark.parametrize("key", sorted(NO))
 async def test_a_position_that_is_not_entered_moves_nothing(key: str, active: Operator) -> None:
     requests = active.hand.requests()
@@ -349,7 +360,7 @@ async def test_halt_works_while_a_position_is_written() -> None:
 def test_a_position_is_in_its_range() -> None:
     """A digit that would leave it is not taken, and is not moved to its end either."""
     moved: list[tuple[Finger, int]] = []
-    target = Target(lambda axes, position: moved.append((axes, position)))
+    target = Target(THREE_FINGER, lambda axes, position: moved.append((axes, position)))
     for key in ("a", "b", "2", "5", "6", "x", "²"):
         assert not target.press(key)
     assert "position 25_" in target.text.plain

@@ -13,6 +13,7 @@ from rich.text import Text
 
 from ...runtime.clock import now
 from ...values.enums import CLOSED, Finger
+from ...values.model import Model
 
 READING_S: Final = 0.3
 """A yes counts only after this time: an earlier one was typed before the question could be read."""
@@ -67,24 +68,26 @@ class Question:
 
 
 class Target:
-    """Asks for axes and a position. Only Enter moves anything."""
+    """Asks for axes of a model and a position; a jaw is chosen from the start. Only Enter moves anything."""
 
-    def __init__(self, move: Callable[[Finger, int], None]) -> None:
+    def __init__(self, model: Model, move: Callable[[Finger, int], None]) -> None:
         self._move = move
-        self._axes = Finger(0)
+        self._there = model.all_axes
+        self._axes = self._there if len(model.axes) == 1 else Finger(0)
         self._digits = ""
 
     @property
     def text(self) -> Text:
         text = Text("move axes to a position\n\naxes     ", "bold")
-        for axis in Finger.ALL:
+        for axis in self._there:
             text.append(str(axis.name), "reverse" if axis in self._axes else "dim not bold")
             text.append(" ")
         text.append(f"\nposition {self._digits}", "bold")
         text.append("_", "blink")
         text.append(f"   0 open .. {CLOSED} closed", "dim not bold")
         text.append("\n\nEnter MOVES them at once.", "bold yellow")
-        text.append("\n\na b c s axes    0-9 position    ESC no    space halt")
+        letters = " ".join(letter for letter, axis in _LETTERS.items() if axis in self._there)
+        text.append(f"\n\n{letters} axes    0-9 position    ESC no    space halt")
         return text
 
     def press(self, key: str) -> bool:
@@ -95,7 +98,7 @@ class Target:
             self._move(self._axes, int(self._digits))
             return True
         if key in _LETTERS:
-            self._axes ^= _LETTERS[key]
+            self._axes ^= _LETTERS[key] & self._there
         elif key in _ERASE:
             self._digits = self._digits[:-1]
         elif len(key) == 1 and key in "0123456789" and int(self._digits + key) <= CLOSED:

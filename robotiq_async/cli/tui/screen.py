@@ -200,7 +200,7 @@ class Monitor(App[None]):
         def begin(axes: Finger, position: int) -> None:
             self._begin(f"{axes} to {position}", partial(self._operator.move, position, axes))
 
-        self.ask(Target(begin))
+        self.ask(Target(self._hand.model, begin))
 
     def action_speed(self, by: int) -> None:
         self._begin("speed", partial(self._operator.change_speed, by))
