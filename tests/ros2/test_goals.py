@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from robotiq_async import ConnectionLostError, Finger, MoveResult, RobotiqHand, State
+from robotiq_async import HAND_E, TWO_FINGER_85, ConnectionLostError, Finger, MoveResult, RobotiqHand, State
 from robotiq_async.hand import Hand
 from robotiq_async.ros2.gripper.goals import Ending, GoalRunner, Outcome
 from robotiq_async.ros2.gripper.hands import make_hand
@@ -219,6 +219,14 @@ async def test_any_hand_will_do() -> None:
 )
 def test_the_address_says_which_hand(address: str, shown: str) -> None:
     assert make_hand(check_settings(USUAL | {"address": address})).address == shown
+
+
+def test_the_model_is_a_parameter_or_in_the_address() -> None:
+    assert make_hand(check_settings(USUAL | {"model": "Hand-E"})).model is HAND_E
+    there = USUAL | {"address": "sim://?model=2f85"}
+    assert make_hand(check_settings(there | {"model": "2f85"})).model is TWO_FINGER_85
+    with pytest.raises(ValueError, match="model hand-e contradicts the address"):
+        make_hand(check_settings(there | {"model": "hand-e"}))
 
 
 async def test_why_no_goal_is_taken(server: SimulatorServer, gripper: SimulatedGripper) -> None:

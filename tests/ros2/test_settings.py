@@ -58,6 +58,7 @@ def test_an_integer_will_do_for_a_float() -> None:
         ("speed", 256, "speed must be in 0..255, got 256"),
         ("force", 64.0, "force must be an int in 0..255, got 64.0"),
         ("allow_stalling", 1, "allow_stalling must be true or false, got 1"),
+        ("model", "2f99", "model must be one of 3f, 2f85, 2f140, hand-e, got '2f99'"),
         ("joint_prefix", "left <&", "joint_prefix may have letters, digits, _ . / and -, got 'left <&'"),
         ("joint_prefix", None, "joint_prefix must be a string, got None"),
     ],

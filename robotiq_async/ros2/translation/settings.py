@@ -11,6 +11,7 @@ from ...fleet.network.route import is_remote, parse_remote_address
 from ...link.address import parse_address
 from ...session.options import Option, Place, offered
 from ...values.checks import check_int, check_number
+from ...values.model import MODELS, model_of
 
 Value = str | int | float | bool
 USUAL: Final = -1
@@ -55,6 +56,7 @@ PARAMETERS: Final[Mapping[str, Parameter]] = {
         "The gripper: tcp://HOST[:502], rtu:///dev/ttyUSB0, rtu+tcp://HOST:PORT, zenoh://SITE/HOST/GRIPPER "
         "(set up on its host: the other options of the hand have no effect), or sim://, simulated.",
     ),
+    "model": Parameter("", f"Model of the gripper: {', '.join(MODELS)}; empty for that of the address."),
     "publish_rate": Parameter(50.0, "Joint states a second.", 1.0, 200.0),
     "joint_prefix": Parameter(
         "",
@@ -84,6 +86,7 @@ class Settings:
 
     options: Mapping[str, Any]
     address: str
+    model: str
     speed: int
     force: int
     publish_rate: float
@@ -155,5 +158,9 @@ def _check_prefix(prefix: str) -> str:
     return prefix
 
 
-_CHECKS: Final = {"address": _check_address, "joint_prefix": _check_prefix}
+def _check_model(text: str) -> str:
+    return model_of(text).name if text else ""
+
+
+_CHECKS: Final = {"address": _check_address, "model": _check_model, "joint_prefix": _check_prefix}
 """Checks of strings, by parameter."""
