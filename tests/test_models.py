@@ -423,4 +423,10 @@ async def test_what_needs_three_fingers_says_so() -> None:
             await ACTIONS["wide"].run(hand)
         with pytest.raises(MeasuringError, match="a 2F-85 has one axis"):
             await grasp(hand, 100, 100)
-        assert await time_closing(hand, 255, JAW, speedup=20) == pytest.approx(85 / 150, rel=0.3)
+
+
+@virtual
+async def test_a_closing_is_timed_against_the_stroke_of_the_model() -> None:
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, model=TWO_FINGER_85)
+    async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
+        assert await time_closing(hand, 255, JAW, speedup=1) == pytest.approx(85 / 150, rel=0.1)

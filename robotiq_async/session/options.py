@@ -232,7 +232,7 @@ class HandOptions:
         Option(
             f"Model of the gripper: {', '.join(MODELS)}",
             _check_model,
-            Place.FILE | Place.COMMAND_LINE,
+            Place.FILE | Place.COMMAND_LINE | Place.ROS,
             choices=tuple(MODELS),
         ),
     ] = None  # type: ignore[assignment]  # that of the address; a name becomes its model

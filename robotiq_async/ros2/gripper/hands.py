@@ -26,10 +26,4 @@ def make_hand(settings: Settings) -> Hand:
         if find_spec("zenoh") is None:
             raise RobotiqError(f"a gripper on another host needs zenoh: {install('fleet')}")
         return RemoteHand(settings.address, control=None)
-    return RobotiqHand(
-        settings.address,
-        model=settings.model or None,
-        speed=settings.speed,
-        force=settings.force,
-        **settings.options,
-    )
+    return RobotiqHand(settings.address, speed=settings.speed, force=settings.force, **settings.options)

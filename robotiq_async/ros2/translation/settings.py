@@ -11,7 +11,7 @@ from ...fleet.network.route import is_remote, parse_remote_address
 from ...link.address import parse_address
 from ...session.options import Option, Place, offered
 from ...values.checks import check_int, check_number
-from ...values.model import MODELS, model_of
+from ...values.model import model_of
 
 Value = str | int | float | bool
 USUAL: Final = -1
@@ -41,6 +41,8 @@ class Parameter:
 
 def _of_hand(name: str, option: Option) -> Parameter:
     text, low, default = option.help, option.low, option.default
+    if option.choices:
+        return Parameter("", f"{text}; empty for that of the address.")
     if default is None:  # it depends on the link
         text += f"; {USUAL} stands for {option.tcp} over TCP, {option.rtu} on a serial line"
         low = default = USUAL
@@ -56,7 +58,6 @@ PARAMETERS: Final[Mapping[str, Parameter]] = {
         "The gripper: tcp://HOST[:502], rtu:///dev/ttyUSB0, rtu+tcp://HOST:PORT, zenoh://SITE/HOST/GRIPPER "
         "(set up on its host: the other options of the hand have no effect), or sim://, simulated.",
     ),
-    "model": Parameter("", f"Model of the gripper: {', '.join(MODELS)}; empty for that of the address."),
     "publish_rate": Parameter(50.0, "Joint states a second.", 1.0, 200.0),
     "joint_prefix": Parameter(
         "",
@@ -86,7 +87,6 @@ class Settings:
 
     options: Mapping[str, Any]
     address: str
-    model: str
     speed: int
     force: int
     publish_rate: float
