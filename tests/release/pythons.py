@@ -18,8 +18,10 @@ from tests.release.environments import CONSTRAINTS, ROOT, FailedError, make, run
 
 TOOLS: Final = (
     "hypothesis",
+    "minimalmodbus",
     "numpy",
     "pyModbusTCP",
+    "pyrobotiqgripper",
     "pyserial",
     "pytest",
     "pytest-asyncio",
