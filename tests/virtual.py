@@ -54,16 +54,20 @@ class HoldWatch:
             self._file = os.open(f"/proc/self/task/{threading.get_native_id()}/schedstat", os.O_RDONLY)
 
     def begin(self) -> None:
-        self._began = time.perf_counter()
-        if self._began - self._looked > BLUR_S:  # a look costs as much as a short callback
-            self._waited = self.waiting()
-            self._began = self._looked = time.perf_counter()
+        """What was until now is not counted."""
+        self._began = 0.0
+        self.turn()
 
-    def end(self) -> None:
-        if self._began:
-            held = time.perf_counter() - self._began
-            if held > self.longest:
-                self.longest = max(self.longest, held - (self.waiting() - self._waited))
+    def turn(self) -> None:
+        """One turn of the loop has ended, and the next begins."""
+        now = time.perf_counter()
+        if now - self._began > self.longest and self._began:
+            self.longest = max(self.longest, now - self._began - (self.waiting() - self._waited))
+            now = time.perf_counter()
+        if now - self._looked > BLUR_S:  # a look costs as much as a short callback
+            self._waited = self.waiting()
+            now = self._looked = time.perf_counter()
+        self._began = now
 
     def close(self) -> None:
         with contextlib.suppress(ValueError):  # closed already
@@ -94,12 +98,13 @@ class _Selector(selectors.DefaultSelector):
         self.turns = 0
         self.at_turn: tuple[int, Callable[[], object]] | None = None
         self.hold = HoldWatch()
+        self._watched = self.get_map()
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
-        self.hold.end()
+        self.hold.turn()
         # Without a serial line there is nothing to look at but the descriptor by which other threads wake the
         # loop: what they want done is among the callbacks already, and only who waits for nothing else looks.
-        events = super().select(0) if timeout is None or len(self.get_map()) > 1 else []
+        events = super().select(0) if timeout is None or len(self._watched) > 1 else []
         self.turns += 1
         if self.at_turn is not None and self.turns >= self.at_turn[0]:
             call, self.at_turn = self.at_turn[1], None
@@ -109,7 +114,6 @@ class _Selector(selectors.DefaultSelector):
             raise NothingWillHappenError("everybody waits, and nothing is going to happen")
         if not events and timeout:
             self.now += timeout
-        self.hold.begin()
         return events
 
     def close(self) -> None:

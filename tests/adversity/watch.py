@@ -22,7 +22,7 @@ class _WatchedSelector(selectors.DefaultSelector):
         self._hold = hold
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
-        self._hold.end()
+        self._hold.turn()
         events = super().select(timeout)
         self._hold.begin()
         return events
@@ -40,7 +40,7 @@ class LoopWatch:
 
     def hold_up(self, seconds: float) -> None:
         """Block the loop on purpose, as an application does."""
-        self.hold.end()
+        self.hold.turn()
         time.sleep(seconds)
         self._deliberate += seconds
         self.hold.begin()  # this one is not the library's
@@ -97,7 +97,7 @@ class WriteWatch:
 
 def check(world: World, writes: WriteWatch, loop: LoopWatch) -> Iterator[str]:
     """Everything that was wrong since the last look."""
-    loop.hold.end()
+    loop.hold.turn()
     yield from writes.check(world)
     try:
         world.check_no_stale_status()

@@ -27,7 +27,7 @@ HABIT: ContextVar[tuple[Trouble | None, Mapping[str, Any]]] = ContextVar("habit"
 """What is otherwise with the gripper of a hand of this process, and the options of that hand."""
 MODEL: ContextVar[Model] = ContextVar("model", default=THREE_FINGER)
 """What the gripper is."""
-LIMIT_S = 1000.0
+LIMIT_S = 500.0
 """Of virtual time: what takes longer hangs."""
 
 

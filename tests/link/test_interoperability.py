@@ -1,4 +1,4 @@
-"""Both sides against a Modbus implementation that shares no code with pymodbus."""
+"""Both sides against other implementations of Modbus: pymodbus, and one that shares no code with it."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ import socket
 import time
 
 import pytest
+from pymodbus import FramerType
+from pymodbus.server import ModbusTcpServer
+from pymodbus.simulator import DataType, SimData, SimDevice
 from pyModbusTCP.client import ModbusClient
 from pyModbusTCP.server import DataBank, ModbusServer
 
@@ -56,6 +59,38 @@ async def test_the_hand_with_a_server_that_is_not_pymodbus() -> None:
             assert hand.statistics.reconnects == 0
     finally:
         server.stop()
+
+
+@pytest.mark.parametrize("framer", [FramerType.SOCKET, FramerType.RTU])
+async def test_the_hand_with_the_server_of_pymodbus(framer: FramerType) -> None:
+    """The simulator's server is ours, as the link is: here somebody else reads what the link writes."""
+    gripper = SimulatedGripper(speedup=20)
+    gripper.place_object(A, 150)
+    serial = framer is FramerType.RTU
+    request, status = (1000, 2000) if serial else (0, 0)
+
+    async def access(
+        function: int, start: int, address: int, count: int, registers: list[int], written: list[int] | None
+    ) -> None:
+        if written is not None:
+            gripper.write(address - request, list(map(int, written)))
+        elif function == (3 if serial else 4):
+            first, offset = address - start, address - status
+            registers[first : first + count] = gripper.status_registers()[offset : offset + count]
+
+    blocks = [SimData(at, count=8, datatype=DataType.REGISTERS) for at in sorted({request, status})]
+    device = SimDevice(id=0, simdata=blocks, action=access)  # type: ignore[arg-type]
+    server = ModbusTcpServer(device, framer=framer, address=("127.0.0.1", 0))
+    await server.listen()
+    try:
+        port = server.transport.sockets[0].getsockname()[1]  # type: ignore[attr-defined]
+        async with RobotiqHand(f"{'rtu+tcp' if serial else 'tcp'}://127.0.0.1:{port}") as hand:
+            result = await hand.close()
+            assert result.contacts == A
+            assert result.positions[Finger.B] >= 240
+            assert hand.statistics.reconnects == 0
+    finally:
+        await server.shutdown()  # type: ignore[no-untyped-call]
 
 
 async def test_a_reply_that_waits_while_the_loop_is_held_up_is_an_answer() -> None:

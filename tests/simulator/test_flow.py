@@ -14,7 +14,6 @@ import pytest
 
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.simulator.server.connection import MOST_UNREAD, MOST_WAITING
-from robotiq_async.simulator.server.endpoint import connections
 from robotiq_async.simulator.server.serial_connection import MOST_UNSENT
 from tests.simulator.test_fault_injector import simulator
 from tests.simulator.test_serial_server import Line, with_crc
@@ -53,7 +52,7 @@ async def narrow(server: SimulatorServer) -> AsyncIterator[RawClient]:
 async def until_held(server: SimulatorServer) -> None:
     """Wait until a client is not read from any more."""
     async with asyncio.timeout(20):
-        while all(each.transport.is_reading() for each in connections(server._running())):  # type: ignore[attr-defined]  # noqa: ASYNC110
+        while all(each.transport.is_reading() for each in server.connections):  # noqa: ASYNC110
             await asyncio.sleep(0.001)
 
 
@@ -61,16 +60,16 @@ async def test_a_client_that_never_reads_has_to_wait() -> None:
     async with SimulatorServer() as server, narrow(server) as client:
         client.writer.write(writes(client, REQUESTS))
         await until_held(server)
-        (connection,) = connections(server._running())
+        (connection,) = server.connections
         assert len(connection._inbox) <= MOST_UNREAD + LARGEST_READ
-        assert connection.transport.get_write_buffer_size() < 100_000  # type: ignore[attr-defined]
+        assert connection.transport.get_write_buffer_size() < 100_000
         async with raw_client(server) as other:
             assert (await other.read_status()).is_reset, "others are served meanwhile"
         for value in range(REQUESTS):
             transaction, _, answer = await client.reply()
             assert transaction == (value + 1) & 0xFFFF
             assert answer == struct.pack(">BHH", 6, 1, value & 0xFFFF), "nothing is lost, and all in order"
-        assert connection.transport.is_reading()  # type: ignore[attr-defined]
+        assert connection.transport.is_reading()
 
 
 async def test_a_client_that_goes_away_while_it_has_to_wait() -> None:
@@ -80,7 +79,7 @@ async def test_a_client_that_goes_away_while_it_has_to_wait() -> None:
             await until_held(server)
         async with asyncio.timeout(5), raw_client(server) as other:
             assert (await other.read_status()).is_reset
-            while len(connections(server._running())) > 1:  # noqa: ASYNC110
+            while len(server.connections) > 1:  # noqa: ASYNC110
                 await asyncio.sleep(0)
 
 
@@ -116,7 +115,7 @@ async def test_replies_that_nobody_takes_from_a_serial_line_are_lost(line: Line)
 
     async with SerialSimulatorServer(line.port, paced=False) as server:
         server.policy = policy
-        (connection,) = connections(server._running())
+        (connection,) = server.connections
         transport: Any = connection.transport
         for count in range(5000):
             line.send(READ)
@@ -140,7 +139,7 @@ async def test_requests_that_come_faster_than_they_are_answered_are_lost(
     cable = VirtualLine(monkeypatch)
     gripper = SimulatedGripper(asyncio.get_running_loop().time)
     async with SerialSimulatorServer(cable.FAR, gripper, paced=False) as server:
-        (connection,) = connections(server._running())
+        (connection,) = server.connections
         for _ in range(1000):
             connection.data_received(100 * READ)
             assert len(connection._inbox) <= MOST_UNREAD + 100 * len(READ)

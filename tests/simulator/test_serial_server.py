@@ -197,7 +197,7 @@ def test_a_request_in_single_bytes(request_: str) -> None:
         inbox.append(byte)
         frames.append(take_rtu(inbox))
     assert frames[:-1] == [None] * (len(whole) - 1)
-    assert frames[-1] == (whole, 9, 0, whole[1:-2])
+    assert frames[-1] == (9, 0, whole[1:-2])
     assert not inbox
 
 

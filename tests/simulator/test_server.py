@@ -11,7 +11,6 @@ import pytest
 from pymodbus.client import AsyncModbusTcpClient
 
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
-from robotiq_async.simulator.server.endpoint import connections
 from robotiq_async.simulator.troubles.corruption import unchanged
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.request import AxisRequest, Request
@@ -454,7 +453,7 @@ async def test_half_a_request_from_before_a_power_cut_is_forgotten(
 ) -> None:
     await client.read_status()
     request = client.frame(b"\x04\x00\x00\x00\x08")
-    (connection,) = connections(server._running())
+    (connection,) = server.connections
     connection.data_received(request[:5])
     server.gripper.power_off()
     connection.data_received(request[5:])

@@ -12,7 +12,6 @@ import serial
 from robotiq_async import Finger, RobotiqHand
 from robotiq_async.simulator import RtuOverTcpSimulatorServer, SerialSimulatorServer, SimulatedGripper
 from robotiq_async.simulator.server.connection import MOST_UNREAD
-from robotiq_async.simulator.server.endpoint import connections
 from robotiq_async.simulator.server.serial_connection import MOST_UNSENT
 from robotiq_async.simulator.server.wire_time import WireTime
 from tests.grippers import activate_beforehand
@@ -122,7 +121,7 @@ def test_a_line_keeps_no_more_than_it_carries_for_a_while(monkeypatch: pytest.Mo
         loop = asyncio.get_running_loop()
         cable = VirtualLine(monkeypatch)
         async with SerialSimulatorServer(cable.FAR, SimulatedGripper(loop.time)) as server:
-            connection: Any = connections(server._running())[0]
+            connection: Any = server.connections[0]
             for _ in range(1000):
                 connection.data_received(100 * READ)
                 connection.pass_on(bytes(100))

@@ -199,8 +199,7 @@ class SimulatedGripper(Surroundings):
     @property
     def is_powered(self) -> bool:
         """Whether the gripper is switched on."""
-        self._catch_up()
-        return self._is_on
+        return max(self._time, self._own_clock.now) >= self._off_until
 
     @property
     def _is_on(self) -> bool:

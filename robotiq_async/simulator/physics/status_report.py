@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import struct
+from typing import TYPE_CHECKING, Final
 
 from robotiq_async.values import registers as reg
 from robotiq_async.values.enums import ObjectStatus
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 
     from .controller import Controller
 
+_AS_REGISTERS: Final = struct.Struct(">8H")
 _MOVING, _SOME_STOPPED, _ALL_STOPPED, _ALL_ARRIVED = range(4)
 
 
@@ -24,21 +26,20 @@ def status_registers(controller: Controller, time: float, fault: Fault) -> reg.R
     its gDT, unless the gripper has another habit; one that was stopped on its way reads 0. So gSTA = 0 then
     does not mean motion.
     """
-    block = [0] * reg.REGISTER_COUNT
+    content = bytearray(2 * reg.REGISTER_COUNT)
     model, request, statuses = controller.model, controller.request, controller.shown_statuses(time)
-    reg.gACT.write(block, request.activate)
-    reg.gGTO.write(block, request.go)
-    reg.gIMC.write(block, controller.progress)
-    reg.gFLT.write(block, fault)
-    for index, (axis, echo) in enumerate(zip(controller.axes, controller.echoes, strict=True)):
-        reg.gPR[index].write(block, echo)
-        reg.gPO[index].write(block, round(axis.position(time)))
-        reg.gCU[index].write(block, axis.current(time))
-        model.object_status[index].write(block, statuses[index])
+    content[0] = request.activate << reg.gACT.shift | request.go << reg.gGTO.shift
+    content[0] |= controller.progress << reg.gIMC.shift
     if model.has_modes:
-        reg.gMOD.write(block, request.mode)
-        reg.gSTA.write(block, _summary(statuses[:3]))
-    return tuple(block)
+        content[0] |= request.mode << reg.gMOD.shift | _summary(statuses[:3]) << reg.gSTA.shift
+    content[reg.gFLT.byte] = fault
+    for index, (axis, echo) in enumerate(zip(controller.axes, controller.echoes, strict=True)):
+        shown = model.object_status[index]
+        content[shown.byte] |= statuses[index] << shown.shift
+        content[reg.gPR[index].byte] = echo
+        content[reg.gPO[index].byte] = round(axis.position(time))
+        content[reg.gCU[index].byte] = axis.current(time)
+    return _AS_REGISTERS.unpack(content)
 
 
 def _summary(fingers: Sequence[ObjectStatus]) -> int:

@@ -1,22 +1,17 @@
-"""One client of a simulator: pymodbus's request handler, fed and drained by us."""
+"""One client of a simulator: its requests are answered one by one, and its replies sent as a policy says."""
 
 from __future__ import annotations
 
+import asyncio
 import socket
 import struct
 from collections import deque
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
-from pymodbus.pdu import ExceptionResponse
-from pymodbus.server.requesthandler import ServerRequestHandler
-
-from .framing import BadFrameError, Frame, refusal
+from .framing import BadFrameError, Frame
 
 if TYPE_CHECKING:
-    import asyncio
-    from collections.abc import Collection, Iterable
-
-    from pymodbus.server.base import ModbusBaseServer
+    from collections.abc import Iterable
 
 MOST_WAITING: Final = 1000
 """Replies that wait to be sent later; while there are so many, no more requests are taken."""
@@ -30,10 +25,6 @@ class Endpoint(Protocol):
     """What a connection asks of the simulator it belongs to."""
 
     @property
-    def served_functions(self) -> Collection[int]:
-        """The Modbus functions that are served now."""
-
-    @property
     def answers_nobody(self) -> bool:
         """Whether the gripper is without power."""
 
@@ -43,6 +34,9 @@ class Endpoint(Protocol):
     def hears(self, frame: Frame) -> bool:
         """Whether a request is heard, and meant for this gripper."""
 
+    def answer(self, frame: Frame) -> bytes:
+        """Carry out a request; the frame of the reply."""
+
     def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
         """What to send for a reply, as a reply policy gives it."""
 
@@ -50,25 +44,29 @@ class Endpoint(Protocol):
         """Drop what is left for a client that is gone."""
 
     def lets_in(self, client: Connection) -> bool:
-        """Whether a client that has come may stay."""
+        """Take note of a client that has come; whether it may stay."""
+
+    def forget(self, client: Connection) -> None:
+        """Take note that a client has gone."""
 
     def left_over(self) -> Iterable[bytes]:
         """What a new client is sent before it has asked for anything."""
 
 
-class Connection(ServerRequestHandler):
-    """Hands pymodbus one request at a time and sends its replies as the endpoint's policy says.
+class Connection(asyncio.Protocol):
+    """Has one request answered in a turn of the loop, and sends the reply as the endpoint's policy says.
 
-    pymodbus's own handler loses what arrives beside the request it works on, answers some malformed
-    requests with function code 0, and knows no misbehaviour.
+    Attributes:
+        transport: to the client; None before it has come, and once it is gone.
     """
 
-    def __init__(self, owner: ModbusBaseServer, endpoint: Endpoint) -> None:
-        super().__init__(owner, None, None, None)  # type: ignore[no-untyped-call]
+    def __init__(self, endpoint: Endpoint) -> None:
+        self.transport: Any = None
+        self._loop = asyncio.get_running_loop()
         self._endpoint = endpoint
         self._inbox = bytearray()
-        self._answering = False
-        self._answer_task: asyncio.Task[None] | None = None
+        self._goes_on = False
+        """Whether the next request is answered in the next turn of the loop."""
         self._outbox: deque[tuple[float, bytes]] = deque()
         """Replies to send later, with their times, in order: no reply overtakes an older one."""
         self._is_clogged = False
@@ -76,14 +74,22 @@ class Connection(ServerRequestHandler):
         self._is_held = False
         """Whether the client is not read from."""
 
-    def callback_connected(self) -> None:
+    def is_active(self) -> bool:
+        """Whether the client is there."""
+        return self.transport is not None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """A client is there."""
-        super().callback_connected()
+        self.transport = transport
         if not self._endpoint.lets_in(self):
             self.hang_up(reset=True)
             return
         for part in self._endpoint.left_over():
             self.pass_on(part)
+
+    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002  # asyncio's
+        """The client is gone."""
+        self._leave()
 
     def data_received(self, data: bytes) -> None:
         """Take bytes from the client."""
@@ -99,37 +105,27 @@ class Connection(ServerRequestHandler):
         self._is_clogged = False
         self._answer_next()
 
-    def handle_later(self) -> None:
-        """Answer the request that was taken, in a task.
-
-        pymodbus goes through the loop's descriptor for other threads, which costs two turns and system calls.
-        """
-        self._answer_task = self.loop.create_task(self.handle_request())  # type: ignore[no-untyped-call]
-
-    def send(self, data: bytes, addr: tuple[Any, ...] | None = None) -> None:  # noqa: ARG002
-        """Send a reply, or what the policy makes of it, and go on with the next request."""
-        self._answering = False
-        parts = () if self._endpoint.answers_nobody else self._endpoint.deliver(data)
+    def _send(self, reply: bytes) -> None:
+        """Send a reply, or what the policy makes of it."""
+        parts = self._endpoint.deliver(reply)
         if parts is None:
             self.hang_up()
             return
-        now = self.loop.time()
+        now = self._loop.time()
         for delay, part in parts:
             if delay <= 0 and not self._outbox:
                 self.pass_on(part)
                 continue
             last = self._outbox[-1][0] if self._outbox else now
             self._outbox.append((max(last, now + delay), part))
-            self.loop.call_at(self._outbox[-1][0], self._write_next)
-        if self._inbox:
-            self.loop.call_soon(self._answer_next)
+            self._loop.call_at(self._outbox[-1][0], self._write_next)
 
     def pass_on(self, part: bytes) -> None:
         """Send bytes now."""
         if not self.is_active():
             self._endpoint.undelivered(part)
         elif part:
-            self.transport.write(part)  # type: ignore[attr-defined]
+            self.transport.write(part)
 
     def hang_up(self, *, reset: bool = False) -> None:
         """Drop the connection at once with a reset (RST); what was not sent is lost."""
@@ -137,17 +133,26 @@ class Connection(ServerRequestHandler):
             line = self.transport.get_extra_info("socket") if reset else None
             if line is not None:
                 line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _LINGER_NOT)
-            self.transport.abort()  # type: ignore[attr-defined]
-            self.close()
+            self.transport.abort()
+            self._leave()
+
+    def _leave(self) -> None:
+        self.transport = None
+        self._endpoint.forget(self)
+
+    def _go_on(self) -> None:
+        self._goes_on = False
+        self._answer_next()
 
     def _answer_next(self) -> None:
-        """Hand over requests until one is being worked on, none is complete, or the client has to wait.
+        """Answer one request, unless none is complete or the client has to wait.
 
-        A gripper without power does not even hear them.
+        Who sends a thousand at once does not keep the loop: each turn has one. A gripper without power does
+        not even hear them.
         """
         if self._endpoint.answers_nobody:
             self._inbox.clear()
-        while not self._answering and not self._is_full and self.is_active():
+        while not self._goes_on and not self._is_full and self.is_active():
             try:
                 frame = self._endpoint.take(self._inbox)
             except BadFrameError:
@@ -156,7 +161,11 @@ class Connection(ServerRequestHandler):
             if frame is None:
                 break
             if self._endpoint.hears(frame):
-                self._answer(frame)
+                if self._inbox:
+                    self._goes_on = True
+                    self._loop.call_soon(self._go_on)
+                self._send(self._endpoint.answer(frame))
+                break
         self._regulate()
 
     @property
@@ -170,17 +179,9 @@ class Connection(ServerRequestHandler):
         if hold != self._is_held and self.is_active():
             self._is_held = hold
             if hold:
-                self.transport.pause_reading()  # type: ignore[attr-defined]
+                self.transport.pause_reading()
             else:
-                self.transport.resume_reading()  # type: ignore[attr-defined]
-
-    def _answer(self, frame: Frame) -> None:
-        self._answering = True
-        if (code := refusal(frame.pdu, self._endpoint.served_functions)) is not None:
-            self.pdu_send(ExceptionResponse(frame.pdu[0], code, frame.unit, frame.transaction))
-            return
-        self.recv_buffer = b""
-        super().data_received(frame.raw)
+                self.transport.resume_reading()
 
     def _write_next(self) -> None:
         self.pass_on(self._outbox.popleft()[1])

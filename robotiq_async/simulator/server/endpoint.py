@@ -15,12 +15,11 @@ from ..troubles.corruption import ReplyPolicy, unchanged
 from ..troubles.fault_injector import FaultInjector
 from ..troubles.like_hardware import OWN_HABITS
 from .connection import Connection
+from .register_bank import RegisterBank
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
     from types import TracebackType
-
-    from pymodbus.server.base import ModbusBaseServer
 
     from ..troubles.trouble import Link
     from .framing import Frame
@@ -38,6 +37,7 @@ class SimulatorEndpoint(ABC):
             not given takes 12 s for an activation.
         policy: changes, delays or drops each reply that no trouble concerns.
         fault_injector: makes troubles happen, and decides on requests and replies.
+        connections: to the clients that are there, oldest first.
     """
 
     link: ClassVar[Link]
@@ -48,7 +48,9 @@ class SimulatorEndpoint(ABC):
         self.gripper = SimulatedGripper(habits=OWN_HABITS) if gripper is None else gripper
         self.policy: ReplyPolicy = unchanged
         self.fault_injector = FaultInjector(self)
-        self._server: ModbusBaseServer | None = None
+        self.connections: list[Connection] = []
+        self._bank = RegisterBank(self.gripper, self.fault_injector)
+        self._is_running = False
         self._left_over: deque[bytes] = deque(maxlen=_MOST_LEFT_OVER)
 
     async def __aenter__(self) -> Self:
@@ -63,7 +65,7 @@ class SimulatorEndpoint(ABC):
     @property
     def is_running(self) -> bool:
         """Whether the server has been started and not stopped."""
-        return self._server is not None
+        return self._is_running
 
     @property
     @abstractmethod
@@ -83,60 +85,70 @@ class SimulatorEndpoint(ABC):
             RuntimeError: it is running already.
             OSError: the address or the serial port cannot be opened.
         """
-        if self._server is not None:
+        if self._is_running:
             raise RuntimeError(f"{type(self).__name__} is running already, at {self.address}")
-        self._server = await self._open()
+        await self._open()
+        self._is_running = True
 
     async def stop(self) -> None:
         """Drop all connections and stop listening. Bounded in time; without effect when it is not running."""
-        server, self._server = self._server, None
-        if server is None:
+        if not self._is_running:
             return
-        hang_up(server)
-        server.close()
+        self._is_running = False
+        self._close()
+        self._hang_up()
         self._left_over.clear()
-        # Two turns of the loop: answers that pymodbus was working on end, and transports close their files.
+        # Two turns of the loop, in which transports close their files.
         await asyncio.sleep(0)
         await asyncio.sleep(0)
 
     def cut(self, *, reset: bool = False) -> None:  # noqa: ARG002
         """Drop all connections. On a serial line there are none."""
-        self._running()
+        self._check_running()
 
     def refuse(self) -> None:
         """Refuse new connections. On a serial line there are none."""
-        self._running()
+        self._check_running()
 
     async def accept(self) -> None:
         """Accept connections again. On a serial line there are none."""
-        self._running()
+        self._check_running()
 
     @abstractmethod
     def _is_meant(self, unit: int) -> bool:
         """Whether a request to a unit id is for this gripper."""
 
     @abstractmethod
-    async def _open(self) -> ModbusBaseServer:
-        """A pymodbus server that listens."""
+    async def _open(self) -> None:
+        """Listen."""
 
-    def _running(self) -> ModbusBaseServer:
-        if self._server is None:
+    @abstractmethod
+    def _close(self) -> None:
+        """Listen no more; the connections are dropped afterwards."""
+
+    @abstractmethod
+    def _reply(self, frame: Frame, pdu: bytes) -> bytes:
+        """The frame of a reply to a request."""
+
+    def _check_running(self) -> None:
+        if not self._is_running:
             raise RuntimeError(f"{type(self).__name__} is not running: start() comes first")
-        return self._server
+
+    def _hang_up(self, *, reset: bool = False) -> None:
+        for connection in tuple(self.connections):
+            connection.hang_up(reset=reset)
 
     # What connections ask (see connection.Endpoint).
 
-    @property
-    def served_functions(self) -> Collection[int]:
-        """The Modbus functions that are served now."""
-        if self.fault_injector.reads_only_with_function_3:
-            return set(self.functions) - {READ_INPUT}
-        return self.functions
-
     def lets_in(self, client: Connection) -> bool:
-        """Whether a client that has come may stay."""
-        others = [] if self._server is None else connections(self._server)
-        return self.fault_injector.lets_in(sum(each.is_active() for each in others if each is not client))
+        """Take note of a client that has come; whether it may stay."""
+        self.connections.append(client)
+        return self.fault_injector.lets_in(len(self.connections) - 1)
+
+    def forget(self, client: Connection) -> None:
+        """Take note that a client has gone."""
+        if client in self.connections:
+            self.connections.remove(client)
 
     @property
     def answers_nobody(self) -> bool:
@@ -151,17 +163,23 @@ class SimulatorEndpoint(ABC):
         """Whether a request is heard, and meant for this gripper."""
         return self._is_meant(frame.unit) and self.fault_injector.hears()
 
+    def answer(self, frame: Frame) -> bytes:
+        """Carry out a request; the frame of the reply."""
+        served: Collection[int] = self.functions
+        if self.fault_injector.reads_only_with_function_3:
+            served = set(served) - {READ_INPUT}
+        return self._reply(frame, self._bank.answer(frame.pdu, served))
+
     def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
         """What to send for a reply."""
         return self.fault_injector.deliver(reply)
 
     def undelivered(self, part: bytes) -> None:
         """Lose what a client that is gone was to be sent; a multiplexer has it for the newest or the next."""
-        if self._server is None or not self.fault_injector.is_multiplexed:
+        if not (self._is_running and self.fault_injector.is_multiplexed):
             return
-        present = [each for each in connections(self._server) if each.is_active()]
-        if present:
-            present[-1].pass_on(part)
+        if self.connections:
+            self.connections[-1].pass_on(part)
         else:
             self._left_over.append(part)
 
@@ -170,14 +188,3 @@ class SimulatorEndpoint(ABC):
         parts = tuple(self._left_over) if self.fault_injector.is_multiplexed else ()
         self._left_over.clear()
         return parts
-
-
-def hang_up(server: ModbusBaseServer, *, reset: bool = False) -> None:
-    """Drop all connections of a server."""
-    for connection in connections(server):
-        connection.hang_up(reset=reset)
-
-
-def connections(server: ModbusBaseServer) -> list[Connection]:
-    """The connections of a server, oldest first."""
-    return [each for each in server.active_connections.values() if isinstance(each, Connection)]

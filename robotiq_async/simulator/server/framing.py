@@ -1,24 +1,18 @@
-"""Cutting requests out of a stream of bytes, and refusing those that cannot be served."""
+"""Requests and replies as bytes: how they are cut out of a stream, and what is put around them."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+import struct
+from typing import Final, NamedTuple
 
-from pymodbus.constants import ExcCodes
 from pymodbus.framer import FramerRTU
 
-from ..functions import READ_WRITE, RTU_FUNCTIONS, WRITE_MULTIPLE, WRITE_SINGLE
-from .register_bank import is_served
-
-if TYPE_CHECKING:
-    from collections.abc import Collection
+from ..functions import READ_WRITE, RTU_FUNCTIONS, WRITE_MULTIPLE
 
 _MBAP: Final = 7
 _LONGEST_TCP_FRAME: Final = 260
 _LONGEST_RTU_FRAME: Final = 256
 _CRC: Final = 2
-_MOST_READ: Final = 125
-_MOST_WRITTEN_AND_READ: Final = 121
 _COUNT_AT: Final = {WRITE_MULTIPLE: 6, READ_WRITE: 10}
 """Where an RTU frame says how many bytes of data follow."""
 
@@ -28,16 +22,14 @@ class BadFrameError(Exception):
 
 
 class Frame(NamedTuple):
-    """One request as it came.
+    """One request.
 
     Attributes:
-        raw: the whole frame.
         unit: the unit id asked for.
         transaction: the transaction id, 0 on a serial line.
         pdu: function code and data.
     """
 
-    raw: bytes
     unit: int
     transaction: int
     pdu: bytes
@@ -58,7 +50,7 @@ def take_tcp(inbox: bytearray) -> Frame | None:
         return None
     raw = bytes(inbox[:size])
     del inbox[:size]
-    return Frame(raw, raw[6], int.from_bytes(raw[:2], "big"), raw[_MBAP:])
+    return Frame(raw[6], int.from_bytes(raw[:2], "big"), raw[_MBAP:])
 
 
 def take_rtu(inbox: bytearray) -> Frame | None:
@@ -75,7 +67,7 @@ def take_rtu(inbox: bytearray) -> Frame | None:
         inbox.clear()
         return None
     del inbox[:size]
-    return Frame(raw, raw[0], 0, raw[1:-_CRC])
+    return Frame(raw[0], 0, raw[1:-_CRC])
 
 
 def _rtu_size(inbox: bytearray) -> int | None:
@@ -93,31 +85,12 @@ def _rtu_size(inbox: bytearray) -> int | None:
     return size if size <= _LONGEST_RTU_FRAME else 0
 
 
-def refusal(pdu: bytes, functions: Collection[int]) -> ExcCodes | None:
-    """The exception for a request that pymodbus would answer wrongly or in earnest; None for any other.
-
-    Args:
-        pdu: the request.
-        functions: the Modbus functions of this kind of link.
-    """
-    if pdu[0] not in functions:
-        return ExcCodes.ILLEGAL_FUNCTION
-    count = int.from_bytes(pdu[3:5], "big")
-    if pdu[0] == READ_WRITE:
-        return _refusal_to_read_and_write(pdu, count)
-    if pdu[0] == WRITE_MULTIPLE:
-        fits = len(pdu) > 5  # pymodbus checks the rest
-    else:
-        fits = len(pdu) == 5 and (pdu[0] == WRITE_SINGLE or 1 <= count <= _MOST_READ)
-    return None if fits else ExcCodes.ILLEGAL_VALUE
+def tcp_reply(frame: Frame, pdu: bytes) -> bytes:
+    """The frame of a reply to a request over TCP."""
+    return struct.pack(">HHHB", frame.transaction, 0, len(pdu) + 1, frame.unit) + pdu
 
 
-def _refusal_to_read_and_write(pdu: bytes, count: int) -> ExcCodes | None:
-    """Refuse a request whose read part is out of range before its write part is carried out."""
-    written = int.from_bytes(pdu[7:9], "big")
-    if not (1 <= count <= _MOST_READ and 1 <= written <= _MOST_WRITTEN_AND_READ):
-        return ExcCodes.ILLEGAL_VALUE
-    if len(pdu) != 10 + 2 * written or pdu[9] != 2 * written:
-        return ExcCodes.ILLEGAL_VALUE
-    is_readable = is_served(int.from_bytes(pdu[1:3], "big"), count)
-    return None if is_readable else ExcCodes.ILLEGAL_ADDRESS
+def rtu_reply(frame: Frame, pdu: bytes) -> bytes:
+    """The frame of a reply to a request over a serial line."""
+    content = bytes((frame.unit,)) + pdu
+    return content + FramerRTU.compute_CRC(content).to_bytes(_CRC, "big")

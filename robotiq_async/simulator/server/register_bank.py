@@ -1,27 +1,37 @@
-"""The gripper's registers as a pymodbus device. Only this file knows pymodbus's simulator classes."""
+"""The gripper's registers as a Modbus device has them: requests in, replies out, without what frames them."""
 
 from __future__ import annotations
 
+import struct
 from typing import TYPE_CHECKING, Final
 
-from pymodbus.simulator import DataType, SimData, SimDevice
+from robotiq_async.values.registers import REGISTER_COUNT, RTU_REGISTERS, Registers
 
-from robotiq_async.values.registers import REGISTER_COUNT, RTU_REGISTERS
-
-from ..functions import READ_HOLDING, READ_INPUT, READ_WRITE
+from ..functions import READ_HOLDING, READ_INPUT, READ_WRITE, WRITE_MULTIPLE, WRITE_SINGLE
 
 if TYPE_CHECKING:
-    from pymodbus.constants import ExcCodes
+    from collections.abc import Collection
 
     from ..physics.gripper import SimulatedGripper
     from ..troubles.fault_injector import FaultInjector
 
-_STARTS: Final = (0, RTU_REGISTERS.request, RTU_REGISTERS.status)
+_REQUEST, _STATUS = RTU_REGISTERS.request, RTU_REGISTERS.status
+_WRITABLE: Final = (0, _REQUEST)
+_READABLE: Final = (0, _REQUEST, _STATUS)
+_ILLEGAL_FUNCTION, _ILLEGAL_ADDRESS, _ILLEGAL_VALUE = 1, 2, 3
+"""Exception codes (Modbus Application Protocol, chapter 7)."""
+_MOST_READ: Final = 125
+_MOST_WRITTEN: Final = 123
+_MOST_WRITTEN_AND_READ: Final = 121
+"""Registers in one request (Modbus Application Protocol, 6.3, 6.12 and 6.17)."""
 
 
-def is_served(address: int, count: int) -> bool:
-    """Whether registers lie within one block."""
-    return any(start <= address and address + count <= start + REGISTER_COUNT for start in _STARTS)
+class _RefusedError(Exception):
+    """A request that gets an exception in place of a reply."""
+
+    def __init__(self, code: int) -> None:
+        super().__init__(code)
+        self.code = code
 
 
 class RegisterBank:
@@ -42,37 +52,71 @@ class RegisterBank:
         self._gripper = gripper
         self._troubles = troubles
 
-    def device(self) -> SimDevice:
-        """A device that answers any unit id."""
-        blocks = [
-            SimData(start, count=REGISTER_COUNT, datatype=DataType.REGISTERS, readonly=readonly)
-            for start, readonly in zip(_STARTS, (False, False, True), strict=True)
-        ]
-        return SimDevice(id=0, simdata=blocks, action=self._access)
+    def answer(self, pdu: bytes, functions: Collection[int]) -> bytes:
+        """Carry out a request, all of it or nothing.
 
-    # The signature that pymodbus 3.16 calls; it was another one in earlier releases.
-    async def _access(
-        self,
-        function_code: int,
-        start_address: int,
-        address: int,
-        count: int,
-        current_registers: list[int],
-        set_values: list[int] | list[bool] | None,
-    ) -> ExcCodes | None:
-        """Carry out an access; pymodbus has checked that it lies within one block that allows it."""
-        block = max(start for start in _STARTS if start <= address)
-        offset = address - block
-        if set_values is not None:
-            self._gripper.write(offset, [int(value) for value in set_values])
-        elif function_code in (READ_HOLDING, READ_INPUT, READ_WRITE):
-            is_status = block == RTU_REGISTERS.status or (block == 0 and self._reads_status(function_code))
-            registers = self._gripper.status_registers() if is_status else self._gripper.request_registers
-            first = address - start_address
-            current_registers[first : first + count] = registers[offset : offset + count]
-        return None
+        Args:
+            pdu: function code and data.
+            functions: the Modbus functions that are served.
 
-    def _reads_status(self, function_code: int) -> bool:
-        """Whether a function reads the status at 0x0000, and not the request."""
-        status = READ_HOLDING if self._troubles.reads_only_with_function_3 else READ_INPUT
-        return function_code == status
+        Returns:
+            The reply, or the exception that refuses the request.
+        """
+        try:
+            if pdu[0] not in functions:
+                raise _RefusedError(_ILLEGAL_FUNCTION)
+            return pdu[:1] + self._carry_out(pdu[0], pdu[1:])
+        except _RefusedError as refused:
+            return bytes((pdu[0] | 0x80, refused.code))
+
+    def _carry_out(self, function: int, data: bytes) -> bytes:
+        if function == WRITE_SINGLE:
+            _check(len(data) == 4)
+            self._write(data[:2], data[2:])
+            return data
+        if function == WRITE_MULTIPLE:
+            self._write(data[:2], _content(data[2:], _MOST_WRITTEN))
+            return data[:4]
+        _check(len(data) >= 4)
+        address, count = struct.unpack_from(">HH", data)
+        _check(1 <= count <= _MOST_READ)
+        block = _block_of(address, count, _READABLE)
+        if function == READ_WRITE:
+            self._write(data[4:6], _content(data[6:], _MOST_WRITTEN_AND_READ))
+        else:
+            _check(len(data) == 4)
+        first = address - block
+        registers = self._registers(function, block)[first : first + count]
+        return struct.pack(f">B{count}H", 2 * count, *registers)
+
+    def _write(self, at: bytes, content: bytes) -> None:
+        address, count = int.from_bytes(at, "big"), len(content) // 2
+        block = _block_of(address, count, _WRITABLE)
+        self._gripper.write(address - block, struct.unpack(f">{count}H", content))
+
+    def _registers(self, function: int, block: int) -> Registers:
+        function_of_the_status = READ_HOLDING if self._troubles.reads_only_with_function_3 else READ_INPUT
+        if block == _STATUS or (block == 0 and function == function_of_the_status):
+            return self._gripper.status_registers()
+        return self._gripper.request_registers
+
+
+def _check(is_right: bool) -> None:
+    if not is_right:
+        raise _RefusedError(_ILLEGAL_VALUE)
+
+
+def _content(data: bytes, most: int) -> bytes:
+    """The registers to write, after their count in registers and in bytes."""
+    _check(len(data) > 3)
+    count, content = int.from_bytes(data[:2], "big"), data[3:]
+    _check(1 <= count <= most and data[2] == 2 * count == len(content))
+    return content
+
+
+def _block_of(address: int, count: int, blocks: tuple[int, ...]) -> int:
+    """Where the block begins that has all of the registers."""
+    for block in blocks:
+        if block <= address and address + count <= block + REGISTER_COUNT:
+            return block
+    raise _RefusedError(_ILLEGAL_ADDRESS)

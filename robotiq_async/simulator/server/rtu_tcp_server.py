@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pymodbus import FramerType
-from pymodbus.server import ModbusTcpServer
-
 from robotiq_async.values.checks import check_flag, check_int
 from robotiq_async.values.registers import RTU_REGISTERS
 
 from ..functions import RTU_FUNCTIONS
-from .framing import Frame, take_rtu
-from .register_bank import RegisterBank
+from .framing import Frame, rtu_reply, take_rtu
 from .serial_connection import SerialConnection
 from .serial_server import BROADCAST, is_answered
 from .tcp_server import SimulatorServer
@@ -74,15 +70,8 @@ class RtuOverTcpSimulatorServer(SimulatorServer):
     def _is_meant(self, unit: int) -> bool:
         return unit == BROADCAST or super()._is_meant(unit)
 
-    def _make_server(self) -> ModbusTcpServer:
-        return _RtuOverTcpServer(self)
+    def _reply(self, frame: Frame, pdu: bytes) -> bytes:
+        return rtu_reply(frame, pdu)
 
-
-class _RtuOverTcpServer(ModbusTcpServer):
-    def __init__(self, endpoint: RtuOverTcpSimulatorServer) -> None:
-        bank = RegisterBank(endpoint.gripper, endpoint.fault_injector)
-        super().__init__(bank.device(), framer=FramerType.RTU)
-        self._endpoint = endpoint
-
-    def callback_new_connection(self) -> SerialConnection:
-        return SerialConnection(self, self._endpoint, paced=self._endpoint.paced)
+    def _connection(self) -> SerialConnection:
+        return SerialConnection(self, paced=self.paced)

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from .connection import MOST_UNREAD, Connection, Endpoint
 from .framing import take_rtu
 from .wire_time import SILENCE_S, WireTime
-
-if TYPE_CHECKING:
-    from pymodbus.server.base import ModbusBaseServer
 
 LONGEST_PAUSE_S: Final = 0.02
 """Longer than this no frame pauses on its way to this program, which does not see the wire: a USB adapter
@@ -24,15 +21,14 @@ MOST_UNSENT: Final = 4096
 class SerialConnection(Connection):
     """The other end of a serial line, which has no connections, no packets and no flow control."""
 
-    def __init__(self, owner: ModbusBaseServer, endpoint: Endpoint, *, paced: bool) -> None:
+    def __init__(self, endpoint: Endpoint, *, paced: bool) -> None:
         """The end of a line.
 
         Args:
-            owner: pymodbus's server.
             endpoint: the simulator it belongs to.
             paced: whether bytes take the time that they take at the baud rate.
         """
-        super().__init__(owner, endpoint)
+        super().__init__(endpoint)
         self._wire = WireTime() if paced else None
         self._heard_at = 0.0
         self._unsent = 0
@@ -40,13 +36,13 @@ class SerialConnection(Connection):
 
     def data_received(self, data: bytes) -> None:
         """Take bytes from the line, once they have come; more than it can carry for long is lost."""
-        now = self.loop.time()
+        now = self._loop.time()
         if self._wire is None:
             pause, self._heard_at = now - self._heard_at, now
             self._hear(data, pause)
         elif self._wire.unheard(now) < MOST_UNREAD:
             due, pause = self._wire.hears(now, len(data))
-            self.loop.call_at(due, self._hear_late, due, data, pause)
+            self._loop.call_at(due, self._hear_late, due, data, pause)
 
     def _hear_late(self, due: float, data: bytes, pause: float) -> None:
         assert self._wire is not None, "bytes take time"
@@ -57,21 +53,21 @@ class SerialConnection(Connection):
     def _hear(self, data: bytes, pause: float) -> None:
         """Bytes have come; those of a frame that was cut off before them are dropped."""
         self._answer_next()  # complete frames are answered, even if their turn has not come
-        if not self._answering and _begins_anew(pause, data):
+        if not self._goes_on and _begins_anew(pause, data):
             self._inbox.clear()
         super().data_received(data)
 
     def pass_on(self, part: bytes) -> None:
         """Send bytes; a reader has them when the last one has arrived."""
-        now = self.loop.time()
+        now = self._loop.time()
         if self._wire is None:
             self._put(part)
         elif part and self._wire.unsent(now) < MOST_UNSENT:
-            self.loop.call_at(self._wire.sends(now, len(part)), self._put, part)
+            self._loop.call_at(self._wire.sends(now, len(part)), self._put, part)
 
     def _put(self, part: bytes) -> None:
         """Put bytes on the line, unless too many are unread."""
-        if self.is_active() and not self.transport.get_write_buffer_size():  # type: ignore[attr-defined]
+        if self.is_active() and not self.transport.get_write_buffer_size():
             self._unsent = 0
         if self._unsent + len(part) <= MOST_UNSENT:
             self._unsent += len(part)

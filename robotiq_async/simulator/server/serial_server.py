@@ -6,16 +6,16 @@ import asyncio
 import importlib.util
 from typing import TYPE_CHECKING, Final
 
-from pymodbus.server import ModbusSerialServer
+from pymodbus.transport.serialtransport import create_serial_connection
 
 from robotiq_async.values.checks import check_flag, check_int
 from robotiq_async.values.registers import RTU_REGISTERS
 
 from ..functions import RTU_FUNCTIONS
 from .endpoint import SimulatorEndpoint
-from .framing import Frame, take_rtu
-from .register_bank import RegisterBank
+from .framing import Frame, rtu_reply, take_rtu
 from .serial_connection import SerialConnection
+from .wire_time import BAUD
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -112,28 +112,18 @@ class SerialSimulatorServer(SimulatorEndpoint):
     def _is_meant(self, unit: int) -> bool:
         return unit in (BROADCAST, self._device_id)
 
-    async def _open(self) -> ModbusSerialServer:
-        server = _SerialServer(self)
-        # pymodbus's own listen() hides the error.
-        server.transport, _ = await server.call_create()
+    def _reply(self, frame: Frame, pdu: bytes) -> bytes:
+        return rtu_reply(frame, pdu)
+
+    def _close(self) -> None:
+        """There is nothing but the one connection."""
+
+    async def _open(self) -> None:
+        loop, line = asyncio.get_running_loop(), {"bytesize": 8, "parity": "N", "stopbits": 1}
+        await create_serial_connection(
+            loop, lambda: SerialConnection(self, paced=self._paced), self._port, baudrate=BAUD, **line
+        )
         # The transport watches the line from the next turn of the loop on and tells the connection in the
         # one after that; closing it earlier would fail.
         await asyncio.sleep(0)
         await asyncio.sleep(0)
-        return server
-
-
-class _SerialServer(ModbusSerialServer):
-    def __init__(self, endpoint: SerialSimulatorServer) -> None:
-        super().__init__(
-            RegisterBank(endpoint.gripper, endpoint.fault_injector).device(),
-            port=endpoint.port,
-            baudrate=115200,
-            bytesize=8,
-            parity="N",
-            stopbits=1,
-        )
-        self._endpoint = endpoint
-
-    def callback_new_connection(self) -> SerialConnection:
-        return SerialConnection(self, self._endpoint, paced=self._endpoint.paced)

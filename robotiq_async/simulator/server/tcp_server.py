@@ -6,20 +6,15 @@ import asyncio
 import socket
 from typing import TYPE_CHECKING, ClassVar, Final
 
-from pymodbus.server import ModbusTcpServer
-
 from robotiq_async.values.checks import check_int, check_seconds
 
 from ..functions import TCP_FUNCTIONS
 from ..troubles.trouble import Trouble
 from .connection import Connection
-from .endpoint import SimulatorEndpoint, hang_up
-from .framing import Frame, take_tcp
-from .register_bank import RegisterBank
+from .endpoint import SimulatorEndpoint
+from .framing import Frame, take_tcp, tcp_reply
 
 if TYPE_CHECKING:
-    from pymodbus.server.base import ModbusBaseServer
-
     from ..physics.gripper import SimulatedGripper
     from ..troubles.trouble import Link
 
@@ -83,7 +78,8 @@ class SimulatorServer(SimulatorEndpoint):
         Raises:
             RuntimeError: the server is not running.
         """
-        hang_up(self._running(), reset=reset)
+        self._check_running()
+        self._hang_up(reset=reset)
 
     def refuse(self) -> None:
         """Refuse new connections until :meth:`accept`; those that exist go on.
@@ -91,7 +87,7 @@ class SimulatorServer(SimulatorEndpoint):
         Raises:
             RuntimeError: the server is not running.
         """
-        self._running()
+        self._check_running()
         self._listener.close()
 
     async def accept(self) -> None:
@@ -101,9 +97,9 @@ class SimulatorServer(SimulatorEndpoint):
             RuntimeError: the server is not running.
             OSError: another process has taken the port.
         """
-        server = self._running()
+        self._check_running()
         if not self._listener.is_serving():
-            await self._listen(server)
+            await self._open()
 
     async def power_cycle(self, off_time: float = 0.0) -> None:
         """Cut the gripper's power and come back after it.
@@ -130,20 +126,20 @@ class SimulatorServer(SimulatorEndpoint):
     def _is_meant(self, unit: int) -> bool:
         return self._device_id in (None, unit)
 
-    async def _open(self) -> ModbusTcpServer:
-        server = self._make_server()
-        await self._listen(server)
-        return server
+    def _reply(self, frame: Frame, pdu: bytes) -> bytes:
+        return tcp_reply(frame, pdu)
 
-    def _make_server(self) -> ModbusTcpServer:
-        return _TcpServer(self)
+    def _connection(self) -> Connection:
+        return Connection(self)
 
-    async def _listen(self, server: ModbusBaseServer) -> None:
-        """Listen. pymodbus's own listen() hides the error and cannot listen again on a port it found."""
+    def _close(self) -> None:
+        self._listener.close()
+
+    async def _open(self) -> None:
         loop = asyncio.get_running_loop()
         try:
             self._listener = await loop.create_server(
-                server.handle_new_connection, self._host, self._port, reuse_address=True
+                self._connection, self._host, self._port, reuse_address=True
             )
         except UnicodeError as error:  # of a name that can be none
             raise OSError(f"{self._host} cannot be resolved: {error}") from error
@@ -153,13 +149,3 @@ class SimulatorServer(SimulatorEndpoint):
             socket.socket().close()  # raises why
             raise OSError(f"there is no socket for {self._host}")
         self._port = self._listener.sockets[0].getsockname()[1]
-        server.transport = self._listener  # type: ignore[assignment]  # as pymodbus does
-
-
-class _TcpServer(ModbusTcpServer):
-    def __init__(self, endpoint: SimulatorServer) -> None:
-        super().__init__(RegisterBank(endpoint.gripper, endpoint.fault_injector).device())
-        self._endpoint = endpoint
-
-    def callback_new_connection(self) -> Connection:
-        return Connection(self, self._endpoint)
