@@ -1,4 +1,4 @@
-"""A third kind of hand, of a page: no link, no task, no simulator. All happens at once.
+"""A third kind of hand, one page long: no link, no task, no simulator. All happens at once.
 
 It proves that a hand takes no more than what Hand asks of its subclasses, and that what stands around a hand
 needs nothing but a Hand.

@@ -30,7 +30,7 @@ ASSIGNED = {
 
 def test_the_axes_have_the_bits_of_the_contract() -> None:
     values = {name: int(member) for name, member in Finger.__members__.items()}
-    assert values == {"A": 1, "B": 2, "C": 4, "SCISSOR": 8, "ABC": 7, "ALL": 15}
+    assert values == {"A": 1, "JAW": 1, "B": 2, "C": 4, "SCISSOR": 8, "ABC": 7, "ALL": 15}
 
 
 def test_the_axes_are_listed_in_the_order_of_their_registers() -> None:

@@ -36,6 +36,7 @@ from robotiq_async.tools.recording.recorder import Recorder
 from robotiq_async.tools.recording.recordings import read_recording
 from robotiq_async.tools.recording.table import COLUMNS, Table
 from robotiq_async.tools.web.page.mirror import HandMirror
+from robotiq_async.values.checks import parse_fingers
 from robotiq_async.values.errors import MeasuringError, RobotiqStateError
 from robotiq_async.values.model import MODELS, model_of
 from robotiq_async.values.request import AxisRequest, Request
@@ -194,6 +195,17 @@ def test_an_address_may_name_the_model(address: str) -> None:
 def test_a_model_that_there_is_not_is_a_malformed_address(address: str) -> None:
     with pytest.raises(ValueError, match="malformed address"):
         parse_address(address)
+
+
+def test_a_simulated_gripper_takes_the_name_of_its_model() -> None:
+    assert SimulatedGripper(model="2f85").model is TWO_FINGER_85
+    with pytest.raises(ValueError, match="model must be"):
+        SimulatedGripper(model="2f-85")
+
+
+def test_the_jaw_is_finger_a_by_another_name() -> None:
+    assert Finger.JAW is Finger.A is JAW
+    assert parse_fingers("fingers", "jaw") is JAW
 
 
 def test_an_option_and_an_address_must_agree() -> None:

@@ -32,7 +32,7 @@ COMMANDS: Final = (
 )
 """A new sub-command is a module with a function of its name, and an entry here."""
 
-_HELP = """Control a Robotiq 3-Finger gripper, or a simulated one.
+_HELP = """Control a Robotiq 3-Finger, 2F-85, 2F-140 or Hand-E gripper, or a simulated one.
 
 Every command that talks to a gripper takes its address as the last argument, and names it first:
 
@@ -41,6 +41,8 @@ Every command that talks to a gripper takes its address as the last argument, an
     rtu+tcp://HOST:PORT   Modbus RTU through a serial server
     zenoh://lab/cell/left one that an agent on another host serves (extra fleet)
     sim://                a gripper simulated inside the command
+
+A gripper other than the 3-Finger is named at the end: tcp://192.168.1.11?model=2f85 (2f140, hand-e).
 
 Without an address it is sim://; doctor, verify and measure want one.
 

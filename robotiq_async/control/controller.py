@@ -1,9 +1,10 @@
-"""The hand without its link: takes in statuses and decides what to write.
+"""Decides what to write: takes in statuses and requests, and gives the image that is due.
 
-No I/O, no clock and no event loop. The task that owns the link calls, once per poll and in this order:
+No I/O, no clock and no event loop. The task that owns the link calls:
 
-* :meth:`Controller.see` with the status just read;
-* :meth:`Controller.decide` for the image to write now, if any; then :meth:`Controller.acknowledged`;
+* :meth:`Controller.see` with each status that it has read;
+* :meth:`Controller.decide` for the image to write now, if any, and then :meth:`Controller.acknowledged`:
+  after the read of a cycle, and before it if the request is urgent, as a stop is;
 * :meth:`Controller.lost` if the link goes down at any point.
 """
 
@@ -82,7 +83,7 @@ class Controller:
         self.passing_faults = 0
         self._passing_fault = PassingFault(self._count_passing_fault)
         self._judged: RobotiqStatus | None = None
-        """The newest status, without 0x09 until that has lasted: decisions use this one."""
+        """The newest status, with a brief 0x09 filtered out: decisions use this one."""
         self._warned = NEVER
         self._closing_time = closing_time
         self._shadow = RequestShadow(speed, force, model, log=machine.log)
@@ -402,7 +403,7 @@ class Controller:
             self.machine.delivered()
 
     def lost(self, why: RobotiqError | None = None) -> None:
-        """The link is down: drop every request that was not acknowledged, and never send it again."""
+        """The link is down: drop what was not acknowledged. No motion is sent again; holds are, on return."""
         self.machine.fire(Trigger.LINK_LOST)
         self._grip_keeper.doubt = "the link went down"
         error = ConnectionLostError(f"the link went down before this was done: {why}")

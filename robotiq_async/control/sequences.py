@@ -26,7 +26,7 @@ from .triggers import classify
 
 Sequence = Generator[Request | None, RobotiqStatus, None]
 Image = Callable[[RobotiqStatus], Request]
-"""Makes the image to begin from out of the newest status."""
+"""Makes the image to begin from, given the newest status."""
 
 
 def activation(at_rest: Image) -> Sequence:

@@ -47,17 +47,18 @@ class Hand(ABC):
 
     Many calls take the same arguments. Any other value raises TypeError or ValueError, and nothing is sent:
 
-    * ``fingers``: the axes, a :class:`Finger` mask or the same integer, 1..15. The others stay as they are.
+    * ``fingers``: the axes, a :class:`Finger` mask or the same integer; the others stay as they are.
       ``Finger.ABC`` are the fingers of the model, ``Finger.ALL`` its axes; others that it lacks are refused.
     * ``position``: the target in counts, 0 (open) .. 255 (closed). Any object with ``__index__`` is an
       integer, except a bool.
-    * ``speed``: 0 (22 mm/s nominal) .. 255 (110 mm/s nominal); None leaves the speed of these axes.
-    * ``force``: 0 (15 N nominal) .. 255 (60 N nominal), not linear; None leaves the force of these axes.
+    * ``speed``: 0 (the slowest) .. 255; None leaves the speed of these axes. :attr:`units` has mm/s.
+    * ``force``: 0 (the least, not none) .. 255, not linear; None leaves the force of these axes.
     * ``timeout``: seconds above 0; None for twice the expected time plus 2 s.
 
     Timestamps are monotonic seconds of this process, wherever the gripper is. No motion is ever sent twice.
 
-    To add a kind of hand, supply the methods below "for subclasses".
+    To add a kind of hand, supply what is abstract, give ``_channels`` each status and transition, and set
+    ``_session`` to the present :class:`~robotiq_async.hand.run.Run`, or override ``_check_running``.
 
     Args:
         address: which gripper; no two hands of a process have the same one.
@@ -157,8 +158,7 @@ class Hand(ABC):
         all, and the log says why: an axis is not at rest within 0.5 s, the link is or goes down, a fault, a
         sequence, another client that commands, or a ``halt()``. A client that starts a motion after the last
         status and before the disconnection is not seen. What a real gripper does with a part, either way, is
-        not known. A gripper that is not polled may lose its activation, and the part: the next program then
-        finds it in RESET.
+        not known. A gripper that is not polled may lose its activation, and the part: it is in RESET then.
 
         If the event loop was closed, the hand counts as stopped, and the fingers go on.
 

@@ -50,4 +50,5 @@ def refuse_with(hand: object) -> None:
         TypeError: always.
     """
     kind = type(hand).__name__
-    raise TypeError(f"a {kind} is used with 'async with'; for 'with' use robotiq_async.sync.RobotiqHand")
+    instead = "; for 'with' use robotiq_async.sync.RobotiqHand" if kind == "RobotiqHand" else ""
+    raise TypeError(f"a {kind} is used with 'async with'{instead}")

@@ -1,9 +1,10 @@
 """The one task that owns the link: it connects, polls, writes, reconnects and shuts down.
 
 Every cycle reads the status, decides and writes at once, like the scan of a PLC, so each decision is made on
-what the gripper has just shown. No other task touches the transport: callers leave their requests with the
-controller and wait. So no exchange is cancelled in flight, except when a stop has waited for it long enough;
-then the link is closed with it. start() and stop() may be called from different tasks.
+what the gripper has just shown. Only what stops the gripper does not wait for the read. No other task touches
+the transport: callers leave their requests with the controller and wait. So no exchange is cancelled in
+flight, except when a stop has waited for it long enough; then the link is closed with it. start() and stop()
+may be called from different tasks.
 """
 
 from __future__ import annotations
@@ -190,7 +191,7 @@ class Poller:
         return connected
 
     async def _connect(self) -> None:
-        """Open the link and see the first status, or what it takes to decide about one."""
+        """Open the link and read the first status; read on while its fault 0x09 may be a passing one."""
         await self._transport.open()
         self._last_poll = 0.0  # the time without a link counts as no period
         await self._poll_once(is_first=True)

@@ -48,7 +48,7 @@ def _documented_as(original: type) -> Callable[[K], K]:
 
 @_documented_as(AsyncRobotiqHand)
 class RobotiqHand:
-    """A Robotiq 3-Finger gripper behind Modbus TCP, a serial line, or simulated, that blocks.
+    """A Robotiq gripper behind Modbus TCP, a serial line, or simulated, that blocks.
 
     Use it as ``with RobotiqHand(address) as hand:``, or call :meth:`start` and :meth:`stop`. The options, the
     calls, their arguments, results and errors are those of :class:`robotiq_async.RobotiqHand`, and each call

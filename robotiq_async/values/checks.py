@@ -78,7 +78,7 @@ def check_mask(fingers: object) -> Finger:
 
 
 def parse_fingers(name: str, text: str) -> Finger:
-    """A mask of axes from words: ``ABC``, ``A,B``, ``scissor``, ``all``.
+    """A mask of axes from words: ``ABC``, ``A,B``, ``scissor``, ``jaw``, ``all``.
 
     Raises:
         ValueError: it names something else, or nothing.
@@ -92,7 +92,7 @@ def parse_fingers(name: str, text: str) -> Finger:
             for letter in word:
                 mask |= Finger[letter]
         else:
-            raise ValueError(f"{name} must name axes (ABC, or A,B, or scissor, or all), got {word!r}")
+            raise ValueError(f"{name} must name axes (ABC, or A,B, or scissor, or jaw, or all), got {word!r}")
     return mask
 
 

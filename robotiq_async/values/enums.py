@@ -11,10 +11,11 @@ class Finger(IntFlag):
     """The axes of a gripper, and masks of them.
 
     ``A`` is the single finger that closes between ``B`` and ``C``; ``SCISSOR`` spreads ``B`` and ``C``. A 2F
-    or a Hand-E has ``A`` alone, its jaw (:data:`JAW`).
+    or a Hand-E has ``A`` alone, also called ``JAW``.
     """
 
     A = 1
+    JAW = 1
     B = 2
     C = 4
     SCISSOR = 8
@@ -26,7 +27,7 @@ class Finger(IntFlag):
 
 
 JAW: Final = Finger.A
-"""The one axis of a 2F or a Hand-E."""
+"""The one axis of a 2F or a Hand-E: another name of ``Finger.A``."""
 NO_AXES: Final = Finger(0)
 """The empty mask."""
 

@@ -180,7 +180,10 @@ class ConnectFailedError(RobotiqConnectionError):
 
 
 class ConnectionLostError(RobotiqConnectionError):
-    """The link went down. Requests that were not acknowledged by then are dropped, never sent again."""
+    """The link went down. What was not acknowledged by then is dropped.
+
+    No motion is sent again; a hold may be.
+    """
 
 
 class ResponseTimeoutError(RobotiqConnectionError, TimeoutError):

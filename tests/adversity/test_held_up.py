@@ -20,7 +20,7 @@ POLL_S = 0.01
 
 def test_what_was_missed_is_counted_and_skipped() -> None:
     async def main() -> None:
-        async with world() as here:
+        async with world(poll_interval=POLL_S) as here:
             await here.activate_beforehand()
             await here.hand.start()
             await anext(here.hand.statuses())

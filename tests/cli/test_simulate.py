@@ -270,6 +270,11 @@ def test_a_trouble_that_does_not_fit_a_serial_line(call: Call) -> None:
     outcome.assert_failed(2, "refuse does not fit a simulator on rtu")
 
 
+def test_a_trouble_that_does_not_fit_a_jaw(call: Call) -> None:
+    words = ("--port", "0", "--model", "2f85", "--trouble", "interference")
+    call("simulate", *words).assert_failed(2, "interference does not fit a 2F-85: it has no scissor")
+
+
 def test_the_list_of_troubles(call: Call) -> None:
     outcome = call("simulate", "--troubles")
     assert (outcome.code, outcome.err) == (0, "")

@@ -78,7 +78,15 @@ def test_stages_that_move_nothing_run_without_a_person(call: Call, tmp_path: Pat
     """Against the gripper of sim://."""
     outcome = call("verify", "sim://", "--up-to", "0", "--yes-to", "0", "--report", str(tmp_path / "report"))
     outcome.assert_succeeded()
-    assert "can be used as it is, as far as stage 0 can tell" in outcome.out.replace("\n", " ")
+    assert "Nothing is known of the gripper yet" in outcome.out
+
+
+def test_it_takes_the_model_as_an_option(call: Call, tmp_path: Path) -> None:
+    where = tmp_path / "report"
+    arguments = ("--model", "2f85", "--up-to", "0", "--yes-to", "0", "--report", str(where))
+    call("verify", "sim://", *arguments).assert_succeeded()
+    assert "Looked at as a 2F-85" in (where / "report.md").read_text()
+    assert 'model="2f85"' in (where / "report.md").read_text()
 
 
 @pytest.mark.parametrize("columns", [40, 60, 100])

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from robotiq_async import RobotiqHand
+from robotiq_async import TWO_FINGER_85, RobotiqHand
 from robotiq_async.fleet.agent.agent_file import read_agent_file
 from robotiq_async.link.address import parse_address
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_parameter
@@ -23,7 +23,7 @@ from robotiq_async.simulator import Trouble
 from robotiq_async.tools.recording.recordings import read_recording
 from robotiq_async.tools.verify import CATALOGUE, ENDINGS, Check, Plan, Report, Runner, Verdict
 from robotiq_async.tools.verify.files import JSON, PAGE, Folder, Scrubber
-from robotiq_async.tools.verify.page import lines, sentences
+from robotiq_async.tools.verify.page import lines, page, sentences
 from robotiq_async.tools.verify.recording import NAME
 from robotiq_async.tools.verify.report import SCHEMA
 from tests.docs.pages import DOCS
@@ -263,11 +263,31 @@ def test_three_sentences_for_every_ending(why: str) -> None:
     usable, known, wanted = sentences(report)
     is_bad = why in ("fault", "envelope", "time", "foreign", "deviation", "inactive")
     assert usable.startswith("Do not use" if is_bad else "This gripper can be used")
-    assert "nothing is known of stage 3, 4, 5, 6, 7, 8, 9" in known
+    assert "not finished: stage 3, 4, 5, 6, 7, 8, 9" in known
     assert "read.registers" in wanted
     report.stages = [0]
     if why in ("refused", "link"):
         assert "could not be judged" in sentences(report)[0]
+
+
+def test_stage_0_alone_says_nothing_of_the_gripper() -> None:
+    report = Report("tcp", stages=[0], entered=[0], why="done")
+    usable, _, wanted = sentences(report)
+    assert usable.startswith("Nothing is known of the gripper")
+    assert wanted == "There is nothing to send yet."
+
+
+def test_the_lines_to_paste_name_the_model(tmp_path: Path) -> None:
+    report = report_with(**EVERY)
+    report.model = TWO_FINGER_85
+    told = lines(report)
+    hand = eval(told["Python"].replace("ADDRESS", "tcp://192.0.2.1"), {"RobotiqHand": RobotiqHand})
+    assert hand.model is TWO_FINGER_85
+    file = tmp_path / "FLEET.toml"
+    file.write_text('site = "lab"\n' + told["FLEET.toml"].replace("ADDRESS", "tcp://192.0.2.1"))
+    assert read_agent_file(file).grippers["NAME"].model is TWO_FINGER_85
+    assert "-p model:=2f85" in told["ROS 2"]
+    assert "Looked at as a 2F-85, link tcp." in page(report)
 
 
 def test_checks_that_were_not_reached_are_said_to_be_so() -> None:

@@ -129,13 +129,15 @@ class Browser:
         return list(self.driver.get_log(kind))  # type: ignore[no-untyped-call]
 
     def requested(self) -> set[str]:
-        """Every address that was asked for since the last time."""
+        """Every address that was asked for since the last time, but what the browser asks of itself."""
         messages = [json.loads(each["message"])["message"] for each in self._log("performance")]
-        return {
+        asked = {
             each["params"].get("request", each["params"]).get("url", "")
             for each in messages
             if each["method"] in ("Network.requestWillBeSent", "Network.webSocketCreated")
         }
+        # The tab that Chromium begins with draws icons of its own, at any time; none is from another host.
+        return {url for url in asked if not url.startswith("chrome://")}
 
     def complaints(self) -> list[str]:
         """What the page has complained about since the last time."""

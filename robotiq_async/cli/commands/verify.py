@@ -6,8 +6,9 @@ import asyncio
 import time
 from collections.abc import AsyncIterator, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -41,6 +42,7 @@ async def verify(
     report: Annotated[Path | None, Parameter(metavar="DIR")] = None,
     yes_to: Annotated[Stage | None, Parameter(show_default=False)] = None,
     label: Annotated[str, Parameter(metavar="TEXT", show_default=False)] = "",
+    model: Literal["3f", "2f85", "2f140", "hand-e"] | None = None,
 ) -> None:
     """Check a real gripper against all that this library assumes. FROM STAGE 3 ON THE FINGERS MOVE.
 
@@ -70,6 +72,7 @@ async def verify(
         report: Folder for the report; it must not contain one yet.
         yes_to: Do not ask for the stages up to this one, at most 2.
         label: Title of the report; it appears there as you write it.
+        model: Which gripper it is (default: that of the address, or 3f).
     """
     if is_remote(address):
         raise UsageError("verify the gripper on the host that its line leads to: it uses no agent")
@@ -82,6 +85,8 @@ async def verify(
         )
     with usage():
         parsed = parse_address(address)
+        if model is not None:
+            parsed = replace(parsed, model=model_of(model))
     need("mcap", "record")
     from ...tools.verify import Plan
     from ...tools.verify.files import Folder

@@ -75,7 +75,7 @@ class WriteHistory:
 
     @property
     def is_in_doubt(self) -> bool:
-        """Whether it is unknown if a write acts."""
+        """Whether there is a write of which it is not known if it acts."""
         return self._has_waiting and len(self._writes) > 1 and self._any_waits()
 
     def _any_waits(self) -> bool:

@@ -48,7 +48,7 @@ MOTIONS: Final = ("move", "set_position")
 
 
 class RemoteHand(Hand):
-    """A Robotiq 3-Finger gripper on another host, served by ``robotiq-async agent`` there.
+    """A Robotiq gripper on another host, served by ``robotiq-async agent`` there.
 
     What all hands promise is in :class:`~robotiq_async.hand.Hand`. Commanding takes a lease, which this
     hand acquires when it starts and renews from its own event loop. A program that hangs loses the lease, and

@@ -14,7 +14,7 @@ from ..translation.settings import Settings
 
 
 def make_hand(settings: Settings) -> Hand:
-    """A hand that is not started. Only this function knows which kind of hand it is.
+    """A hand that is not started. In the ROS node only this function knows which kind of hand it is.
 
     A hand on another host acquires its lease with the first command: connecting only reads.
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 from robotiq_async.values import registers as reg
 from robotiq_async.values.checks import check_int, check_seconds
 from robotiq_async.values.enums import NO_AXES, Fault, Finger
-from robotiq_async.values.model import THREE_FINGER, Model
+from robotiq_async.values.model import Model, model_of
 
 from .clock import Clock
 from .control_modes import SCISSOR_HIGH, SCISSOR_LOW, check_scissor_limit
@@ -66,7 +66,7 @@ class SimulatedGripper(Surroundings):
         spread: bool = True,
         seed: int = SEED,
         habits: Habits | None = None,
-        model: Model = THREE_FINGER,
+        model: Model | str | None = None,
     ) -> None:
         """A gripper that was just switched on: open, reset, all registers 0.
 
@@ -81,25 +81,22 @@ class SimulatedGripper(Surroundings):
                 early or late. Without it they are exact: an open finger reads 6, a closed one 241.
             seed: which gripper it is, 0 or more: another seed, other counts; the same seed, the same.
             habits: how it does what the manual leaves open; None for the usual ones.
-            model: what it is a gripper of.
+            model: which gripper it is, a :class:`Model` or its name; None for a 3-Finger.
 
         Raises:
             TypeError: an argument is of the wrong type.
-            ValueError: device_cycle or seed is negative, speedup is not above 0, or scissor_limit is not a
-                range within 6..232.
+            ValueError: device_cycle or seed is negative, speedup is not above 0, scissor_limit is not a range
+                within 6..232, or no model has this name.
         """
         self._cycle = check_seconds("device_cycle", device_cycle, 0, _LONGEST)
         number = check_int("seed", seed, 0, sys.maxsize)
-        super().__init__(
-            Controller(
-                model, check_scissor_limit(scissor_limit), number if spread else None, habits or Habits()
-            )
-        )
+        limit, seed_or_none = check_scissor_limit(scissor_limit), number if spread else None
+        super().__init__(Controller(model_of(model), limit, seed_or_none, habits or Habits()))
         self._clock = clock
         self._own_clock = Clock(clock, speedup)
         self._off_until = -math.inf if powered else math.inf
         self._heard_at = 0.0
-        self._inbox = Inbox(model)
+        self._inbox = Inbox(self.model)
 
     # The bus side.
 

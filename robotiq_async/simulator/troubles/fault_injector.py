@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from robotiq_async.values.enums import Finger
 from robotiq_async.values.request import AxisRequest, Request
 
 from .corruption import Reply
@@ -57,7 +58,7 @@ class FaultInjector:
         return tuple(self._ongoing)
 
     def check(self, troubles: Iterable[Trouble]) -> None:
-        """See whether troubles fit this kind of link.
+        """See whether troubles fit this kind of link, and this gripper.
 
         Raises:
             ValueError: one of them does not.
@@ -65,12 +66,15 @@ class FaultInjector:
         for trouble in troubles:
             if not KINDS[trouble.kind].fits(self._target.link):
                 raise ValueError(f"{trouble.kind} does not fit a simulator on {self._target.link}")
+            model = self._target.gripper.model
+            if trouble.kind == "interference" and Finger.SCISSOR not in model.all_axes:
+                raise ValueError(f"interference does not fit a {model}: it has no scissor")
 
     async def begin(self, trouble: Trouble) -> Ongoing:
         """Let a trouble begin now, whenever its plan would. :meth:`end` ends it.
 
         Raises:
-            ValueError: it does not fit this kind of link.
+            ValueError: it does not fit this kind of link, or this gripper.
             RuntimeError: it is about connections, and the server is not running.
         """
         self.check([trouble])

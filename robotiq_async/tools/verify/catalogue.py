@@ -31,7 +31,7 @@ CATALOGUE: Final[dict[str, Assumption]] = {
     "host.timer": Assumption(0, "This computer's timers are at most 1 ms late."),
     "host.adapter": Assumption(0, "A USB adapter passes on what it hears within 2 ms."),
     "read.registers": Assumption(1, "Unit id, function and registers are the usual ones of the link."),
-    "read.others": Assumption(1, "What is asked at a wrong address is refused, or not answered."),
+    "read.others": Assumption(1, "There are registers at the addresses of the manual, and nowhere else."),
     "read.counts": Assumption(1, "One to eight registers can be read at once."),
     "read.round_trip": Assumption(1, "A status is read within the usual poll interval."),
     "read.silence": Assumption(1, "The first read after a silence shows no fault."),
@@ -40,7 +40,7 @@ CATALOGUE: Final[dict[str, Assumption]] = {
     "write.same": Assumption(2, "The image that is in force already changes nothing when written.", True),
     "write.still": Assumption(2, "With rGTO = 0 no position request moves anything.", True),
     "write.echo": Assumption(2, "A write is echoed within 20 ms of its acknowledgement."),
-    "write.spacing": Assumption(2, "Of two writes 10 ms apart the second acts."),
+    "write.spacing": Assumption(2, "Of two writes the second acts, however soon it comes."),
     "activation.time": Assumption(3, "An activation takes at most 20 s."),
     "activation.words": Assumption(3, "After it no go is echoed, and every gDT is 0."),
     "axis.finger": Assumption(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from ...values.model import THREE_FINGER
 from .catalogue import CATALOGUE, ENDINGS, LAST, Check, Verdict
 from .report import Report
 
@@ -25,6 +26,8 @@ def _usable(report: Report) -> str:
         return f"Do not use this gripper with robotiq_async before this is understood: {words}."
     if report.why in NOT_JUDGED and 2 not in report.stages:
         return f"Whether this gripper can be used could not be judged: {words}."
+    if not any(report.stages):
+        return "Nothing is known of the gripper yet: only this computer was looked at."
     how_far = "" if LAST in report.stages else f", as far as stage {max(report.stages, default=0)} can tell"
     if report.options:
         options = ", ".join(f"{name}={value:g}" for name, value in report.options.items())
@@ -35,11 +38,12 @@ def _usable(report: Report) -> str:
 
 
 def _known(report: Report) -> str:
-    counts = {verdict: sum(each.verdict is verdict for each in report.checks.values()) for verdict in Verdict}
-    words = ", ".join(f"{count} {verdict.value}" for verdict, count in counts.items())
+    total, differing, untold = len(report.checks), len(report.differing), len(report.untold)
+    as_assumed = total - differing - untold
+    words = f"{total} checks: {as_assumed} as assumed, {differing} otherwise, {untold} undecided"
     missing = [number for number in range(LAST + 1) if number not in report.stages]
-    rest = f"; nothing is known of stage {', '.join(map(str, missing))}" if missing else ""
-    return f"Of {len(report.checks)} checks: {words}{rest}."
+    rest = f"; not finished: stage {', '.join(map(str, missing))}" if missing else ""
+    return f"{words}{rest}."
 
 
 def _to_report(report: Report) -> str:
@@ -48,15 +52,21 @@ def _to_report(report: Report) -> str:
         differ = "differs" if len(names) == 1 else "differ"
         found = f"{', '.join(names)} {differ} from what the library assumes"
         return f"Please send the folder with an issue: {found}."
-    return "Please send the folder with an issue all the same: that a gripper is as assumed is news."
+    if not any(report.stages):
+        return "There is nothing to send yet."
+    return "Please send the folder with an issue: a gripper that is as assumed is worth knowing, too."
 
 
 def lines(report: Report) -> dict[str, str]:
     """Lines to paste, by what they are for; the address is left to the user."""
     options = report.options
-    hand = "".join(f", {name}={value:g}" for name, value in options.items())
-    toml = "".join(f"{name} = {value:g}\n" for name, value in options.items())
-    ros = "".join(f" -p {name}:={value:g}" for name, value in options.items() if name not in WITHOUT_ROS)
+    model = None if report.model is THREE_FINGER else report.model.name
+    hand = f', model="{model}"' if model else ""
+    hand += "".join(f", {name}={value:g}" for name, value in options.items())
+    toml = f'model = "{model}"\n' if model else ""
+    toml += "".join(f"{name} = {value:g}\n" for name, value in options.items())
+    ros = f" -p model:={model}" if model else ""
+    ros += "".join(f" -p {name}:={value:g}" for name, value in options.items() if name not in WITHOUT_ROS)
     missing = [name for name in options if name in WITHOUT_ROS]
     note = f"  # the node has no parameter {', '.join(missing)}" if missing else ""
     return {
@@ -89,7 +99,8 @@ def page(report: Report, pictures: tuple[str, ...] = (), why_none: str = "") -> 
         *sentences(report),
         "",
         f"It ended because {ENDINGS.get(report.why, 'it was killed')}: {report.words.rstrip('.') or '-'}.",
-        f"Link {report.link}; Python {fields['python']} on {fields['system']}, {fields['machine']}.",
+        f"Looked at as a {report.model}, link {report.link}.",
+        f"Python {fields['python']} on {fields['system']}, {fields['machine']}.",
         "",
         "## Lines to paste",
         "",

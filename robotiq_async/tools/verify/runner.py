@@ -112,7 +112,7 @@ class Runner:
         try:
             for stage in STAGES[self._plan.first : self._plan.last + 1]:
                 await self._do(stage)
-            report.why, report.words = "done", "the last stage that was asked for is over"
+            report.why, report.words = "done", f"stages {self._plan.first} to {self._plan.last}"
         except EndError as end:
             report.why, report.words = end.why, end.words
         except RobotiqConnectionError as error:

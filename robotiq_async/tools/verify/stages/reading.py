@@ -106,7 +106,7 @@ async def _others(bench: Bench) -> None:
             "read.others", f"registers are read at {NOWHERE}, too", follows, units=answering, places=places
         )
     else:
-        bench.as_assumed("read.others", words, units=answering, places=places)
+        bench.as_assumed("read.others", f"{words}; nothing at {NOWHERE}", units=answering, places=places)
 
 
 async def _answers(bench: Bench, registers: RegisterMap) -> bool:
