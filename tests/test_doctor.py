@@ -33,7 +33,8 @@ from tests.virtual import run
 
 virtual_time = pytest.mark.virtual_time
 """For all but names and serial lines: two seconds pass in which somebody is watched for."""
-HEALTHY = ["name", "port", "Modbus", "unit id", "registers", "round trip", "rate", "activation", "fault"]
+REACHED = ["name", "port", "Modbus", "unit id", "registers", "round trip", "rate"]
+HEALTHY = [*REACHED, "model", "activation", "fault"]
 
 
 async def findings(address: str, *, seconds: float = 30.0, **options: Any) -> dict[str, Finding]:
@@ -93,6 +94,15 @@ async def test_a_healthy_connection() -> None:
 async def test_a_simulated_one_too() -> None:
     found = await findings("sim://")
     assert list(found) == [*HEALTHY[2:], "other clients"]
+    assert found["model"].found == "a 3-Finger"
+
+
+@virtual_time
+async def test_of_a_jaw_it_is_said_that_the_models_look_alike() -> None:
+    found = await findings("sim://?model=hand-e")
+    assert found["model"].found == (
+        "a 2F-85 or a 2F-140 or a Hand-E; the registers do not say which: taken as a Hand-E"
+    )
 
 
 async def test_a_name_that_does_not_exist() -> None:

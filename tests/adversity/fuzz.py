@@ -12,6 +12,7 @@ import argparse
 import asyncio
 import logging
 import random
+import struct
 import sys
 import time
 from collections import deque
@@ -27,7 +28,8 @@ from robotiq_async.link.frames import expected_reply
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
 from robotiq_async.simulator.troubles.corruption import unchanged
 from robotiq_async.values.errors import ProtocolError
-from robotiq_async.values.model import MODELS
+from robotiq_async.values.model import MODELS, THREE_FINGER, Model
+from robotiq_async.values.registers import REGISTER_COUNT
 from tests.adversity.world import HABITS, MODEL
 
 READ, WRITE = 4, 16
@@ -99,13 +101,15 @@ def answers(request: bytes, reply: bytes, serial: bool) -> bool:
     return len(body) == 3 + size and body[:3] == bytes((asked[0], asked[1], size))
 
 
-def payload(reply: bytes, serial: bool) -> bytes | None:
+def payload(reply: bytes, serial: bool, model: Model) -> bytes | None:
     """The registers of a reply to the reading of a status, if it is right in all that can be checked.
 
     What follows it may arrive later, when the reply has been taken already.
     """
     reply = reply[: 21 if serial else 25]
-    request = bytes((9, 3, 0x07, 0xD0, 0, 8)) if serial else reply[:4] + bytes((0, 6, 2, READ, 0, 0, 0, 8))
+    where = model.rtu if serial else model.tcp
+    asked = struct.pack(">BBHH", where.device_id, where.read_function, where.status, REGISTER_COUNT)
+    request = asked if serial else reply[:4] + bytes((0, len(asked))) + asked
     right = len(reply) == (21 if serial else 25) and answers(request, reply, serial)
     return (reply[3:19] if serial else reply[9:25]) if right else None
 
@@ -165,6 +169,7 @@ class Line:
     rng: random.Random
     serial: bool
     share: float
+    model: Model = THREE_FINGER
     replies: int = 0
     mutated: int = 0
     statuses: int = 0
@@ -190,7 +195,7 @@ class Line:
     def check(self, status: RobotiqStatus) -> None:
         """A status that was published is what a whole reply said, just before."""
         self.statuses += 1
-        said = [payload(frame, self.serial) for frame in self.given]
+        said = [payload(frame, self.serial, self.model) for frame in self.given]
         assert b"".join(each.to_bytes(2, "big") for each in status.registers) in said, (
             f"nobody said {status!r}"
         )
@@ -264,7 +269,7 @@ async def _live_over_tcp(count: int, seed: int) -> dict[str, float]:
     async with SimulatorServer(SimulatedGripper(speedup=50, model=MODEL)) as server:
         for habit in HABITS:
             await server.fault_injector.begin(habit)
-        line = Line(random.Random(seed), serial=False, share=0.25)
+        line = Line(random.Random(seed), serial=False, share=0.25, model=MODEL)
         figures: dict[str, float] = {}
         # This fills what grows once: caches, samples, the history of writes (the last 10,000).
         await live(server, server.address, line, count // 2)

@@ -7,6 +7,7 @@ import random
 
 import pytest
 
+from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
 from tests.adversity.fuzz import Line, decoder, live
 from tests.adversity.world import world
 from tests.virtual import run
@@ -17,14 +18,18 @@ def test_the_decoder() -> None:
     assert min(figures.values()) > 1000, f"one-sided: {figures}"
 
 
-@pytest.mark.parametrize("link", ["tcp", "rtu"])
-def test_a_live_link(link: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+@pytest.mark.parametrize(
+    ("link", "model"), [("tcp", THREE_FINGER), ("rtu", THREE_FINGER), ("tcp", TWO_FINGER_85)], ids=str
+)
+def test_a_live_link(
+    link: str, model: Model, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     async def main() -> dict[str, int]:
-        async with world(link, patch=monkeypatch) as here:
+        async with world(link, patch=monkeypatch, model=model) as here:
             await here.activate_beforehand()
-            line = Line(random.Random(1), serial=link == "rtu", share=0.25)
+            line = Line(random.Random(1), serial=link == "rtu", share=0.25, model=model)
             address = here.server.address if here.line is None else f"rtu://{here.line.NEAR}"
-            return await live(here.server, address, line, 5000)
+            return await live(here.server, address, line, 4000)
 
     caplog.set_level(logging.CRITICAL, logger="robotiq_async")
     figures = run(main)

@@ -209,7 +209,7 @@ async def world(
         server, address = TcpServer(gripper), ""
     async with server:
         # Every phase and every trouble lasts for many polls; more of them show no more and take longer.
-        options = {"poll_interval": 0.02, "model": model} | options
+        options = {"poll_interval": 0.03, "model": model} | options
         if any(habit.kind == "function-3-only" for habit in HABITS):
             options = {"read_function": 3} | options
         hand = RobotiqHand(address or server.address, **options)  # type: ignore[arg-type]

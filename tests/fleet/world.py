@@ -26,8 +26,8 @@ T = TypeVar("T")
 WINDOW_S = 1.0
 PROMPT_S = 0.2
 """Allowed beside the window."""
-LOOK_S = 0.02
-POLL_S = 0.04
+LOOK_S = 0.04
+POLL_S = 0.05
 """Seldom enough for a few hundred cells to take no more than half a minute."""
 NAMES = ("left", "right")
 

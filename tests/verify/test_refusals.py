@@ -17,6 +17,7 @@ from robotiq_async.tools.verify import Plan, Report, Runner
 from robotiq_async.tools.verify.runner import LEFT_SET
 from robotiq_async.tools.verify.stages import single_axis
 from robotiq_async.values.enums import Finger
+from robotiq_async.values.model import TWO_FINGER_85
 from robotiq_async.values.request import AxisRequest, Request
 from tests.test_doctor import answering, registers_in, reply
 from tests.verify.people import SHORT, Helper, Roll, served, verified
@@ -176,6 +177,15 @@ async def test_another_device_is_not_written_to(block: Callable[[], bytes]) -> N
         assert not written
         assert report.why in ("refused", "foreign"), report.words
         assert 2 not in report.entered
+
+
+async def test_another_model_is_refused_with_the_names_that_fit() -> None:
+    async with served(model=TWO_FINGER_85) as server:
+        plan = Plan(parse_address(f"127.0.0.1:{server.port}"), lengths=SHORT)
+        report = await Runner(plan, Helper(server), Roll(), lambda _: None).run()
+        assert not server.gripper.writes
+    assert report.why == "refused"
+    assert "name its model: ?model=2f85 or ?model=2f140 or ?model=hand-e" in report.words
 
 
 async def test_nobody_there() -> None:

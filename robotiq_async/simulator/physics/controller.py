@@ -163,6 +163,8 @@ class Controller:
         """What gFLT says: the release above all, then the worst fault, then a request that has to wait."""
         if self._release is not Fault.NONE:
             return self._release
+        if self._waiting is Fault.NONE:
+            return self.faults.worst
         return max(self.faults.worst, self._waiting, key=lambda fault: (fault.is_serious, fault))
 
     @property

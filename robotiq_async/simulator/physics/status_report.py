@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from .controller import Controller
 
 _AS_REGISTERS: Final = struct.Struct(">8H")
+_AXIS_BYTES: Final = tuple(
+    (echo.byte, position.byte, current.byte)
+    for echo, position, current in zip(reg.gPR, reg.gPO, reg.gCU, strict=True)
+)
 _MOVING, _SOME_STOPPED, _ALL_STOPPED, _ALL_ARRIVED = range(4)
 
 
@@ -33,12 +37,13 @@ def status_registers(controller: Controller, time: float, fault: Fault) -> reg.R
     if model.has_modes:
         content[0] |= request.mode << reg.gMOD.shift | _summary(statuses[:3]) << reg.gSTA.shift
     content[reg.gFLT.byte] = fault
-    for index, (axis, echo) in enumerate(zip(controller.axes, controller.echoes, strict=True)):
-        shown = model.object_status[index]
-        content[shown.byte] |= statuses[index] << shown.shift
-        content[reg.gPR[index].byte] = echo
-        content[reg.gPO[index].byte] = round(axis.position(time))
-        content[reg.gCU[index].byte] = axis.current(time)
+    for axis, status, shown, echo, (echo_byte, position_byte, current_byte) in zip(
+        controller.axes, statuses, model.object_status, controller.echoes, _AXIS_BYTES, strict=False
+    ):
+        content[shown.byte] |= status << shown.shift
+        content[echo_byte] = echo
+        content[position_byte] = round(axis.position(time))
+        content[current_byte] = axis.current(time)
     return _AS_REGISTERS.unpack(content)
 
 

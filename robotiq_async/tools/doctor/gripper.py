@@ -20,7 +20,7 @@ from ...session.options import (
 )
 from ...values.enums import Severity
 from ...values.errors import ConnectionLostError, RobotiqConnectionError
-from ...values.model import Model, model_of, names_that_fit
+from ...values.model import MODELS, Model, model_of, names_that_fit
 from ...values.registers import Registers
 from ...values.statistics import percentile
 from ...values.status import RobotiqStatus
@@ -77,6 +77,10 @@ def _check_model(model: Model, registers: Registers, report: Report) -> None:
         GiveUpError: they are such: what they mean cannot be told.
     """
     if not (why := model.contradiction(registers)):
+        if any(registers):  # a gateway may show zeros before its gripper answers
+            alike = [each.title for each in MODELS.values() if not each.contradiction(registers)]
+            rest = f"; the registers do not say which: taken as a {model.title}" if len(alike) > 1 else ""
+            report(Finding(Level.GOOD, "model", f"a {' or a '.join(alike)}{rest}"))
         return
     advice = f"{names_that_fit(registers).capitalize()}."
     report(Finding(Level.BAD, "model", f"this is no {model.title}: its registers show {why}", advice))

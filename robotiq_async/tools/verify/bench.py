@@ -34,6 +34,7 @@ class Lengths:
         alone: seconds without a client in stage 8.
         soak: seconds of reading in stage 9.
         commands: seconds of commands at each rate in stage 9.
+        interval: seconds between two reads while fingers are watched; None for what is usual on the link.
     """
 
     reads: int = 300
@@ -41,6 +42,7 @@ class Lengths:
     alone: tuple[float, ...] = (10.0, 60.0, 300.0)
     soak: float = 600.0
     commands: float = 5.0
+    interval: float | None = None
 
 
 @dataclass
@@ -102,7 +104,8 @@ class Bench:
 
     def watch(self, seconds: float) -> Watch:
         """Look after the gripper for some seconds."""
-        return Watch(self.link, self.person, seconds=seconds, interval=self.interval, spacing=self.spacing)
+        interval = self.lengths.interval or self.interval
+        return Watch(self.link, self.person, seconds=seconds, interval=interval, spacing=self.spacing)
 
     # -- results ---------------------------------------------------------------------------------------------
 

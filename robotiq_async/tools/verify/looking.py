@@ -7,7 +7,7 @@ from typing import Final
 
 from ...session.gripper_link import registers_of
 from ...values.enums import Fault
-from ...values.model import THREE_FINGER
+from ...values.model import THREE_FINGER, names_that_fit
 from ...values.registers import STATUS_RESERVED
 from ...values.status import RobotiqStatus
 from ..doctor.answer import find_gripper
@@ -51,7 +51,8 @@ def why_no_gripper(status: RobotiqStatus) -> str:
     if not any(status.registers):
         return "all registers read 0; the gripper may be without power behind its fieldbus"
     if shown := status.model.contradiction(status.registers):
-        return f"this is no {status.model.title}: its registers show {shown}"
+        how = names_that_fit(status.registers)
+        return f"this is no {status.model.title}: its registers show {shown}; {how}"
     # The old controller of the siblings has faults of its own in byte 2 (kFLT).
     reserved = STATUS_RESERVED if status.model is THREE_FINGER else STATUS_RESERVED[1:]
     if any(field.read(status.registers) for field in reserved):

@@ -19,7 +19,6 @@ SECONDS: Final = 180.0
 SPEEDS: Final = (0, 64, 255)
 STROKE_S: Final = 20.0
 """Twice what the slowest one takes."""
-READ_S: Final = 0.01
 SCISSOR_SPEED: Final = 64
 SHARE: Final = 0.2
 CLOSED_AT_LEAST: Final = 240
@@ -69,7 +68,7 @@ async def _stroke(watch: Watch, image: Request, axes: tuple[Finger, ...]) -> tup
         return status.echo == image.echo and rests and loop.time() - moved >= 0.5
 
     # By the scissor's echo alone the end is not known where limits are echoed: it stands long enough then.
-    status = await watch.until(lambda now: stands(now) or loop.time() - moved >= 2.0, STROKE_S, READ_S)
+    status = await watch.until(lambda now: stands(now) or loop.time() - moved >= 2.0, STROKE_S)
     if status is None:
         raise EndError("time", f"a stroke was not over within {STROKE_S:g} s")
     return status, moved - began
