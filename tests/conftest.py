@@ -9,6 +9,7 @@ import logging
 import os
 import signal
 from collections.abc import AsyncIterator, Callable, Iterator
+from zlib import crc32
 
 import pytest
 import pytest_asyncio
@@ -41,11 +42,15 @@ def pytest_xdist_auto_num_workers() -> int:
     return (os.cpu_count() or 1) * 2
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Watch over every test that has an event loop (giving one to the others would take a while)."""
     for item in items:
         if isinstance(item, pytest.Function) and inspect.iscoroutinefunction(item.function):
             item.fixturenames.insert(0, "nothing_left_running")
+    if hasattr(config, "workerinput"):
+        # In a fixed disorder: the tests of the command line wait for processes, and by their names they would
+        # be the last ones, while the workers have nothing else to do.
+        items.sort(key=lambda item: crc32(item.nodeid.partition("[")[0].encode()))
 
 
 def pytest_asyncio_loop_factories(item: pytest.Item) -> dict[str, Callable[[], asyncio.AbstractEventLoop]]:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from ..fleet.network.route import is_remote, parse_remote_address
-from ..link.address import parse_address
+from ..link.address import is_remote, parse_address
 from ..values.model import Model, model_of
 from .failures import usage
 
@@ -15,7 +14,11 @@ def full_address(address: str) -> str:
         UsageError: malformed.
     """
     with usage():
-        return str(parse_remote_address(address)[0] if is_remote(address) else parse_address(address))
+        if not is_remote(address):
+            return str(parse_address(address))
+        from ..fleet.network.route import parse_remote_address
+
+        return str(parse_remote_address(address)[0])
 
 
 def gripper_words(address: str) -> str:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
-from ..fleet.network.route import is_remote
-from ..fleet.remote.remote_hand import RemoteHand
 from ..hand import Hand
 from ..hand.robotiq_hand import RobotiqHand
+from ..link.address import is_remote
 from ..session.options import POLL_INTERVAL_S
 from ..tools.actions import Operator
 from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED
@@ -42,6 +41,8 @@ def make_hand(
         need("zenoh", "fleet")
         if link != USUAL:
             raise UsageError("a gripper on another host is set up there: its agent's file has these options")
+        from ..fleet.remote.remote_hand import RemoteHand
+
         with usage():
             return RemoteHand(address, control=control)
     with usage():

@@ -13,6 +13,8 @@ from .simulation import NOTHING_SPECIAL, Simulation, parse_simulation
 TCP_PORT: Final = 502
 """The port of Modbus TCP, and the gripper's."""
 
+REMOTE_SCHEME: Final = "zenoh://"
+"""Of a gripper on another host, for a remote hand."""
 FORMS: Final = (
     "tcp://HOST[:PORT] (or bare HOST or HOST:PORT), "
     "rtu:///dev/ttyUSB0 (a serial port; rtu://COM3 on Windows), "
@@ -58,6 +60,11 @@ class Address:
             host = f"[{self.host}]" if ":" in self.host else self.host
             return f"{self.kind}://{host}:{self.port}{query}"
         return f"{self.kind}://{self.host}{query}"
+
+
+def is_remote(address: object) -> bool:
+    """Whether an address is one of a gripper on another host; upper or lower case."""
+    return isinstance(address, str) and address[: len(REMOTE_SCHEME)].lower() == REMOTE_SCHEME
 
 
 def parse_address(address: object) -> Address:

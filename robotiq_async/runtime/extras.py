@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Iterator, Sequence
-from importlib import metadata
 from typing import Final
 
 NAME: Final = "robotiq-async"
@@ -25,6 +24,8 @@ def install(extra: str) -> str:
     Raises:
         ValueError: there is no such extra.
     """
+    from importlib import metadata  # noqa: PLC0415  # a tenth of the time that a command needs to begin
+
     try:
         requirements = metadata.requires(NAME) or []
     except metadata.PackageNotFoundError:  # runs from a clone that is not installed

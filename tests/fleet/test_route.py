@@ -11,10 +11,10 @@ from robotiq_async.fleet.network.route import (
     KEYS_VARIABLE,
     Route,
     default_route,
-    is_remote,
     parse_remote_address,
 )
 from robotiq_async.fleet.wire.names import GripperName
+from robotiq_async.link.address import is_remote
 
 NAME = GripperName("lab", "cell-1", "left")
 PLAIN = "zenoh://lab/cell-1/left"

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ...fleet.network.route import is_remote
-from ...link.address import parse_address
+from ...link.address import is_remote, parse_address
 from ...runtime.log import printable
 from ...session.gripper_link import registers_of
 from ..addresses import full_address, gripper_words

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Parameter
 
-from ...fleet.keys.key_folder import DAYS
 from ..arguments import need
 from ..failures import CommandError, UsageError, usage
 
@@ -29,7 +28,7 @@ def keys(
     read: Names = (),
     halt: Names = (),
     operate: Names = (),
-    days: Annotated[int, Parameter(metavar="N", show_default=False)] = DAYS,
+    days: Annotated[int | None, Parameter(metavar="N", show_default=False)] = None,
 ) -> None:
     """Make keys for agents and clients, and set who may do what.
 
@@ -52,7 +51,9 @@ def keys(
     """
     need("cryptography", "fleet")
     from ...fleet.keys.access_list import Role
+    from ...fleet.keys.key_folder import DAYS
 
+    days = DAYS if days is None else days
     clients = {Role.READ: read, Role.HALT: halt, Role.OPERATE: operate}
     subjects = [_agent(text) for text in dict.fromkeys(agent)]
     subjects += [Subject(role, name) for role, names in clients.items() for name in dict.fromkeys(names)]

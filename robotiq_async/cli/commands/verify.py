@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from ...fleet.network.route import is_remote
 from ...link.address import Address as GripperAddress
-from ...link.address import parse_address
+from ...link.address import is_remote, parse_address
 from ...runtime.concurrency import wait_shielded
 from ...values.model import model_of
 from ..addresses import gripper_words

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from ...hand.robotiq_hand import RobotiqHand
+from ...link.address import is_remote
 from ...session.options import HandOptions, Place, offered
 from ...values.checks import check_seconds
 from ..control.lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
@@ -21,7 +22,7 @@ from ..keys.access_list import AccessList
 from ..keys.key_folder import ACCESS, check_key_folder
 from ..network.configuration import LOOPBACK, LOOPBACK_TLS
 from ..network.endpoints import check_connect, check_listen
-from ..wire.names import check_name, has_scheme
+from ..wire.names import check_name
 from .toml_lines import Names, line_of
 
 _GRIPPERS: Final = "grippers"
@@ -161,7 +162,7 @@ class _Reader:
         with self._blaming(*path, "address"):
             if not isinstance(address, str):
                 raise TypeError(f"address must be a string, got {address!r}")
-            if has_scheme(address):
+            if is_remote(address):
                 raise ValueError(f"address must be of a gripper on this host, got {address!r}")
             HandOptions(address)
         for key, value in table.items():  # one by one: the error names the line of the key

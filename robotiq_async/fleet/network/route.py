@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 from urllib.parse import parse_qsl
 
-from ..wire.names import GripperName, has_scheme
+from ..wire.names import GripperName
 from .configuration import LOOPBACK, LOOPBACK_TLS, client_configuration
 
 FORM: Final = "zenoh://SITE/HOST/GRIPPER[?connect=tls/HOST:7447][&keys=FOLDER]"
@@ -50,11 +50,6 @@ def default_route() -> Route:
     connect = tuple(filter(None, os.environ.get(CONNECT_VARIABLE, "").split(",")))
     keys = os.environ.get(KEYS_VARIABLE)
     return Route(connect, Path(keys) if keys else None)
-
-
-def is_remote(address: object) -> bool:
-    """Whether an address is one of a hand on another host."""
-    return isinstance(address, str) and has_scheme(address)
 
 
 def parse_remote_address(address: object) -> tuple[GripperName, Route]:

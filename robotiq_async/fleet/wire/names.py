@@ -28,11 +28,6 @@ def check_name(what: str, name: object) -> str:
     return name
 
 
-def has_scheme(address: str) -> bool:
-    """Whether an address begins with ``zenoh://``, in lower or upper case."""
-    return address[: len(SCHEME)].lower() == SCHEME
-
-
 @dataclass(frozen=True, slots=True, order=True)
 class GripperName:
     """One gripper of a fleet.
@@ -66,7 +61,7 @@ class GripperName:
         if not isinstance(address, str):
             raise TypeError(f"address must be a string, got {address!r}; accepted: {FORM}")
         parts = address[len(SCHEME) :].split("/")
-        if not has_scheme(address) or len(parts) != 3:
+        if address[: len(SCHEME)].lower() != SCHEME or len(parts) != 3:
             raise ValueError(f"it must be {FORM}")
         return cls(*parts)
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
-from ...fleet.network.route import is_remote
 from ...fleet.remote.remote_hand import RemoteHand
 from ...hand import Hand
 from ...hand.robotiq_hand import RobotiqHand
+from ...link.address import is_remote
 from ...runtime.extras import install
 from ...values.errors import RobotiqError
 from ..translation.settings import Settings

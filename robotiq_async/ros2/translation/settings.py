@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Final
 
-from ...fleet.network.route import is_remote, parse_remote_address
-from ...link.address import parse_address
+from ...fleet.network.route import parse_remote_address
+from ...link.address import is_remote, parse_address
 from ...session.options import Option, Place, offered
 from ...values.checks import check_int, check_number
 from ...values.model import model_of
