@@ -16,8 +16,8 @@ def classify(status: RobotiqStatus) -> Trigger:
     A serious fault comes first: gIMC = 0 with a fault is an automatic release and not a reset.
     """
     # Only gACT, gIMC and gFLT decide. They rarely change and this runs at every poll, so it is cached.
-    first, second = status.registers[:2]
-    return _classify(first >> 8, second >> 8 & 0x0F, status.model)
+    registers = status.registers
+    return _classify(registers[0] >> 8, registers[1] >> 8 & 0x0F, status.model)
 
 
 @cache

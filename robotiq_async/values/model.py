@@ -95,7 +95,8 @@ class Model:
         forces_n: nominal forces at the values 0 and 255.
         has_modes: whether it has grasping modes, and request bits that choose individual control.
         all_axes: its axes, as a mask.
-        moving: for each value of the byte with the object status, the axes that move.
+        object_shift: of the byte with the object status, in register 0.
+        moving: for each value of that byte, the axes that move.
         contacts: the same for the axes that a contact stopped.
         names: of the axes.
         contact_names: of the axes in ``contacts``.
@@ -121,7 +122,7 @@ class Model:
     names: tuple[str, ...] = field(init=False)
     contact_names: tuple[tuple[str, ...], ...] = field(init=False)
     _index: dict[Finger, int] = field(init=False)
-    _shift: int = field(init=False)
+    object_shift: int = field(init=False)
 
     def __post_init__(self) -> None:
         keep = object.__setattr__
@@ -132,17 +133,13 @@ class Model:
         keep(self, "names", tuple(names_of(self.all_axes)))
         keep(self, "contact_names", tuple(tuple(names_of(axes)) for axes in self.contacts))
         keep(self, "_index", {axis: index for index, axis in enumerate(self.axes)})
-        keep(self, "_shift", 0 if self.object_status[0].byte else 8)
+        keep(self, "object_shift", 0 if self.object_status[0].byte else 8)
 
     def __repr__(self) -> str:
         return self.title
 
     def __reduce__(self) -> tuple[object, tuple[str]]:
         return model_of, (self.name,)
-
-    def object_byte(self, registers: Registers) -> int:
-        """The byte with the object status: the index into ``moving`` and ``contacts``."""
-        return registers[0] >> self._shift & 0xFF
 
     def index(self, finger: object) -> int:
         """The place of one axis among the registers.

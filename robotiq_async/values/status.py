@@ -15,7 +15,8 @@ NO_REQUEST: Final = "NO_REQUEST"
 """What :meth:`RobotiqStatus.axis_state` says of an axis whose gDT of 0 does not mean motion."""
 
 _set = object.__setattr__
-_STATES = tuple(what.name for what in ObjectStatus)
+_OBJECT_STATUSES = tuple(ObjectStatus)
+_STATES = tuple(what.name for what in _OBJECT_STATUSES)
 _STATES_WITHOUT_REQUEST = (NO_REQUEST, *_STATES[1:])
 
 
@@ -103,7 +104,8 @@ class RobotiqStatus:
             TypeError: not a Finger or an int.
             ValueError: not exactly one axis.
         """
-        return ObjectStatus(self._object_status(finger))
+        model = self._model
+        return _OBJECT_STATUSES[model.object_status[model.index(finger)].read(self._registers)]
 
     def axis_state(self, finger: Finger | int) -> str:
         """What the axis does, in a word for people and files: the name of its :meth:`finger_status`.
@@ -115,11 +117,7 @@ class RobotiqStatus:
         Raises:
             TypeError, ValueError: as :meth:`finger_status`.
         """
-        return self._states[self._object_status(finger)]
-
-    def _object_status(self, finger: Finger | int) -> int:
-        model = self._model
-        return model.object_status[model.index(finger)].read(self._registers)
+        return self._states[self.finger_status(finger)]
 
     def position(self, finger: Finger | int) -> int:
         """Position in counts, 0..255 (gPO). Open reads 6-7 on a 3-Finger, closed 240 or more."""
@@ -152,15 +150,24 @@ class RobotiqStatus:
     @property
     def go_echo(self) -> bool:
         """Echo of the go bit (gGTO)."""
-        return bool(reg.gGTO.read(self._registers))
+        return bool(self._registers[0] & 0x0800)  # by hand, as the echo
 
     @property
     def echo(self) -> reg.Echo:
         """The echo of the request in force: gACT, gGTO, and the position of each axis."""
         # By hand for speed: this runs at every poll.
         word = self._registers
-        first = bool(word[0] & 0x0100), bool(word[0] & 0x0800), word[1] & 0xFF
-        return first if len(self._model.axes) == 1 else (*first, word[3] >> 8, word[4] & 0xFF, word[6] >> 8)
+        first = word[0]
+        if len(self._model.axes) == 1:
+            return bool(first & 0x0100), bool(first & 0x0800), word[1] & 0xFF
+        return (
+            bool(first & 0x0100),
+            bool(first & 0x0800),
+            word[1] & 0xFF,
+            word[3] >> 8,
+            word[4] & 0xFF,
+            word[6] >> 8,
+        )
 
     @property
     def mode(self) -> Mode:
@@ -206,7 +213,8 @@ class RobotiqStatus:
     def moving(self) -> Finger:
         """The axes that move (empty when none does)."""
         model = self._model
-        return model.moving[model.object_byte(self._registers)] if self._is_under_request else Finger(0)
+        shown = self._registers[0] >> model.object_shift & 0xFF
+        return model.moving[shown] if self._is_under_request else Finger(0)
 
     @property
     def _is_under_request(self) -> bool:
@@ -221,7 +229,7 @@ class RobotiqStatus:
     def contacts(self) -> Finger:
         """The axes stopped by a contact (empty when none is)."""
         model = self._model
-        return model.contacts[model.object_byte(self._registers)]
+        return model.contacts[self._registers[0] >> model.object_shift & 0xFF]
 
     def as_dict(self) -> dict[str, Any]:
         """The status in types for JSON and pandas, by attribute name.
@@ -245,7 +253,7 @@ class RobotiqStatus:
             "mode": self.mode.name,
             "activation_echo": self.activation_echo,
             "go_echo": self.go_echo,
-            "contacts": list(model.contact_names[model.object_byte(words)]),
+            "contacts": list(model.contact_names[words[0] >> model.object_shift & 0xFF]),
             **{
                 name: {
                     "position": reg.gPO[n].read(words),
