@@ -24,6 +24,9 @@ settings.register_profile("suite", derandomize=True, deadline=None)
 settings.register_profile("explore", max_examples=1000, deadline=None, print_blob=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "suite"))
 
+MADE_ONCE = ("test_replay.py", "test_guard.py", "test_access.py", "test_roles.py", "test_examination.py")
+"""Files with fixtures that take long and are made once for all of their tests: these stay together."""
+
 
 def pytest_configure() -> None:
     """A signal that is ignored here, under nohup or in the background, is heard by what the tests start.
@@ -50,7 +53,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if hasattr(config, "workerinput"):
         # In a fixed disorder: the tests of the command line wait for processes, and by their names they would
         # be the last ones, while the workers have nothing else to do.
-        items.sort(key=lambda item: crc32(item.nodeid.partition("[")[0].encode()))
+        items.sort(key=_place)
+
+
+def _place(item: pytest.Item) -> int:
+    file, _, test = item.nodeid.partition("[")[0].partition("::")
+    return crc32((file if file.endswith(MADE_ONCE) else file + test).encode())
 
 
 def pytest_asyncio_loop_factories(item: pytest.Item) -> dict[str, Callable[[], asyncio.AbstractEventLoop]]:
