@@ -208,8 +208,8 @@ class Hand(ABC):
     ) -> None:
         """Ask something of axes and return at once, for control loops. The last value wins; nothing queues.
 
-        What you ask between two polls goes out as one write. If the link goes down first, it is dropped: the
-        state and the log show that.
+        What you ask between two polls is one write, dropped if the link goes down first; the log shows that.
+        :attr:`is_moving` is true until the axes rest; statuses show the old request until it is echoed.
 
         Raises:
             ValueError: also if position, speed and force are all None.

@@ -151,7 +151,7 @@ class ControlLostError(RobotiqStateError):
 
     Attributes:
         reason: "held", "taken" or "halted" by another client, "expired" (not renewed in time), "released" by
-            this hand, "late" for one request, or "closed".
+            this hand, "restarted" (the agent was), "early" or "late" for one request, or "closed".
     """
 
     def __init__(self, message: str, reason: str) -> None:
