@@ -17,7 +17,7 @@ from robotiq_async.tools.verify.stages import loss, single_axis, soft_part
 from robotiq_async.values.enums import Finger
 from tests.grippers import activate_beforehand
 
-SHORT = Lengths(reads=50, idle=(0.5, 1.0, 1.5, 5.0), alone=(10.0,), soak=3.0, commands=0.5, interval=0.02)
+SHORT = Lengths(reads=50, idle=(0.5, 1.0, 1.5, 5.0), alone=(10.0,), soak=3.0, commands=0.5, interval=0.04)
 FOAM = 120
 """Where the fingers meet it."""
 WHICH = {Finger.A: "a", Finger.B: "p", Finger.C: "o", Finger.SCISSOR: "s"}
