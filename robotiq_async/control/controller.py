@@ -32,7 +32,7 @@ from .grip_keeper import GripKeeper
 from .motion import Move
 from .open_requests import OpenRequests
 from .passing_fault import PassingFault
-from .requests.merging import merged
+from .requests.merging import at_rest, merged, stopped
 from .requests.pending import Command
 from .requests.shadow import NEVER, RequestShadow, Whose
 from .sequences import Sequence, activation, automatic_release, reset, shutdown
@@ -184,7 +184,7 @@ class Controller:
         """
         if self.machine.fire(trigger, self.status):
             self._requests.fail(MoveSupersededError(f"{trigger.value} took over"))
-            self._begin(reset(self._shadow.at_rest))
+            self._begin(reset(self._at_rest))
 
     def release(self) -> None:
         """Begin an automatic release.
@@ -196,7 +196,7 @@ class Controller:
             raise NotActivatedError("the gripper is reset: there is nothing to release")
         self.machine.fire(Trigger.ASK_RELEASE, self.status)
         self._requests.fail(MoveSupersededError("atr() took over"))
-        self._begin(automatic_release(self._shadow.at_rest))
+        self._begin(automatic_release(self._at_rest))
 
     def drop_requests(self, error: RobotiqError) -> None:
         """Fail the requests that are not sent, except holds and halts."""
@@ -238,16 +238,19 @@ class Controller:
         """
         self._keeps_grip = keep_grip
         if self._activating:
-            self._begin(reset(self._shadow.at_rest))
+            self._begin(reset(self._at_rest))
         elif self.status is not None:
             stop = self._image_to_stop
             self._begin(self._grip_keeper.sequence(stop) if keep_grip else shutdown(stop))
+
+    def _at_rest(self, status: RobotiqStatus) -> Request:
+        return at_rest(self._shadow.base, status)
 
     def _image_to_stop(self, status: RobotiqStatus) -> Request | None:
         """The image that stops the fingers, whichever client moves them; None if there is nothing to stop."""
         if classify(status) is Trigger.SEEN_READY:
             self._shadow.follow(self._shadow.identify(), status)
-        return self._shadow.stop_image(status)
+        return stopped(self._shadow.base, status, settled=self._shadow.is_settled)
 
     # -- what is known ---------------------------------------------------------------------------------
 
@@ -321,7 +324,7 @@ class Controller:
             return True
         if self._keeps_grip and self._grip_keeper.rests(self._judged):
             return False  # the next status decides whether rGTO stays set
-        return self._activating or self._shadow.stop_image(self._judged) is not None
+        return self._activating or self._judged.go_echo or not self._shadow.is_settled
 
     def wait(self, now: float) -> float:
         """Seconds until the next write may leave; 0 for a stop that is not a repetition."""
@@ -354,7 +357,9 @@ class Controller:
         if self._passing_fault.is_open and pending.halting is None and not pending.holds_at_most:
             return None  # if the fault lasts, no motion is sent at all
         base = shadow.base
-        if pending.halting is None and not shadow.is_ready(status, base, moves=bool(pending.positions)):
+        # After a halt a motion waits until the halt acts: only then is it known where the fingers stopped.
+        stopping = not base.go and status.go_echo and not shadow.is_settled
+        if pending.halting is None and (not shadow.is_certain or (pending.positions and stopping)):
             return None  # only a halt does not wait
         image = merged(
             base,
@@ -362,7 +367,7 @@ class Controller:
             status,
             gripping=shadow.grips.held(status, base),
             arrived=shadow.arrivals.axes,
-            doubtful=shadow.doubtful(status) if pending.hold else NO_AXES,
+            doubtful=shadow.arrivals.doubtful(status, shadow.now) if pending.hold else NO_AXES,
         )
         if pending.holds_at_most and image == base:
             # No axis moves. If an earlier write does not act yet, one may begin to: ask again then.
@@ -418,7 +423,7 @@ class Controller:
     def _begin_activation(self, trigger: Trigger) -> None:
         if self.machine.fire(trigger, self.status):
             self._activating = True
-            self._begin(activation(self._shadow.at_rest))
+            self._begin(activation(self._at_rest))
 
     def _begin(self, sequence: Sequence) -> None:
         self.machine.begin(sequence)
@@ -486,7 +491,7 @@ class Controller:
         if before is State.DISCONNECTED:
             self._return(status)
         elif before not in _COMMANDED:
-            self._shadow.adopt(status)
+            self._shadow.follow(Whose.FOREIGN, status)
         elif (whose := self._shadow.identify()) is Whose.FOREIGN:
             self._take_over(status)
         elif whose is not Whose.OURS:
@@ -531,11 +536,10 @@ class Controller:
         """Another client commands the gripper: adopt its requests, or our next write would undo them."""
         self.foreign_commands += 1
         limited = self._shadow.arrivals.limited
-        self._shadow.see_others()
         if status.timestamp - self._warned >= WARNING_S:
             self._warned = status.timestamp
             self.machine.log.warning("another client commands the gripper: %r", status)
-        self._shadow.adopt(status)
+        self._shadow.follow(Whose.FOREIGN, status)
         self._requests.pending.hold &= self._shadow.ours | self._requests.pending.asked_to_hold
         self._requests.moves.fail(
             MoveSupersededError("another client commands the gripper"),

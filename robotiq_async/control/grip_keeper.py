@@ -119,7 +119,7 @@ class GripKeeper:
             status,
             gripping=NO_AXES,
             arrived=shadow.arrivals.axes,
-            doubtful=shadow.doubtful(status),
+            doubtful=shadow.arrivals.doubtful(status, shadow.now),
         )
         return None if image == shadow.base else image
 

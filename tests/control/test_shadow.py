@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from robotiq_async.control.requests.adoption import DIRECTION_WAIT_S
-from robotiq_async.control.requests.shadow import RequestShadow
+from robotiq_async.control.requests.merging import at_rest
+from robotiq_async.control.requests.shadow import RequestShadow, Whose
 from robotiq_async.control.requests.writes import SILENT_S, WINDOW_S
 from robotiq_async.values.enums import NO_AXES, Finger
 from robotiq_async.values.model import THREE_FINGER
@@ -51,10 +52,10 @@ def test_a_moving_gripper_that_is_found_is_not_certain_before_it_has_shown_its_d
 
 def test_at_rest_nothing_could_be_woken(ours: Shadow) -> None:
     """With rGTO clear, every axis is asked to be where it is."""
-    at_rest = ours.at_rest(status_of(0x39, 0x00, echo=200, position=(1, 2, 3, 4)))
-    assert not at_rest.go
-    assert positions(at_rest) == [1, 2, 3, 4]
-    assert [(axis.speed, axis.force) for axis in at_rest.axes] == [(100, 50)] * 4
+    resting = at_rest(ours.base, status_of(0x39, 0x00, echo=200, position=(1, 2, 3, 4)))
+    assert not resting.go
+    assert positions(resting) == [1, 2, 3, 4]
+    assert [(axis.speed, axis.force) for axis in resting.axes] == [(100, 50)] * 4
 
 
 # -- what we write -----------------------------------------------------------------------------------------
@@ -109,7 +110,7 @@ def test_what_we_never_wrote_is_anothers(ours: Shadow) -> None:
 
 def test_the_requests_of_another_client_are_what_the_next_image_is_made_from(ours: Shadow) -> None:
     status = ours.shown(shows(77, 1.2), 1.2)
-    ours.adopt(status)
+    ours.follow(Whose.FOREIGN, status)
     assert ours.base == image(77), "speed and force stay as we last wrote them: they have no echo"
     assert ours.follows(ours.shown(shows(77, 1.3), 1.3))
 
@@ -117,15 +118,16 @@ def test_the_requests_of_another_client_are_what_the_next_image_is_made_from(our
 def test_an_axis_that_another_client_leaves_alone_stays_ours(shadow: Shadow) -> None:
     shadow.write(image(200), moved=A | B)
     shadow.shown(shows(200, 1.1), 1.1)
-    shadow.adopt(
-        shadow.shown(status_of(0x39, 0xFF, echo=(200, 77, 200, 200), position=(200, 77, 200, 200)), 1.2)
+    shadow.follow(
+        Whose.FOREIGN,
+        shadow.shown(status_of(0x39, 0xFF, echo=(200, 77, 200, 200), position=(200, 77, 200, 200)), 1.2),
     )
     assert shadow.ours == A, "B is asked for something else, and C was never moved by us"
 
 
 def test_our_write_that_shows_after_another_clients_is_gone_on_from(ours: Shadow) -> None:
     ours.write(image(30))
-    ours.adopt(ours.shown(shows(77, 1.2), 1.2))
+    ours.follow(Whose.FOREIGN, ours.shown(shows(77, 1.2), 1.2))
     assert not ours.is_certain, "our write may still act"
     assert ours.follows(ours.shown(shows(30, 1.3), 1.3))
     assert ours.base == image(30)
@@ -139,7 +141,7 @@ def test_who_writes_again_and_again_does_not_make_us_wait_again_and_again(shadow
         at = 2.0 + n * DIRECTION_WAIT_S / 5
         moving = status_of(0x39, 0x00, echo=150 + n, position=50)
         assert not shadow.follows(shadow.shown(moving, at))
-        shadow.adopt(moving)
+        shadow.follow(Whose.FOREIGN, moving)
     assert shadow.is_certain
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from robotiq_async.control.requests.shadow import Whose
 from robotiq_async.values.enums import NO_AXES, Finger
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.status import RobotiqStatus
@@ -47,7 +48,7 @@ def test_a_grip_ends(ours: Shadow, how: str) -> None:
         case "moved":
             ours.write(image(200), moved=A)
         case "adopted":
-            ours.adopt(GRIP)
+            ours.follow(Whose.FOREIGN, GRIP)
         case "sequence":
             ours.grips.forget()
     assert gripping(ours) == (B | S if how == "moved" else NO_AXES)

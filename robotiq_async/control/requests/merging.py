@@ -59,3 +59,21 @@ def merged(
             for axis, old in base.by_axis
         ),
     )
+
+
+def at_rest(base: Request, status: RobotiqStatus) -> Request:
+    """Clear rGTO and ask every axis to be where it is, so that no axis starts."""
+    here = {axis: status.position(axis) for axis in status.model.axes}
+    return replace(base, go=False).with_positions(here)
+
+
+def stopped(base: Request, status: RobotiqStatus, *, settled: bool) -> Request | None:
+    """The image that leaves the gripper stopped; None when rGTO is clear, and no write may set it.
+
+    ``settled``: whether the last image acts.
+    """
+    if settled and not status.go_echo:
+        return None
+    # The shutdown must not activate a gripper that lost its activation unnoticed, or that a reset of ours is
+    # about to reach. Nor must it reset one that another client has activated.
+    return replace(base, activate=status.activation_echo and (base.activate or settled), go=False)

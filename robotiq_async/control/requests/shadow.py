@@ -8,7 +8,6 @@ image may be in force; an adopted gripper's requests are known only from its sta
 
 from __future__ import annotations
 
-from dataclasses import replace
 from enum import Enum
 from functools import reduce
 from operator import or_
@@ -85,21 +84,6 @@ class RequestShadow:
         """The image that the next one is made from."""
         return self._image if self._adoption is None else self._adoption.request(self._image.axes)
 
-    def at_rest(self, status: RobotiqStatus) -> Request:
-        """The base with rGTO clear and every axis asked to be where it is, so that no axis starts."""
-        here = {axis: status.position(axis) for axis in status.model.axes}
-        return replace(self.base, go=False).with_positions(here)
-
-    def stop_image(self, status: RobotiqStatus) -> Request | None:
-        """The image that leaves the gripper stopped; None when rGTO is clear, and no write may set it."""
-        if self.is_settled and not status.go_echo:
-            return None
-        # The shutdown must not activate a gripper that lost its activation unnoticed, or that a reset of ours
-        # is about to reach. Nor must it reset one that another client has activated.
-        base = self.base
-        active = status.activation_echo and (base.activate or self.is_settled)
-        return replace(base, activate=active, go=False)
-
     @property
     def is_certain(self) -> bool:
         """Whether the base can be relied on.
@@ -118,18 +102,6 @@ class RequestShadow:
     @property
     def _is_in_doubt(self) -> bool:
         return self._writes.is_in_doubt and self.now.time - self._sure_at < SILENT_S
-
-    def is_ready(self, status: RobotiqStatus, base: Request, *, moves: bool) -> bool:
-        """Whether the next image can be made now.
-
-        Args:
-            status: the newest status.
-            base: what it is made from.
-            moves: whether it sets an axis going. After a halt that waits until the halt acts: only then is it
-                known where the fingers stopped.
-        """
-        stopping = not base.go and status.go_echo and not self.is_settled
-        return self.is_certain and not (moves and stopping)
 
     @property
     def is_settled(self) -> bool:
@@ -209,21 +181,17 @@ class RequestShadow:
                 self._image = self._image.with_positions({axis: limit})
                 self.arrivals.limit(axis, limit)
 
-    def see_others(self) -> None:
-        self._others_at = self.now.time
-        self._writes.limits.doubt()
-
     def returned(self, status: RobotiqStatus) -> None:
         """The link is back: go on from the image of ours that shows, or adopt the gripper."""
         self._unsure_until = self.now.time + WINDOW_S
         if self._shown is None or self._shown is self._adopted:
             self._moved = NO_AXES
-            self.adopt(status)
+            self._adopt(status)
         else:
             self._image = self._writes.newest_that_shows_like(self._shown)
             self._writes.adopt(self._image, status.echo, self.now.time)
 
-    def adopt(self, status: RobotiqStatus) -> None:
+    def _adopt(self, status: RobotiqStatus) -> None:
         """Take the gripper's request from its status; write nothing."""
         self.grips.forget()
         # A client that keeps writing must not make us wait anew each time.
@@ -243,8 +211,12 @@ class RequestShadow:
 
     def follow(self, whose: Whose, status: RobotiqStatus) -> None:
         """Take over the request that the status shows; ``whose`` is the result of :meth:`identify`."""
-        if whose is Whose.FOREIGN or (whose is Whose.ADOPTED and self._adoption is None):
-            self.adopt(status)
+        if whose is Whose.FOREIGN:
+            self._others_at = self.now.time
+            self._writes.limits.doubt()
+            self._adopt(status)
+        elif whose is Whose.ADOPTED and self._adoption is None:
+            self._adopt(status)
         elif whose is Whose.ADOPTED and self._adoption is not None:
             self._adoption.see(status, self.now)
         elif whose is Whose.OLDER and self._shown is not None:
@@ -269,9 +241,5 @@ class RequestShadow:
         if self.grips or status.contacts:
             contacts = status.contacts
             if contacts & ~self.arrivals.axes:
-                contacts &= ~self.doubtful(status)
+                contacts &= ~self.arrivals.doubtful(status, self.now)
             self.grips.see(status, contacts)
-
-    def doubtful(self, status: RobotiqStatus) -> Finger:
-        """The axes that may move, or be about to, although the status shows them at rest."""
-        return self.arrivals.doubtful(status, self.now)
