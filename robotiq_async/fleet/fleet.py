@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import json
+import math
+import secrets
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import count
 from types import TracebackType
 from typing import Any, Final, Self
 
@@ -13,14 +17,19 @@ from ..runtime.event_loop import running_loop
 from ..session.listeners import Listeners
 from ..session.streams import Channel, Stream
 from ..values.enums import Fault, State
-from ..values.errors import NotAllStoppedError, ProtocolError
-from .halting import STOPPED, halt
+from ..values.errors import AgentError, NotAllStoppedError, ProtocolError, RobotiqError
+from ..values.model import model_of
 from .limited_log import LimitedLog
-from .network.bus import Bus, Undo
+from .network.bus import Bus, Reply, Undo, Urgency
 from .network.route import Route, default_route
+from .remote.mirror import AgentClock
+from .remote.pending_request import is_refusal
 from .remote.remote_hand import RemoteHand
-from .summaries import Summaries
+from .remote.requests import NoAnswerError, label
+from .remote.stops import HALT_S, until_answered
+from .wire.envelope import Call, unpack_answer
 from .wire.names import ROOT, GripperName, check_name
+from .wire.values import reading, words
 
 LOOK_S: Final = 0.5
 """Seconds to wait for the tokens of agents."""
@@ -28,6 +37,9 @@ LOOK_AGAIN_S: Final = 0.1
 """Seconds until the next look for agents, during a halt."""
 SETTLE_S: Final = 2.0
 """Seconds after which the links to all agents that can be reached are up."""
+
+
+STOPPED: Final = "stopped"
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,3 +255,98 @@ def _report(outcomes: Mapping[GripperName, str], unreached: Sequence[str]) -> st
     parts += [f"{name}: {how}" for name, how in outcomes.items() if how != STOPPED]
     parts += [f"not reached: {', '.join(unreached)}"] if unreached else []
     return "; ".join(parts)
+
+
+async def halt(bus: Bus, name: GripperName, agents: int) -> str:
+    """Halt a gripper; returns "stopped", or "no answer" or "refused" with the reason. Raises no such error.
+
+    Args:
+        bus: an open session.
+        name: the gripper.
+        agents: number of agents that serve it: all of them must confirm that it has stopped.
+    """
+    client, numbers = secrets.token_hex(8), count(1)
+
+    async def attempt(left: float) -> None:
+        call = Call(name.base, client, number=next(numbers), arguments={"label": label()})
+        confirmed: set[int] = set()
+
+        def decides(reply: Reply) -> bool:
+            if is_refusal(reply):
+                return True
+            answer = unpack_answer(reply.payload)
+            if (answer.to, answer.number) == (call.to, call.number):
+                confirmed.add(answer.epoch)
+            return False
+
+        reply = await bus.ask(
+            name.key("halt"), call.pack(), timeout=left, urgency=Urgency.STOP, decides=decides
+        )
+        if reply is None:
+            raise NoAnswerError("no answer")
+        answer = unpack_answer(reply.payload)
+        if answer.to != name.base or answer.number != call.number:
+            raise AgentError("the answer to another request")
+        answer.outcome(lambda stamp: stamp)
+        if len(confirmed) < agents:
+            raise NoAnswerError(f"no answer from {agents - len(confirmed)} of {agents} agents")
+
+    try:
+        await until_answered(attempt, HALT_S)
+    except NoAnswerError as error:
+        return str(error)
+    except (RobotiqError, TypeError, ValueError) as error:
+        return f"refused: {error}"
+    return STOPPED
+
+
+@dataclass(slots=True)
+class _Run:
+    """A run of an agent: its clock, and the newest stamp."""
+
+    epoch: int
+    newest: float = -math.inf
+    clock: AgentClock = field(default_factory=AgentClock)
+
+
+class Summaries:
+    """Reads summaries, and drops those that were overtaken."""
+
+    def __init__(self) -> None:
+        self._runs: dict[GripperName, _Run] = {}
+        """The last run of the agent, by gripper."""
+
+    def read(self, payload: bytes, arrival: float) -> tuple[GripperName, dict[str, Any]] | None:
+        """The gripper of a summary, and the fields of its member; None if a newer summary has overtaken it.
+
+        Raises:
+            ProtocolError: malformed.
+        """
+        with reading("a summary"):
+            fields = json.loads(payload)
+            # The name in the payload, not in the key: zenoh may deliver under a wrong one.
+            name = GripperName.of_key(f"{fields['to']}/summary")
+            stamp, age, fault = float(fields["stamp"]), fields["age"], fields["fault"]
+            seen = stamp if age is None else stamp - float(age)
+            if not math.isfinite(seen):
+                raise ValueError(f"no time: {stamp}, {age}")
+            what = {
+                "state": State[fields["state"]],
+                "fault": None if fault is None else model_of(fields.get("model")).fault(fault),
+                "is_moving": bool(fields["is_moving"]),
+                "holder": None if fields["holder"] is None else words(fields["holder"]),
+                "problem": words(fields["problem"]),
+                "address": words(fields["address"]),
+            }
+            run = self._run_of(name, int(fields["epoch"]))
+        run.clock.receive(stamp, arrival)
+        if stamp < run.newest:
+            return None
+        run.newest = stamp
+        return name, what | {"seen_at": None if age is None else run.clock(seen)}
+
+    def _run_of(self, name: GripperName, epoch: int) -> _Run:
+        run = self._runs.get(name)
+        if run is None or run.epoch != epoch:
+            run = self._runs[name] = _Run(epoch)
+        return run

@@ -15,8 +15,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from robotiq_async.fleet.network.bus import Query, Reply, Undo, Urgency, is_any, is_anything
-from robotiq_async.fleet.network.pending_query import PendingQuery
+from robotiq_async.fleet.network.bus import PendingQuery, Query, Reply, Undo, Urgency, is_any, is_anything
 
 LATENCY_S = 0.0002
 LINK_LEASE_S = 1.0

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from robotiq_async.fleet.keys.access import access_control, rights
-from robotiq_async.fleet.keys.access_list import AccessList, Role
+from robotiq_async.fleet.keys.access import AccessList, Role, access_control, rights
 from robotiq_async.fleet.keys.authority import Authority, Pair
 from robotiq_async.fleet.keys.certificates import HERE, issue, make_authority
 from robotiq_async.fleet.keys.key_folder import ACCESS

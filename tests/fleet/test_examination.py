@@ -14,7 +14,7 @@ import pytest
 
 from robotiq_async import Finger
 from robotiq_async.fleet.agent.agent import Agent
-from robotiq_async.fleet.keys.access_list import Role
+from robotiq_async.fleet.keys.access import Role
 from robotiq_async.fleet.keys.certificates import issue, make_authority
 from robotiq_async.fleet.network.bus import Query, Urgency
 from robotiq_async.fleet.wire.envelope import Answer

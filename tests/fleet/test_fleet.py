@@ -9,9 +9,8 @@ from typing import Any
 import pytest
 
 from robotiq_async import State
-from robotiq_async.fleet.fleet import Fleet
+from robotiq_async.fleet.fleet import Fleet, Summaries
 from robotiq_async.fleet.network.bus import Urgency
-from robotiq_async.fleet.summaries import Summaries
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.values.errors import ProtocolError
 from tests.fleet.lab import lab

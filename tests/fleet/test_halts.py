@@ -13,8 +13,8 @@ import pytest
 
 from robotiq_async import Finger, State
 from robotiq_async.fleet.fleet import Fleet
-from robotiq_async.fleet.remote.persistence import until_answered
 from robotiq_async.fleet.remote.requests import NoAnswerError
+from robotiq_async.fleet.remote.stops import until_answered
 from robotiq_async.fleet.wire.envelope import Call
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.values.errors import NotAllowedError, NotAllStoppedError, RobotiqStateError

@@ -7,7 +7,7 @@ import logging
 
 import pytest
 
-from robotiq_async.fleet.agent.questions import Questions
+from robotiq_async.fleet.agent.agent import Questions
 from robotiq_async.fleet.control.budget import ALL, EACH, Budget
 from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.wire.envelope import Call

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from robotiq_async.fleet.network.reply_sender import MOST, ReplySender
+from robotiq_async.fleet.network.mailbox import MOST_REPLIES, ReplySender
 
 PATIENCE_S = 10.0
 
@@ -23,7 +23,7 @@ def test_whoever_does_not_read_holds_up_nobody_and_too_much_is_dropped_in_the_th
     reply_sender, read = ReplySender(), threading.Event()
     sent, dropped_in = list[int](), set[threading.Thread]()
     reply_sender.put(lambda: (read.wait(PATIENCE_S), None)[1], lambda: None)
-    for number in range(2 * MOST):
+    for number in range(2 * MOST_REPLIES):
         reply_sender.put(
             lambda number=number: sent.append(number),  # type: ignore[misc]
             lambda: dropped_in.add(threading.current_thread()),
@@ -32,7 +32,7 @@ def test_whoever_does_not_read_holds_up_nobody_and_too_much_is_dropped_in_the_th
     read.set()
     reply_sender.close()
     reply_sender.join(PATIENCE_S)
-    assert MOST - 1 <= len(sent) <= MOST
+    assert MOST_REPLIES - 1 <= len(sent) <= MOST_REPLIES
     assert dropped_in
     assert threading.current_thread() not in dropped_in
 

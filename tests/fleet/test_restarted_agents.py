@@ -7,7 +7,7 @@ import asyncio
 import pytest
 
 from robotiq_async import Finger
-from robotiq_async.fleet.remote.settings import Settings
+from robotiq_async.fleet.remote.requests import Settings
 from robotiq_async.fleet.wire.envelope import Call
 from robotiq_async.values.request import Request
 from tests.fleet.world import World, world

@@ -12,7 +12,7 @@ import pytest
 from robotiq_async import RobotiqHand
 from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.fleet import Fleet
-from robotiq_async.fleet.keys.access_list import Role
+from robotiq_async.fleet.keys.access import Role
 from robotiq_async.fleet.keys.certificates import issue, make_authority
 from robotiq_async.fleet.network.configuration import agent_configuration
 from robotiq_async.fleet.network.route import Route

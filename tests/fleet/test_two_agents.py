@@ -13,8 +13,7 @@ import pytest
 from robotiq_async import ConnectionLostError, Finger, RobotiqHand, State
 from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.fleet import Fleet
-from robotiq_async.fleet.network.bus import is_any
-from robotiq_async.fleet.network.pending_query import PendingQuery
+from robotiq_async.fleet.network.bus import PendingQuery, is_any
 from robotiq_async.fleet.remote.pending_request import is_refusal, of_its_run
 from robotiq_async.fleet.wire.envelope import Answer, Call, failure
 from robotiq_async.fleet.wire.names import GripperName

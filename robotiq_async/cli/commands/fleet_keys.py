@@ -12,7 +12,7 @@ from ..arguments import need
 from ..failures import CommandError, UsageError, usage
 
 if TYPE_CHECKING:
-    from ...fleet.keys.access_list import Role
+    from ...fleet.keys.access import Role
 
 _MAY: Final = {"read": "watch", "halt": "watch and halt", "operate": "watch, halt and command"}
 
@@ -50,7 +50,7 @@ def keys(
         days: How long the certificates are valid (default: 825; the authority: ten years).
     """
     need("cryptography", "fleet")
-    from ...fleet.keys.access_list import Role
+    from ...fleet.keys.access import Role
     from ...fleet.keys.key_folder import DAYS
 
     days = DAYS if days is None else days
@@ -74,7 +74,7 @@ class Subject:
 
 
 def _agent(text: str) -> Subject:
-    from ...fleet.keys.access_list import Role
+    from ...fleet.keys.access import Role
 
     name, equals, hosts = text.partition("=")
     return Subject(Role.AGENT, name, tuple(hosts.split(",")) if equals else (name,))
@@ -82,7 +82,7 @@ def _agent(text: str) -> Subject:
 
 def _check(folder: Path, subjects: list[Subject], days: int) -> None:
     """Check everything before anything is written."""
-    from ...fleet.keys.access_list import check_subject
+    from ...fleet.keys.access import check_subject
     from ...fleet.keys.authority import DAYS_MAX, check_host
     from ...fleet.keys.certificates import subject_folder
 
@@ -102,7 +102,7 @@ def _check(folder: Path, subjects: list[Subject], days: int) -> None:
 
 def _make(folder: Path, subjects: list[Subject], days: int) -> None:
     """Make the missing files, and print for each folder where it goes."""
-    from ...fleet.keys.access_list import Role
+    from ...fleet.keys.access import Role
     from ...fleet.keys.certificates import AUTHORITY_KEY, access_lists, has_authority, issue, make_authority
 
     if not has_authority(folder):
@@ -115,7 +115,7 @@ def _make(folder: Path, subjects: list[Subject], days: int) -> None:
 
 
 def _destination(subject: Subject) -> str:
-    from ...fleet.keys.access_list import Role
+    from ...fleet.keys.access import Role
 
     if subject.role is Role.AGENT:
         return f"for the agent on {subject.name}; clients connect to it by {', '.join(subject.hosts)}"

@@ -4,22 +4,24 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import re
 import secrets
+import threading
 import time
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from ...hand.robotiq_hand import RobotiqHand
 from ...runtime.clock import now
-from ...runtime.log import Log
+from ...runtime.log import Log, log
 from ...values.errors import AgentError
+from ..control.budget import Budget
 from ..control.lease import WINDOW_S
-from ..limited_log import LimitedLog
+from ..limited_log import EVERY_S, LimitedLog
 from ..network.bus import Bus, Query, Undo
 from ..wire.envelope import Answer
 from ..wire.names import ROOT, GripperName
 from ..wire.values import error_fields
-from .questions import Questions
 from .records import NoRecords, Records
 from .served_hand import ServedHand
 
@@ -31,6 +33,9 @@ LOOK_S: Final = 0.3
 """Seconds to wait for the tokens of other agents: a router may forward them late."""
 EPOCH_BITS: Final = 53
 """Bits of an epoch: JSON readers that use doubles represent it exactly."""
+
+
+_CLIENT: Final = re.compile(rb'"client": ?"([^"\\]{1,64})"')
 
 
 class Agent:
@@ -219,3 +224,30 @@ def _suspended() -> float:
     if not hasattr(time, "CLOCK_BOOTTIME"):
         return 0.0
     return time.clock_gettime(time.CLOCK_BOOTTIME) - time.clock_gettime(time.CLOCK_MONOTONIC)
+
+
+class Questions:
+    """Admits a question before anything else is done with it, in any thread and in a few microseconds.
+
+    A dropped question gets no answer, not even a refusal, which would take as long as the answer.
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self._budget = Budget()
+        self._lock = threading.Lock()
+        self._dropped = 0
+        self._report_due = 0.0
+
+    def allow(self, payload: bytes) -> bool:
+        """Whether to read a question. Clients without an identification share one budget."""
+        found = _CLIENT.search(payload)
+        client, now = found[1].decode("ascii", "replace") if found else "", self._clock()
+        with self._lock:
+            if self._budget.allows(client, now):
+                return True
+            self._dropped += 1
+            if now >= self._report_due:
+                log.warning("%d questions were dropped: a client asks too many", self._dropped)
+                self._dropped, self._report_due = 0, now + EVERY_S
+            return False

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine
+from contextlib import suppress
 from typing import Any, Final, TypeVar
 
-from ...runtime.log import Log
+from ...runtime.log import Log, printable
+from ...values.enums import NO_AXES, Finger
 from ...values.errors import AgentError, ControlLostError, RobotiqError
 from ...values.move_result import MoveResult
 from ..network.bus import Query
 from ..wire.envelope import Answer, Call, failure
-from ..wire.values import result_fields
+from ..wire.values import Fields, result_fields
 from .publisher import HandPublisher
 
 REMEMBERED: Final = 256
@@ -20,6 +22,10 @@ END_S: Final = 0.5
 """Seconds for requests under way to end after the hand has been stopped, before they are cancelled."""
 T = TypeVar("T")
 Work = Coroutine[Any, Any, MoveResult | None]
+
+
+LABEL_MAX: Final = 200
+"""Characters of a label that are shown."""
 
 
 class Request:
@@ -126,3 +132,18 @@ class Requests:
         for number in sorted(self._known)[: REMEMBERED // 2]:
             if self._known[number].answer is not None:
                 del self._known[number]
+
+
+def label_of(call: Call) -> str:
+    """What a client calls itself, safe to show to others."""
+    return printable(str(call.arguments.get("label", "unknown client"))[:LABEL_MAX])
+
+
+def axes_of(name: str, arguments: Fields) -> Finger:
+    """The axes that a command addresses; all of them by default."""
+    masks = arguments.get("axes", {}) if name == "command" else [arguments.get("fingers", 15)]
+    axes = NO_AXES
+    for mask in masks:
+        with suppress(TypeError, ValueError):
+            axes |= Finger(int(mask) & 15)
+    return axes

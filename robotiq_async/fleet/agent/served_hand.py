@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Mapping
 from contextlib import suppress
 from inspect import signature
 from typing import Final
@@ -17,19 +18,18 @@ from ...runtime.version import __version__
 from ...values.checks import check_byte, check_mask
 from ...values.enums import Finger
 from ...values.errors import AgentError, ControlLostError, RobotiqConnectionError, RobotiqError
+from ...values.events import SentRequest
 from ...values.move_result import MoveResult
 from ..control.admission import Admission
 from ..control.lease import Lease
 from ..network.bus import Bus, Query
 from ..wire.envelope import Answer, Call, failure, unpack_call
 from ..wire.names import GripperName
-from ..wire.settings import read_settings, settings_of
+from ..wire.settings import Setting, read_settings, settings_of
 from ..wire.values import Fields, error_fields
-from .arguments import axes_of, label_of
 from .publisher import HandPublisher
 from .records import Records
-from .requests import Request, Requests, Work
-from .settings import RestoredSettings
+from .requests import Request, Requests, Work, axes_of, label_of
 
 RETRY_S: Final = 1.0
 """Seconds between two attempts to reach the gripper."""
@@ -377,3 +377,37 @@ class ServedHand:
             # The cancellation may have overtaken the command: refuse it when it arrives.
             self._admission.bar(Call(call.to, call.client, number=int(call.arguments.get("number", 0))))
         self._reply(query, Answer(call.to, call.number, self._epoch, {}))
+
+
+class RestoredSettings:
+    """Merged into each command, so that both are written in one image, until such an image is acknowledged.
+
+    A restarted agent has its own speeds and forces: the next motion could be faster and stronger than the
+    client asked for.
+    """
+
+    def __init__(self, hand: RobotiqHand) -> None:
+        self._hand = hand
+        self._missing: dict[Setting, int] = {}
+
+    def restore(self, settings: Mapping[Setting, int]) -> None:
+        has = self._hand.model.all_axes
+        self._missing.update({each: value for each, value in settings.items() if each[0] in has})
+
+    def merge(self, renewed: Mapping[Setting, int]) -> None:
+        """Merge them into the command of this turn, which sets the renewed ones itself."""
+        try:
+            for (axis, what), value in self._missing.items():
+                self._hand.command(axis, **{what: value})
+        except RobotiqError:
+            return  # the hand refuses the command, too
+        self._missing.update(
+            {setting: value for setting, value in renewed.items() if setting in self._missing}
+        )
+
+    def observe(self, what: object) -> None:
+        # An acknowledged image that contains all of them has restored them.
+        if self._missing and isinstance(what, SentRequest) and what.acknowledged:
+            axes = dict(what.request.by_axis)
+            if all(getattr(axes[axis], name) == value for (axis, name), value in self._missing.items()):
+                self._missing.clear()

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Final
 
 from ...values.checks import check_int
-from .access_list import AccessList, Role, check_subject
+from .access import AccessList, Role, check_subject
 from .authority import DAYS_MAX, Authority, Pair
 from .key_folder import ACCESS, AUTHORITY, CERTIFICATE, DAYS, KEY
 

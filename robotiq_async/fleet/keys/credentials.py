@@ -11,7 +11,7 @@ from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives import serialization
 from cryptography.x509.oid import NameOID
 
-from .access_list import Role
+from .access import Role
 from .key_folder import AUTHORITY, CERTIFICATE, KEY
 
 

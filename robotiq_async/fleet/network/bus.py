@@ -1,4 +1,7 @@
-"""Bus: the network as agents and clients use it, in one event loop. Over zenoh, or simulated in tests."""
+"""Bus: the network as agents and clients use it, in one event loop. Over zenoh, or simulated in tests.
+
+PendingQuery is for those who implement one.
+"""
 
 from __future__ import annotations
 
@@ -123,3 +126,27 @@ class Bus(Protocol):
 
     async def close(self) -> None:
         """End all declarations and close; takes a second at most. Idempotent."""
+
+
+class PendingQuery:
+    """Waits for the reply that decides; without such a reply, the result is the last one.
+
+    Attributes:
+        answered: the reply; None if none came.
+    """
+
+    def __init__(self, decides: Callable[[Reply], bool]) -> None:
+        self.answered: asyncio.Future[Reply | None] = asyncio.get_running_loop().create_future()
+        self._decides = decides
+        self._last: Reply | None = None
+
+    def take(self, reply: Reply) -> None:
+        if not self.answered.done():
+            self._last = reply
+            if self._decides(reply):
+                self.answered.set_result(reply)
+
+    def end(self) -> None:
+        """No more replies will come."""
+        if not self.answered.done():
+            self.answered.set_result(self._last)

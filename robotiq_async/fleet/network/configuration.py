@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from ..keys.access import access_control
-from ..keys.access_list import AccessList
+from ..keys.access import AccessList, access_control
 from ..keys.key_folder import ACCESS, AUTHORITY, CERTIFICATE, KEY, check_key_folder
 from .endpoints import check_connect, check_listen
 

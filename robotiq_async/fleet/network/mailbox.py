@@ -1,9 +1,11 @@
-"""Mailbox: brings messages from zenoh's threads into the event loop."""
+"""Mailbox and ReplySender: between zenoh's threads and the event loop, so that neither waits for the other."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import queue
+import threading
 import time
 from collections import deque
 from collections.abc import Callable
@@ -19,6 +21,11 @@ TURN_S: Final = 0.002
 """Seconds of deliveries in one turn of the loop: the rest of the program must run, too."""
 MOST: Final = 2000
 """Requests and telemetry that may wait. Beyond that they are dropped, as on a full network."""
+
+
+MOST_REPLIES: Final = 1000
+"""Replies that may wait. Beyond that the query is dropped, also in this thread: zenoh notifies the client of
+it, which can block for as long. Clients repeat their requests."""
 
 
 class Kind(Enum):
@@ -97,3 +104,36 @@ class Mailbox:
             dropped, self._dropped = self._dropped, 0
             self._report_due = self._loop.time() + EVERY_S
             log.warning("%d fleet messages dropped: queue full", dropped)
+
+
+class ReplySender:
+    """Sends replies from a thread of its own, started with the first one.
+
+    A reply takes the priority and the congestion control of its query, which the client chooses. Sending one
+    to a client that does not read can block until the connection is closed; the event loop must not wait for
+    that.
+    """
+
+    def __init__(self) -> None:
+        self._waiting: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
+        self._thread: threading.Thread | None = None
+
+    def put(self, send: Callable[[], None], drop: Callable[[], None]) -> None:
+        """Send a reply after those before it, or drop its query if too many wait."""
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._run, name="robotiq_async fleet", daemon=True)
+            self._thread.start()
+        self._waiting.put(send if self._waiting.qsize() < MOST_REPLIES else drop)
+
+    def close(self) -> None:
+        """Send the waiting replies, then end the thread."""
+        self._waiting.put(None)
+
+    def join(self, timeout: float) -> None:
+        # Blocks: call it outside the event loop.
+        if self._thread is not None:
+            self._thread.join(timeout)
+
+    def _run(self) -> None:
+        while (send := self._waiting.get()) is not None:
+            send()

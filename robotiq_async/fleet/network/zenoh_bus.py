@@ -13,6 +13,9 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
+from ...link.host_names import addresses_of
+from .endpoints import parse_endpoint
+
 try:
     import zenoh
     from zenoh.handlers import Callback
@@ -23,11 +26,8 @@ except ModuleNotFoundError as error:
 
 from ...runtime.concurrency import in_a_thread
 from ...values.errors import ConnectFailedError
-from .bus import Query, Reply, Undo, Urgency, is_any, is_anything
-from .locators import locators
-from .mailbox import Kind, Mailbox
-from .pending_query import PendingQuery
-from .reply_sender import ReplySender
+from .bus import PendingQuery, Query, Reply, Undo, Urgency, is_any, is_anything
+from .mailbox import Kind, Mailbox, ReplySender
 
 CLOSE_S: Final = 1.0
 """Seconds for closing a session."""
@@ -42,6 +42,10 @@ _PRIORITY: Final = {
 }
 _EXPRESS: Final = (Urgency.STOP, Urgency.COMMAND)
 """Sent at once, not batched."""
+
+
+RESOLVED_S: Final = 1.0
+"""Seconds to resolve a host name; one that takes longer counts as unknown."""
 
 
 async def open_bus(configuration: Mapping[str, object], what: str) -> ZenohBus:
@@ -261,3 +265,14 @@ def _deliver(listener: Callable[[str, bytes], None], sample: zenoh.Sample) -> No
 def _direct(deliver: Callable[[Any], None]) -> Any:  # noqa: ANN401
     # In zenoh's own thread: the thread that it would start otherwise does not end with the program.
     return Callback(deliver, indirect=False)
+
+
+async def locators(endpoint: str) -> set[str]:
+    """All locators that a connection to an endpoint may have; empty if its host name is unknown."""
+    checked, port = parse_endpoint("connect", endpoint), endpoint.rpartition(":")[2]
+    try:
+        async with asyncio.timeout(RESOLVED_S):
+            numbers = await addresses_of(checked.host, int(port))
+    except (OSError, UnicodeError, TimeoutError):
+        return set()
+    return {f"{checked.protocol}/{f'[{number}]' if ':' in number else number}:{port}" for number in numbers}

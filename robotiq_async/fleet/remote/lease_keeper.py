@@ -7,21 +7,22 @@ gripper in the meantime, which must not be overruled. The agent decides that, by
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Coroutine
+import logging
+from collections.abc import Callable, Coroutine
 from typing import Any, Final, Protocol
 
 from ...runtime.clock import now
 from ...runtime.log import Log
 from ...session.ending import Ending
-from ...values.errors import ControlLostError, RobotiqError
+from ...values.errors import AgentError, ControlLostError, RobotiqError
+from ..limited_log import LimitedLog
+from ..network.bus import Bus, Undo
 from ..wire.envelope import Call
 from ..wire.names import GripperName
 from ..wire.values import Fields, reading
-from .agents import Agents
 from .mirror import Mirror
 from .pending_request import PendingRequest
-from .requests import NoAnswerError, label
-from .settings import Settings
+from .requests import NoAnswerError, Settings, label
 
 RENEWALS: Final = 5
 """Renewals, and checks for silence, per window."""
@@ -31,6 +32,41 @@ RELEASE_S: Final = 0.9
 """Seconds for the answer to a release. Closing a session of zenoh may take 1 s, and a stop 2 s in total."""
 NOT_REACQUIRED: Final = ("taken", "halted", "held", "restarted")
 """Reasons after which the lease is not reacquired automatically: only an explicit acquire() does."""
+
+
+LOOK_S: Final = 0.5
+"""Seconds to look for the tokens of agents."""
+TWO_AGENTS: Final = "two agents serve it, perhaps different grippers under one name: stop one of them"
+
+
+class Agents:
+    """The agents that serve one gripper. With two of them, only a person can say which one is the mistake."""
+
+    def __init__(self, name: GripperName, bus: Bus, two: Callable[[], None]) -> None:
+        self._name = name
+        self._bus = bus
+        self._two = two
+        self._tokens: set[str] = set()
+        self._log = LimitedLog(Log(str(name)))
+        self.end: Undo = bus.watch(name.key("alive", "*"), self._update_token)
+
+    async def check_one(self) -> None:
+        """Refuse to acquire the lease while two agents serve the gripper.
+
+        Raises:
+            AgentError: they do.
+        """
+        if len(self._tokens) > 1:  # one may be gone, and its sign-off lost
+            self._tokens = set(await self._bus.announced(self._name.key("alive", "*"), timeout=LOOK_S))
+        if len(self._tokens) > 1:
+            raise AgentError(f"{self._name}: {TWO_AGENTS}; nothing was done")
+
+    def _update_token(self, token: str, is_there: bool) -> None:
+        before = len(self._tokens)
+        (self._tokens.add if is_there else self._tokens.discard)(token)
+        if before < 2 <= len(self._tokens):
+            self._log.warn("%s", TWO_AGENTS, level=logging.ERROR)
+            self._two()
 
 
 class AgentClient(Protocol):

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import asyncio
+from collections.abc import Callable, Coroutine, Iterable
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 from ...runtime.log import Log, log
 from ...session.streams import Channels
 from ...values.enums import State
+from ...values.errors import RobotiqError
 from ...values.events import Transition
 from ...values.status import RobotiqStatus
 from ...values.trigger import Trigger
@@ -28,6 +30,10 @@ _SEEN: Final = {
     State.RESET: Trigger.SEEN_RESET,
 }
 _OFF: Final = (State.DO_SHUTDOWN, State.SHUTDOWN)
+
+
+PAUSE_S: Final = 0.02
+"""Seconds between two questions: 50 a second, half of what an agent answers to one client."""
 
 
 def as_seen_from_here(state: State) -> State:
@@ -300,3 +306,40 @@ class Mirror:
     def _in_order(self, at: float) -> float:
         self._reported_at = max(self._reported_at, at)
         return self._reported_at
+
+
+class MissedEvents:
+    """Fetches them, one question at a time."""
+
+    def __init__(
+        self,
+        mirror: Mirror,
+        ask: Callable[[int], Coroutine[Any, Any, Any]],
+        spawn: Callable[[Coroutine[Any, Any, Any]], object],
+    ) -> None:
+        self._mirror = mirror
+        self._ask = ask
+        self._spawn = spawn
+        self._is_fetching = False
+
+    def fetch(self) -> None:
+        """Fetch them, unless that is under way."""
+        if not self._is_fetching:
+            self._is_fetching = True
+            self._spawn(self._fetch())
+
+    async def _fetch(self) -> None:
+        mirror = self._mirror
+        try:
+            while mirror.has_missed():
+                info = await self._ask(mirror.events)
+                with reading("events"):
+                    events = info["events"]
+                    if info["epoch"] == mirror.epoch and events:
+                        mirror.skip_events(events[0]["index"] - 1)
+                        mirror.receive_events(events)
+                await asyncio.sleep(PAUSE_S)
+        except RobotiqError as error:
+            mirror.log.info("missed events could not be fetched: %s", error)
+        finally:
+            self._is_fetching = False

@@ -17,10 +17,10 @@ from ...values.errors import AgentError, ConnectionLostError, NotAllowedError, N
 from ..network.bus import Bus, Reply, Urgency
 from ..wire.envelope import Answer, Call, unpack_answer
 from ..wire.names import GripperName
+from ..wire.settings import Setting, settings_fields, settings_of
 from ..wire.values import Fields
 from .mirror import Mirror
 from .pending_request import PendingRequest, is_refusal, of_its_run
-from .settings import Settings
 
 IN_ANY_RUN: Final = ("info", "halt")
 """Requests that any run of the agent may answer."""
@@ -32,6 +32,28 @@ EARLY_S: Final = 0.005
 """Seconds until all commands are repeated when the agent waits for a lost one."""
 LAST_ANSWER_S: Final = 0.5
 """Seconds for the answer to a command whose lease has ended."""
+
+
+class Settings:
+    """The last speed and force of each axis.
+
+    They have no echo in the status. A restarted agent has its own, and a client that held the lease meanwhile
+    may have set others: the next motion could be faster and stronger than the program asked for. So all of
+    them are sent with each request for the lease.
+    """
+
+    def __init__(self) -> None:
+        self._asked: dict[Setting, tuple[int, int]] = {}
+        """By setting: the number of the request, and the value."""
+
+    def note(self, verb: str, call: Call) -> None:
+        """Remember the settings of a request that was carried out, or may have been."""
+        for setting, value in settings_of(verb.removeprefix("cmd/"), call.arguments).items():
+            self._asked[setting] = max(self._asked.get(setting, (0, 0)), (call.number, value))
+
+    @property
+    def fields(self) -> Fields:
+        return settings_fields({setting: value for setting, (_, value) in self._asked.items()})
 
 
 class NoAnswerError(ConnectionLostError):

@@ -37,10 +37,8 @@ from ..wire.envelope import Call
 from ..wire.names import GripperName
 from ..wire.status_message import unpack
 from ..wire.values import Fields, read_statistics, reading
-from .agents import Agents
-from .lease_keeper import ANSWER_S, RENEWALS, LeaseKeeper
-from .mirror import Mirror
-from .missed_events import MissedEvents
+from .lease_keeper import ANSWER_S, RENEWALS, Agents, LeaseKeeper
+from .mirror import Mirror, MissedEvents
 from .pending_request import PendingRequest
 from .requests import NoAnswerError, Requests
 from .stops import Stops

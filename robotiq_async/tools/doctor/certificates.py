@@ -7,7 +7,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Final
 
-from ...fleet.keys.access_list import Role
+from ...fleet.keys.access import Role
 from ...fleet.keys.key_folder import KEY, check_key_folder
 from .findings import Finding, GiveUpError, Level, Report
 
