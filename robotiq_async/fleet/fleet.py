@@ -31,12 +31,9 @@ from .wire.envelope import Call, unpack_answer
 from .wire.names import ROOT, GripperName, check_name
 from .wire.values import reading, words
 
-LOOK_S: Final = 0.5
-"""Seconds to wait for the tokens of agents."""
-LOOK_AGAIN_S: Final = 0.1
-"""Seconds until the next look for agents, during a halt."""
-SETTLE_S: Final = 2.0
-"""Seconds after which the links to all agents that can be reached are up."""
+LOOK_S: Final = 0.5  # seconds to wait for the tokens of agents
+LOOK_AGAIN_S: Final = 0.1  # seconds until the next look for agents, during a halt
+SETTLE_S: Final = 2.0  # seconds after which the links to all agents that can be reached are up
 
 
 STOPPED: Final = "stopped"
@@ -260,10 +257,7 @@ def _report(outcomes: Mapping[GripperName, str], unreached: Sequence[str]) -> st
 async def halt(bus: Bus, name: GripperName, agents: int) -> str:
     """Halt a gripper; returns "stopped", or "no answer" or "refused" with the reason. Raises no such error.
 
-    Args:
-        bus: an open session.
-        name: the gripper.
-        agents: number of agents that serve it: all of them must confirm that it has stopped.
+    All ``agents`` that serve it must confirm that it has stopped.
     """
     client, numbers = secrets.token_hex(8), count(1)
 
@@ -313,15 +307,10 @@ class Summaries:
     """Reads summaries, and drops those that were overtaken."""
 
     def __init__(self) -> None:
-        self._runs: dict[GripperName, _Run] = {}
-        """The last run of the agent, by gripper."""
+        self._runs: dict[GripperName, _Run] = {}  # the last run of the agent, by gripper
 
     def read(self, payload: bytes, arrival: float) -> tuple[GripperName, dict[str, Any]] | None:
-        """The gripper of a summary, and the fields of its member; None if a newer summary has overtaken it.
-
-        Raises:
-            ProtocolError: malformed.
-        """
+        """The gripper of a summary, and the fields of its member; None if a newer one has overtaken it."""
         with reading("a summary"):
             fields = json.loads(payload)
             # The name in the payload, not in the key: zenoh may deliver under a wrong one.

@@ -9,8 +9,7 @@ from typing import Final
 from ..runtime.clock import now
 from ..runtime.log import Log, log
 
-EVERY_S: Final = 10.0
-"""Seconds between two messages of one kind."""
+EVERY_S: Final = 10.0  # seconds between two messages of one kind
 
 
 class LimitedLog:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import pytest
 
-from robotiq_async.fleet.network.endpoints import check_connect, check_listen
+from robotiq_async.fleet.network.endpoints import check_endpoints
 
 Check = Callable[..., tuple[str, ...]]
-CHECKS = pytest.mark.parametrize("check", [check_listen, check_connect])
+CHECKS = pytest.mark.parametrize("check", [partial(check_endpoints, "listen")])
 LOOPBACK = ("tcp/127.0.0.1:7447", "tcp/127.1.2.3:1", "tcp/[::1]:7447", "tcp/localhost:65535")
 OPEN = (
     "tcp/0.0.0.0:7447",

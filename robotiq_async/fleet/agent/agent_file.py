@@ -21,7 +21,7 @@ from ..control.lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
 from ..keys.access import AccessList
 from ..keys.key_folder import ACCESS, check_key_folder
 from ..network.configuration import LOOPBACK, LOOPBACK_TLS
-from ..network.endpoints import check_connect, check_listen
+from ..network.endpoints import check_endpoints
 from ..wire.names import check_name
 
 _GRIPPERS: Final = "grippers"
@@ -37,27 +37,16 @@ class AgentFileError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class AgentSettings:
-    """The content of FLEET.toml, checked.
-
-    Attributes:
-        site: the site's name.
-        grippers: the options of each hand, by its name.
-        host: the host's name; by default this machine's.
-        listen: endpoints of zenoh for clients; none with a router.
-        connect: endpoints of a router, through which clients connect.
-        keys: folder with the agent's certificate and key; None for no encryption.
-        insecure: whether other machines may connect without encryption.
-        window: seconds for which a lease lasts without being renewed.
-    """
+    """The content of FLEET.toml, checked."""
 
     site: str
-    grippers: Mapping[str, HandOptions]
+    grippers: Mapping[str, HandOptions]  # by the name of the hand
     host: str = field(default_factory=lambda: machine_name())
-    listen: tuple[str, ...] = (LOOPBACK,)
-    connect: tuple[str, ...] = ()
-    keys: Path | None = None
-    insecure: bool = False
-    window: float = WINDOW_S
+    listen: tuple[str, ...] = (LOOPBACK,)  # endpoints of zenoh for clients; none with a router
+    connect: tuple[str, ...] = ()  # endpoints of a router, through which clients connect
+    keys: Path | None = None  # folder with the agent's certificate and key; None for no encryption
+    insecure: bool = False  # whether other machines may connect without encryption
+    window: float = WINDOW_S  # seconds for which a lease lasts without being renewed
 
 
 _OF_GRIPPER: Final = tuple(offered(Place.FILE))
@@ -74,11 +63,7 @@ def machine_name() -> str:
 
 
 def read_agent_file(path: str | Path) -> AgentSettings:
-    """Read and check a FLEET.toml.
-
-    Raises:
-        AgentFileError: the file cannot be read, or its content is invalid.
-    """
+    """Read and check a FLEET.toml; AgentFileError if it cannot be read, or its content is invalid."""
     path = Path(path)
     try:
         text = path.read_text(encoding="utf-8")
@@ -109,11 +94,11 @@ class _Reader:
             keys = self._keys(table.get("keys"))
         with self._blaming("connect"):
             wanted = _check_list("connect", table.get("connect", []))
-            connect = check_connect(wanted, has_keys=keys is not None, insecure=insecure)
+            connect = check_endpoints("connect", wanted, has_keys=keys is not None, insecure=insecure)
         default = [] if connect else [LOOPBACK if keys is None else LOOPBACK_TLS]
         with self._blaming("listen"):
             wanted = _check_list("listen", table.get("listen", default))
-            listen = check_listen(wanted, has_keys=keys is not None, insecure=insecure)
+            listen = check_endpoints("listen", wanted, has_keys=keys is not None, insecure=insecure)
             if listen and connect:
                 why = "clients connect there, or through a router"
                 raise ValueError(f"listen must be left out where there is connect: {why}, got {wanted!r}")
@@ -221,8 +206,8 @@ def _check_list(name: str, value: object) -> list[object]:
 def line_of(text: str, path: Names) -> int | None:
     """The line, counted from 1, of the key or the table at a path; None if it is not certain.
 
-    Inside an inline table or an array it is the line where that begins. The search looks at single lines, and
-    a multi-line string may contain what looks like a key.
+    tomllib does not say it. Inside an inline table or an array it is the line where that begins. The search
+    looks at single lines, and a multi-line string may contain what looks like a key.
     """
     for length in range(len(path), 0, -1):
         lines = [number for number, found in _keys(text) if found == path[:length]]

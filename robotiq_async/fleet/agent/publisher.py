@@ -25,8 +25,7 @@ from ..wire.values import Fields, request_fields, transition_fields
 
 KEPT: Final = 2000
 """Events that are kept for clients that missed them: some seconds of a loop that commands at 200 Hz."""
-AT_ONCE: Final = 40
-"""Events in one answer: even the longest ones fit into a message."""
+AT_ONCE: Final = 40  # events in one answer: even the longest ones fit into a message
 
 
 class HandPublisher:

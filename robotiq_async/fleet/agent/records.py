@@ -19,8 +19,7 @@ from ...runtime.log import log
 from ..wire.names import GripperName
 from ..wire.values import Fields
 
-KEPT_S: Final = 0.1
-"""Seconds that the answer to a halt waits for its record at most; a disk may stall."""
+KEPT_S: Final = 0.1  # seconds that the answer to a halt waits for its record at most; a disk may stall
 _BOOT: Final = Path("/proc/sys/kernel/random/boot_id")
 
 

@@ -16,16 +16,14 @@ from ..wire.envelope import Answer, Call, failure
 from ..wire.values import Fields, result_fields
 from .publisher import HandPublisher
 
-REMEMBERED: Final = 256
-"""Requests whose answers are kept for repetitions."""
+REMEMBERED: Final = 256  # requests whose answers are kept for repetitions
 END_S: Final = 0.5
 """Seconds for requests under way to end after the hand has been stopped, before they are cancelled."""
 T = TypeVar("T")
 Work = Coroutine[Any, Any, MoveResult | None]
 
 
-LABEL_MAX: Final = 200
-"""Characters of a label that are shown."""
+LABEL_MAX: Final = 200  # characters of a label that are shown
 
 
 class Request:

@@ -31,8 +31,7 @@ from .publisher import HandPublisher
 from .records import Records
 from .requests import Request, Requests, Work, axes_of, label_of
 
-RETRY_S: Final = 1.0
-"""Seconds between two attempts to reach the gripper."""
+RETRY_S: Final = 1.0  # seconds between two attempts to reach the gripper
 SEQUENCES: Final = frozenset({"activate", "reset", "atr", "recover"})
 """Commands with a speed and a force of their own."""
 COMMANDS: Final = frozenset({"set_position", "set_speed", "set_force", "move", "hold"}) | SEQUENCES
@@ -40,12 +39,7 @@ COMMANDS: Final = frozenset({"set_position", "set_speed", "set_force", "move", "
 
 
 class ServedHand:
-    """Serves one hand, in the agent's event loop.
-
-    Attributes:
-        name: the gripper's.
-        publisher: publishes its statuses and events.
-    """
+    """Serves one hand, in the agent's event loop."""
 
     def __init__(
         self, name: GripperName, hand: RobotiqHand, bus: Bus, records: Records, *, epoch: int, window: float
@@ -60,10 +54,8 @@ class ServedHand:
         self.publisher = HandPublisher(name, hand, bus, epoch, self._lease)
         self._requests = Requests(self.publisher, epoch, self._log, self._carried_out)
         self._settings = RestoredSettings(hand)
-        self._released: Request | None = None
-        """The last request that released the lease; it may be repeated."""
-        self._commanded = Finger(0)
-        """Axes that the holder has commanded: they are held when its lease ends."""
+        self._released: Request | None = None  # the last request that released the lease; it may be repeated
+        self._commanded = Finger(0)  # axes that the holder has commanded: they are held when its lease ends
         self._to_hold = Finger(0)
         """Axes to hold when the gripper is reached again: the link was down when they should have been."""
         self._expiry: asyncio.TimerHandle | None = None
@@ -149,7 +141,7 @@ class ServedHand:
                 self._reply(query, Answer(call.to, call.number, self._epoch, value))
 
     def _answer(self, verb: str, call: Call, query: Query) -> Fields | None:
-        """The answer; None if it follows later."""
+        # None: the answer follows later.
         if self._is_ending and verb not in ("info", "halt"):
             raise ControlLostError("the agent is ending; nothing was done", "closed")
         match verb.split("/"):
@@ -329,16 +321,13 @@ class ServedHand:
         if name == "cancel":
             self._cancel(call, query)
             return
-        self._check_known(name)
+        if name != "command" and name not in COMMANDS:
+            raise AgentError(f"unknown command {name!r}")
         self._admission.admit(call, now())
         axes = axes_of(name, call.arguments)
         work = self._work(name, call.arguments)  # raises for invalid arguments, before anything changes
         self._commanded |= axes
         self._requests.begin(Request(name, call, query), work)
-
-    def _check_known(self, name: str) -> None:
-        if name != "command" and name not in COMMANDS:
-            raise AgentError(f"unknown command {name!r}")
 
     def _carried_out(self, request: Request) -> None:
         # A new command replaces the hold that its axes still wait for.

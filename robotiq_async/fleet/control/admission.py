@@ -18,20 +18,14 @@ can make up clients."""
 
 
 class Admission:
-    """The requests that one gripper accepts.
-
-    Attributes:
-        lease: the right to command.
-    """
+    """The requests that one gripper accepts."""
 
     def __init__(self, base: str, epoch: int, lease: Lease) -> None:
         self.lease = lease
         self._base = base
         self._epoch = epoch
-        self._newest = 0
-        """Number of the newest request admitted under the present lease."""
-        self._asked: dict[str, int] = {}
-        """Number of the newest request for the lease, by client."""
+        self._newest = 0  # number of the newest request admitted under the present lease
+        self._asked: dict[str, int] = {}  # number of the newest request for the lease, by client
 
     def check_meant(self, call: Call, *, in_any_run: bool = False) -> None:
         if call.to != self._base:
@@ -40,12 +34,7 @@ class Admission:
             raise AgentError("the agent was restarted since this request was made; nothing was done")
 
     def admit(self, call: Call, now: float) -> None:
-        """Accept a command and count it. The caller has ended an expired lease first.
-
-        Raises:
-            ControlLostError: not from the holder; or late; or the preceding command is missing.
-            AgentError: a later command came first.
-        """
+        """Accept a command and count it. The caller has ended an expired lease first."""
         self._check_holder(call, now)
         if call.number <= self._newest:
             raise AgentError("a later request overtook this one; nothing was done")
@@ -72,11 +61,7 @@ class Admission:
         return True
 
     def acquire(self, call: Call, label: str) -> int:
-        """Give the lease to a client; returns its number. The caller ends the previous lease first.
-
-        Raises:
-            ControlLostError: another client holds it.
-        """
+        """Give the lease to a client; returns its number. The caller ends the previous lease first."""
         holder = self.lease.holder
         if holder is not None:
             raise ControlLostError(f"{holder.label} commands the gripper", "held")

@@ -9,12 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-EACH: Final = 100.0
-"""Questions a second of one client; fetching missed events takes 50."""
+EACH: Final = 100.0  # questions a second of one client; fetching missed events takes 50
 ALL: Final = 1000.0
 """Questions a second of all clients together: limits a program that changes its client name each time."""
-_CLIENTS: Final = 1000
-"""Clients with a budget of their own. The least recent one is forgotten."""
+_CLIENTS: Final = 1000  # Clients with a budget of their own. The least recent one is forgotten
 
 
 @dataclass(slots=True)

@@ -16,23 +16,16 @@ WINDOW_S: Final = 1.0
 """Seconds that a lease lasts beyond the newest stamp that its holder has proven to have received."""
 WINDOW_MIN_S: Final = 0.1
 WINDOW_MAX_S: Final = 10.0
-_KEPT: Final = 64
-"""Leases whose reason for ending is kept."""
-_RUNS: Final = 64
-"""Runs of the agent that are kept: a client may reacquire a lease of one of these."""
+_KEPT: Final = 64  # leases whose reason for ending is kept
+_RUNS: Final = 64  # runs of the agent that are kept: a client may reacquire a lease of one of these
 
 
 @dataclass(frozen=True, slots=True)
 class Holder:
-    """The client that commands.
+    """The client that commands."""
 
-    Attributes:
-        client: identifies the client; random, chosen by the client.
-        label: what the client calls itself: user, host, process.
-    """
-
-    client: str
-    label: str
+    client: str  # random, chosen by the client
+    label: str  # what the client calls itself: user, host, process
 
 
 class Lease:
@@ -60,8 +53,7 @@ class Lease:
         self._last = ""
         """The client that held it last; ``_last_from`` is the first lease number of its present series."""
         self._last_from = 0
-        self._barred = -1, ""
-        """Leases up to this number may not be reacquired automatically, for this reason."""
+        self._barred = -1, ""  # leases up to this number may not be reacquired automatically, for this reason
 
     @property
     def expires(self) -> float:
@@ -120,11 +112,7 @@ class Lease:
         return {"runs": self.runs, "number": self.number, "barred": self._barred}
 
     def resume(self, record: Mapping[str, Any]) -> None:
-        """Continue from the record of an earlier run.
-
-        Raises:
-            KeyError, TypeError, ValueError: the record is malformed.
-        """
+        """Continue from the record of an earlier run. KeyError, TypeError, ValueError: it is malformed."""
         number, (barred, reason) = int(record["number"]), record["barred"]
         runs = tuple(int(run) for run in record["runs"])
         self.runs = (*runs, *self.runs)[-_RUNS:]

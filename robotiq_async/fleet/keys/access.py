@@ -5,8 +5,8 @@ patterns, so the list contains every client. A client that is removed from it ha
 certificate, after the agents have been restarted with the new list. Do not give its name to another client:
 the old certificate would be valid again.
 
-Access control is the part of an agent's configuration that says which messages zenoh passes between it and its
-clients. All others are denied.
+Access control is the part of an agent's configuration that says which messages zenoh passes between it and
+its clients. All others are denied.
 
 A rule of zenoh covers an expression only if it includes all of it: zenoh silently drops a subscription that
 is wider than the rule, and a message under a key without a rule. The common names in the certificates of both
@@ -25,8 +25,7 @@ from typing import Final, Self
 
 from ..wire.names import ROOT, check_name
 
-NAME_MAX: Final = 56
-"""The common name in a certificate has at most 64 characters, and includes the role."""
+NAME_MAX: Final = 56  # the common name in a certificate has at most 64 characters, and includes the role
 _HEAD: Final = """\
 # The role of each client. Agents use the copy in their folder, from their next start on.
 # To shut a client out, remove its name, here and in the agents' copies, and never give it again:
@@ -37,14 +36,10 @@ _HEAD: Final = """\
 class Role(Enum):
     """The purpose of a certificate."""
 
-    AGENT = "agent"
-    """Serves grippers."""
-    READ = "read"
-    """Watches."""
-    HALT = "halt"
-    """Watches, and halts."""
-    OPERATE = "operate"
-    """Watches, halts and commands."""
+    AGENT = "agent"  # serves grippers
+    READ = "read"  # watches
+    HALT = "halt"  # watches, and halts
+    OPERATE = "operate"  # watches, halts and commands
 
     def common_name(self, name: str) -> str:
         """The common name in the certificate of a role, which zenoh compares."""
@@ -54,10 +49,8 @@ class Role(Enum):
 CLIENTS: Final = (Role.READ, Role.HALT, Role.OPERATE)
 
 
-_IN: Final = ("ingress",)
-"""From the client to the agent."""
-_OUT: Final = ("egress",)
-"""From the agent to the client."""
+_IN: Final = ("ingress",)  # from the client to the agent
+_OUT: Final = ("egress",)  # from the agent to the client
 _RIGHTS: Final = {
     Role.READ: ("watch", "published", "presence", "present", "ask info", "answer info"),
     Role.HALT: ("ask halt", "answer halt"),
@@ -69,12 +62,7 @@ Rule = dict[str, object]
 
 
 def check_subject(name: object) -> str:
-    """Check the name of the owner of a certificate.
-
-    Raises:
-        TypeError: not a string.
-        ValueError: empty, too long, or with characters that a gripper's name cannot have.
-    """
+    """Check the name of the owner of a certificate."""
     checked = check_name("the name in a certificate", name)
     if len(checked) > NAME_MAX:
         raise ValueError(f"the name in a certificate must have at most {NAME_MAX} characters, got {name!r}")
@@ -83,17 +71,11 @@ def check_subject(name: object) -> str:
 
 @dataclass(frozen=True, slots=True)
 class AccessList:
-    """The clients by role.
+    """The names of the clients by role."""
 
-    Attributes:
-        read: names of clients that watch.
-        halt: names of clients that also halt.
-        operate: names of clients that also command.
-    """
-
-    read: tuple[str, ...] = ()
-    halt: tuple[str, ...] = ()
-    operate: tuple[str, ...] = ()
+    read: tuple[str, ...] = ()  # they watch
+    halt: tuple[str, ...] = ()  # they also halt
+    operate: tuple[str, ...] = ()  # they also command
 
     def of(self, role: Role) -> tuple[str, ...]:
         return {Role.READ: self.read, Role.HALT: self.halt, Role.OPERATE: self.operate}[role]
@@ -104,11 +86,7 @@ class AccessList:
 
     @classmethod
     def read_file(cls, path: Path) -> Self:
-        """Read a list.
-
-        Raises:
-            ValueError: missing or malformed; the message names file and key.
-        """
+        """Read a list: ValueError, with file and key, if it is missing or malformed."""
         try:
             table = tomllib.loads(path.read_text(encoding="utf-8"))
             return cls(**_check(table))

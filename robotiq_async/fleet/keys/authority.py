@@ -48,11 +48,7 @@ class Authority:
 
     @classmethod
     def load(cls, pair: Pair) -> Self:
-        """Load an authority.
-
-        Raises:
-            ValueError: not a certificate and its key.
-        """
+        """Load an authority: ValueError unless the key is that of the certificate."""
         certificate = x509.load_pem_x509_certificate(pair.certificate)
         key = serialization.load_pem_private_key(pair.key, None)
         if not isinstance(key, ec.EllipticCurvePrivateKey) or key.public_key() != certificate.public_key():
@@ -66,14 +62,8 @@ class Authority:
     def certify(self, common_name: str, until: datetime, server_names: Sequence[str] = ()) -> Pair:
         """Make a key and a certificate for it.
 
-        Args:
-            common_name: the owner's.
-            until: end of validity.
-            server_names: host names and IP addresses that clients connect to; empty for a client's
-                certificate.
-
-        Raises:
-            ValueError: the authority expires earlier, or a malformed host.
+        ``server_names`` are the host names and IP addresses that clients connect to; a client has none.
+        ValueError: the authority expires earlier, or a host is malformed.
         """
         end = self.certificate.not_valid_after_utc
         if until > end:
@@ -97,11 +87,6 @@ class Authority:
 
 
 def check_host(host: str) -> x509.GeneralName:
-    """Check a host name or IP address of a server.
-
-    Raises:
-        ValueError: malformed.
-    """
     try:
         return x509.IPAddress(ip_address(host))
     except ValueError:

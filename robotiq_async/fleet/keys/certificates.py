@@ -24,8 +24,7 @@ from .key_folder import ACCESS, AUTHORITY, CERTIFICATE, DAYS, KEY
 
 AUTHORITY_KEY: Final = "ca.key"
 AUTHORITY_DAYS: Final = 3650
-HERE: Final = ("localhost", "127.0.0.1", "::1")
-"""Names of every agent on its own machine."""
+HERE: Final = ("localhost", "127.0.0.1", "::1")  # names of every agent on its own machine
 
 
 def has_authority(folder: Path) -> bool:
@@ -34,19 +33,12 @@ def has_authority(folder: Path) -> bool:
 
 
 def make_authority(folder: Path, *, days: int = AUTHORITY_DAYS) -> Path:
-    """Make a certificate authority with an empty access list.
-
-    Args:
-        folder: created if it does not exist.
-        days: validity, 1..36500.
-
-    Returns:
-        The path of its certificate.
+    """Make a certificate authority with an empty access list; returns the path of its certificate.
 
     Raises:
         FileExistsError: the folder has an authority already.
         OSError: the folder cannot be written.
-        TypeError, ValueError: days not in range.
+        TypeError, ValueError: days not in 1..36500.
     """
     days = check_int("days", days, 1, DAYS_MAX)
     if has_authority(folder):
@@ -62,15 +54,8 @@ def make_authority(folder: Path, *, days: int = AUTHORITY_DAYS) -> Path:
 def issue(folder: Path, name: str, role: Role, *, hosts: Sequence[str] = (), days: int = DAYS) -> Path:
     """Make a key and a certificate for an agent or a client, and add a client to the access lists.
 
-    Args:
-        folder: the authority's.
-        name: of the agent's host, or of the client.
-        role: of the agent or the client.
-        hosts: names and IP addresses by which clients connect to the agent; loopback is added.
-        days: validity, 1..36500.
-
-    Returns:
-        The folder for that machine.
+    ``hosts`` are names and IP addresses by which clients connect to the agent; loopback is added. Returns the
+    folder for that machine.
 
     Raises:
         FileExistsError: the folder exists already.

@@ -17,17 +17,11 @@ from .key_folder import AUTHORITY, CERTIFICATE, KEY
 
 @dataclass(frozen=True, slots=True)
 class Credentials:
-    """A certificate whose key and authority are in the same folder.
+    """A certificate whose key and authority are in the same folder."""
 
-    Attributes:
-        common_name: the owner's, as zenoh compares it.
-        begins: start of validity.
-        ends: end of validity; that of the authority, if earlier.
-    """
-
-    common_name: str
+    common_name: str  # the owner's, as zenoh compares it
     begins: datetime
-    ends: datetime
+    ends: datetime  # or the end of the authority, if earlier
 
     @property
     def role(self) -> Role | None:
@@ -38,12 +32,7 @@ class Credentials:
 
 
 def read_credentials(folder: Path) -> Credentials:
-    """Read a folder of keys.
-
-    Raises:
-        OSError: a file cannot be read.
-        ValueError: a file is malformed, or the files do not belong together.
-    """
+    """Read a folder of keys; ValueError if a file is malformed, or the files do not belong together."""
     authority = _certificate(folder / AUTHORITY)
     own = _certificate(folder / CERTIFICATE)
     try:

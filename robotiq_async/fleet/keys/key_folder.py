@@ -5,23 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-AUTHORITY: Final = "ca.pem"
-"""The authority's certificate, which both sides trust."""
+AUTHORITY: Final = "ca.pem"  # the authority's certificate, which both sides trust
 CERTIFICATE: Final = "cert.pem"
-KEY: Final = "key.pem"
-"""Secret: proves that its owner is the one named in the certificate."""
-ACCESS: Final = "access.toml"
-"""The access list; only agents have it."""
-DAYS: Final = 825
-"""Default validity of a certificate; some systems reject longer ones."""
+KEY: Final = "key.pem"  # secret: proves that its owner is the one named in the certificate
+ACCESS: Final = "access.toml"  # the access list; only agents have it
+DAYS: Final = 825  # default validity of a certificate; some systems reject longer ones
 
 
 def check_key_folder(folder: Path) -> Path:
-    """Check a folder of keys; returns its absolute path.
-
-    Raises:
-        ValueError: a file is missing.
-    """
+    """Check a folder of keys; returns its absolute path. ValueError: a file is missing."""
     missing = [name for name in (AUTHORITY, CERTIFICATE, KEY) if not (folder / name).is_file()]
     if missing:
         raise ValueError(f"keys must be a folder with {', '.join(missing)} in it, got {str(folder)!r}")

@@ -10,19 +10,15 @@ from collections.abc import Callable
 from enum import Enum
 from typing import Protocol
 
-Undo = Callable[[], None]
-"""Ends a declaration."""
+Undo = Callable[[], None]  # ends a declaration
 
 
 class Urgency(Enum):
     """Priority of a message on a full link."""
 
-    STOP = "stop"
-    """Halts: before everything else."""
-    COMMAND = "command"
-    """Commands, leases, their answers."""
-    TELEMETRY = "telemetry"
-    """Statuses, events, summaries: dropped when the link is full."""
+    STOP = "stop"  # halts: before everything else
+    COMMAND = "command"  # commands, leases, their answers
+    TELEMETRY = "telemetry"  # statuses, events, summaries: dropped when the link is full
 
 
 class Query(Protocol):
@@ -129,11 +125,7 @@ class Bus(Protocol):
 
 
 class PendingQuery:
-    """Waits for the reply that decides; without such a reply, the result is the last one.
-
-    Attributes:
-        answered: the reply; None if none came.
-    """
+    """Waits for the reply that decides; without such a reply, the result is the last one, or None."""
 
     def __init__(self, decides: Callable[[Reply], bool]) -> None:
         self.answered: asyncio.Future[Reply | None] = asyncio.get_running_loop().create_future()
@@ -147,6 +139,5 @@ class PendingQuery:
                 self.answered.set_result(reply)
 
     def end(self) -> None:
-        """No more replies will come."""
         if not self.answered.done():
             self.answered.set_result(self._last)

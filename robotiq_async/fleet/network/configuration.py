@@ -8,17 +8,15 @@ from typing import Final
 
 from ..keys.access import AccessList, access_control
 from ..keys.key_folder import ACCESS, AUTHORITY, CERTIFICATE, KEY, check_key_folder
-from .endpoints import check_connect, check_listen
+from .endpoints import check_endpoints
 
 PORT: Final = 7447
 LOOPBACK: Final = f"tcp/127.0.0.1:{PORT}"
 LOOPBACK_TLS: Final = f"tls/127.0.0.1:{PORT}"
-QUEUED: Final = 16
-"""Halts, and commands, that may wait in a link until its thread runs; zenoh's default is 2."""
+QUEUED: Final = 16  # halts, and commands, that may wait in a link until its thread runs; zenoh's default is 2
 UNKNOWN: Final = 1000
 """Connections that have not identified themselves; at the limit, by default 100, zenoh accepts no others."""
-UNKNOWN_MS: Final = 5000
-"""Time in ms after which those are closed; zenoh's default is 10 s."""
+UNKNOWN_MS: Final = 5000  # time in ms after which those are closed; zenoh's default is 10 s
 LINK_LEASE_MS: Final = 1000
 """Time in ms after which a frozen or unplugged peer is detected; zenoh's default is 10 s."""
 
@@ -32,22 +30,13 @@ def agent_configuration(
     keys: Path | None = None,
     insecure: bool = False,
 ) -> dict[str, object]:
-    """Configuration of an agent's session.
-
-    Args:
-        site: the site's name.
-        host: the host's name.
-        listen: endpoints for clients.
-        connect: endpoints of routers. With no ``listen`` endpoint, the agent is reached through the router
-            alone.
-        keys: the agent's folder of keys; clients may then do only what its access list permits.
-        insecure: see :func:`~robotiq_async.fleet.network.endpoints.check_listen`.
+    """Configuration of an agent's session. With keys, clients may do only what its access list permits.
 
     Raises:
         TypeError, ValueError: a malformed or unprotected endpoint; a folder that lacks a file.
     """
-    listen = check_listen(listen, has_keys=keys is not None, insecure=insecure)
-    connect = check_connect(connect, has_keys=keys is not None, insecure=insecure)
+    listen = check_endpoints("listen", listen, has_keys=keys is not None, insecure=insecure)
+    connect = check_endpoints("connect", connect, has_keys=keys is not None, insecure=insecure)
     # A router forwards nothing between peers. Our clients are peers, so the agent is a client of the router.
     mode = "client" if connect and not listen else "peer"
     session = session_configuration(listen, connect, keys) | {"mode": mode}
@@ -60,17 +49,8 @@ def agent_configuration(
 def client_configuration(
     connect: Sequence[str] = (LOOPBACK,), *, keys: Path | None = None, insecure: bool = False
 ) -> dict[str, object]:
-    """Configuration of a client's session; it does not listen.
-
-    Args:
-        connect: endpoints of agents, or of a router.
-        keys: the client's folder of keys.
-        insecure: see :func:`~robotiq_async.fleet.network.endpoints.check_connect`.
-
-    Raises:
-        TypeError, ValueError: as :func:`agent_configuration`.
-    """
-    connect = check_connect(connect, has_keys=keys is not None, insecure=insecure)
+    """Configuration of a client's session, which does not listen; errors as of an agent's."""
+    connect = check_endpoints("connect", connect, has_keys=keys is not None, insecure=insecure)
     return session_configuration((), connect, keys)
 
 

@@ -16,17 +16,11 @@ _ENDPOINT: Final = re.compile(r"(tcp|tls|quic)/(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9_.-
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """A checked endpoint.
+    """A checked endpoint."""
 
-    Attributes:
-        text: the endpoint as zenoh takes it.
-        protocol: "tcp", "tls" or "quic".
-        host: name or IP address, without brackets.
-    """
-
-    text: str
-    protocol: str
-    host: str
+    text: str  # as zenoh takes it
+    protocol: str  # "tcp", "tls" or "quic"
+    host: str  # name or IP address, without brackets
 
     @property
     def is_encrypted(self) -> bool:
@@ -40,12 +34,7 @@ class Endpoint:
 
 
 def parse_endpoint(what: str, text: object) -> Endpoint:
-    """Parse an endpoint; ``what`` names it in messages.
-
-    Raises:
-        TypeError: not a string.
-        ValueError: malformed; the message shows the accepted forms.
-    """
+    """Parse an endpoint, named ``what`` in messages. TypeError, ValueError: it has not one of the FORMS."""
     if not isinstance(text, str):
         raise TypeError(f"{what} must be {FORMS}, got {text!r}")
     found = _ENDPOINT.fullmatch(text)
@@ -54,32 +43,21 @@ def parse_endpoint(what: str, text: object) -> Endpoint:
     return Endpoint(text, found[1], found[2].strip("[]"))
 
 
-def check_listen(endpoints: Sequence[object], *, has_keys: bool, insecure: bool = False) -> tuple[str, ...]:
-    """Check endpoints to listen on: without keys, only this machine is allowed.
+def check_endpoints(
+    what: str, endpoints: Sequence[object], *, has_keys: bool, insecure: bool = False
+) -> tuple[str, ...]:
+    """Check endpoints to "listen" on, or to "connect" to, where others could read and write as well.
 
     Args:
+        what: names the endpoints in messages.
         endpoints: of zenoh.
-        has_keys: whether there are certificates for mutual TLS.
+        has_keys: whether there are certificates for mutual TLS; without them only this machine is allowed.
         insecure: the operator vouches for everyone on that network.
 
     Raises:
         TypeError: an endpoint is not a string.
         ValueError: an endpoint is malformed or unprotected.
     """
-    return _check("listen", endpoints, has_keys=has_keys, insecure=insecure)
-
-
-def check_connect(endpoints: Sequence[object], *, has_keys: bool, insecure: bool = False) -> tuple[str, ...]:
-    """Check endpoints to connect to; as :func:`check_listen`, because others could read and write there.
-
-    Raises:
-        TypeError: an endpoint is not a string.
-        ValueError: an endpoint is malformed or unprotected.
-    """
-    return _check("connect", endpoints, has_keys=has_keys, insecure=insecure)
-
-
-def _check(what: str, endpoints: Sequence[object], *, has_keys: bool, insecure: bool) -> tuple[str, ...]:
     if has_keys and insecure:
         raise ValueError("keys and insecure exclude each other: with keys everything is encrypted")
     checked = [parse_endpoint(what, endpoint) for endpoint in endpoints]

@@ -1,4 +1,4 @@
-"""Mailbox and ReplySender: between zenoh's threads and the event loop, so that neither waits for the other."""
+"""Mailbox and ReplySender: between zenoh's threads and the event loop; neither waits for the other."""
 
 from __future__ import annotations
 
@@ -17,10 +17,8 @@ from ..limited_log import EVERY_S, LimitedLog
 
 GATHER_S: Final = 0.001
 """Seconds for which telemetry is collected under load, to wake the loop once for all of it."""
-TURN_S: Final = 0.002
-"""Seconds of deliveries in one turn of the loop: the rest of the program must run, too."""
-MOST: Final = 2000
-"""Requests and telemetry that may wait. Beyond that they are dropped, as on a full network."""
+TURN_S: Final = 0.002  # seconds of deliveries in one turn of the loop: the rest of the program must run, too
+MOST: Final = 2000  # Requests and telemetry that may wait. Beyond that they are dropped, as on a full network
 
 
 MOST_REPLIES: Final = 1000
@@ -31,13 +29,10 @@ it, which can block for as long. Clients repeat their requests."""
 class Kind(Enum):
     """Kind of a delivery."""
 
-    HALT = "halt"
-    """Delivered before all others."""
-    ANSWER = "answer"
-    """To a request of this process: never dropped."""
+    HALT = "halt"  # delivered before all others
+    ANSWER = "answer"  # to a request of this process: never dropped
     REQUEST = "request"
-    TELEMETRY = "telemetry"
-    """May wait 1 ms."""
+    TELEMETRY = "telemetry"  # may wait 1 ms
 
 
 class Mailbox:

@@ -29,31 +29,22 @@ from ...values.errors import ConnectFailedError
 from .bus import PendingQuery, Query, Reply, Undo, Urgency, is_any, is_anything
 from .mailbox import Kind, Mailbox, ReplySender
 
-CLOSE_S: Final = 1.0
-"""Seconds for closing a session."""
-LAST_ANSWERS_S: Final = 0.2
-"""Seconds to send the answers to requests that are cancelled at the end."""
-LONGEST: Final = 4096
-"""Bytes of a request; a longer one is dropped unread."""
+CLOSE_S: Final = 1.0  # seconds for closing a session
+LAST_ANSWERS_S: Final = 0.2  # seconds to send the answers to requests that are cancelled at the end
+LONGEST: Final = 4096  # bytes of a request; a longer one is dropped unread
 _PRIORITY: Final = {
     Urgency.STOP: zenoh.Priority.REAL_TIME,
     Urgency.COMMAND: zenoh.Priority.INTERACTIVE_HIGH,
     Urgency.TELEMETRY: zenoh.Priority.DATA,
 }
-_EXPRESS: Final = (Urgency.STOP, Urgency.COMMAND)
-"""Sent at once, not batched."""
+_EXPRESS: Final = (Urgency.STOP, Urgency.COMMAND)  # sent at once, not batched
 
 
-RESOLVED_S: Final = 1.0
-"""Seconds to resolve a host name; one that takes longer counts as unknown."""
+RESOLVED_S: Final = 1.0  # seconds to resolve a host name; one that takes longer counts as unknown
 
 
-async def open_bus(configuration: Mapping[str, object], what: str) -> ZenohBus:
-    """Open a session; ``what`` names it in messages.
-
-    Raises:
-        ConnectFailedError: an address in use, or a malformed certificate, for example.
-    """
+async def open_bus(configuration: Mapping[str, Any], what: str) -> ZenohBus:
+    """Open a session, named ``what`` in messages; ConnectFailedError: an address in use, for example."""
 
     def open_session() -> zenoh.Session:
         return zenoh.open(zenoh.Config.from_json5(json.dumps(configuration)))
@@ -66,12 +57,7 @@ async def open_bus(configuration: Mapping[str, object], what: str) -> ZenohBus:
     except asyncio.CancelledError:
         opening.add_done_callback(_close_opened)
         raise
-    return ZenohBus(session, _endpoints(configuration))
-
-
-def _endpoints(configuration: Mapping[str, Any]) -> Sequence[str]:
-    endpoints: Sequence[str] = configuration["connect"]["endpoints"]
-    return endpoints
+    return ZenohBus(session, configuration["connect"]["endpoints"])
 
 
 def _close_opened(opening: asyncio.Future[zenoh.Session]) -> None:

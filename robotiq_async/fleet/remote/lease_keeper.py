@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Coroutine
-from typing import Any, Final, Protocol
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Final
 
 from ...runtime.clock import now
 from ...runtime.log import Log
@@ -17,25 +17,22 @@ from ...session.ending import Ending
 from ...values.errors import AgentError, ControlLostError, RobotiqError
 from ..limited_log import LimitedLog
 from ..network.bus import Bus, Undo
-from ..wire.envelope import Call
 from ..wire.names import GripperName
 from ..wire.values import Fields, reading
-from .mirror import Mirror
-from .pending_request import PendingRequest
-from .requests import NoAnswerError, Settings, label
+from .requests import NoAnswerError, label
 
-RENEWALS: Final = 5
-"""Renewals, and checks for silence, per window."""
-ANSWER_S: Final = 0.5
-"""Seconds for an answer that the agent gives at once; callers with more time ask again."""
+if TYPE_CHECKING:
+    from .session import RemoteSession
+
+RENEWALS: Final = 5  # renewals, and checks for silence, per window
+ANSWER_S: Final = 0.5  # seconds for an answer that the agent gives at once; callers with more time ask again
 RELEASE_S: Final = 0.9
 """Seconds for the answer to a release. Closing a session of zenoh may take 1 s, and a stop 2 s in total."""
 NOT_REACQUIRED: Final = ("taken", "halted", "held", "restarted")
 """Reasons after which the lease is not reacquired automatically: only an explicit acquire() does."""
 
 
-LOOK_S: Final = 0.5
-"""Seconds to look for the tokens of agents."""
+LOOK_S: Final = 0.5  # seconds to look for the tokens of agents
 TWO_AGENTS: Final = "two agents serve it, perhaps different grippers under one name: stop one of them"
 
 
@@ -51,11 +48,7 @@ class Agents:
         self.end: Undo = bus.watch(name.key("alive", "*"), self._update_token)
 
     async def check_one(self) -> None:
-        """Refuse to acquire the lease while two agents serve the gripper.
-
-        Raises:
-            AgentError: they do.
-        """
+        """Refuse to acquire the lease while two agents serve the gripper."""
         if len(self._tokens) > 1:  # one may be gone, and its sign-off lost
             self._tokens = set(await self._bus.announced(self._name.key("alive", "*"), timeout=LOOK_S))
         if len(self._tokens) > 1:
@@ -69,35 +62,6 @@ class Agents:
             self._two()
 
 
-class AgentClient(Protocol):
-    """The part of a run that the keeper uses."""
-
-    name: GripperName
-    mirror: Mirror
-    agents: Agents
-    settings: Settings
-    window: float
-
-    def call(self, arguments: Fields | None = None) -> Call: ...
-
-    async def send(self, call: Call, verb: str, **how: Any) -> Any:  # noqa: ANN401
-        ...
-
-    def post(self, call: Call, verb: str, **how: Any) -> PendingRequest:  # noqa: ANN401
-        ...
-
-    async def answer(self, posted: PendingRequest) -> Any:  # noqa: ANN401
-        ...
-
-    def fail_calls(self, lease: int, error: ControlLostError) -> None:
-        """A lease has ended: fail the calls that wait for a request under it."""
-
-    async def ask_quietly(self, verb: str, arguments: Fields, timeout: float) -> None:
-        """Ask, and ignore errors: the answer itself has the effect."""
-
-    def spawn(self, work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]: ...
-
-
 class LeaseKeeper:
     """The lease of one run.
 
@@ -107,7 +71,7 @@ class LeaseKeeper:
         lost: why it lost control; None while it is in control, and if it never was.
     """
 
-    def __init__(self, run: AgentClient, *, wants_control: bool) -> None:
+    def __init__(self, run: RemoteSession, *, wants_control: bool) -> None:
         self.is_in_control = False
         self.lease = 0
         self.lost: ControlLostError | None = None
@@ -115,24 +79,16 @@ class LeaseKeeper:
         self._log = Log(str(run.name))
         self._wants_control = wants_control
         self._may_reacquire = True
-        self._lease_run = 0
-        """The run of the agent that gave the number of the lease."""
+        self._lease_run = 0  # the run of the agent that gave the number of the lease
         self._acquiring = asyncio.Lock()
         self._reacquiring: asyncio.Task[Any] | None = None
         self._checking: asyncio.Task[Any] | None = None
-        self._releasing: asyncio.Task[Any] | None = None
-        """The present release, or the last one."""
+        self._releasing: asyncio.Task[Any] | None = None  # the present release, or the last one
         self._ending: Ending | None = None
         self._is_ending = False
 
     async def begin(self, deadline: float) -> None:
-        """Acquire the lease if wanted; repeat until the deadline if an answer was lost.
-
-        Raises:
-            ControlLostError: another client commands the gripper.
-            AgentError: two agents serve it.
-            RobotiqError: the agent did not answer.
-        """
+        """Acquire the lease if wanted; repeat until the deadline if an answer was lost."""
         while self._wants_control and not self.is_in_control:
             try:
                 await self.acquire()
@@ -237,11 +193,7 @@ class LeaseKeeper:
             self._log.warning("lost control: %s", why)
 
     def check(self) -> None:
-        """Refuse commands without the lease.
-
-        Raises:
-            ControlLostError: this client does not hold it.
-        """
+        """Refuse commands without the lease."""
         if not self.is_in_control:
             if self.lost is None:
                 raise ControlLostError("this hand only reads: acquire() the lease first", "released")

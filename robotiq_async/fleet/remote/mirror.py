@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Callable, Coroutine, Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 from ...runtime.log import Log, log
 from ...session.streams import Channels
 from ...values.enums import State
-from ...values.errors import RobotiqError
 from ...values.events import Transition
 from ...values.status import RobotiqStatus
 from ...values.trigger import Trigger
@@ -18,10 +16,8 @@ from ..control.lease import WINDOW_S
 from ..wire.status_message import StatusMessage
 from ..wire.values import Fields, read_request, read_transition, reading
 
-_RUNS: Final = 16
-"""Runs of an agent whose clocks are kept."""
-DRIFT: Final = 200e-6
-"""Drift between two clocks at most, in seconds per second."""
+_RUNS: Final = 16  # runs of an agent whose clocks are kept
+DRIFT: Final = 200e-6  # drift between two clocks at most, in seconds per second
 _SEEN: Final = {
     State.RUNNING_IDLE: Trigger.SEEN_READY,
     State.RUNNING_CC: Trigger.SEEN_READY,
@@ -30,10 +26,6 @@ _SEEN: Final = {
     State.RESET: Trigger.SEEN_RESET,
 }
 _OFF: Final = (State.DO_SHUTDOWN, State.SHUTDOWN)
-
-
-PAUSE_S: Final = 0.02
-"""Seconds between two questions: 50 a second, half of what an agent answers to one client."""
 
 
 def as_seen_from_here(state: State) -> State:
@@ -91,16 +83,7 @@ class Mirror:
         before: Mirror | None = None,
         log: Log = log,
     ) -> None:
-        """Mirror one gripper.
-
-        Args:
-            mark: see :attr:`~robotiq_async.fleet.wire.names.GripperName.mark`.
-            channels: streams of statuses, transitions and requests.
-            entered: called with each state.
-            before: the mirror of the previous run of the hand, whose state and sequences continue; None for
-                the first run.
-            log: of the hand.
-        """
+        """Call ``entered`` with each state. State and sequences continue from the mirror ``before``."""
         self.log = log
         self.clock = AgentClock()
         self.newest: StatusMessage | None = None
@@ -119,10 +102,8 @@ class Mirror:
         self._reported_at = 0.0
         self._events_state = State.DISCONNECTED
         """State after the events so far; statuses may be ahead of them."""
-        self._pushed: RobotiqStatus | None = None
-        """The last status that readers got."""
-        self._clocks: dict[int, AgentClock] = {}
-        """By run of the agent, the present one last."""
+        self._pushed: RobotiqStatus | None = None  # the last status that readers got
+        self._clocks: dict[int, AgentClock] = {}  # by run of the agent, the present one last
         self._first = 0 if before is None else before.next_sequence
         self._base = 0
         """Added to the sequences of the agent, which restart with each of its runs; ours never do."""
@@ -176,13 +157,8 @@ class Mirror:
     ) -> bool:
         """Take over a message; returns whether it is current, that is, at most ``window`` seconds old.
 
-        Args:
-            message: about this gripper, of the present run or the next.
-            arrival: our time.
-            in_turn: whether it was published, and has its place among the other statuses. The status of an
-                answer may have overtaken those: readers get them first.
-            window: seconds.
-            asked: our time of the question, if it came with an answer.
+        ``in_turn`` says that it was published, and has its place among the other statuses. The status of an
+        answer may have overtaken those: readers get them first. ``asked`` is our time of its question.
         """
         if message.epoch != self.epoch:
             self._begin_run(message, arrival)
@@ -306,40 +282,3 @@ class Mirror:
     def _in_order(self, at: float) -> float:
         self._reported_at = max(self._reported_at, at)
         return self._reported_at
-
-
-class MissedEvents:
-    """Fetches them, one question at a time."""
-
-    def __init__(
-        self,
-        mirror: Mirror,
-        ask: Callable[[int], Coroutine[Any, Any, Any]],
-        spawn: Callable[[Coroutine[Any, Any, Any]], object],
-    ) -> None:
-        self._mirror = mirror
-        self._ask = ask
-        self._spawn = spawn
-        self._is_fetching = False
-
-    def fetch(self) -> None:
-        """Fetch them, unless that is under way."""
-        if not self._is_fetching:
-            self._is_fetching = True
-            self._spawn(self._fetch())
-
-    async def _fetch(self) -> None:
-        mirror = self._mirror
-        try:
-            while mirror.has_missed():
-                info = await self._ask(mirror.events)
-                with reading("events"):
-                    events = info["events"]
-                    if info["epoch"] == mirror.epoch and events:
-                        mirror.skip_events(events[0]["index"] - 1)
-                        mirror.receive_events(events)
-                await asyncio.sleep(PAUSE_S)
-        except RobotiqError as error:
-            mirror.log.info("missed events could not be fetched: %s", error)
-        finally:
-            self._is_fetching = False

@@ -15,10 +15,8 @@ from ..wire.envelope import Call
 from .pending_request import PendingRequest
 from .session import RemoteSession
 
-UNDER_WAY: Final = 4
-"""Unanswered requests at a time: enough for 200 a second up to a round trip of 20 ms."""
-ANSWER_S: Final = 1.0
-"""Seconds for the answer to a command."""
+UNDER_WAY: Final = 4  # unanswered requests at a time: enough for 200 a second up to a round trip of 20 ms
+ANSWER_S: Final = 1.0  # seconds for the answer to a command
 
 
 class Outbox:

@@ -16,13 +16,11 @@ from ...values.errors import RobotiqError
 from ..network.bus import Reply, Urgency
 from ..wire.envelope import Answer, Call, unpack_answer
 
-REPEAT_S: Final = 0.25
-"""Seconds without an answer before a request is repeated: longer than a round trip."""
+REPEAT_S: Final = 0.25  # seconds without an answer before a request is repeated: longer than a round trip
 REPEAT_SLOWLY_S: Final = 1.0
 """After this many seconds, the interval of repetitions: by then the request was admitted or is too late, and
 only its answer may be lost."""
-STRAYS: Final = 3
-"""Answers to other requests that are ignored, at most."""
+STRAYS: Final = 3  # answers to other requests that are ignored, at most
 
 
 def of_its_run(call: Call) -> Callable[[Reply], bool]:
@@ -54,9 +52,7 @@ class PendingRequest:
     """Waits for the first answer to any of the copies of a request.
 
     Attributes:
-        call: the request.
         verb: the last part of its key.
-        urgency: of the request and its answer.
         timeout: seconds for the answer, from the first copy.
         asked_at: when the wait for an answer began.
         answered: the reply; None if there is none, or the error that ended the wait.
@@ -75,7 +71,6 @@ class PendingRequest:
         self.begin()
 
     def begin(self) -> None:
-        """Wait for an answer from now on."""
         self.asked_at = now()
         self.answered: asyncio.Future[Reply | RobotiqError | None] = self._loop.create_future()
 
@@ -101,7 +96,6 @@ class PendingRequest:
 
     @property
     def left(self) -> float:
-        """Seconds left for the answer."""
         return max(0.0, self._until - now())
 
     def packed(self, after: int) -> bytes:
@@ -158,12 +152,11 @@ class PendingRequest:
             copy.cancel()
 
     async def ended(self) -> None:
-        """Wait until all copies have ended."""
         await asyncio.gather(*self._copies, return_exceptions=True)
 
 
 def _came_early(reply: Reply) -> bool:
-    """Whether the agent waits for a command that was sent before this one."""
+    # The agent waits for a command that was sent before this one.
     try:
         answer: Answer = unpack_answer(reply.payload)
     except RobotiqError:

@@ -36,14 +36,11 @@ from .outbox import Outbox
 from .requests import no_answer_as_lost_connection
 from .session import CONNECT_S, RemoteSession
 
-COMMAND_S: Final = 5.0
-"""Seconds for commands that end with the acknowledgment of the gripper."""
+COMMAND_S: Final = 5.0  # seconds for commands that end with the acknowledgment of the gripper
 SEQUENCE_S: Final = 130.0
 """Seconds for an activation, a reset or a release; the agent's own limits are shorter."""
-MOVE_S: Final = 100.0
-"""Seconds for a move without a timeout; the agent's own limit is shorter."""
-SLACK_S: Final = 5.0
-"""Seconds beyond a timeout that the agent applies."""
+MOVE_S: Final = 100.0  # seconds for a move without a timeout; the agent's own limit is shorter
+SLACK_S: Final = 5.0  # seconds beyond a timeout that the agent applies
 MOTIONS: Final = ("move", "set_position")
 
 
@@ -114,8 +111,7 @@ class RemoteHand(Hand):
         self._shared_bus = bus
         self._opening: object = None
         """Identifies the start that opens a bus; None if there is none, or if stop() was called."""
-        self._outbox: Outbox | None = None
-        """Of the present run, or the last one."""
+        self._outbox: Outbox | None = None  # of the present run, or the last one
 
     # -- lifetime --------------------------------------------------------------------------------------
 

@@ -22,16 +22,13 @@ from ..wire.values import Fields
 from .mirror import Mirror
 from .pending_request import PendingRequest, is_refusal, of_its_run
 
-IN_ANY_RUN: Final = ("info", "halt")
-"""Requests that any run of the agent may answer."""
+IN_ANY_RUN: Final = ("info", "halt")  # requests that any run of the agent may answer
 RECENT_S: Final = 0.5
 """Seconds in which a message of the agent must follow an empty reply to prove that access was denied."""
 AT_ONCE_S: Final = 0.25
 """Seconds: an empty reply before that is no timeout, but means that no process received the request."""
-EARLY_S: Final = 0.005
-"""Seconds until all commands are repeated when the agent waits for a lost one."""
-LAST_ANSWER_S: Final = 0.5
-"""Seconds for the answer to a command whose lease has ended."""
+EARLY_S: Final = 0.005  # seconds until all commands are repeated when the agent waits for a lost one
+LAST_ANSWER_S: Final = 0.5  # seconds for the answer to a command whose lease has ended
 
 
 class Settings:
@@ -62,11 +59,7 @@ class NoAnswerError(ConnectionLostError):
 
 @contextmanager
 def no_answer_as_lost_connection() -> Iterator[None]:
-    """Around public calls: report a missing answer as a lost connection.
-
-    Raises:
-        ConnectionLostError: no answer arrived.
-    """
+    """Around public calls: report a missing answer as a lost connection."""
     try:
         yield
     except NoAnswerError as error:
@@ -92,8 +85,7 @@ class Requests:
         self._closed: asyncio.Future[None] = self._loop.create_future()
         self._has_ended = False
         self._pending: set[PendingRequest] = set()
-        self._commands: dict[int, PendingRequest] = {}
-        """Commands without an answer, in their order."""
+        self._commands: dict[int, PendingRequest] = {}  # commands without an answer, in their order
         self._resending: asyncio.TimerHandle | None = None
         self.settings = Settings()
 
@@ -123,7 +115,6 @@ class Requests:
         self.fall_silent()
 
     async def close(self) -> None:
-        """End all waits."""
         self._has_ended = True
         if not self._closed.done():
             self._closed.set_result(None)
@@ -141,14 +132,7 @@ class Requests:
     ) -> PendingRequest:
         """Send a request, before any that is posted later. Wait for its answer with :meth:`answer`.
 
-        Args:
-            call: the request.
-            verb: the last part of its key.
-            timeout: seconds for its answer.
-            urgency: with STOP, the wait continues if the agent falls silent.
-
-        Raises:
-            NotStartedError: the hand was stopped.
+        With Urgency.STOP that wait continues if the agent falls silent.
         """
         posted = PendingRequest(call, verb, timeout, urgency)
         if self._has_ended and not posted.is_allowed_after_stop:

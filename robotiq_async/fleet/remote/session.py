@@ -38,13 +38,14 @@ from ..wire.names import GripperName
 from ..wire.status_message import unpack
 from ..wire.values import Fields, read_statistics, reading
 from .lease_keeper import ANSWER_S, RENEWALS, Agents, LeaseKeeper
-from .mirror import Mirror, MissedEvents
+from .mirror import Mirror
 from .pending_request import PendingRequest
 from .requests import NoAnswerError, Requests
 from .stops import Stops
 
-CONNECT_S: Final = 5.0
-"""Seconds to find the agent."""
+PAUSE_S: Final = 0.02
+"""Seconds between two questions for events: 50 a second, half of what an agent answers to one client."""
+CONNECT_S: Final = 5.0  # seconds to find the agent
 OWN: Final = ("info", "lease", "halt", "cmd/cancel")
 """Requests whose arguments come from this library: a TypeError in the answer is not the user's."""
 
@@ -53,11 +54,6 @@ class RemoteSession:
     """One run. It belongs to the event loop that it was made in.
 
     Attributes:
-        log: of the hand.
-        mirror: the state of the hand.
-        keeper: the lease.
-        stops: halts and cancellations under way.
-        agents: the agents that serve the gripper.
         waiters: calls that wait for a state.
         is_over: whether the run has ended, or is ending.
         has_ended: whether all of it has ended.
@@ -74,16 +70,7 @@ class RemoteSession:
         owns_bus: bool = False,
         before: Mirror | None = None,
     ) -> None:
-        """Subscribe to the gripper.
-
-        Args:
-            name: the gripper's.
-            bus: an open session.
-            channels: the streams of the hand, which outlive the run.
-            wants_control: whether to acquire the lease, and reacquire it after a lost connection.
-            owns_bus: whether to close the bus at the end.
-            before: the mirror of the previous run.
-        """
+        """Subscribe to the gripper. The channels outlive the run; ``before`` is the mirror of the last."""
         self.name = name
         self.log = Log(str(name))
         self.loop = asyncio.get_running_loop()
@@ -97,14 +84,11 @@ class RemoteSession:
         self._owns_bus = owns_bus
         self._closing: asyncio.Task[None] | None = None
         self.window = WINDOW_S
-        self._arrived_at = 0.0
-        """Arrival of the last message, current or not."""
+        self._arrived_at = 0.0  # arrival of the last message, current or not
         self._requests = Requests(name, bus)
         self.settings = self._requests.settings
         self._tasks: set[asyncio.Task[Any]] = set()
-        self._missed = MissedEvents(
-            self.mirror, lambda since: self.ask("info", {"since": since}, timeout=ANSWER_S), self.spawn
-        )
+        self._is_fetching = False
         self.keeper = LeaseKeeper(self, wants_control=wants_control)
         self.stops = Stops(self)
         self._querying: asyncio.Task[Any] | None = None
@@ -119,13 +103,7 @@ class RemoteSession:
     # -- start and end ---------------------------------------------------------------------------------
 
     async def connect(self, timeout: float) -> None:
-        """Wait for the agent, and acquire the lease if wanted.
-
-        Raises:
-            ConnectFailedError: no agent was found, or it cannot reach the gripper.
-            NotAllowedError: the agent is running, but does not answer.
-            ControlLostError: another client commands the gripper.
-        """
+        """Wait for the agent, and acquire the lease if wanted; errors as of :meth:`RemoteHand.start`."""
         deadline = now() + timeout
         while not await self._ask_info(deadline):
             if now() >= deadline:
@@ -221,11 +199,6 @@ class RemoteSession:
         self._end()
 
     def check_running(self) -> None:
-        """Refuse calls that need a running hand.
-
-        Raises:
-            NotStartedError: it is not running.
-        """
         if self.is_over and not self.has_ended:
             raise NotStartedError("the hand was stopped")
         if self.is_over:
@@ -247,8 +220,26 @@ class RemoteSession:
                     self._receive_status(payload, in_turn=True)
         except RobotiqError as error:
             self._unreadable.warn("a message was dropped: %s", error)
-        if self.mirror.has_missed() and not self.is_over:
-            self._missed.fetch()  # an event was dropped by the network
+        if self.mirror.has_missed() and not self.is_over and not self._is_fetching:
+            self._is_fetching = True
+            self.spawn(self._fetch_events())
+
+    async def _fetch_events(self) -> None:
+        # The network dropped events; the agent keeps the last ones.
+        mirror = self.mirror
+        try:
+            while mirror.has_missed():
+                info = await self.ask("info", {"since": mirror.events}, timeout=ANSWER_S)
+                with reading("events"):
+                    events = info["events"]
+                    if info["epoch"] == mirror.epoch and events:
+                        mirror.skip_events(events[0]["index"] - 1)
+                        mirror.receive_events(events)
+                await asyncio.sleep(PAUSE_S)
+        except RobotiqError as error:
+            self.log.info("missed events could not be fetched: %s", error)
+        finally:
+            self._is_fetching = False
 
     def _is_about_another(self, mark: object) -> bool:
         if not self.mirror.is_about_another(mark):
@@ -257,7 +248,7 @@ class RemoteSession:
         return True
 
     def _receive_status(self, payload: bytes, *, in_turn: bool, asked: float | None = None) -> bool:
-        """Take over a status; returns whether it is about this gripper."""
+        # Returns whether it is about this gripper.
         message, arrival = unpack(payload), now()
         if self._is_about_another(message.mark):
             return False
@@ -284,7 +275,6 @@ class RemoteSession:
             self.mirror.receive_events(fields["events"])
 
     async def _supervise(self) -> None:
-        """Detect silence, and renew or reacquire the lease."""
         interval = self.window / RENEWALS
         while True:
             due = now() + interval
@@ -317,12 +307,6 @@ class RemoteSession:
     # -- control ---------------------------------------------------------------------------------------
 
     def check_control(self) -> None:
-        """Refuse commands without the lease, or without the agent.
-
-        Raises:
-            ConnectionLostError: the agent is silent.
-            ControlLostError: this hand does not hold the lease.
-        """
         if self.mirror.is_silent:
             raise ConnectionLostError(f"{self.name}: the agent is silent: nothing was asked")
         self.keeper.check()
@@ -330,7 +314,6 @@ class RemoteSession:
     # -- asking ----------------------------------------------------------------------------------------
 
     async def ask(self, verb: str, arguments: Fields | None = None, **how: Any) -> Any:  # noqa: ANN401
-        """Ask the agent, once; keywords and errors as :meth:`Requests.post` and :meth:`answer`."""
         return await self.send(self.call(arguments), verb, **how)
 
     def call(self, arguments: Fields | None = None) -> Call:
@@ -343,11 +326,7 @@ class RemoteSession:
         return await self.answer(self.post(call, verb, **how))
 
     async def answer(self, posted: PendingRequest) -> Any:  # noqa: ANN401
-        """Wait for the answer to a request; errors also as :meth:`Requests.answer`.
-
-        Raises:
-            NotStartedError: the run has ended meanwhile.
-        """
+        """As :meth:`Requests.answer`, with the outcome of the answer, and NotStartedError after the end."""
         try:
             answer, status = await self._requests.answer(posted)
         except NoAnswerError:
@@ -378,7 +357,6 @@ class RemoteSession:
             await self.ask(verb, arguments, timeout=timeout)
 
     def spawn(self, work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
-        """Run a task that ends with the run."""
         task = self.loop.create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)

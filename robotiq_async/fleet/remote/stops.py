@@ -4,51 +4,33 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Coroutine
-from typing import Any, Final, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from ...runtime.clock import now
 from ...session.ending import Ending
 from ...values.errors import AgentError, NotAllowedError, ProtocolError, RobotiqError
 from ..network.bus import Urgency
 from ..wire.envelope import Call
-from ..wire.values import Fields
-from .lease_keeper import LeaseKeeper
 from .requests import NoAnswerError, label
 
-TRIES: Final = 2
-"""Attempts to cancel a command, within one window."""
+if TYPE_CHECKING:
+    from .session import RemoteSession
+
+TRIES: Final = 2  # attempts to cancel a command, within one window
 CONTINUES: Final = frozenset({"activate", "reset", "atr", "recover"})
 """Commands that continue when their call is cancelled, as with a hand of this process."""
-
-
-HALT_S: Final = 2.0
-"""Seconds for which a halt is repeated."""
-ATTEMPT_S: Final = 0.3
-"""Seconds from one attempt to the next."""
-RETRY_S: Final = 0.05
-"""The same after an attempt that failed at once, as no agent was reached."""
+HALT_S: Final = 2.0  # seconds for which a halt is repeated
+ATTEMPT_S: Final = 0.3  # seconds from one attempt to the next
+RETRY_S: Final = 0.05  # the same after an attempt that failed at once, as no agent was reached
 _RETRIED: Final = (NoAnswerError, NotAllowedError, AgentError, ProtocolError)
 """No answer, or one to another request: the next attempt may get through."""
 T = TypeVar("T")
 
 
-class AgentClient(Protocol):
-    """The part of a run that stops use."""
-
-    keeper: LeaseKeeper
-    is_over: bool
-    window: float
-
-    async def ask(self, verb: str, arguments: Fields | None = None, **how: Any) -> Any:  # noqa: ANN401
-        ...
-
-    def spawn(self, work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]: ...
-
-
 class Stops:
     """Halts and cancellations of one run."""
 
-    def __init__(self, run: AgentClient) -> None:
+    def __init__(self, run: RemoteSession) -> None:
         self._run = run
         self._halts: set[asyncio.Task[Any]] = set()
         self._cancels: set[asyncio.Task[Any]] = set()
@@ -61,7 +43,6 @@ class Stops:
         return Ending.KEEP if self._cancels else Ending.LEAVE
 
     def halt(self) -> asyncio.Task[Any]:
-        """Halt; repeated until it is answered."""
         return self._begin(self._halts, until_answered(self._halt_once, HALT_S))
 
     async def halted(self) -> None:
@@ -102,9 +83,7 @@ async def until_answered(attempt: Callable[[float], Awaitable[T]], limit: float)
 
     Earlier attempts stay open: on a slow link an answer may take longer than the time between two attempts.
 
-    Args:
-        attempt: asks once; its argument is the seconds that are left.
-        limit: seconds.
+    The argument of an attempt is the seconds that are left.
 
     Raises:
         NotAllowedError: access was denied, and no attempt succeeded.
@@ -135,7 +114,7 @@ async def until_answered(attempt: Callable[[float], Awaitable[T]], limit: float)
     finally:
         for each in under_way:
             each.cancel()
-        await _ended(under_way)
+        await asyncio.gather(*under_way, return_exceptions=True)
 
 
 async def _last(under_way: set[asyncio.Future[T]], failure: Exception | None) -> T:
@@ -151,7 +130,3 @@ async def _last(under_way: set[asyncio.Future[T]], failure: Exception | None) ->
 def _more_telling(failure: Exception | None, later: Exception) -> Exception:
     # The last attempt has little time, so it may end without an answer where all before it were denied.
     return failure if isinstance(failure, NotAllowedError) and isinstance(later, NoAnswerError) else later
-
-
-async def _ended(futures: set[asyncio.Future[Any]]) -> None:
-    await asyncio.gather(*futures, return_exceptions=True)

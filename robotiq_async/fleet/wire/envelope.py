@@ -45,12 +45,7 @@ class Call:
 
 
 def unpack_call(data: bytes) -> Call:
-    """Parse a request.
-
-    Raises:
-        ProtocolError: not a request.
-        AgentError: a request of another version.
-    """
+    """Parse a request: ProtocolError if it is none, AgentError if it is of another version."""
     fields = _object("a request", data)
     try:
         call = Call(**{name: fields[name] for name in Call.__slots__ if name in fields or name != "after"})
@@ -98,23 +93,14 @@ class Answer:
         return _pack(self)
 
     def outcome(self, clock: Clock) -> Any:  # noqa: ANN401  # what each request returns
-        """Return what the request returned, or raise what it raised.
-
-        Raises:
-            RobotiqError, TypeError, ValueError: the error in the answer.
-        """
+        """Return what the request returned, or raise what it raised."""
         if self.error is not None:
             raise read_error(self.error, clock)
         return self.value
 
 
 def unpack_answer(data: bytes) -> Answer:
-    """Parse an answer.
-
-    Raises:
-        ProtocolError: not an answer.
-        AgentError: an answer of another version.
-    """
+    """Parse an answer: ProtocolError if it is none, AgentError if it is of another version."""
     fields = _object("an answer", data)
     try:
         return Answer(**{name: fields[name] for name in Answer.__slots__})

@@ -16,12 +16,7 @@ _SETTERS: Final = {"set_speed": "speed", "set_force": "force"}
 
 
 def settings_of(name: str, arguments: Mapping[str, Any]) -> dict[Setting, int]:
-    """Speeds and forces that a command sets; empty if its arguments are malformed.
-
-    Args:
-        name: of the command, without ``cmd/``.
-        arguments: of the request.
-    """
+    """Speeds and forces that a command sets, named without ``cmd/``; empty if its arguments are malformed."""
     try:
         return dict(_settings(name, arguments))
     except (AttributeError, TypeError, ValueError):
@@ -58,11 +53,7 @@ def settings_fields(settings: Mapping[Setting, int]) -> Fields:
 
 
 def read_settings(fields: object) -> dict[Setting, int]:
-    """Parse settings.
-
-    Raises:
-        TypeError, ValueError: malformed.
-    """
+    """Parse settings: TypeError or ValueError if they are malformed."""
     if not isinstance(fields, dict) or not all(isinstance(each, dict) for each in fields.values()):
         raise TypeError(f"settings must be an object of objects, got {fields!r:.200}")
     return dict(_by_axis(fields))

@@ -1,19 +1,6 @@
 """StatusMessage: the status of a gripper for its readers, 60 bytes, 200 times a second.
 
-| bytes | what |
-|--|--|
-| B | version of the layout |
-| B | state, as its index in ``State`` |
-| B | flags: 1 a status was read, 2 the axes move, 4 the lease is held |
-| B | model of the gripper, as its index in ``MODELS``: 0 is the 3-Finger |
-| I | mark of the gripper: the CRC-32 of its base key |
-| I | number of the lease |
-| I | number of the newest event |
-| Q | epoch: random, new with each start of the agent |
-| Q | sequence of the status |
-| d | stamp: the agent's time at which this was sent, in seconds |
-| f | age of the status when it was sent, in seconds |
-| 8H | the eight status registers |
+docs/fleet-protocol.md has the layout. A state and a model are their index in ``State`` and in ``MODELS``.
 """
 
 from __future__ import annotations

@@ -32,25 +32,19 @@ from ...values.status import RobotiqStatus
 from ...values.trigger import Trigger
 
 Fields = dict[str, Any]
-Clock = Callable[[float], float]
-"""Converts a time of the agent to a time of this process."""
+Clock = Callable[[float], float]  # converts a time of the agent to a time of this process
 
 _KINDS: Final = {
     name: kind
     for name, kind in vars(errors).items()
     if isinstance(kind, type) and issubclass(kind, RobotiqError) and kind is not errors.NotAllStoppedError
 } | {"TypeError": TypeError, "ValueError": ValueError}
-_WORDS: Final = ("address", "reason")
-"""Attributes of errors that are text."""
+_WORDS: Final = ("address", "reason")  # attributes of errors that are text
 
 
 @contextmanager
 def reading(what: str) -> Iterator[None]:
-    """Report malformed data from an agent, or from another program, as ProtocolError.
-
-    Raises:
-        ProtocolError: a field is missing or of the wrong type.
-    """
+    """Report malformed data from an agent, or from another program, as ProtocolError."""
     try:
         yield
     except (AttributeError, KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
@@ -58,11 +52,7 @@ def reading(what: str) -> Iterator[None]:
 
 
 def words(text: object) -> str:
-    """Text from the network, without control characters, fit to be shown.
-
-    Raises:
-        TypeError: not a string.
-    """
+    """Text from the network, without control characters, fit to be shown."""
     if not isinstance(text, str):
         raise TypeError(f"words must be a string, got {text!r}")
     return printable(text)
