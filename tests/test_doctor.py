@@ -26,7 +26,7 @@ from robotiq_async.simulator import (
 )
 from robotiq_async.tools.doctor import Finding, Level, examine
 from robotiq_async.tools.doctor.answer import _advice_for_opening
-from robotiq_async.tools.doctor.serial_line import report_adapter
+from robotiq_async.tools.doctor.gripper import report_adapter
 from robotiq_async.values.request import AxisRequest, Request
 from tests.serial_line import SerialLine
 from tests.virtual import run

@@ -22,8 +22,8 @@ from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.hand.robotiq_hand import RobotiqHand
 from robotiq_async.simulator import SimulatorServer
 from robotiq_async.tools.doctor import Finding, Level, examine_remote
-from robotiq_async.tools.doctor.certificates import examine_keys
 from robotiq_async.tools.doctor.findings import GiveUpError
+from robotiq_async.tools.doctor.fleet import examine_keys
 from tests.fleet.lab import Lab, lab
 from tests.fleet.network import MemoryBus, Network
 from tests.virtual import virtual

@@ -11,10 +11,10 @@ import pytest
 
 from robotiq_async import HAND_E, TWO_FINGER_85, ConnectionLostError, Finger, MoveResult, RobotiqHand, State
 from robotiq_async.hand import Hand
+from robotiq_async.ros2.gripper.connection import make_hand
 from robotiq_async.ros2.gripper.goals import Ending, GoalRunner, Outcome
-from robotiq_async.ros2.gripper.hands import make_hand
+from robotiq_async.ros2.translation.diagnosis import is_connected, why_not
 from robotiq_async.ros2.translation.joints import Targets
-from robotiq_async.ros2.translation.readiness import is_connected, why_not
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_settings
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.request import Request

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import pytest
 
-from robotiq_async.ros2.translation.pace import Pace
+from robotiq_async.ros2.node.timing import Pace
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from robotiq_async.ros2.gripper.hands import make_hand
+from robotiq_async.ros2.gripper.connection import make_hand
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_parameter, check_settings
 
 USUAL = {name: parameter.default for name, parameter in PARAMETERS.items()}

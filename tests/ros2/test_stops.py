@@ -9,9 +9,8 @@ from collections.abc import AsyncIterator
 import pytest
 
 from robotiq_async import Finger, RobotiqHand, State
-from robotiq_async.ros2.gripper.connection import Connection, RefusedError
+from robotiq_async.ros2.gripper.connection import PENDING_S, Connection, RefusedError
 from robotiq_async.ros2.gripper.goals import Ending, Outcome
-from robotiq_async.ros2.gripper.pending_stop import PENDING_S
 from robotiq_async.ros2.translation.joints import Targets
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_settings
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer

@@ -7,7 +7,7 @@ import asyncio
 import pytest
 
 from robotiq_async import NotStartedError
-from robotiq_async.ros2.node.timer import Timer
+from robotiq_async.ros2.node.timing import Timer
 from tests.virtual import VirtualLoop
 
 pytestmark = pytest.mark.virtual_time

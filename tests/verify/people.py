@@ -13,7 +13,7 @@ from robotiq_async.simulator import RtuOverTcpSimulatorServer, SimulatedGripper,
 from robotiq_async.tools.verify import ENTER, Lengths, Plan, Report, Runner, Verdict
 from robotiq_async.tools.verify.catalogue import LAST, checks_of
 from robotiq_async.tools.verify.recorded_link import Frame
-from robotiq_async.tools.verify.stages import loss, single_axis, soft_part
+from robotiq_async.tools.verify.stages import first_motions, loss, soft_part
 from robotiq_async.values.enums import Finger
 from tests.grippers import activate_beforehand
 
@@ -111,7 +111,7 @@ class Helper:
             await self._meanwhile(Trouble("e-stop"))
         elif question == loss.POWER:
             await self._meanwhile(Trouble("power-cut"))
-        elif question in (single_axis.QUESTION, single_axis.JAW_QUESTION):
+        elif question in (first_motions.QUESTION, first_motions.JAW_QUESTION):
             return WHICH[max(gone, key=lambda axis: gone[axis])]
         return ENTER
 

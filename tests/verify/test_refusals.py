@@ -15,7 +15,7 @@ from robotiq_async.link.address import parse_address
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.tools.verify import Plan, Report, Runner
 from robotiq_async.tools.verify.runner import LEFT_SET
-from robotiq_async.tools.verify.stages import single_axis
+from robotiq_async.tools.verify.stages import first_motions
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.model import TWO_FINGER_85
 from robotiq_async.values.request import AxisRequest, Request
@@ -213,7 +213,7 @@ async def test_what_is_not_agreed_to_is_not_done(number: int) -> None:
 async def test_a_finger_that_is_not_the_one_asked_for_ends_the_run(answer: str) -> None:
     async with served(active=True) as server:
         helper = Helper(server)
-        helper.before = lambda words: answer if words == single_axis.QUESTION else None
+        helper.before = lambda words: answer if words == first_motions.QUESTION else None
         report = await verified(server, helper, first=4)
         assert report.why == "deviation"
         assert report.entered == [4]

@@ -15,8 +15,8 @@ from robotiq_async.simulator.physics.habits import Habits
 from robotiq_async.simulator.troubles.like_hardware import LIKE_HARDWARE, OWN_HABITS
 from robotiq_async.tools.recording.recordings import read_recording
 from robotiq_async.tools.verify import Plan, Runner, pictures
-from robotiq_async.tools.verify.files import Folder
-from robotiq_async.tools.verify.recording import NAME, segments
+from robotiq_async.tools.verify.files import NAME, Folder
+from robotiq_async.tools.verify.pictures import segments
 from robotiq_async.values.enums import ObjectStatus
 from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
 from tests import hardware

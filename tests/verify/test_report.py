@@ -22,10 +22,8 @@ from robotiq_async.ros2.translation.settings import PARAMETERS, check_parameter
 from robotiq_async.simulator import Trouble
 from robotiq_async.tools.recording.recordings import read_recording
 from robotiq_async.tools.verify import CATALOGUE, ENDINGS, Check, Plan, Report, Runner, Verdict
-from robotiq_async.tools.verify.files import JSON, PAGE, Folder, Scrubber
-from robotiq_async.tools.verify.page import lines, page, sentences
-from robotiq_async.tools.verify.recording import NAME
-from robotiq_async.tools.verify.report import SCHEMA
+from robotiq_async.tools.verify.files import JSON, NAME, PAGE, Folder, Scrubber
+from robotiq_async.tools.verify.report import SCHEMA, lines, page, sentences
 from tests.docs.pages import DOCS
 from tests.verify.people import SHORT, Helper, Roll, served, threads, verified
 

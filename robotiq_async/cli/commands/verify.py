@@ -130,7 +130,7 @@ async def _run(plan: Plan, person: Person, folder: Folder) -> None:
 
 async def _end(report: Report, folder: Folder) -> None:
     """Write the report and print a summary, also if the report cannot be written."""
-    from ...tools.verify.page import lines, sentences
+    from ...tools.verify.report import lines, sentences
 
     failure = await folder.end(report)
     print(wrapped("\n" + "\n".join(sentences(report))), flush=True)

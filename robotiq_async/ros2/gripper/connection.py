@@ -3,18 +3,30 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
+from importlib.util import find_spec
 from typing import Final
 
+from ...fleet.remote.remote_hand import RemoteHand
 from ...hand import Hand
+from ...hand.robotiq_hand import RobotiqHand
+from ...link.address import is_remote
+from ...runtime.clock import now
+from ...runtime.extras import install
 from ...runtime.log import Log
 from ...tools.actions import ACTIONS, Operator
-from ...values.errors import NotStartedError, RobotiqConnectionError, RobotiqError
+from ...values.enums import State
+from ...values.errors import (
+    ControlLostError,
+    NotStartedError,
+    RobotiqConnectionError,
+    RobotiqError,
+    StateTimeoutError,
+)
+from ..translation.diagnosis import why_not
 from ..translation.joints import Targets
-from ..translation.readiness import why_not
 from ..translation.settings import Settings
 from .goals import GoalRunner, Outcome
-from .pending_stop import PendingStop
 
 COMMANDS: Final = ("activate", "reset", "halt", "recover", "release")
 """Names of the services, and of the actions that they carry out."""
@@ -209,3 +221,65 @@ class Connection:
             raise RefusedError("a halt is under way")
         if self._pending_stop.is_pending:
             raise RefusedError("the fingers are not stopped yet: the link was down when they were to be")
+
+
+PENDING_S: Final = 60.0
+"""Seconds after which every motion from before the loss has ended; the longest is an automatic release."""
+RETRY_S: Final = 0.05
+"""Seconds between two attempts."""
+_REACHED: Final = tuple(set(State) - {State.DISCONNECTED, State.DO_SHUTDOWN, State.SHUTDOWN})
+
+
+class PendingStop:
+    """Sends the stop as soon as the link is back. A stop moves nothing, so it may be late."""
+
+    def __init__(self, hand: Hand) -> None:
+        self._hand = hand
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    @property
+    def is_pending(self) -> bool:
+        return bool(self._tasks)
+
+    def schedule(self, stop: Callable[[], Awaitable[None]]) -> None:
+        """Send a stop when the link is back, within PENDING_S; again after RobotiqConnectionError."""
+        task = asyncio.ensure_future(self._send(stop, now() + PENDING_S))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def cancel(self) -> None:
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    async def _send(self, stop: Callable[[], Awaitable[None]], until: float) -> None:
+        while (left := until - now()) > 0:
+            try:
+                await self._hand.wait_for_state(*_REACHED, timeout=left)
+                await stop()
+            except RobotiqConnectionError:
+                await asyncio.sleep(RETRY_S)
+            except (NotStartedError, StateTimeoutError, ControlLostError):
+                return  # the hand or its lease has ended, which stops the fingers; or it is too late
+            except RobotiqError as error:
+                Log(self._hand.name).error("the link is back, and the fingers MAY STILL MOVE: %s", error)
+                return
+            else:
+                Log(self._hand.name).warning("the link is back, and what still moved has been stopped")
+                return
+
+
+def make_hand(settings: Settings) -> Hand:
+    """A hand that is not started. In the ROS node only this function knows which kind of hand it is.
+
+    A hand on another host acquires its lease with the first command: connecting only reads.
+
+    Raises:
+        ValueError: an option that the hand refuses.
+        RobotiqError: the extra that this address needs is not installed.
+    """
+    if is_remote(settings.address):
+        if find_spec("zenoh") is None:
+            raise RobotiqError(f"a gripper on another host needs zenoh: {install('fleet')}")
+        return RemoteHand(settings.address, control=None)
+    return RobotiqHand(settings.address, speed=settings.speed, force=settings.force, **settings.options)

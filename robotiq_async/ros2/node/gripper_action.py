@@ -21,7 +21,7 @@ from ..gripper.goals import Ending, Outcome
 from ..translation.joints import GoalError, Targets, targets
 from ..translation.settings import Settings
 from .bridge import Bridge
-from .messages import JointStates
+from .publishing import JointStates
 
 Configured = tuple[Connection, JointStates, Settings]
 

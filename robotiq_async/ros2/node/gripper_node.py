@@ -19,14 +19,12 @@ from std_srvs.srv import Trigger
 
 from ...values.errors import RobotiqError
 from ...values.model import THREE_FINGER
-from ..gripper.connection import COMMANDS, Connection, RefusedError
-from ..gripper.hands import make_hand
+from ..gripper.connection import COMMANDS, Connection, RefusedError, make_hand
 from ..translation.description import robot_description
 from . import parameters
 from .bridge import Bridge, ClosedError
 from .gripper_action import Configured, GripperAction
-from .messages import JointStates
-from .publishing import Publishing
+from .publishing import JointStates, Publishing
 
 NAME: Final = "gripper"
 _CALLS: Final = QoSProfile(depth=100)

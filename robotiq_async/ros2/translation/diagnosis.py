@@ -1,4 +1,4 @@
-"""Diagnoses of a hand, and its state as JSON. Values that are unknown are left out."""
+"""Diagnoses of a hand, its state as JSON, and why it takes no goals. What is unknown is left out."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 
+from ...control.state_machine import RUNNING
 from ...hand import Hand
-from ...values.enums import Severity
+from ...values.enums import Severity, State
 from ...values.errors import NotStartedError
 from ...values.status import RobotiqStatus
-from .readiness import is_connected
 
 
 class Level(IntEnum):
@@ -111,3 +111,23 @@ def _newest(hand: Hand) -> RobotiqStatus | None:
         return hand.status
     except NotStartedError:
         return None
+
+
+def is_connected(hand: Hand) -> bool:
+    """Whether the status of the hand is current."""
+    return hand.state not in (State.DISCONNECTED, State.DO_SHUTDOWN, State.SHUTDOWN)
+
+
+def why_not(hand: Hand) -> str | None:
+    """Why the hand accepts no goal now; None if it does."""
+    state = hand.state
+    if state in RUNNING:
+        return None
+    if not is_connected(hand):
+        return "the link to the gripper is down"
+    if state is State.RESET:
+        return "the gripper is not activated: call ~/activate (its fingers MOVE)"
+    if state in (State.FAULT, State.ATR_DONE):
+        fault = hand.status.fault
+        return f"the gripper is in fault 0x{int(fault):02X}, {fault.description}: call ~/recover"
+    return f"an activation, a reset or a release is under way ({state.name})"

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from .bench import Lengths
 from .catalogue import CATALOGUE, ENDINGS, Check, Verdict
-from .person import ENTER, Person
 from .report import Report
 from .runner import Plan, Runner
+from .watch import ENTER, Person
 
 __all__ = [
     "CATALOGUE",

@@ -14,9 +14,8 @@ from ...values.model import Model, model_of
 from ...values.registers import RegisterMap
 from ...values.status import RobotiqStatus
 from .catalogue import CATALOGUE, NO_OPTIONS, Check, EndError, Figure, Options, Verdict
-from .person import Person
 from .recorded_link import Frame, RecordedLink
-from .watch import Watch
+from .watch import Person, Watch
 
 CONNECT_S: Final = 2.0
 """For a connection: with this a stop over a link that was lost is tried soon again."""

@@ -85,6 +85,8 @@ LAST: Final = 9
 """The last stage."""
 HARMLESS: Final = 2
 """The last stage in which nothing moves."""
+STAGE: Final = "verify stage "
+"""Before the number, in the event that tells that a stage begins."""
 
 
 Figure = int | float | str | bool | None | list[Any]

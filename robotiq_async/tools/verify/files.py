@@ -1,19 +1,144 @@
-"""The folder of a report: recording.mcap, report.json, report.md and pictures."""
+"""The folder of a report: recording.mcap, report.json, report.md and pictures. Needs the extra ``record``.
+
+Statuses and commands are those of a recorded hand. An event of the kind "state" tells that a stage has begun
+(``verify stage 4``), one of the kind "log" that an exchange has failed, or what was found in another place.
+"""
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import platform
+import time
+from collections.abc import Callable
+from io import FileIO
 from pathlib import Path
 from typing import Final, TypeVar, cast
 
 from ...link.address import Address
 from ...runtime.concurrency import in_a_thread
-from ...values.model import model_of
-from .page import page
-from .recording import NAME, Recording
-from .report import Report
+from ...values.events import SentRequest
+from ...values.model import Model, model_of
+from ...values.request import Request
+from ...values.status import RobotiqStatus
+from ..recording.feed import COMMAND, EVENT, STATUS, Message, Topic, compact
+from ..recording.mcap_file import McapFile
+from ..recording.payloads import Fields
+from ..recording.raw_output import write_all
+from .catalogue import STAGE
+from .recorded_link import Frame
+from .report import Report, page
+
+FLUSH_S: Final = 0.5
+NAME: Final = "recording.mcap"
+
+
+class Recording:
+    """Takes frames; a task writes them to the disk in threads.
+
+    Attributes:
+        failure: why nothing is written any more; empty as long as it is.
+    """
+
+    def __init__(self, folder: Path, clean: Callable[[str], str], model: Model) -> None:
+        """Create the file.
+
+        Args:
+            folder: where it goes.
+            clean: takes out of a text what must not be in it.
+            model: of the gripper.
+
+        Raises:
+            OSError: that is not possible.
+        """
+        self.failure = ""
+        self._file = FileIO(folder / NAME, "x")
+        self._waiting: list[bytes] = []
+        self._count = 0
+        self._format = McapFile(self, name="verify", address="")
+        self._clean = clean
+        self._model = model
+        self._epoch = time.time() - asyncio.get_running_loop().time()
+        self._counts = {STATUS: 0, COMMAND: 0, EVENT: 0}
+        self._over = asyncio.Event()
+        self._saving = asyncio.ensure_future(self._save_again_and_again())
+
+    # What the MCAP writer needs of a file.
+
+    def write(self, data: bytes) -> int:
+        """Keep bytes until a thread writes them."""
+        self._waiting.append(bytes(data))
+        self._count += len(data)
+        return len(data)
+
+    def tell(self) -> int:
+        """How many there were."""
+        return self._count
+
+    def flush(self) -> None:
+        """Nothing: the disk is a thread's business."""
+
+    # What a run tells.
+
+    def keep(self, frame: Frame) -> None:
+        """Take a frame. Never blocks and never fails."""
+        if self.failure:
+            return
+        if frame.kind == "status":
+            status = RobotiqStatus(frame.registers, frame.ended, self._counts[STATUS] + 1, self._model)
+            self._add(STATUS, frame.ended, status.as_dict())
+        elif frame.registers:
+            image = Request.from_registers(frame.registers, self._model)
+            sent = SentRequest(image, frame.began, frame.kind == "command")
+            self._add(COMMAND, frame.began, sent.as_dict())
+        if frame.words:
+            words = {"kind": "log", "timestamp": frame.ended, "message": self._clean(frame.words)}
+            self._add(EVENT, frame.ended, words)
+
+    def begin(self, stage: int) -> None:
+        """Note that a stage begins."""
+        now = asyncio.get_running_loop().time()
+        fields = {"kind": "state", "timestamp": now, "target": f"{STAGE}{stage}", "model": self._model.name}
+        self._add(EVENT, now, fields)
+
+    def _add(self, topic: Topic, seconds: float, fields: Fields) -> None:
+        self._counts[topic] += 1
+        stamp = round((seconds + self._epoch) * 1e9)
+        self._format.take(Message(topic, stamp, compact(fields), self._counts[topic]))
+
+    # The disk.
+
+    async def end(self) -> None:
+        """Write what is left, and close the file; a failure is kept in :attr:`failure`."""
+        self._over.set()
+        await self._saving
+        if not self.failure:
+            self._format.finish()
+            await self._save()
+        self._file.close()
+
+    async def _save_again_and_again(self) -> None:
+        while not (self._over.is_set() or self.failure):
+            self._format.flush()
+            await self._save()
+            try:
+                async with asyncio.timeout(FLUSH_S):
+                    await self._over.wait()
+            except TimeoutError:
+                pass
+
+    async def _save(self) -> None:
+        data, self._waiting = b"".join(self._waiting), []
+        try:
+            await in_a_thread(lambda: self._write(data))
+        except OSError as error:
+            self.failure = error.strerror or str(error)
+
+    def _write(self, data: bytes) -> None:
+        write_all(self._file.fileno(), data)
+        os.fsync(self._file.fileno())
+
 
 T = TypeVar("T")
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Final
@@ -16,10 +18,12 @@ except ModuleNotFoundError as error:
     raise ImportError(f"pictures need matplotlib: {install('plot')}") from error
 
 from ...values.enums import CLOSED, Finger, ObjectStatus
-from ...values.model import Model
+from ...values.model import THREE_FINGER, Model, model_of
 from ...values.request import Request
 from ...values.status import RobotiqStatus
-from .recording import Segment, segments
+from ..recording.feed import COMMAND, EVENT, STATUS
+from ..recording.recordings import read_recording
+from .catalogue import STAGE
 from .report import Report
 
 if TYPE_CHECKING:
@@ -30,6 +34,39 @@ FAR: Final = 10
 BEFORE_S: Final = 0.05
 AFTER_S: Final = 0.4
 """What is shown around the request of one axis: longer than a hand waits for an object status (0.25 s)."""
+
+
+@dataclass
+class Segment:
+    """What was recorded in a stage, each with its time in seconds."""
+
+    stage: int
+    began: float
+    statuses: list[tuple[float, RobotiqStatus]] = field(default_factory=list)
+    commands: list[tuple[float, Request]] = field(default_factory=list)
+
+
+def segments(path: Path, stages: tuple[int, ...]) -> list[Segment]:
+    """Some stages of a recording, in their order."""
+    found: list[Segment] = []
+    model = THREE_FINGER
+    for entry in read_recording(path):
+        seconds = entry.nanoseconds / 1e9
+        if entry.topic == EVENT.name:
+            fields = json.loads(entry.data)
+            target = str(fields.get("target", ""))
+            if target.startswith(STAGE):
+                model = model_of(fields.get("model"))
+                found.append(Segment(int(target.removeprefix(STAGE)), seconds))
+        elif found and found[-1].stage in stages:
+            registers = tuple(json.loads(entry.data)["registers"])
+            if entry.topic == STATUS.name:
+                status = RobotiqStatus.from_registers(registers, timestamp=seconds, model=model)
+                found[-1].statuses.append((seconds, status))
+            elif entry.topic == COMMAND.name:
+                found[-1].commands.append((seconds, Request.from_registers(registers, model)))
+    return [segment for segment in found if segment.stage in stages]
+
 
 Draw = Callable[[tuple["Axes", ...], Segment], bool]
 

@@ -15,15 +15,13 @@ from ...values.model import model_of
 from ...values.request import Request
 from .bench import Bench, Lengths
 from .catalogue import HARMLESS, LAST, EndError
-from .fingers import stop_fingers
 from .looking import find, see_that_it_may_be_written_to
-from .motions import as_found
-from .person import Person
+from .motions import as_found, stop_fingers
 from .recorded_link import Frame
 from .report import Report
+from .stages import STAGES, Stage
 from .stages.loss import report_lost_activation
-from .stages.stage import STAGES, Stage
-from .watch import words_of
+from .watch import Person, words_of
 
 LEFT_SET: Final = (
     "A program has left rGTO set. Going on writes rGTO = 0 first: it stops every axis, and starts none."

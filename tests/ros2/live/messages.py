@@ -10,7 +10,7 @@ from rclpy.serialization import deserialize_message
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 
-from robotiq_async.ros2.node.messages import JointStates, stamp
+from robotiq_async.ros2.node.publishing import JointStates, stamp
 from robotiq_async.runtime.clock import now
 from tests.register_words import status_of
 

@@ -1,7 +1,124 @@
-"""The ten stages, each with what a person is told before it."""
+"""The ten stages and what a person is told before each."""
 
 from __future__ import annotations
 
-from .stage import STAGES, Stage
+from collections.abc import Awaitable, Callable
+from typing import Final, NamedTuple
 
-__all__ = ["STAGES", "Stage"]
+from ....values.model import THREE_FINGER, Model
+from ..bench import Bench
+from . import first_motions, full_strokes, loss, reading, soak, soft_part, stopping, writing
+
+
+class Stage(NamedTuple):
+    """One stage.
+
+    Attributes:
+        number: 0..9.
+        title: a few words.
+        run: does it; what must end the run raises.
+        moves: what moves.
+        how_far: how far.
+        how_fast: how fast.
+        clear: what must be clear.
+        lasts: how long it takes.
+        is_moving: whether fingers move.
+        needs_active: whether the gripper must be active before.
+        jaw_moves: what moves of a gripper with a jaw, if that is something else.
+    """
+
+    number: int
+    title: str
+    run: Callable[[Bench], Awaitable[None]]
+    moves: str
+    how_far: str
+    how_fast: str
+    clear: str
+    lasts: str
+    is_moving: bool = True
+    needs_active: bool = True
+    jaw_moves: str = ""
+
+    def as_text(self, model: Model = THREE_FINGER) -> str:
+        """What a person reads before it."""
+        moves = self.moves if len(model.axes) > 1 else self.jaw_moves or self.moves
+        lines = [f"Stage {self.number}: {self.title}", f"  moves:    {moves}"]
+        if self.is_moving:
+            lines += [
+                f"  how far:  {self.how_far}",
+                f"  how fast: {self.how_fast}",
+                f"  clear:    {self.clear}",
+            ]
+        return "\n".join([*lines, f"  takes:    {self.lasts}"])
+
+
+_NOTHING: Final = ("nothing", "", "", "")
+_WAY: Final = "the fingers' whole way, and the way of what they could push; no hand, no cable"
+_SLOWEST: Final = "the slowest there is (20 to 30 mm/s by the manuals), the weakest force"
+
+STAGES: Final = (
+    Stage(0, "this computer", reading.host, *_NOTHING, "1 s", is_moving=False, needs_active=False),
+    Stage(1, "reading only", reading.reading, *_NOTHING, "3 minutes", is_moving=False, needs_active=False),
+    Stage(
+        *(2, "writing with rGTO = 0", writing.writing),
+        "nothing should; stay clear all the same, for that is what is checked",
+        *("", "", "", "20 s"),
+        is_moving=False,
+        needs_active=False,
+    ),
+    Stage(
+        *(3, "activation", first_motions.activation),
+        "ALL FINGERS AND THE SCISSOR; what is held falls",
+        "open and close to their stops",
+        "the gripper's own pace; no option sets it",
+        _WAY,
+        "5 to 30 s",
+        needs_active=False,
+        jaw_moves="THE JAW; what is held falls",
+    ),
+    Stage(
+        *(4, "one axis at a time", first_motions.single_axis),
+        "A, then B, then C, then the scissor, each there and back; you say which it was",
+        "30 counts of 255, about an eighth of the way",
+        *(_SLOWEST, _WAY, "1 minute"),
+        jaw_moves="the jaw, there and back; you say what it was",
+    ),
+    Stage(
+        *(5, "stopping", stopping.stopping),
+        "A, B and C together, stopped and turned half way",
+        "80 counts of 255, about a third of the way",
+        "speed 64 of 255, the weakest force",
+        *(_WAY, "20 s"),
+        jaw_moves="the jaw, stopped and turned half way",
+    ),
+    Stage(
+        *(6, "full strokes", full_strokes.full_strokes),
+        "the scissor to both ends, then A, B and C closed and open three times",
+        "the whole way",
+        "slowest, speed 64, and at last the FASTEST there is (2 s), the weakest force",
+        *("everything; nothing may be between the fingers", "1 minute"),
+        jaw_moves="the jaw, closed and open three times",
+    ),
+    Stage(
+        *(7, "something soft", soft_part.soft_part),
+        "A, B and C close on a block of foam that you put there, and open again",
+        "until they touch it",
+        *(_SLOWEST, "your hands, once the foam lies there", "2 minutes"),
+        jaw_moves="the jaw closes on a block of foam that you put there, and opens again",
+    ),
+    Stage(
+        *(8, "losing client, cable, emergency stop, power", loss.loss),
+        "finger A there and back, and ALL FINGERS in activations that are asked for",
+        "60 counts of 255; the activations to the stops",
+        *(_SLOWEST, _WAY, "10 minutes, with your hands on cable and switches"),
+        jaw_moves="THE JAW, there and back, and in activations that are asked for",
+    ),
+    Stage(
+        *(9, "soak", soak.soak),
+        "nothing for 10 minutes, then finger A back and forth",
+        "15 counts of 255, about a sixteenth of the way",
+        *("speed 64 of 255, the weakest force", _WAY, "11 minutes"),
+        jaw_moves="nothing for 10 minutes, then the jaw back and forth",
+    ),
+)
+"""In their order."""

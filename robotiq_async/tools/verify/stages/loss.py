@@ -13,8 +13,7 @@ from ....values.status import RobotiqStatus
 from ..bench import Bench
 from ..catalogue import EndError, Figure
 from ..motions import MARGIN, activate, are_near, standing, way
-from ..person import ENTER
-from ..watch import Watch
+from ..watch import ENTER, Watch
 
 SECONDS: Final = 900.0
 STEP: Final = 60

@@ -1,12 +1,34 @@
-"""Timer: periodic work in the event loop. Does not import ROS."""
+"""Pace and Timer: what is done at a rate. Does not import ROS."""
 
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable
 from contextlib import suppress
 
 from ...values.errors import NotStartedError
+
+
+class Pace:
+    """Selects the statuses that are due. After a gap it continues from there, without catching up.
+
+    Args:
+        rate: statuses per second.
+    """
+
+    def __init__(self, rate: float) -> None:
+        self._period = 1 / rate
+        self._due = -math.inf
+
+    def takes(self, timestamp: float) -> bool:
+        """Whether the status of this time, in monotonic seconds, is due."""
+        if timestamp < self._due:
+            return False
+        self._due += self._period
+        if self._due <= timestamp:
+            self._due = timestamp + self._period
+        return True
 
 
 class Timer:
