@@ -1,104 +1,138 @@
-"""What a configured node does with its hand, without ROS."""
+"""What a configured node does with its hand, without ROS: what it takes, what a stop ends, what it tells."""
 
 from __future__ import annotations
 
 import asyncio
 import json
 import logging
-import subprocess
-import sys
+from collections.abc import AsyncIterator
 
 import pytest
 
 from robotiq_async import Fault, Finger, RobotiqError, RobotiqHand, RobotiqStatus, State
-from robotiq_async.ros2.gripper.connection import COMMANDS, MOST_CALLS, Connection, RefusedError
-from robotiq_async.ros2.gripper.goals import Ending
+from robotiq_async.ros2.gripper.connection import COMMANDS, MOST_CALLS, PENDING_S, Connection, RefusedError
+from robotiq_async.ros2.gripper.goals import Ending, Outcome
 from robotiq_async.ros2.translation.diagnosis import Level, diagnose, status_text
 from robotiq_async.ros2.translation.joints import Targets
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_settings
 from robotiq_async.runtime.clock import now
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.fake_hand import FakeHand
+from tests.fleet.lab import lab
+from tests.virtual import LATENCY_S
+
+pytestmark = pytest.mark.virtual_time
 
 SETTINGS = check_settings({name: parameter.default for name, parameter in PARAMETERS.items()})
 CLOSE = Targets(((240, Finger.ABC),))
+POLL_S = 0.02
+FAR = 200
+"""Fingers that were stopped on their way are not there."""
 
 
-def begin_goal(connection: Connection) -> asyncio.Task[object]:
-    return asyncio.create_task(connection.run_goal(b"1", CLOSE, SETTINGS, lambda: None, connection.stops))
+@pytest.fixture
+async def gripper() -> SimulatedGripper:
+    """One that takes some three seconds to close."""
+    return SimulatedGripper(asyncio.get_running_loop().time, spread=False)
 
 
-async def connected(server: SimulatorServer, *, active: bool = True) -> Connection:
-    connection = Connection(RobotiqHand(server.address), SETTINGS)
+@pytest.fixture
+async def inactive(server: SimulatorServer) -> AsyncIterator[Connection]:
+    """Of a node that was configured."""
+    connection = Connection(RobotiqHand(server.address, poll_interval=POLL_S), SETTINGS)
     await connection.open()
-    if active:
-        await connection.permit()
-        await connection.command("activate")
-    return connection
-
-
-async def test_opening_and_permitting_write_nothing(
-    server: SimulatorServer, gripper: SimulatedGripper
-) -> None:
-    connection = await connected(server, active=False)
-    assert not connection.takes_commands
-    await connection.permit()
-    await connection.close("the end")
-    assert connection.hand.state is State.SHUTDOWN
-    assert all(not write.registers[0] >> 8 & 0x01 for write in gripper.writes), "no activation"
-
-
-async def test_who_was_never_active_leaves_the_fingers_alone(
-    server: SimulatorServer, gripper: SimulatedGripper
-) -> None:
-    connection = await connected(server, active=False)
-    await connection.close("the end")
-    await connection.close("twice")
-    assert not gripper.writes
-
-
-@pytest.mark.parametrize("name", COMMANDS)
-async def test_an_inactive_node_takes_a_halt_and_nothing_else(server: SimulatorServer, name: str) -> None:
-    connection = await connected(server, active=False)
-    if name == "halt":
-        assert await connection.command(name)
-    else:
-        with pytest.raises(RefusedError, match="the node is not active"):
-            await connection.command(name)
-    with pytest.raises(RefusedError, match="the node is not active"):
-        await begin_goal(connection)
+    yield connection
     await connection.close("the end")
 
 
-async def test_forbidding_aborts_the_goal_and_halts(
-    server: SimulatorServer, gripper: SimulatedGripper
-) -> None:
-    connection = await connected(server)
-    goal = begin_goal(connection)
-    await connection.hand.wait_for_state(State.RUNNING_CC)
-    assert await connection.forbid("the node was deactivated")
-    outcome = await goal
-    assert getattr(outcome, "ending", None) is Ending.ABORTED
-    assert not gripper.request_registers[0] >> 8 & 0x08, "rGTO"
-    await connection.close("the end")
+@pytest.fixture
+async def connection(inactive: Connection) -> Connection:
+    """Of an active node, at an active gripper."""
+    await inactive.permit()
+    await inactive.command("activate")
+    return inactive
 
 
-async def test_a_halt_that_does_not_arrive_is_an_error_in_the_log(
-    server: SimulatorServer, caplog: pytest.LogCaptureFixture
-) -> None:
-    connection = await connected(server)
+def begin(connection: Connection, key: bytes = b"1") -> asyncio.Task[Outcome]:
+    return asyncio.create_task(connection.run_goal(key, CLOSE, SETTINGS, lambda: None, connection.stops))
+
+
+async def moving(connection: Connection) -> asyncio.Task[Outcome]:
+    """A goal whose fingers have begun to move."""
+    goal = begin(connection)
+    async for status in connection.hand.statuses():
+        if status.position(Finger.A) > 40:
+            break
+    return goal
+
+
+async def lose_link(connection: Connection, server: SimulatorServer) -> None:
     server.refuse()
     server.cut()
     await connection.hand.wait_for_state(State.DISCONNECTED)
-    with caplog.at_level(logging.ERROR, "robotiq_async"):
-        assert not await connection.forbid("the node was deactivated")
-    assert "no halt, the fingers MAY STILL MOVE" in caplog.text
-    assert not connection.takes_commands
+
+
+async def settled(gripper: SimulatedGripper) -> int:
+    """Where finger A is, after all that was to come has come."""
+    await asyncio.sleep(4)
+    return gripper.position(Finger.A)
+
+
+async def test_an_inactive_node_takes_a_halt_and_nothing_else(
+    inactive: Connection, gripper: SimulatedGripper
+) -> None:
+    for name in set(COMMANDS) - {"halt"}:
+        with pytest.raises(RefusedError, match="the node is not active"):
+            await inactive.command(name)
+    with pytest.raises(RefusedError, match="the node is not active"):
+        await begin(inactive)
+    assert not gripper.writes
+    assert await inactive.command("halt")
+
+
+async def test_opening_permitting_and_closing_activate_nothing(
+    inactive: Connection, gripper: SimulatedGripper
+) -> None:
+    await inactive.permit()
+    await inactive.close("the end")
+    assert inactive.hand.state is State.SHUTDOWN
+    assert not any(write.registers[0] >> 8 & 0x01 for write in gripper.writes), "rACT"
+
+
+async def test_a_node_that_was_never_active_leaves_the_fingers_alone(
+    inactive: Connection, gripper: SimulatedGripper
+) -> None:
+    await inactive.close("the end")
+    await inactive.close("twice")
+    assert not gripper.writes
+    for again in (inactive.open, inactive.permit):
+        with pytest.raises(RefusedError, match="the connection has been closed"):
+            await again()
+    assert not inactive.takes_commands
+
+
+async def test_any_hand_will_do() -> None:
+    connection = Connection(FakeHand(), SETTINGS)
+    await connection.open()
+    await connection.permit()
+    assert (await begin(connection)).ending is Ending.SUCCEEDED
     await connection.close("the end")
 
 
-async def test_a_halt_is_never_one_command_too_many(server: SimulatorServer) -> None:
-    connection = await connected(server)
+# -- stops ---------------------------------------------------------------------------------------------------
+
+
+async def test_forbidding_aborts_the_goal_and_halts(
+    connection: Connection, gripper: SimulatedGripper
+) -> None:
+    goal = await moving(connection)
+    assert await connection.forbid("the node was deactivated")
+    assert ((await goal).ending, (await goal).reason) == (Ending.ABORTED, "the node was deactivated")
+    assert not gripper.request_registers[0] >> 8 & 0x08, "rGTO"
+    assert not connection.takes_commands
+
+
+async def test_a_halt_is_never_one_command_too_many(connection: Connection) -> None:
     await connection.command("reset")
     activations = [asyncio.create_task(connection.command("activate")) for _ in range(MOST_CALLS)]
     await connection.hand.wait_for_state(State.WF_ACTIVATION)
@@ -107,23 +141,169 @@ async def test_a_halt_is_never_one_command_too_many(server: SimulatorServer) -> 
     assert "the gripper is reset" in await connection.command("halt")
     ended = await asyncio.gather(*activations, return_exceptions=True)
     assert all(isinstance(each, RobotiqError) for each in ended)
-    await connection.close("the end")
 
 
-async def test_any_hand_will_do() -> None:
-    connection = Connection(FakeHand(), SETTINGS)
-    await connection.open()
-    await connection.permit()
-    outcome = await connection.run_goal(b"1", CLOSE, SETTINGS, lambda: None, connection.stops)
-    assert outcome.ending is Ending.SUCCEEDED
-    await connection.close("the end")
+@pytest.mark.parametrize("turns", [1, 2, 3, 4])
+async def test_a_goal_that_begins_beside_a_halt_moves_nothing_after_it(
+    connection: Connection, gripper: SimulatedGripper, turns: int
+) -> None:
+    goal = begin(connection)
+    for _ in range(turns):
+        await asyncio.sleep(0)
+    await connection.command("halt")
+    assert (await goal).ending is Ending.ABORTED
+    assert await settled(gripper) < 20
+
+
+async def test_a_goal_that_was_accepted_before_a_halt_is_not_begun_after_it(
+    connection: Connection, gripper: SimulatedGripper
+) -> None:
+    accepted_at = connection.stops
+    await connection.command("halt")
+    writes = len(gripper.writes)
+    with pytest.raises(RefusedError, match="a stop took over before it began"):
+        await connection.run_goal(b"1", CLOSE, SETTINGS, lambda: None, accepted_at)
+    assert len(gripper.writes) == writes
+
+
+async def test_while_a_halt_is_under_way_nothing_else_is_taken(
+    connection: Connection, gripper: SimulatedGripper
+) -> None:
+    goal = await moving(connection)
+    halting = asyncio.create_task(connection.command("halt"))
+    await asyncio.sleep(0)
+    for name in ("activate", "recover", "reset"):
+        with pytest.raises(RefusedError, match="a halt is under way"):
+            await connection.command(name)
+    with pytest.raises(RefusedError, match="a halt is under way"):
+        await begin(connection, b"2")
+    await halting
+    assert (await goal).reason == "a halt took over"
+    assert connection.hand.state is State.RUNNING_IDLE
+    assert await settled(gripper) < FAR
+
+
+@pytest.mark.parametrize("name", ["activate", "recover"])
+async def test_a_halt_ends_what_a_service_has_begun(connection: Connection, name: str) -> None:
+    await connection.command("reset")
+    call = asyncio.create_task(connection.command(name))
+    await connection.hand.wait_for_state(State.WF_ACTIVATION)
+    assert "the gripper is reset" in await connection.command("halt")
+    with pytest.raises(RefusedError, match=f"a stop took over: {name} was aborted"):
+        await call
+
+
+@pytest.mark.parametrize("turns", [1, 2])
+async def test_an_activation_that_waits_for_its_lease_does_not_begin_after_a_stop(turns: int) -> None:
+    async with lab(active=False) as here:
+        connection = Connection(here.client(control=None), SETTINGS)
+        await connection.open()
+        await connection.permit()
+        call = asyncio.create_task(connection.command("activate"))
+        for _ in range(turns):
+            await asyncio.sleep(0)
+        await connection.forbid("the node was deactivated")
+        with pytest.raises(RefusedError, match="a stop took over"):
+            await call
+        await asyncio.sleep(1)
+        assert connection.hand.state is State.RESET
+        await connection.close("the end")
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.006, 0.012, 0.018])
+async def test_a_cancel_is_acknowledged_with_the_next_poll(connection: Connection, offset: float) -> None:
+    goal = await moving(connection)
+    await asyncio.sleep(offset)
+    asked = asyncio.get_running_loop().time()
+    await connection.cancel_goal(b"1")
+    assert (await goal).ending is Ending.CANCELED
+    assert asyncio.get_running_loop().time() - asked <= POLL_S + 5 * LATENCY_S
+
+
+async def test_a_connection_that_is_ending_takes_no_command_while_the_rest_ends(
+    connection: Connection, gripper: SimulatedGripper
+) -> None:
+    """The publishers were stopped first, and commands were taken until that was done."""
+    goal = await moving(connection)
+    connection.refuse("the node is shutting down")
+    for name in ("activate", "reset", "recover", "release"):
+        with pytest.raises(RefusedError):
+            await connection.command(name)
+    with pytest.raises(RefusedError):
+        await begin(connection, b"2")
+    with pytest.raises(RefusedError):
+        await connection.permit()
+    await connection.close("the node is shutting down")
+    assert (await goal).ending is Ending.ABORTED
+    assert await settled(gripper) < FAR
+
+
+# -- what a lost link keeps back -----------------------------------------------------------------------------
+
+
+async def test_the_fingers_of_a_goal_that_a_lost_link_ended_are_held_when_it_is_back(
+    connection: Connection, gripper: SimulatedGripper, server: SimulatorServer
+) -> None:
+    goal = await moving(connection)
+    await lose_link(connection, server)
+    assert (await goal).ending is Ending.ABORTED
+    with pytest.raises(RefusedError, match="the link to the gripper is down"):
+        await begin(connection, b"2")
+    await asyncio.sleep(0.2)
+    assert gripper.is_moving, "nothing can stop them meanwhile"
+    await server.accept()
+    await connection.hand.wait_for_state(State.RUNNING_IDLE)
+    with pytest.raises(RefusedError, match="the fingers are not stopped yet"):
+        await begin(connection, b"2")
+    assert await settled(gripper) < FAR
+    assert (await begin(connection, b"2")).ending is Ending.SUCCEEDED
+
+
+async def test_a_deactivation_without_a_link_halts_when_it_is_back(
+    connection: Connection, server: SimulatorServer, caplog: pytest.LogCaptureFixture
+) -> None:
+    await connection.command("reset")
+    call = asyncio.create_task(connection.command("activate"))
+    await connection.hand.wait_for_state(State.WF_ACTIVATION)
+    await lose_link(connection, server)
+    with caplog.at_level(logging.WARNING, "robotiq_async"):
+        assert not await connection.forbid("the node was deactivated")
+        await asyncio.gather(call, return_exceptions=True)
+        assert not connection.takes_commands
+        await server.accept()
+        await connection.hand.wait_for_state(State.RESET, timeout=5)
+        await asyncio.sleep(1)
+    levels = {record.getMessage(): record.levelno for record in caplog.records}
+    (failed,) = (level for text, level in levels.items() if "no halt, the fingers MAY STILL MOVE" in text)
+    assert failed == logging.ERROR
+    assert "the link is back, and what still moved has been stopped" in caplog.text
+
+
+async def test_a_stop_that_would_come_too_late_for_anything_is_not_sent(
+    connection: Connection, gripper: SimulatedGripper, server: SimulatorServer
+) -> None:
+    await lose_link(connection, server)
+    await connection.forbid("the node was deactivated")
+    await asyncio.sleep(PENDING_S + 1)
+    writes = len(gripper.writes)
+    await server.accept()
+    await connection.hand.wait_for_state(State.RUNNING_IDLE)
+    await settled(gripper)
+    assert len(gripper.writes) == writes
+
+
+async def test_the_end_of_the_node_owes_nothing(connection: Connection, server: SimulatorServer) -> None:
+    goal = await moving(connection)
+    await lose_link(connection, server)
+    await goal
+    await connection.close("the end")  # no task is left: the fixtures look
 
 
 # -- what is told -------------------------------------------------------------------------------------------
 
 
-async def test_diagnoses_of_a_gripper_that_is_well(hand: RobotiqHand) -> None:
-    link, gripper = diagnose(hand, now())
+async def test_diagnoses_of_a_gripper_that_is_well(connection: Connection) -> None:
+    link, gripper = diagnose(connection.hand, now())
     assert (link.level, link.message) == (Level.OK, "connected")
     assert (gripper.level, gripper.message) == (Level.OK, "RUNNING_IDLE")
     assert int(link.values["polls"]) > 0
@@ -134,51 +314,27 @@ async def test_diagnoses_of_a_gripper_that_is_well(hand: RobotiqHand) -> None:
     ("fault", "level"), [(Fault.COMMUNICATION_NOT_READY, Level.WARN), (Fault.SCISSOR_BLOCKED, Level.ERROR)]
 )
 async def test_diagnoses_of_a_fault(
-    hand: RobotiqHand, gripper: SimulatedGripper, fault: Fault, level: Level
+    connection: Connection, gripper: SimulatedGripper, fault: Fault, level: Level
 ) -> None:
     gripper.inject_fault(fault)
-    await hand.wait_for_state(State.FAULT)
-    _, told = diagnose(hand, now())
+    await connection.hand.wait_for_state(State.FAULT)
+    _, told = diagnose(connection.hand, now())
     assert (told.level, told.message) == (level, fault.description)
-    text = json.loads(status_text(hand, takes_commands=True))
-    node = {"state": "FAULT", "connected": True, "takes_commands": True}
-    assert (
-        text
-        == node
-        | RobotiqStatus.from_registers(
-            text["registers"], timestamp=text["timestamp"], sequence=text["sequence"]
-        ).as_dict()
+    text = json.loads(status_text(connection.hand, takes_commands=True))
+    status = RobotiqStatus.from_registers(
+        text["registers"], timestamp=text["timestamp"], sequence=text["sequence"]
     )
+    assert text == {"state": "FAULT", "connected": True, "takes_commands": True} | status.as_dict()
     assert text["fault"] == fault.name
 
 
-async def test_without_a_link_nothing_is_known(hand: RobotiqHand, server: SimulatorServer) -> None:
-    server.refuse()
-    server.cut()
-    await hand.wait_for_state(State.DISCONNECTED)
-    link, gripper = diagnose(hand, now())
+async def test_without_a_link_nothing_is_known(connection: Connection, server: SimulatorServer) -> None:
+    await lose_link(connection, server)
+    link, gripper = diagnose(connection.hand, now())
     assert link.level is Level.ERROR
     assert (gripper.level, gripper.message, gripper.values) == (Level.STALE, "unknown: the link is down", {})
-    assert json.loads(status_text(hand, takes_commands=False)) == {
-        "state": "DISCONNECTED",
-        "connected": False,
-        "takes_commands": False,
-    }
-
-
-def test_nothing_is_known_before_the_first_status() -> None:
-    hand = RobotiqHand("tcp://192.0.2.1")
-    assert diagnose(hand, 0.0)[1].level is Level.STALE
-    assert "fault" not in json.loads(status_text(hand, takes_commands=False))
-
-
-# -- without ROS --------------------------------------------------------------------------------------------
-
-
-def test_without_ros_it_says_what_to_do() -> None:
-    command = [sys.executable, "-m", "robotiq_async.ros2"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 1
-    assert done.stdout == ""
-    assert done.stderr.count("\n") == 1
-    assert "the node needs rclpy, which comes with ROS 2 Jazzy or later: source /opt/ros/" in done.stderr
+    told = json.loads(status_text(connection.hand, takes_commands=False))
+    assert told == {"state": "DISCONNECTED", "connected": False, "takes_commands": False}
+    fresh = RobotiqHand("tcp://192.0.2.1")
+    assert diagnose(fresh, 0.0)[1].level is Level.STALE
+    assert "fault" not in json.loads(status_text(fresh, takes_commands=False))

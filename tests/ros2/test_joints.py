@@ -9,24 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async import (
-    HAND_E,
-    JAW,
-    TWO_FINGER_85,
-    TWO_FINGER_140,
-    Finger,
-    Model,
-    RobotiqStatus,
-)
-from robotiq_async.ros2.translation.joints import (
-    LIMITS,
-    GoalError,
-    Motion,
-    Targets,
-    joint_names,
-    positions,
-    targets,
-)
+from robotiq_async import HAND_E, JAW, TWO_FINGER_85, TWO_FINGER_140, Finger, Model, RobotiqStatus
+from robotiq_async.ros2.translation.joints import LIMITS, GoalError, Motion, joint_names, positions, targets
 from robotiq_async.tools.description import hand_model
 from robotiq_async.tools.description.kinematics import JOINTS, joint_angles
 from tests.register_words import status_of
@@ -93,21 +77,11 @@ def test_velocities_are_taken_over_some_time() -> None:
         _, velocities = motion.of(reading(a=6 + step, at=step * 0.01))
         assert velocities[base] == pytest.approx(math.radians(0.5) / 0.01)
     assert motion.of(reading(a=25, at=0.19))[1][base] == pytest.approx(math.radians(0.5) / 0.01)
-
-
-def test_fingers_that_have_come_to_rest_have_no_velocity() -> None:
-    motion = Motion()
-    motion.of(reading(a=6, at=0.0))
-    for step in range(1, 10):
-        motion.of(reading(a=200, at=step * 0.01))
-    assert motion.of(reading(a=200, at=0.1)) == (positions(reading(a=200)), (0.0,) * 11)
-
-
-def test_velocities_forget_what_was_before_a_lost_link() -> None:
-    motion = Motion()
-    motion.of(reading(a=6, at=0.0))
+    for step in range(20, 25):
+        motion.of(reading(a=25, at=step * 0.01))
+    assert motion.of(reading(a=25, at=0.25)) == (positions(reading(a=25)), (0.0,) * 11), "at rest"
     motion.forget()
-    assert set(motion.of(reading(a=200, at=0.1))[1]) == {0.0}
+    assert set(motion.of(reading(a=200, at=0.3))[1]) == {0.0}, "before a lost link was no motion"
 
 
 # -- a jaw -------------------------------------------------------------------------------------------------
@@ -137,6 +111,8 @@ def test_a_jaw_has_the_joint_of_its_public_description(
     assert velocity == pytest.approx(2 * (there - positions(jaw(model, 50))[0]))
     assert targets([], [wide], model=model).counts == ((3, JAW),)
     assert targets([name], [shut], model=model).counts == ((228, JAW),)
+    if model is TWO_FINGER_85:  # public descriptions limit it at 0.8, and clients close to that
+        assert targets([], [0.8], model=model).counts == ((228, JAW),)
     beyond = max(wide, shut) * 1.02
     for names, value, why in (
         ([name], beyond, rf"must be in 0.0..{max(wide, shut)} {unit}, got"),
@@ -157,11 +133,6 @@ def test_a_joint_state_of_a_jaw_sent_back_leads_there(
     assert targets([name], positions(jaw(model, position)), model=model).counts == ((position, JAW),)
 
 
-def test_a_jaw_closes_to_the_limit_of_its_joint() -> None:
-    """Public descriptions limit it at 0.8, and clients close to that."""
-    assert targets([], [0.8], model=TWO_FINGER_85).counts == ((228, JAW),)
-
-
 # -- goals -------------------------------------------------------------------------------------------------
 
 
@@ -169,19 +140,14 @@ def test_a_jaw_closes_to_the_limit_of_its_joint() -> None:
     ("names", "angles", "counts"),
     [
         (["finger_1_joint_1"], [0.0], [(0, C)]),
-        (["finger_2_joint_1"], [math.radians(35)], [(70, B)]),
         (["finger_middle_joint_1"], [1.2218], [(140, A)]),
         (["finger_middle_joint_2"], [math.radians(45)], [(190, A)]),
-        (["finger_middle_joint_2"], [1.5708], [(240, A)]),
         (["finger_middle_joint_2"], [0.0], [(140, A)]),
         (["finger_1_joint_1", "finger_1_joint_2"], [1.2, 0.9], [(197, C)]),
         (["finger_1_joint_1", "finger_1_joint_2"], [0.5, 0.0], [(57, C)]),
-        (["palm_finger_1_joint"], [0.192], [(15, S)]),
         (["palm_finger_1_joint"], [0.0], [(128, S)]),
-        (["palm_finger_1_joint"], [-0.1784], [(232, S)]),
         (["fingers"], [0.0], [(0, A | B | C)]),
         (["fingers"], [2.8], [(240, A | B | C)]),
-        (["fingers"], [math.radians(70)], [(140, A | B | C)]),
         ([], [math.radians(115)], [(190, A | B | C)]),
         (["fingers", "palm_finger_1_joint"], [0.0, 0.0], [(0, A | B | C), (128, S)]),
         (["finger_1_joint_1", "finger_2_joint_1"], [0.5, 0.7], [(57, C), (80, B)]),
@@ -195,17 +161,12 @@ def test_what_a_goal_asks_of_the_axes(
     assert targets(names, angles).counts == tuple(counts)
 
 
-@given(st.integers(6, 240))
-def test_a_joint_state_sent_back_as_a_goal_leads_there(counts: int) -> None:
-    state = dict(zip(JOINTS, positions(reading(c=counts)), strict=True))
+@given(st.integers(6, 240), st.integers(15, 232))
+def test_a_joint_state_sent_back_as_a_goal_leads_there(finger: int, scissor: int) -> None:
+    state = dict(zip(JOINTS, positions(reading(c=finger, scissor=scissor)), strict=True))
     names = ["finger_1_joint_1", "finger_1_joint_2"]
-    assert targets(names, [state[name] for name in names]).counts == ((counts, C),)
-
-
-@given(st.integers(15, 232))
-def test_so_does_that_of_the_palm(counts: int) -> None:
-    palm = positions(reading(scissor=counts))[JOINTS.index("palm_finger_1_joint")]
-    assert targets(["palm_finger_1_joint"], [palm]).counts == ((counts, S),)
+    assert targets(names, [state[name] for name in names]).counts == ((finger, C),)
+    assert targets(["palm_finger_1_joint"], [state["palm_finger_1_joint"]]).counts == ((scissor, S),)
 
 
 def test_the_prefix_is_taken_off() -> None:
@@ -215,19 +176,12 @@ def test_the_prefix_is_taken_off() -> None:
         targets(["finger_1_joint_1"], [0.0], "left_")
 
 
-def test_the_addressed_axes() -> None:
-    assert Targets(((0, A | B), (9, S))).axes == A | B | S
-
-
 @pytest.mark.parametrize(
     ("names", "angles", "reason"),
     [
         (["finger_1_joint_1"], [math.nan], "the position of 'finger_1_joint_1' is nan"),
-        (["fingers"], [math.inf], "is inf"),
         (["left_finger_1_joint_1"], [0.1], "there is no joint 'left_finger_1_joint_1'"),
-        (["robotiq_85_left_knuckle_joint"], [0.1], "there is no joint"),
         (["finger_1_joint_3"], [-0.5], "follows other joints and takes no goal"),
-        (["palm_finger_2_joint"], [0.0], "follows other joints"),
         (["finger_1_joint_1", "finger_1_joint_1"], [0.1, 0.2], "two positions for one joint: 'finger_1_j"),
         (["fingers", "finger_1_joint_1"], [0.1, 0.2], "two positions for one finger: 'fingers' and"),
         (["finger_1_joint_1", "finger_1_joint_2"], [0.5, 0.5], "bends only once finger_1_joint_1 is at"),
@@ -238,8 +192,8 @@ def test_the_addressed_axes() -> None:
         (["palm_finger_1_joint"], [0.2], "must be in -0.1784..0.1919 rad"),
         (["fingers"], [2.9], "must be in 0..2.8 rad"),
         (["fingers"], [-0.1], "must be in 0..2.8 rad"),
-        (["fingers"], [], "1 joints and 0 positions"),
         (["fingers"], [1.0, 2.0], "1 joints and 2 positions"),
+        (["x" * 1_000_000], [0.0], "there is no joint 'xxx"),
         ([], [], "no joint is named"),
         ([], [0.1, 0.2], "one position is needed, got 2"),
     ],
@@ -248,12 +202,7 @@ def test_what_a_goal_cannot_ask(names: Sequence[str], angles: Sequence[float], r
     with pytest.raises(GoalError) as refused:
         targets(names, angles)
     assert reason in str(refused.value)
-
-
-def test_a_name_without_end_is_not_repeated_without_end() -> None:
-    with pytest.raises(GoalError) as refused:
-        targets(["x" * 1_000_000], [0.0])
-    assert len(str(refused.value)) < 500
+    assert len(str(refused.value)) < 500, "a name without end is not repeated without end"
 
 
 @given(st.lists(st.tuples(st.sampled_from([*JOINTS, "fingers", "", "x"]), st.floats()), max_size=5))

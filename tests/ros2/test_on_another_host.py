@@ -3,133 +3,112 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import AsyncIterator
 from dataclasses import replace
 
 import pytest
 
 from robotiq_async import Finger, State
 from robotiq_async.ros2.gripper.connection import Connection, RefusedError
-from robotiq_async.ros2.gripper.goals import Ending
+from robotiq_async.ros2.gripper.goals import Ending, Outcome
 from robotiq_async.ros2.translation.diagnosis import Level, diagnose
 from robotiq_async.ros2.translation.joints import Targets
-from robotiq_async.ros2.translation.settings import PARAMETERS, check_settings
 from robotiq_async.runtime.clock import now
-from tests.fleet.lab import lab
-from tests.virtual import virtual
+from tests.fleet.lab import Lab, lab
+from tests.ros2.test_connection import CLOSE, SETTINGS, moving
 
-SETTINGS = check_settings({name: parameter.default for name, parameter in PARAMETERS.items()})
-CLOSE = Targets(((240, Finger.ABC),))
+pytestmark = pytest.mark.virtual_time
 
 
-@virtual
-async def test_a_goal_and_its_cancellation() -> None:
+@pytest.fixture
+async def here() -> AsyncIterator[Lab]:
     async with lab() as here:
-        hand = here.client(control=None)
-        connection = Connection(hand, SETTINGS)
-        await connection.open()
-        assert not hand.is_in_control, "connecting only reads"
-        await connection.permit()
-        assert [each.level for each in diagnose(hand, now())] == [Level.OK, Level.OK]
-        outcome = await connection.run_goal(
-            b"1", Targets(((60, Finger.A), (80, Finger.B))), SETTINGS, lambda: None, 0
-        )
-        assert outcome.ending is Ending.SUCCEEDED
-        assert [here.gripper.position(axis) for axis in (Finger.A, Finger.B)] == pytest.approx(
-            [60, 80], abs=2
-        )
-        goal = asyncio.create_task(connection.run_goal(b"2", CLOSE, SETTINGS, lambda: None, 0))
-        async for status in hand.statuses():
-            if status.position(Finger.A) > 90:
-                break
-        await connection.cancel_goal(b"2")
-        assert (await goal).ending is Ending.CANCELED
-        there = here.gripper.position(Finger.A)
-        assert there < 200
-        await asyncio.sleep(0.5)
-        assert abs(here.gripper.position(Finger.A) - there) <= 3
-        await connection.close("the end")
-        assert not hand.is_in_control
+        yield here
 
 
-@virtual
-async def test_a_new_goal_holds_the_other_axes() -> None:
-    async with lab() as here:
-        hand = here.client(control=None)
-        connection = Connection(hand, SETTINGS)
-        await connection.open()
-        await connection.permit()
-        first = asyncio.create_task(connection.run_goal(b"1", CLOSE, SETTINGS, lambda: None, 0))
-        async for status in hand.statuses():
-            if status.position(Finger.A) > 40:
-                break
-        second = await connection.run_goal(b"2", Targets(((20, Finger.A),)), SETTINGS, lambda: None, 0)
-        assert (await first).ending is Ending.ABORTED
-        assert second.ending is Ending.SUCCEEDED
-        assert here.gripper.position(Finger.B) < 200
-        assert not here.gripper.is_moving
-        await connection.close("the end")
+@pytest.fixture
+async def connection(here: Lab) -> AsyncIterator[Connection]:
+    """Of an active node."""
+    connection = Connection(here.client(control=None), SETTINGS)
+    await connection.open()
+    assert not connection.hand.is_in_control, "connecting only reads"  # type: ignore[attr-defined]
+    await connection.permit()
+    yield connection
+    await connection.close("the end")
 
 
-@virtual
-async def test_a_silent_agent_is_a_link_that_is_down() -> None:
-    async with lab() as here:
-        hand = here.client(control=None)
-        connection = Connection(hand, SETTINGS)
-        await connection.open()
-        await connection.permit()
-        await here.end_agent()
-        await hand.wait_for_state(State.DISCONNECTED, timeout=10)
-        assert diagnose(hand, now())[0].level is Level.ERROR
-        with pytest.raises(RefusedError, match="the link to the gripper is down"):
-            await connection.check_goal()
-        await connection.close("the end")
+def run(connection: Connection, key: bytes, targets: Targets = CLOSE) -> asyncio.Task[Outcome]:
+    return asyncio.create_task(connection.run_goal(key, targets, SETTINGS, lambda: None, 0))
 
 
-@virtual
-async def test_what_a_goal_moved_is_held_when_the_agent_has_its_gripper_back() -> None:
-    async with lab() as here:
-        connection = Connection(here.client(control=None), SETTINGS)
-        await connection.open()
-        await connection.permit()
-        slow = replace(SETTINGS, speed=0)
-        goal = asyncio.create_task(connection.run_goal(b"1", CLOSE, slow, lambda: None, 0))
-        async for status in connection.hand.statuses():
-            if status.position(Finger.A) > 40:
-                break
-        here.server.refuse()
-        here.server.cut()
-        assert (await goal).ending is Ending.ABORTED
-        assert here.gripper.is_moving
-        await here.server.accept()
-        await connection.hand.wait_for_state(State.RUNNING_IDLE)
-        await asyncio.sleep(0.3)
-        assert not here.gripper.is_moving
-        assert here.gripper.position(Finger.A) < 200
-        await connection.close("the end")
+async def test_a_goal_and_its_cancellation(here: Lab, connection: Connection) -> None:
+    assert [each.level for each in diagnose(connection.hand, now())] == [Level.OK, Level.OK]
+    outcome = await run(connection, b"2", Targets(((30, Finger.A), (35, Finger.B))))
+    assert outcome.ending is Ending.SUCCEEDED
+    reached = [here.gripper.position(axis) for axis in (Finger.A, Finger.B)]
+    assert reached == pytest.approx([30, 35], abs=2)
+    goal = await moving(connection)
+    await connection.cancel_goal(b"1")
+    assert (await goal).ending is Ending.CANCELED
+    there = here.gripper.position(Finger.A)
+    assert there < 200
+    await asyncio.sleep(0.5)
+    assert abs(here.gripper.position(Finger.A) - there) <= 3
+    await connection.close("the end")
+    assert not connection.hand.is_in_control  # type: ignore[attr-defined]
 
 
-@virtual
-async def test_after_a_halt_from_elsewhere_the_node_has_to_be_configured_anew() -> None:
-    async with lab() as here:
-        connection = Connection(here.client(control=None), SETTINGS)
-        await connection.open()
-        await connection.permit()
-        goal = asyncio.create_task(connection.run_goal(b"1", CLOSE, SETTINGS, lambda: None, 0))
-        async for status in connection.hand.statuses():
-            if status.position(Finger.A) > 40:
-                break
-        other = here.client("other", control=False)
-        await other.start(activate=False)
-        await other.halt()
-        assert (await goal).ending is Ending.ABORTED
-        again = await connection.run_goal(b"2", CLOSE, SETTINGS, lambda: None, 0)
-        assert again.ending is Ending.ABORTED
-        assert "lost control of" in again.reason
-        assert not here.gripper.is_moving
-        await connection.close("the node was cleaned up")
-        anew = Connection(here.client("anew", control=None), SETTINGS)
-        await anew.open()
-        await anew.permit()
-        assert (await anew.run_goal(b"3", CLOSE, SETTINGS, lambda: None, 0)).ending is Ending.SUCCEEDED
-        await anew.close("the end")
-        await other.stop()
+async def test_a_new_goal_holds_the_other_axes(here: Lab, connection: Connection) -> None:
+    first = await moving(connection)
+    second = await run(connection, b"2", Targets(((20, Finger.A),)))
+    assert ((await first).ending, second.ending) == (Ending.ABORTED, Ending.SUCCEEDED)
+    assert here.gripper.position(Finger.B) < 200
+    assert not here.gripper.is_moving
+
+
+async def test_a_silent_agent_is_a_link_that_is_down(here: Lab, connection: Connection) -> None:
+    await here.end_agent()
+    await connection.hand.wait_for_state(State.DISCONNECTED, timeout=10)
+    assert diagnose(connection.hand, now())[0].level is Level.ERROR
+    with pytest.raises(RefusedError, match="the link to the gripper is down"):
+        await connection.check_goal()
+
+
+async def test_what_a_goal_moved_is_held_when_the_agent_has_its_gripper_back(
+    here: Lab, connection: Connection
+) -> None:
+    slow = replace(SETTINGS, speed=0)
+    goal = asyncio.create_task(connection.run_goal(b"1", CLOSE, slow, lambda: None, 0))
+    async for status in connection.hand.statuses():
+        if status.position(Finger.A) > 40:
+            break
+    here.server.refuse()
+    here.server.cut()
+    assert (await goal).ending is Ending.ABORTED
+    assert here.gripper.is_moving
+    await here.server.accept()
+    await connection.hand.wait_for_state(State.RUNNING_IDLE)
+    await asyncio.sleep(0.3)
+    assert not here.gripper.is_moving
+    assert here.gripper.position(Finger.A) < 200
+
+
+async def test_after_a_halt_from_elsewhere_the_node_has_to_be_configured_anew(
+    here: Lab, connection: Connection
+) -> None:
+    goal = await moving(connection)
+    other = here.client("other", control=False)
+    await other.start(activate=False)
+    await other.halt()
+    assert (await goal).ending is Ending.ABORTED
+    again = await run(connection, b"2")
+    assert again.ending is Ending.ABORTED
+    assert "lost control of" in again.reason
+    assert not here.gripper.is_moving
+    await connection.close("the node was cleaned up")
+    anew = Connection(here.client("anew", control=None), SETTINGS)
+    await anew.open()
+    await anew.permit()
+    assert (await run(anew, b"3")).ending is Ending.SUCCEEDED
+    await anew.close("the end")
+    await other.stop()

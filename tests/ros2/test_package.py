@@ -67,3 +67,10 @@ def test_the_description_for_robot_state_publisher_is_one() -> None:
     (script,) = re.findall(r'^python -c "(.*)" > hand\.urdf$', PAGE, re.MULTILINE)
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert HandModel.parse(done.stdout) == hand_model()
+
+
+def test_without_ros_it_says_what_to_do() -> None:
+    command = [sys.executable, "-m", "robotiq_async.ros2"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+    assert "the node needs rclpy, which comes with ROS 2 Jazzy or later: source /opt/ros/" in done.stderr

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from typing import Any
 
@@ -27,19 +26,11 @@ def test_the_defaults_will_do() -> None:
         for name, value in USUAL.items()
         if value != -1 and name != "model"  # "" is the address's
     }
-
-
-def test_every_parameter_says_what_it_is_for() -> None:
+    rate = check_settings(USUAL | {"publish_rate": 100}).publish_rate
+    assert (rate, type(rate)) == (100.0, float), "an integer will do"
     for parameter in PARAMETERS.values():
-        assert parameter.description.endswith(".")
         is_number = not isinstance(parameter.default, bool | str)
         assert is_number == (parameter.high > parameter.low)
-
-
-def test_an_integer_will_do_for_a_float() -> None:
-    settings = check_settings(USUAL | {"publish_rate": 100})
-    assert settings.publish_rate == 100.0
-    assert isinstance(settings.publish_rate, float)
 
 
 @pytest.mark.parametrize(
@@ -49,20 +40,15 @@ def test_an_integer_will_do_for_a_float() -> None:
         ("address", "zenoh://lab", "malformed address 'zenoh://lab'"),
         ("address", 7, "address must be a string, got 7"),
         ("publish_rate", 0.0, "publish_rate must be a number in 1.0..200.0, got 0.0"),
-        ("publish_rate", math.nan, "publish_rate must be a number in 1.0..200.0, got nan"),
-        ("publish_rate", "fast", "publish_rate must be a number in 1.0..200.0, got 'fast'"),
         ("publish_rate", True, "must be a number"),
         ("poll_interval", 1, "poll_interval must be seconds in 0.001..0.1, got 1"),
-        ("response_timeout", 6, "response_timeout must be seconds in 0.005..5.0, got 6"),
         ("device_id", 256, "device_id must be in -1..255, got 256"),
         ("read_function", 0, "read_function must be -1 or in 3..4, got 0"),
         ("read_function", 5, "read_function must be in -1..4, got 5"),
-        ("speed", 256, "speed must be in 0..255, got 256"),
         ("force", 64.0, "force must be an int in 0..255, got 64.0"),
         ("allow_stalling", 1, "allow_stalling must be true or false, got 1"),
         ("model", "2f99", "model must be one of 3f, 2f85, 2f140, hand-e, got '2f99'"),
         ("joint_prefix", "left <&", "joint_prefix may have letters, digits, _ . / and -, got 'left <&'"),
-        ("joint_prefix", None, "joint_prefix must be a string, got None"),
     ],
 )
 def test_what_will_not_do_is_told(name: str, value: object, reason: str) -> None:
