@@ -6,8 +6,9 @@ Everything here waits for what happens, and for PATIENCE_S at most.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
+from contextlib import contextmanager
 from typing import Any, Final, Self, TypeVar
 
 import rclpy
@@ -28,7 +29,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from tests.ros2.live.processes import PATIENCE_S
+from tests.ros2.live.processes import PATIENCE_S, Process, node
 
 T = TypeVar("T")
 SUCCEEDED: Final = GoalStatus.STATUS_SUCCEEDED
@@ -187,18 +188,15 @@ class Client:
         return goal
 
     def joint_states(self, name: str = "/joint_states") -> Topic:
-        return self._listen(JointState, name, 10)
+        return self.listen(JointState, name, 10)
 
     def status(self) -> Topic:
-        return self._listen(String, f"{self._name}/status", LATEST)
+        return self.listen(String, f"{self._name}/status", LATEST)
 
     def diagnostics(self) -> Topic:
-        return self._listen(DiagnosticArray, "/diagnostics", 10)
+        return self.listen(DiagnosticArray, "/diagnostics", 10)
 
-    def description(self, name: str = "/robot_description") -> Topic:
-        return self._listen(String, name, LATEST)
-
-    def _listen(self, kind: Any, name: str, qos: Any) -> Topic:
+    def listen(self, kind: Any, name: str, qos: Any) -> Topic:
         topic = Topic()
         self.node.create_subscription(kind, name, topic.take, qos)
         return topic
@@ -210,3 +208,13 @@ def waited(future: Any) -> Any:
     future.add_done_callback(lambda _: done.set_result(None))
     done.result(PATIENCE_S)
     return future.result()
+
+
+@contextmanager
+def active(address: str, **parameters: Any) -> Iterator[tuple[Process, Client]]:
+    """An active node at an active gripper."""
+    with node(address=address, autostart=True, **parameters) as process, Client() as client:
+        process.prints("commands are taken")
+        answer = client.call("activate")
+        assert answer.success, answer.message
+        yield process, client

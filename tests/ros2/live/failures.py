@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import signal
 
-from tests.ros2.live.bench import ABORTED, SUCCEEDED, Client
+from tests.ros2.live.bench import ABORTED, SUCCEEDED, Client, active
 from tests.ros2.live.goals import begun
 from tests.ros2.live.processes import node
 from tests.ros2.live.simulated import Simulator
@@ -13,9 +13,7 @@ from tests.ros2.live.simulated import Simulator
 
 def test_a_killed_node_leaves_the_fingers_running(simulator: Simulator) -> None:
     """What the pages warn of. A node that is started again adopts the gripper, and can halt it."""
-    with node(address=simulator.address, autostart=True) as process, Client() as client:
-        process.prints("commands are taken")
-        assert client.call("activate").success
+    with active(simulator.address) as (process, client):
         begun(client.move(2.8))
         process.send(signal.SIGKILL)
         assert process.ends() == -signal.SIGKILL
@@ -27,9 +25,7 @@ def test_a_killed_node_leaves_the_fingers_running(simulator: Simulator) -> None:
 
 
 def test_a_lost_link(simulator: Simulator) -> None:
-    with node(address=simulator.address, autostart=True) as process, Client() as client:
-        process.prints("commands are taken")
-        assert client.call("activate").success
+    with active(simulator.address) as (process, client):
         states, status, diagnostics = client.joint_states(), client.status(), client.diagnostics()
         goal = begun(client.move(2.8))
         simulator.lose_link()
@@ -48,14 +44,8 @@ def test_a_lost_link(simulator: Simulator) -> None:
         states.wait()
         process.prints("the link is back, and what still moved has been stopped")
         assert client.move(0.0).ends()[0] == SUCCEEDED
-
-
-def test_a_deactivation_without_a_link_is_told(simulator: Simulator) -> None:
-    with node(address=simulator.address, autostart=True) as process, Client() as client:
-        process.prints("commands are taken")
-        assert client.call("activate").success
         simulator.lose_link()
-        client.status().wait(lambda it: not json.loads(it.data)["connected"], new=False)
+        status.wait(lambda it: not json.loads(it.data)["connected"])
         assert client.change("deactivate")
         process.prints("no halt, the fingers MAY STILL MOVE")
         process.prints("no commands are taken; NOT halted")

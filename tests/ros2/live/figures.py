@@ -10,13 +10,12 @@ from __future__ import annotations
 import os
 import signal
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from statistics import median
 from typing import Final
 
-from tests.ros2.live.bench import ABORTED, CANCELED, Client, Goal
+from tests.ros2.live.bench import ABORTED, CANCELED, Client, Goal, active
 from tests.ros2.live.processes import Process, isolate, node
 from tests.ros2.live.simulated import Simulator
 
@@ -51,16 +50,6 @@ def timed(work: Callable[[], object]) -> float:
 
 
 # -- latencies ----------------------------------------------------------------------------------------------
-
-
-@contextmanager
-def active(address: str) -> Iterator[tuple[Process, Client]]:
-    """An active node at an active gripper."""
-    with node(address=address, autostart=True) as process, Client() as client:
-        process.prints("commands are taken")
-        answer = client.call("activate")
-        assert answer.success, answer.message
-        yield process, client
 
 
 def under_way(client: Client) -> Goal:

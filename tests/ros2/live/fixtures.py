@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import pytest
 
-from tests.ros2.live.bench import Client
-from tests.ros2.live.processes import OF_ROS, Process, isolate, node
+from tests.ros2.live.bench import Client, active
+from tests.ros2.live.processes import OF_ROS, Process, isolate
 from tests.ros2.live.simulated import Simulator
 
 isolate()
@@ -28,13 +28,7 @@ class Cell(NamedTuple):
 @pytest.fixture(scope="module")
 def shared() -> Iterator[Cell]:
     """An active node at an active gripper, for all tests of a file."""
-    with (
-        Simulator() as simulator,
-        node(address=simulator.address, autostart=True) as process,
-        Client() as client,
-    ):
-        process.prints("commands are taken")
-        assert client.call("activate").success
+    with Simulator() as simulator, active(simulator.address) as (process, client):
         yield Cell(simulator, process, client)
 
 

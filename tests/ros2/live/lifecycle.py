@@ -10,7 +10,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
 from robotiq_async.ros2.translation.settings import PARAMETERS
-from tests.ros2.live.bench import ABORTED, SUCCEEDED, Client
+from tests.ros2.live.bench import ABORTED, SUCCEEDED, Client, active
 from tests.ros2.live.goals import begun, position
 from tests.ros2.live.processes import node
 from tests.ros2.live.simulated import Simulator
@@ -71,8 +71,10 @@ def test_who_only_looks_leaves_the_fingers_alone(simulator: Simulator) -> None:
 
 
 def test_parameters(simulator: Simulator) -> None:
-    with node(address="tcp://", publish_rate=20, poll_interval=7) as process, Client() as client:
-        assert not client.change("configure")
+    with (
+        node(address="tcp://", publish_rate=20, poll_interval=7, autostart=True) as process,
+        Client() as client,
+    ):
         process.prints("cannot configure: malformed address 'tcp://'")
         assert client.state() == "unconfigured"
         assert client.set("address", simulator.address).successful
@@ -88,6 +90,10 @@ def test_parameters(simulator: Simulator) -> None:
             assert reason in refused.reason
         process.prints("parameter rejected: publish_rate must be a number")
         assert client.set("poll_interval", 0.01).successful
+        assert client.set("address", "tcp://127.0.0.1:9").successful
+        assert not client.change("configure")
+        process.prints("cannot configure: cannot connect to tcp://127.0.0.1:9")
+        assert client.set("address", simulator.address).successful
         assert client.change("configure")
         refused = client.set("address", "sim://")
         assert "address is read when the node is configured: clean it up first" in refused.reason
@@ -100,57 +106,26 @@ def test_parameters(simulator: Simulator) -> None:
 
 
 def test_of_parameters_that_are_set_together_none_counts_if_one_is_refused(simulator: Simulator) -> None:
-    with (
-        node(address=simulator.address, autostart=True, adress="tcp://192.0.2.1") as process,
-        Client() as client,
-    ):
-        process.prints("commands are taken")
+    with active(simulator.address, adress="tcp://192.0.2.1") as (process, client):
         assert "this node has no parameter adress" in process.text
-        assert client.call("activate").success
         assert not client.set_together(speed=7, force=999).successful
         assert client.move(0.3).ends()[0] == SUCCEEDED
-        assert speed(simulator) == 128
+        assert simulator.request.axes[0].speed == 128
         assert client.set_together(speed=9, force=11).successful
         assert client.move(0.4).ends()[0] == SUCCEEDED
-        assert speed(simulator) == 9
+        assert simulator.request.axes[0].speed == 9
 
 
-def speed(simulator: Simulator) -> int:
-    """That finger A was last given."""
-    return simulator.request.axes[0].speed
-
-
-def test_a_gripper_that_is_not_there(simulator: Simulator) -> None:
-    with node(address="tcp://127.0.0.1:9", autostart=True) as process, Client() as client:
-        process.prints("cannot configure: cannot connect to tcp://127.0.0.1:9")
-        assert client.state() == "unconfigured"
-        assert client.set("address", simulator.address).successful
-        assert client.change("configure")
-
-
-def test_a_signal_while_the_node_shuts_down(simulator: Simulator) -> None:
-    """As a launch ends its nodes: the transition and the signal at once, in a goal."""
-    with node(address=simulator.address, autostart=True) as process, Client() as client:
-        process.prints("commands are taken")
-        assert client.call("activate").success
+@pytest.mark.parametrize(
+    ("number", "shuts_down"), [(signal.SIGINT, False), (signal.SIGTERM, False), (signal.SIGINT, True)]
+)
+def test_a_signal_during_a_goal(simulator: Simulator, number: signal.Signals, shuts_down: bool) -> None:
+    """A launch ends its nodes with the transition and the signal at once."""
+    with active(simulator.address) as (process, client):
         goal = begun(client.move(2.8))
-        client.begin(
-            "change_state", ChangeState, ChangeState.Request(transition=Transition(label="shutdown"))
-        )
-        process.send(signal.SIGINT)
-        assert goal.ends()[0] == ABORTED
-        assert process.ends() == 0
-        assert not simulator.request.go, "rGTO"
-        assert position(simulator) < 230
-        assert "Traceback" not in process.text
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_during_a_goal(simulator: Simulator, number: signal.Signals) -> None:
-    with node(address=simulator.address, autostart=True) as process, Client() as client:
-        process.prints("commands are taken")
-        assert client.call("activate").success
-        goal = begun(client.move(2.8))
+        if shuts_down:
+            shutdown = ChangeState.Request(transition=Transition(label="shutdown"))
+            client.begin("change_state", ChangeState, shutdown)
         process.send(number)
         process.send(number)  # launchers send several
         assert goal.ends()[0] == ABORTED

@@ -8,20 +8,12 @@ import socket
 
 import pytest
 
-from tests.ros2.live.bench import ABORTED, CANCELED, SUCCEEDED, Client
+from tests.ros2.live.bench import ABORTED, CANCELED, SUCCEEDED, active
 from tests.ros2.live.goals import begun, position
-from tests.ros2.live.processes import Process, node
+from tests.ros2.live.processes import Process
 from tests.ros2.live.simulated import Simulator
 
 pytest.importorskip("zenoh")
-
-
-@pytest.fixture
-def endpoint() -> str:
-    """Where the agent listens."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{free.getsockname()[1]}"
 
 
 def agent(endpoint: str, simulator: Simulator) -> Process:
@@ -31,15 +23,12 @@ def agent(endpoint: str, simulator: Simulator) -> Process:
     return process
 
 
-def test_goals_a_halt_and_an_agent_that_is_killed(simulator: Simulator, endpoint: str) -> None:
+def test_goals_a_halt_and_an_agent_that_is_killed(simulator: Simulator) -> None:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
     address = f"zenoh://lab/cell/left?connect={endpoint}&insecure=1"
-    with (
-        agent(endpoint, simulator) as served,
-        node(address=address, autostart=True) as process,
-        Client() as client,
-    ):
-        process.prints("commands are taken")
-        assert client.call("activate").success
+    with agent(endpoint, simulator) as served, active(address) as (process, client):
         assert client.move(0.5).ends()[0] == SUCCEEDED
         goal = begun(client.move(2.8))
         goal.cancel()

@@ -7,11 +7,12 @@ import math
 from typing import Any
 
 import pytest
+from std_msgs.msg import String
 
 from robotiq_async import Finger
 from robotiq_async.ros2.translation.joints import joint_names
 from robotiq_async.tools.description import HandModel
-from tests.ros2.live.bench import SUCCEEDED, Client
+from tests.ros2.live.bench import LATEST, SUCCEEDED, Client, active
 from tests.ros2.live.goals import position
 from tests.ros2.live.processes import node
 from tests.ros2.live.simulated import Simulator
@@ -32,7 +33,7 @@ def test_a_prefix_is_before_every_joint(simulator: Simulator) -> None:
         assert [goal.ends()[0] for goal in moving] == [SUCCEEDED, SUCCEEDED]
         assert position(simulator) >= 238
         assert position(other) == 70
-        described = one.description("/left/robot_description").wait(new=False).data
+        described = one.listen(String, "/left/robot_description", LATEST).wait(new=False).data
         assert {joint.name for joint in HandModel.parse(described).moving} == set(joint_names("left_"))
         assert one.joint_states("/left/joint_states").wait().name[0] == "left_palm_finger_1_joint"
         assert two.joint_states("/right/joint_states").wait().name[0] == "right_palm_finger_1_joint"
@@ -41,14 +42,8 @@ def test_a_prefix_is_before_every_joint(simulator: Simulator) -> None:
 
 
 def test_a_jaw_has_one_joint() -> None:
-    with (
-        Simulator(model="2f85") as jaw,
-        node(address=jaw.address, autostart=True) as process,
-        Client() as client,
-    ):
+    with Simulator(model="2f85") as jaw, active(jaw.address) as (process, client):
         process.prints("no robot description: the packaged one is not of a 2F-85")
-        process.prints("commands are taken")
-        assert client.call("activate").success
         status, result = client.move(0.8, names=["robotiq_85_left_knuckle_joint"]).ends()
         assert status == SUCCEEDED
         assert list(result.state.name) == ["robotiq_85_left_knuckle_joint"]
@@ -65,7 +60,9 @@ def test_topics(simulator: Simulator, tmp_path_factory: pytest.TempPathFactory) 
     options: dict[str, Any] = {"urdf": str(urdf), "frame_id": "palm", "publish_rate": 100.0}
     with node(address=simulator.address, autostart=True, **options) as process, Client() as client:
         process.prints("commands are taken")
-        assert client.description().wait(new=False).data == "<robot name='hand'/>"
+        assert (
+            client.listen(String, "/robot_description", LATEST).wait(new=False).data == "<robot name='hand'/>"
+        )
         states = client.joint_states()
         first = states.wait()
         assert first.header.frame_id == "palm"
