@@ -30,8 +30,7 @@ from .goals import GoalRunner, Outcome
 
 COMMANDS: Final = ("activate", "reset", "halt", "recover", "release")
 """Names of the services, and of the actions that they carry out."""
-MOST_CALLS: Final = 16
-"""Commands under way at a time, without halts, which are always accepted."""
+MOST_CALLS: Final = 16  # commands under way at a time, without halts, which are always accepted
 
 
 class RefusedError(RobotiqError):
@@ -225,8 +224,7 @@ class Connection:
 
 PENDING_S: Final = 60.0
 """Seconds after which every motion from before the loss has ended; the longest is an automatic release."""
-RETRY_S: Final = 0.05
-"""Seconds between two attempts."""
+RETRY_S: Final = 0.05  # seconds between two attempts
 _REACHED: Final = tuple(set(State) - {State.DISCONNECTED, State.DO_SHUTDOWN, State.SHUTDOWN})
 
 

@@ -15,8 +15,7 @@ from ...values.errors import RobotiqConnectionError, RobotiqError
 from ...values.move_result import MoveResult
 from ..translation.joints import Targets
 
-FEEDBACK_S: Final = 0.05
-"""Seconds between two feedbacks: 20 Hz."""
+FEEDBACK_S: Final = 0.05  # seconds between two feedbacks: 20 Hz
 
 
 class Ending(Enum):
@@ -29,19 +28,12 @@ class Ending(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a goal ended.
+    """How a goal ended."""
 
-    Attributes:
-        ending: the final state of the goal.
-        stalled: whether a contact stopped at least one addressed axis.
-        reached: whether every addressed axis has reached its target.
-        reason: for the log and the client.
-    """
-
-    ending: Ending
-    stalled: bool
-    reached: bool
-    reason: str
+    ending: Ending  # the final state of the goal
+    stalled: bool  # whether a contact stopped at least one addressed axis
+    reached: bool  # whether every addressed axis has reached its target
+    reason: str  # for the log and the client
 
 
 class _Goal:
@@ -52,8 +44,7 @@ class _Goal:
         """Final state and reason, if the goal was ended before its moves."""
         self.hold: asyncio.Future[str] | None = None
         """Done when the gripper has acknowledged the hold of its axes: empty, or why it has not."""
-        self.is_over = asyncio.Event()
-        """Set when the next goal may use its axes."""
+        self.is_over = asyncio.Event()  # set when the next goal may use its axes
 
     def end(self, ending: Ending, reason: str) -> None:
         # The first reason counts. Its task then holds the axes that still move.

@@ -41,12 +41,7 @@ class Bridge:
             await asyncio.gather(*(each for each in under_way if each.done()), return_exceptions=True)
 
     async def ask(self, work: Coroutine[Any, Any, T]) -> T:
-        """Run work in the loop, from a callback of ROS; other callbacks run meanwhile.
-
-        Raises:
-            ClosedError: the node is shutting down.
-            Exception: from the work.
-        """
+        """Run work in the loop, from a callback of ROS; other callbacks run meanwhile."""
         # Awaiting an asyncio future would end the executor. A future of ROS wakes it only with a callback.
         answer = Future(executor=self._executor)
         answer.add_done_callback(lambda _: None)
@@ -55,20 +50,11 @@ class Bridge:
         return result
 
     def submit(self, work: Coroutine[Any, Any, object]) -> None:
-        """Run work in the loop without waiting for it. It must not raise.
-
-        Raises:
-            ClosedError: the node is shutting down.
-        """
+        """Run work in the loop without waiting for it. It must not raise."""
         self._begin(work)
 
     def wait(self, work: Coroutine[Any, Any, T]) -> T:
-        """Run work in the loop and block the executor: for transitions, whose callbacks must be synchronous.
-
-        Raises:
-            ClosedError: the node is shutting down.
-            Exception: from the work.
-        """
+        """Run work in the loop and block the executor: for transitions, whose callbacks are synchronous."""
         return self._begin(work).result()
 
     def _begin(self, work: Coroutine[Any, Any, T]) -> concurrent.futures.Future[T]:

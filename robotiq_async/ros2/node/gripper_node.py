@@ -44,8 +44,7 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
     def __init__(self, context: Context, bridge: Bridge, failed: Callable[[BaseException], object]) -> None:
         super().__init__(NAME, context=context)
         self._bridge = bridge
-        self._current: Configured | None = None
-        """Set while the node is configured; the loop reads it too."""
+        self._current: Configured | None = None  # set while the node is configured; the loop reads it too
         parameters.declare(self)
         parameters.guard(self, lambda: self._current is not None, self._apply_live_parameters)
         parameters.warn_of_unknown(self)

@@ -27,11 +27,7 @@ def declare(node: Node) -> None:
 
 
 def read(node: Node) -> Settings:
-    """The checked parameters.
-
-    Raises:
-        ValueError: an invalid value.
-    """
+    """The checked parameters."""
     return check_settings({name: node.get_parameter(name).value for name in PARAMETERS})
 
 

@@ -31,11 +31,7 @@ def robot_description(path: str, prefix: str) -> str:
 
 
 def prefixed(text: str, prefix: str) -> str:
-    """A URDF with a prefix on the names of its links and joints.
-
-    Raises:
-        ValueError: not a URDF.
-    """
+    """A URDF with a prefix on the names of its links and joints."""
     if not prefix:
         return text
     robot = _parse(text, "the description")

@@ -33,19 +33,12 @@ _LEVELS = {
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """The condition of one part.
+    """The condition of one part."""
 
-    Attributes:
-        what: the part.
-        level: how serious the condition is.
-        message: the condition as a text.
-        values: figures.
-    """
-
-    what: str
-    level: Level
-    message: str
-    values: Mapping[str, str] = field(default_factory=dict)
+    what: str  # the part
+    level: Level  # how serious the condition is
+    message: str  # the condition as a text
+    values: Mapping[str, str] = field(default_factory=dict)  # figures
 
 
 def diagnose(hand: Hand, now: float) -> tuple[Diagnosis, Diagnosis]:

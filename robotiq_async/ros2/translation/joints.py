@@ -55,19 +55,16 @@ _LIMITS: Final = tuple(LIMITS[name] for name in JOINTS)
 
 CLOSING_END: Final = 2.8
 """End of the closing angle of all fingers: 70 degrees of the base and 90 of the middle joint, rounded up."""
-TOLERANCE: Final = 1e-3
-"""Radians that a goal may be outside its range, because clients round."""
+TOLERANCE: Final = 1e-3  # radians that a goal may be outside its range, because clients round
 JAW_TOLERANCE: Final = 0.01
 """Share of its range that a goal for a jaw may be outside. Clients round, and close a 2F-85 to 0.8, the limit
 of its joint in public descriptions."""
 _STOP_TOLERANCE: Final = 0.1
 """Radians that the base joint of a goal may be off its stop while the middle one bends."""
 
-LONGEST_NAME: Final = 80
-"""Characters of an unknown name that an error shows."""
+LONGEST_NAME: Final = 80  # characters of an unknown name that an error shows
 
-VELOCITY_S: Final = 0.04
-"""Seconds over which a velocity is computed, at least: one count is half a degree."""
+VELOCITY_S: Final = 0.04  # seconds over which a velocity is computed, at least: one count is half a degree
 
 
 class GoalError(ValueError):

@@ -14,29 +14,19 @@ from ...values.checks import check_int, check_number
 from ...values.model import model_of
 
 Value = str | int | float | bool
-USUAL: Final = -1
-"""Represents None: a parameter of ROS always has a value."""
-OF_HAND: Final = offered(Place.ROS)
-"""The parameters that are options of the hand."""
+USUAL: Final = -1  # represents None: a parameter of ROS always has a value
+OF_HAND: Final = offered(Place.ROS)  # the parameters that are options of the hand
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One parameter.
+    """One parameter."""
 
-    Attributes:
-        default: its default, of the parameter's type.
-        description: for ``ros2 param describe``.
-        low: the lowest value of a number.
-        high: the highest value of a number.
-        live: whether it may be changed while the node is configured.
-    """
-
-    default: Value
-    description: str
-    low: float = 0.0
-    high: float = 0.0
-    live: bool = False
+    default: Value  # its default, of the parameter's type
+    description: str  # for `ros2 param describe`
+    low: float = 0.0  # the lowest value of a number
+    high: float = 0.0  # the highest value of a number
+    live: bool = False  # whether it may be changed while the node is configured
 
 
 def _of_hand(name: str, option: Option) -> Parameter:

@@ -23,23 +23,15 @@ from .findings import Finding, GiveUpError, Level, Report
 from .gripper import report_state
 
 ANSWER_S: Final = 1.0
-TRIES: Final = 3
-"""Attempts: just after a connection was made the first answers may be empty."""
-PROBES: Final = 100
-"""Requests for measuring the round trip."""
-WATCH_S: Final = 2.0
-"""How long to listen to statuses."""
+TRIES: Final = 3  # attempts: just after a connection was made the first answers may be empty
+PROBES: Final = 100  # requests for measuring the round trip
+WATCH_S: Final = 2.0  # how long to listen to statuses
 _READ: Final = frozenset({"version", "window", "statistics", "problem", "state", "address", "holder"})
-LOST: Final = 0.01
-"""Accepted share of lost statuses."""
+LOST: Final = 0.01  # accepted share of lost statuses
 
 
 async def examine_agent(name: GripperName, bus: Bus, report: Report) -> None:
-    """Examine the answers and the messages of an agent.
-
-    Raises:
-        GiveUpError: it does not answer.
-    """
+    """Examine the answers and the messages of an agent."""
     asker = _Asker(name, bus)
     await _describe(asker, report)
     report(Finding(Level.GOOD, "access", "the agent answers"))
@@ -91,19 +83,13 @@ class _Asker:
 
 
 class _Listener:
-    """Sorts the messages under the keys of a gripper.
-
-    Attributes:
-        statuses: about the gripper.
-        misrouted: number of messages about another gripper.
-        unreadable: the error of the last unreadable message; empty if there was none.
-    """
+    """Sorts the messages under the keys of a gripper."""
 
     def __init__(self, name: GripperName) -> None:
         self._mark = name.mark
-        self.statuses: list[StatusMessage] = []
-        self.misrouted = 0
-        self.unreadable = ""
+        self.statuses: list[StatusMessage] = []  # about the gripper
+        self.misrouted = 0  # number of messages about another gripper
+        self.unreadable = ""  # the error of the last unreadable message; empty if there was none
 
     def hear(self, _key: str, payload: bytes) -> None:
         try:

@@ -26,38 +26,28 @@ from ...values.registers import RTU_REGISTERS, STATUS_RESERVED, TCP_REGISTERS, R
 from ...values.status import RobotiqStatus
 from .findings import Finding, GiveUpError, Level, Report
 
-REACH_S: Final = 3.0
-"""Timeout for resolving the name, and for connecting to the port."""
+REACH_S: Final = 3.0  # timeout for resolving the name, and for connecting to the port
 ANSWER_S: Final = 0.5
 """Timeout for a reply; the last attempt with the usual registers waits as long as a hand ever does."""
 LET_GO_S: Final = 0.5
 """Pause after a failed attempt: a gateway that serves one client must notice that this one has gone."""
-TRIES: Final = 3
-"""Attempts with the usual unit id and registers, before others are tried: replies get lost."""
+TRIES: Final = 3  # attempts with the usual unit id and registers, before others are tried: replies get lost
 UNITS: Final = (2, 9, 1, 0, 255)
 """Unit ids to try when the usual one does not answer; 0 and 255 are not valid on a serial line."""
 ALONE: Final = "It may serve one client at a time"
 
 
 class Answering(NamedTuple):
-    """A gripper that answers.
+    """A gripper that answers."""
 
-    Attributes:
-        link: open.
-        registers: addresses of its registers, and its unit id.
-    """
-
-    link: Link
-    registers: RegisterMap
+    link: Link  # open
+    registers: RegisterMap  # addresses of its registers, and its unit id
 
 
 async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> Answering:
     """Find the unit id and the registers under which a gripper answers; returns an open link to it.
 
     It opens no extra connection to test the port, which would occupy a gateway that serves one client.
-
-    Raises:
-        GiveUpError: nothing answers, or another device does.
     """
     failure: RobotiqConnectionError | None = None
     stranger: RobotiqStatus | None = None

@@ -17,19 +17,12 @@ class Level(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """The result of one check.
+    """The result of one check."""
 
-    Attributes:
-        level: severity.
-        what: what was checked.
-        found: the result.
-        advice: what to do about it; empty if there is nothing to do.
-    """
-
-    level: Level
-    what: str
-    found: str
-    advice: str = ""
+    level: Level  # severity
+    what: str  # what was checked
+    found: str  # the result
+    advice: str = ""  # what to do about it; empty if there is nothing to do
 
 
 Report = Callable[[Finding], None]

@@ -22,10 +22,8 @@ from ...values.errors import ConnectFailedError
 from .agent import examine_agent
 from .findings import Finding, GiveUpError, Level, Report
 
-LOOK_S: Final = 3.0
-"""How long to look for the agent."""
-ROUND_S: Final = 0.3
-"""Duration of one look."""
+LOOK_S: Final = 3.0  # how long to look for the agent
+ROUND_S: Final = 0.3  # duration of one look
 
 
 async def examine_remote(address: str, report: Report, *, bus: Bus | None = None) -> None:
@@ -128,9 +126,6 @@ def examine_keys(folder: Path, report: Report, *, now: datetime) -> None:
         folder: of a client.
         report: called with each finding.
         now: the current time.
-
-    Raises:
-        GiveUpError: the certificate cannot be used.
     """
     # Needs the extra fleet. The folder of keys may come from another machine.
     from ...fleet.keys.credentials import read_credentials  # noqa: PLC0415
@@ -179,18 +174,12 @@ def _report_role(common_name: str, role: Role | None, report: Report) -> None:
         report(Finding(Level.DOUBT, "role", found, advice))
 
 
-REACH_S: Final = 3.0
-"""Timeout for connecting, and for the TLS handshake."""
-SHUT_S: Final = 0.5
-"""A side that distrusts a certificate hangs up within this time; one that trusts it waits."""
+REACH_S: Final = 3.0  # timeout for connecting, and for the TLS handshake
+SHUT_S: Final = 0.5  # A side that distrusts a certificate hangs up within this time; one that trusts it waits
 
 
 async def examine_way(route: Route, report: Report) -> None:
-    """Examine every endpoint of a route.
-
-    Raises:
-        GiveUpError: none of them is open.
-    """
+    """Examine every endpoint of a route."""
     endpoints = [parse_endpoint("connect", text) for text in route.endpoints]
     is_open = [await _examine_endpoint(endpoint, route, report) for endpoint in endpoints]
     if not any(is_open):
@@ -280,12 +269,7 @@ def _context(keys: Path, *, shows: bool) -> ssl.SSLContext:
 
 
 async def _connect(endpoint: Endpoint, context: ssl.SSLContext | None) -> bool:
-    """Connect and hang up; returns whether the other side kept the connection open.
-
-    Raises:
-        OSError: no connection.
-        TimeoutError: none in time.
-    """
+    """Connect and hang up; returns whether the other side kept the connection open."""
     port = int(endpoint.text.rpartition(":")[2])
     async with asyncio.timeout(REACH_S):
         reader, writer = await asyncio.open_connection(endpoint.host, port, ssl=context)

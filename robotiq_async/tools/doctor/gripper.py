@@ -30,12 +30,9 @@ from ...values.status import RobotiqStatus
 from .answer import REACH_S, find_gripper, long_enough
 from .findings import Finding, GiveUpError, Level, Report
 
-PROBES: Final = 300
-"""Reads for measuring round trip and rate."""
-WATCH_S: Final = 2.0
-"""How long to watch for another client."""
-LONGEST_PERIOD_S: Final = 0.1
-"""The longest poll_interval of a hand."""
+PROBES: Final = 300  # reads for measuring round trip and rate
+WATCH_S: Final = 2.0  # how long to watch for another client
+LONGEST_PERIOD_S: Final = 0.1  # the longest poll_interval of a hand
 
 
 async def examine(address: Address, report: Report, *, device_id: int | None = None) -> None:
@@ -73,11 +70,7 @@ async def examine(address: Address, report: Report, *, device_id: int | None = N
 
 
 def _check_model(model: Model, registers: Registers, report: Report) -> None:
-    """Report registers that only another model can show.
-
-    Raises:
-        GiveUpError: they are such: what they mean cannot be told.
-    """
+    """Report registers that only another model can show."""
     if not (why := model.contradiction(registers)):
         if any(registers):  # a gateway may show zeros before its gripper answers
             alike = [each.title for each in MODELS.values() if not each.contradiction(registers)]
@@ -175,8 +168,7 @@ async def _others(link: Link, report: Report) -> None:
         report(Finding(Level.DOUBT, "other clients", found, advice))
 
 
-LATENCY_MS: Final = 2
-"""An adapter that keeps bytes for longer delays every read; a hand sets 1 ms."""
+LATENCY_MS: Final = 2  # an adapter that keeps bytes for longer delays every read; a hand sets 1 ms
 
 
 def report_adapter(address: Address, report: Report, folder: Path = USB_SERIAL) -> None:

@@ -35,23 +35,17 @@ from ...values.model import THREE_FINGER
 
 REST_S: Final = 0.3
 """Pause between runs, in the gripper's time: a finger that has just stopped may still swing."""
-ATTEMPTS: Final = 20
-"""Attempts at a run: one in which the event loop was blocked is repeated."""
-TOLERATED: Final = 0.01
-"""Share of a run for which the event loop may be blocked, apart from two polls."""
-SLACK: Final = 5
-"""Counts by which the readings of a full closing may miss those that the manual gives."""
-GRASP_S: Final = 1.0
-"""How long a grasp is recorded after the fingers have stopped, in the gripper's time."""
-CURRENT_MA: Final = 2550
-"""The highest current that a status can report."""
+ATTEMPTS: Final = 20  # attempts at a run: one in which the event loop was blocked is repeated
+TOLERATED: Final = 0.01  # share of a run for which the event loop may be blocked, apart from two polls
+SLACK: Final = 5  # counts by which the readings of a full closing may miss those that the manual gives
+GRASP_S: Final = 1.0  # how long a grasp is recorded after the fingers have stopped, in the gripper's time
+CURRENT_MA: Final = 2550  # the highest current that a status can report
 FINGERS: Final = (Finger.A, Finger.B, Finger.C)
 _CURRENTS_HEADER: Final = ["force_value", "run", "time_ms", "a_ma", "b_ma", "c_ma"]
 
 Sample = tuple[int, int, int, int]
 """Milliseconds since the command, and the currents of A, B and C in milliampere."""
-Currents = dict[int, list[list[Sample]]]
-"""For each force value the samples of each run."""
+Currents = dict[int, list[list[Sample]]]  # for each force value the samples of each run
 
 
 # -- values to measure, in their order ---------------------------------------------------------------------
@@ -270,11 +264,7 @@ def origin_beside(path: Path) -> Path:
 
 
 def read_origin(path: Path) -> dict[str, str]:
-    """Read the origin of a table; empty if it has none.
-
-    Raises:
-        TableError: the file beside the table cannot be read.
-    """
+    """Read the origin of a table; empty if it has none."""
     beside = origin_beside(path)
     if not beside.exists():
         return {}
@@ -282,11 +272,7 @@ def read_origin(path: Path) -> dict[str, str]:
 
 
 def write_origin(path: Path, origin: dict[str, str]) -> None:
-    """Write the origin of a table into the file beside it.
-
-    Raises:
-        OSError: it cannot be written.
-    """
+    """Write the origin of a table into the file beside it."""
     write_rows(origin_beside(path), sorted(origin.items()))
 
 
@@ -325,11 +311,7 @@ def read_currents(path: Path) -> Currents:
 
 
 def write_currents(path: Path, currents: Currents) -> None:
-    """Write the currents of grasps into a file, replacing it at once.
-
-    Raises:
-        OSError: it cannot be written; the file is unchanged.
-    """
+    """Write the currents of grasps into a file, replacing it at once."""
     rows = (
         (force, number, *sample)
         for force in sorted(currents)

@@ -31,20 +31,14 @@ OURS: Final = "#0b6ea8"
 THEIRS: Final = "#d1731f"
 COLOURS: Final = ("#0b6ea8", "#2a8f4c", "#b03a6b")
 """Colours of the fingers A, B and C."""
-WIDTHS: Final = {"A": 4.2, "B": 2.6, "C": 1.1, "SCISSOR": 1.4}
-"""Line widths in the plot of a recording."""
+WIDTHS: Final = {"A": 4.2, "B": 2.6, "C": 1.1, "SCISSOR": 1.4}  # line widths in the plot of a recording
 DRAWN: Final = ("position", "requested_position", "current_ma")
-LABEL: Final = 0.012
-"""Width of a label, as a share of the picture's."""
-LONGEST: Final = 40
-"""Characters of a label."""
-STRIP: Final = 0.075
-"""Height of a character of a label, where that of the positions is 3."""
-SHOWN_FORCES: Final = (0, 125, 250)
-"""Force values whose currents are drawn over time, or the nearest to them."""
+LABEL: Final = 0.012  # width of a label, as a share of the picture's
+LONGEST: Final = 40  # characters of a label
+STRIP: Final = 0.075  # height of a character of a label, where that of the positions is 3
+SHOWN_FORCES: Final = (0, 125, 250)  # force values whose currents are drawn over time, or the nearest to them
 
-Event = tuple[float, str, bool]
-"""When, what, and whether it is about a fault."""
+Event = tuple[float, str, bool]  # when, what, and whether it is about a fault
 
 
 def plot_speed(path: Path, table: Table, label: str) -> list[Path]:
@@ -149,10 +143,6 @@ def plot_recording(path: Path, entries: Iterable[Entry]) -> list[Path]:
 
     Returns:
         The files; none when there is no status to draw.
-
-    Raises:
-        OSError: they cannot be written.
-        RecordingError: a message is not as a recorder writes it.
     """
     seconds, began = array("d"), 0
     events: list[Event] = []

@@ -17,69 +17,43 @@ from .catalogue import CATALOGUE, NO_OPTIONS, Check, EndError, Figure, Options, 
 from .recorded_link import Frame, RecordedLink
 from .watch import Person, Watch
 
-CONNECT_S: Final = 2.0
-"""For a connection: with this a stop over a link that was lost is tried soon again."""
-SPACING_S: Final = 0.02
-"""Twice what the manual wants between two writes."""
+CONNECT_S: Final = 2.0  # for a connection: with this a stop over a link that was lost is tried soon again
+SPACING_S: Final = 0.02  # twice what the manual wants between two writes
 
 
 @dataclass(frozen=True, slots=True)
 class Lengths:
-    """How long the long checks last; a rehearsal has shorter ones.
+    """How long the long checks last; a rehearsal has shorter ones."""
 
-    Attributes:
-        reads: round trips at each of three rates.
-        idle: seconds of silence in stage 1.
-        alone: seconds without a client in stage 8.
-        soak: seconds of reading in stage 9.
-        commands: seconds of commands at each rate in stage 9.
-        interval: seconds between two reads while fingers are watched; None for what is usual on the link.
-    """
-
-    reads: int = 300
-    idle: tuple[float, ...] = (0.5, 1.0, 1.5, 2.0, 5.0, 30.0, 60.0)
-    alone: tuple[float, ...] = (10.0, 60.0, 300.0)
-    soak: float = 600.0
-    commands: float = 5.0
-    interval: float | None = None
+    reads: int = 300  # round trips at each of three rates
+    idle: tuple[float, ...] = (0.5, 1.0, 1.5, 2.0, 5.0, 30.0, 60.0)  # seconds of silence in stage 1
+    alone: tuple[float, ...] = (10.0, 60.0, 300.0)  # seconds without a client in stage 8
+    soak: float = 600.0  # seconds of reading in stage 9
+    commands: float = 5.0  # seconds of commands at each rate in stage 9
+    interval: float | None = None  # seconds between two reads of moving fingers; None: as usual
 
 
 @dataclass
 class Bench:
-    """The gripper under test and what surrounds it.
+    """The gripper under test and what surrounds it."""
 
-    Attributes:
-        address: where it is; tcp, rtu or rtu+tcp.
-        person: beside it.
-        keep: is given every frame.
-        lengths: of the long checks.
-        checks: the results so far, by name.
-        link: to the gripper, once it has been found.
-        registers: how it is asked, once it has been found.
-        found: the first status.
-        spacing: seconds from one write to the next; stage 2 finds out whether more are needed.
-        is_active: whether it was active when a stage last came to its end.
-    """
-
-    address: Address
-    person: Person
-    keep: Callable[[Frame], None]
-    lengths: Lengths = field(default_factory=Lengths)
-    checks: dict[str, Check] = field(default_factory=dict)
-    link: RecordedLink = field(init=False)
-    registers: RegisterMap | None = None
-    found: RobotiqStatus | None = None
-    spacing: float = SPACING_S
-    is_active: bool = False
+    address: Address  # where it is; tcp, rtu or rtu+tcp
+    person: Person  # beside it
+    keep: Callable[[Frame], None]  # is given every frame
+    lengths: Lengths = field(default_factory=Lengths)  # of the long checks
+    checks: dict[str, Check] = field(default_factory=dict)  # the results so far, by name
+    link: RecordedLink = field(init=False)  # to the gripper, once it has been found
+    registers: RegisterMap | None = None  # how it is asked, once it has been found
+    found: RobotiqStatus | None = None  # the first status
+    spacing: float = SPACING_S  # seconds from one write to the next; stage 2 may raise it
+    is_active: bool = False  # whether it was active when a stage last came to its end
 
     @property
     def model(self) -> Model:
-        """The model that the address names."""
         return model_of(self.address.model)
 
     @property
     def fingers(self) -> tuple[Finger, ...]:
-        """A, B and C, or the jaw."""
         return tuple(axis for axis in self.model.axes if axis in Finger.ABC)
 
     @property
@@ -102,31 +76,43 @@ class Bench:
         return RecordedLink(transport, keep or self.keep, self.model)
 
     def watch(self, seconds: float) -> Watch:
-        """Look after the gripper for some seconds."""
         interval = self.lengths.interval or self.interval
         return Watch(self.link, self.person, seconds=seconds, interval=interval, spacing=self.spacing)
 
     # -- results ---------------------------------------------------------------------------------------------
 
-    def as_assumed(self, name: str, found: str, **figures: Figure) -> None:
-        """What was assumed holds."""
-        self._add(Check(name, Verdict.AS_ASSUMED, found, figures=figures))
+    def judge(
+        self,
+        name: str,
+        holds: bool,
+        found: str,
+        follows: str,
+        options: Options = NO_OPTIONS,
+        /,
+        **figures: Figure,
+    ) -> None:
+        """Note what was found: as assumed if it holds, else what follows for the user.
 
-    def untold(self, name: str, why: str, **figures: Figure) -> None:
-        """It could not be told."""
-        self._add(Check(name, Verdict.UNTOLD, why, figures=figures))
+        Raises:
+            EndError: it does not hold, and is about safety.
+        """
+        if holds:
+            self._add(Check(name, Verdict.AS_ASSUMED, found, figures=figures))
+            return
+        self._add(Check(name, Verdict.DIFFERS, found, follows, options, figures))
+        if CATALOGUE[name].is_safety:
+            raise EndError("deviation", f"{name}: {found}")
+
+    def as_assumed(self, name: str, found: str, **figures: Figure) -> None:
+        self.judge(name, True, found, "", **figures)
 
     def differs(
         self, name: str, found: str, follows: str, options: Options = NO_OPTIONS, /, **figures: Figure
     ) -> None:
-        """What was assumed does not hold.
+        self.judge(name, False, found, follows, options, **figures)
 
-        Raises:
-            EndError: and that is about safety.
-        """
-        self._add(Check(name, Verdict.DIFFERS, found, follows, options, figures))
-        if CATALOGUE[name].is_safety:
-            raise EndError("deviation", f"{name}: {found}")
+    def untold(self, name: str, why: str, **figures: Figure) -> None:
+        self._add(Check(name, Verdict.UNTOLD, why, figures=figures))
 
     def _add(self, check: Check) -> None:
         assert check.name in CATALOGUE

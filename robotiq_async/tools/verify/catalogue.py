@@ -12,19 +12,12 @@ from ...values.model import Model
 
 
 class Assumption(NamedTuple):
-    """One thing that the library takes for granted of every gripper.
+    """One thing that the library takes for granted of every gripper."""
 
-    Attributes:
-        stage: the stage that checks it.
-        assumed: what is assumed, in a sentence.
-        is_safety: whether nothing further is done when it does not hold.
-        of_several: whether it is about a gripper with several axes: a jaw has none of it.
-    """
-
-    stage: int
-    assumed: str
-    is_safety: bool = False
-    of_several: bool = False
+    stage: int  # the stage that checks it
+    assumed: str  # what is assumed, in a sentence
+    is_safety: bool = False  # whether nothing further is done when it does not hold
+    of_several: bool = False  # whether it is about a gripper with several axes: a jaw has none of it
 
 
 CATALOGUE: Final[dict[str, Assumption]] = {
@@ -81,18 +74,13 @@ def checks_of(model: Model) -> dict[str, Assumption]:
     return {name: each for name, each in CATALOGUE.items() if several or not each.of_several}
 
 
-LAST: Final = 9
-"""The last stage."""
-HARMLESS: Final = 2
-"""The last stage in which nothing moves."""
-STAGE: Final = "verify stage "
-"""Before the number, in the event that tells that a stage begins."""
+LAST: Final = 9  # the last stage
+HARMLESS: Final = 2  # the last stage in which nothing moves
+STAGE: Final = "verify stage "  # before the number, in the event that tells that a stage begins
 
 
-Figure = int | float | str | bool | None | list[Any]
-"""What JSON takes, for the figures of a check."""
-Options = Mapping[str, int | float]
-"""Options of a hand, by the names of its constructor."""
+Figure = int | float | str | bool | None | list[Any]  # what JSON takes, for the figures of a check
+Options = Mapping[str, int | float]  # options of a hand, by the names of its constructor
 
 NO_OPTIONS: Final[Options] = MappingProxyType({})
 
@@ -107,26 +95,16 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One check that was made, or could not be.
+    """One check that was made, or could not be."""
 
-    Attributes:
-        name: of the assumption, see :mod:`.catalogue`.
-        verdict: how it ended.
-        found: what was found, in a sentence.
-        follows: what follows for the user, where it differs.
-        options: those that make the library right, where it differs.
-        figures: what was measured, with the unit at the end of each name.
-    """
-
-    name: str
-    verdict: Verdict
-    found: str
-    follows: str = ""
-    options: Options = field(default_factory=lambda: NO_OPTIONS)
-    figures: Mapping[str, Figure] = field(default_factory=dict)
+    name: str  # of the assumption, see catalogue
+    verdict: Verdict  # how it ended
+    found: str  # what was found, in a sentence
+    follows: str = ""  # what follows for the user, where it differs
+    options: Options = field(default_factory=lambda: NO_OPTIONS)  # make the library right, where it differs
+    figures: Mapping[str, Figure] = field(default_factory=dict)  # the unit ends each name
 
     def as_dict(self) -> dict[str, Any]:
-        """The same in types that JSON takes."""
         return {
             "name": self.name,
             "verdict": self.verdict.value,
@@ -156,18 +134,13 @@ ENDINGS: Final = {
 
 
 class EndError(Exception):
-    """The run ends here.
-
-    Attributes:
-        why: one of :data:`ENDINGS`.
-        words: what happened, in a sentence.
-    """
+    """The run ends here."""
 
     def __init__(self, why: str, words: str) -> None:
         assert why in ENDINGS
         super().__init__(why, words)
-        self.why = why
-        self.words = words
+        self.why = why  # one of ENDINGS
+        self.words = words  # what happened, in a sentence
 
     def __str__(self) -> str:
         return f"{self.why}: {self.words}"

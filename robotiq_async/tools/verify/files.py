@@ -35,24 +35,10 @@ NAME: Final = "recording.mcap"
 
 
 class Recording:
-    """Takes frames; a task writes them to the disk in threads.
-
-    Attributes:
-        failure: why nothing is written any more; empty as long as it is.
-    """
+    """Takes frames, and cleans what they say; a task writes them to the disk in threads."""
 
     def __init__(self, folder: Path, clean: Callable[[str], str], model: Model) -> None:
-        """Create the file.
-
-        Args:
-            folder: where it goes.
-            clean: takes out of a text what must not be in it.
-            model: of the gripper.
-
-        Raises:
-            OSError: that is not possible.
-        """
-        self.failure = ""
+        self.failure = ""  # why nothing is written any more; empty as long as it is
         self._file = FileIO(folder / NAME, "x")
         self._waiting: list[bytes] = []
         self._count = 0
@@ -67,17 +53,14 @@ class Recording:
     # What the MCAP writer needs of a file.
 
     def write(self, data: bytes) -> int:
-        """Keep bytes until a thread writes them."""
         self._waiting.append(bytes(data))
         self._count += len(data)
         return len(data)
 
     def tell(self) -> int:
-        """How many there were."""
         return self._count
 
-    def flush(self) -> None:
-        """Nothing: the disk is a thread's business."""
+    def flush(self) -> None: ...
 
     # What a run tells.
 
@@ -97,7 +80,6 @@ class Recording:
             self._add(EVENT, frame.ended, words)
 
     def begin(self, stage: int) -> None:
-        """Note that a stage begins."""
         now = asyncio.get_running_loop().time()
         fields = {"kind": "state", "timestamp": now, "target": f"{STAGE}{stage}", "model": self._model.name}
         self._add(EVENT, now, fields)
@@ -158,50 +140,29 @@ class Scrubber:
         """The same without; looks into lists and objects."""
         cleaned: object = what
         if isinstance(what, str):
-            cleaned = self._cleaned(what)
+            text: str = what
+            for secret in self._secrets:
+                text = text.replace(secret, "HIDDEN")
+            cleaned = text
         elif isinstance(what, dict):
             cleaned = {key: self.clean(value) for key, value in what.items()}
         elif isinstance(what, list):
             cleaned = [self.clean(each) for each in what]
         return cast("T", cleaned)
 
-    def _cleaned(self, text: str) -> str:
-        for secret in self._secrets:
-            text = text.replace(secret, "HIDDEN")
-        return text
-
 
 class Folder:
-    """Where the report of a run goes. Made in a running loop.
-
-    Attributes:
-        path: the folder.
-        recording: takes the frames.
-    """
+    """Where the report of a run goes. Made in a running loop; OSError if the path has a report already."""
 
     def __init__(self, path: Path, address: Address) -> None:
-        """Make the folder and begin the recording.
-
-        Args:
-            path: may be there already, without a report in it.
-            address: of the gripper; it is kept out of everything that is written.
-
-        Raises:
-            OSError: it cannot be made or written to, or has a report.
-        """
-        self.path = path
+        self.path = path  # the folder
         self._scrubber = Scrubber(address)
         self._pictures: tuple[str, ...] = ()
         self._why_no_pictures = ""
         path.mkdir(parents=True, exist_ok=True)
-        self.recording = Recording(path, self._scrubber.clean, model_of(address.model))
+        self.recording = Recording(path, self._scrubber.clean, model_of(address.model))  # takes the frames
 
     def save(self, report: Report) -> None:
-        """Write the report as it is now.
-
-        Raises:
-            OSError: that failed.
-        """
         clean = self._scrubber.clean
         fields = json.dumps(clean(report.as_dict()), indent=2, ensure_ascii=False)
         self._write(JSON, f"{fields}\n")

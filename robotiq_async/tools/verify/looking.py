@@ -16,17 +16,12 @@ from .bench import Bench
 from .catalogue import EndError
 from .watch import LASTING, words_of
 
-WATCH_S: Final = 2.0
-"""For so long the gripper is watched for another client, and for motion."""
+WATCH_S: Final = 2.0  # for so long the gripper is watched for another client, and for motion
 STILL_COUNTS: Final = 1
 
 
 async def find(bench: Bench) -> None:
-    """Find the gripper, and open the link to it.
-
-    Raises:
-        EndError: nothing answers, or another device.
-    """
+    """Find the gripper, and open the link to it."""
     findings: list[Finding] = []
     try:
         answering = await find_gripper(bench.address, registers_of(bench.address), findings.append)
@@ -69,12 +64,7 @@ def why_no_gripper(status: RobotiqStatus) -> str:
 
 
 async def see_that_it_may_be_written_to(bench: Bench) -> RobotiqStatus:
-    """Watch it for a while; returns the newest status.
-
-    Raises:
-        EndError: another client commands it, it moves, holds something, or has a fault.
-        RobotiqConnectionError: the link failed.
-    """
+    """Watch it for a while; returns the newest status."""
     loop, first = asyncio.get_running_loop(), await bench.link.read()
     until, not_ready, last = loop.time() + WATCH_S, 0, first
     while loop.time() < until:

@@ -15,12 +15,9 @@ from .catalogue import EndError
 from .recorded_link import RecordedLink
 from .watch import ANYWHERE, Watch, words_of
 
-MARGIN: Final = 4
-"""Counts beside its way that an axis may reach: it may stop 2 beside its request (manual)."""
-ASIDE: Final = 3
-"""Counts by which an axis that is not asked may waver."""
-ACTIVATION_S: Final = 60.0
-"""An activation that takes longer is taken back: drivers wait for 25 to 30 s."""
+MARGIN: Final = 4  # counts beside its way that an axis may reach: it may stop 2 beside its request (manual)
+ASIDE: Final = 3  # counts by which an axis that is not asked may waver
+ACTIVATION_S: Final = 60.0  # an activation that takes longer is taken back: drivers wait for 25 to 30 s
 
 
 def standing(status: RobotiqStatus, *, speed: int = 0, force: int = 0, go: bool = False) -> Request:
@@ -61,11 +58,7 @@ def are_near(status: RobotiqStatus, targets: Mapping[Finger, int], counts: int) 
 
 
 async def reset(watch: Watch) -> None:
-    """Take rACT back and wait for it to show. The fingers stay where they are.
-
-    Raises:
-        EndError: it does not show, or what :meth:`Watch.look` raises.
-    """
+    """Take rACT back and wait for it to show. The fingers stay where they are."""
     watch.needs_active = False
     await watch.write(Request(model=watch.model))
     if await watch.until(lambda status: not status.activation_echo and status.is_reset, 2.0) is None:
@@ -73,11 +66,7 @@ async def reset(watch: Watch) -> None:
 
 
 async def activate(watch: Watch) -> float:
-    """Reset and activate: all fingers move. Returns how many seconds the activation took.
-
-    Raises:
-        EndError: it did not come to its end in time, or what :meth:`Watch.look` raises.
-    """
+    """Reset and activate: all fingers move. Returns how many seconds the activation took."""
     watch.envelope = ANYWHERE
     await reset(watch)
     began = await watch.write(Request(activate=True, model=watch.model))
@@ -91,14 +80,7 @@ async def activate(watch: Watch) -> float:
 async def go(
     watch: Watch, image: Request, targets: Mapping[Finger, int], seconds: float
 ) -> RobotiqStatus | None:
-    """Send axes to targets and wait until they stand there; None if they do not in time.
-
-    Args:
-        watch: of the stage.
-        image: speeds, forces and the requests of the other axes.
-        targets: where the axes go.
-        seconds: for the way.
-    """
+    """Send axes to targets and wait until they stand there; None if they do not in time."""
     assert watch.last is not None
     watch.envelope = way(watch.last, targets)
     await watch.write(replace(image, go=True).with_positions(targets))

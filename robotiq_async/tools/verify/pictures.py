@@ -29,8 +29,7 @@ from .report import Report
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FAR: Final = 10
-"""Counts that make a motion: more than an axis ends beside its request."""
+FAR: Final = 10  # counts that make a motion: more than an axis ends beside its request
 BEFORE_S: Final = 0.05
 AFTER_S: Final = 0.4
 """What is shown around the request of one axis: longer than a hand waits for an object status (0.25 s)."""
@@ -72,22 +71,20 @@ Draw = Callable[[tuple["Axes", ...], Segment], bool]
 
 
 def draw(folder: Path, recording: Path, report: Report) -> tuple[str, ...]:
-    """Draw what the run has measured; the names of the files.
-
-    Raises:
-        OSError: a picture cannot be written.
-    """
+    """Draw what the run has measured; the names of the files."""
     drawn: list[str] = []
     for segment in segments(recording, tuple(PICTURES)):
         name, title, rows, curve = PICTURES[segment.stage]
         figure, axes = _figure(title, rows)
         if segment.statuses and curve(axes, segment):
             axes[-1].set_xlabel("s")
-            drawn += _save(figure, folder, name)
+            figure.savefig(folder / name, dpi=110)
+            drawn.append(name)
     if "read.round_trip" in report.checks:
         figure, (axis,) = _figure("Round trips of reads (stage 1)", 1)
         if _round_trips(axis, report.checks["read.round_trip"].figures):
-            drawn += _save(figure, folder, "round_trips.png")
+            figure.savefig(folder / "round_trips.png", dpi=110)
+            drawn.append("round_trips.png")
     return tuple(sorted(set(drawn)))
 
 
@@ -99,11 +96,6 @@ def _figure(title: str, rows: int) -> tuple[Figure, tuple[Axes, ...]]:
     for axis in axes:
         axis.grid(alpha=0.3)
     return figure, tuple(axes)
-
-
-def _save(figure: Figure, folder: Path, name: str) -> list[str]:
-    figure.savefig(folder / name, dpi=110)
-    return [name]
 
 
 def _round_trips(axis: Axes, figures: Mapping[str, object]) -> bool:
@@ -131,19 +123,14 @@ def _activation(axes: tuple[Axes, ...], segment: Segment) -> bool:
     }.items():
         states.step(times, values, where="post", label=name)
     states.legend()
-    _positions(positions, times, shown)
+    for axis in shown[0].model.axes:
+        positions.plot(times, [status.position(axis) for status in shown], lw=1, label=axis.name)
+    positions.set_ylabel("position, counts")
+    positions.legend()
     return True
 
 
-def _positions(axis: Axes, times: list[float], shown: list[RobotiqStatus]) -> None:
-    for each in shown[0].model.axes if shown else ():
-        axis.plot(times, [status.position(each) for status in shown], lw=1, label=each.name)
-    axis.set_ylabel("position, counts")
-    axis.legend()
-
-
 def _echo(axes: tuple[Axes, ...], segment: Segment) -> bool:
-    """One motion: what is echoed, where the axis is, and what gDT says."""
     found = _motion_from_rest(segment)
     if found is None:
         return False
@@ -203,7 +190,6 @@ def _strokes(axes: tuple[Axes, ...], segment: Segment) -> bool:
 
 
 def _closings(segment: Segment) -> Iterator[tuple[float, float, Request]]:
-    """When the fingers were asked to close, and when the next was asked."""
     ends = [seconds for seconds, _ in segment.commands[1:]] + [segment.statuses[-1][0]]
     for (seconds, request), end in zip(segment.commands, ends, strict=True):
         if request.go and all(request.position(each) == CLOSED for each in _fingers(request.model)):

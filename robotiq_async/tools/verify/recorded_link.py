@@ -25,21 +25,13 @@ RECENT_S: Final = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One exchange.
+    """One exchange."""
 
-    Attributes:
-        began: when it was asked for, in the loop's time.
-        ended: when it was answered, or failed.
-        kind: "status", "command", "failure", or "probe" for a read in another place.
-        registers: what was read or written; empty for a probe and for a failure of a read.
-        words: why it failed, or what the probe found.
-    """
-
-    began: float
-    ended: float
-    kind: str
-    registers: Registers = ()
-    words: str = ""
+    began: float  # when it was asked for, in the loop's time
+    ended: float  # when it was answered, or failed
+    kind: str  # "status", "command", "failure", or "probe" for a read in another place
+    registers: Registers = ()  # what was read or written; empty for a probe and for a failure of a read
+    words: str = ""  # why it failed, or what the probe found
 
 
 class RecordedLink:
@@ -47,55 +39,29 @@ class RecordedLink:
 
     A cancellation waits for the exchange under way. One that was cut off would cost the connection, and the
     stop that follows would have to make a new one first.
-
-    Attributes:
-        model: of the gripper.
-        written: the last image that was written; None before the first.
-        shown: the last status that was read; None before the first.
-        asked: when that was asked for, in the loop's time.
-        wrote: when the last write was sent, in the loop's time.
     """
 
     def __init__(self, link: Link, keep: Callable[[Frame], None], model: Model) -> None:
-        """Use a link, open or not.
-
-        Args:
-            link: leads to the gripper.
-            keep: is given every frame.
-            model: of the gripper.
-        """
-        self.model = model
+        self.model = model  # of the gripper
         self.link = link
-        self.written: Request | None = None
-        self.shown: RobotiqStatus | None = None
-        self.asked = 0.0
-        self.wrote = -math.inf
+        self.written: Request | None = None  # the last image that was written; None before the first
+        self.shown: RobotiqStatus | None = None  # the last status that was read; None before the first
+        self.asked = 0.0  # when that was asked for, in the loop's time
+        self.wrote = -math.inf  # when the last write was sent, in the loop's time
         self._keep = keep
         self._echoes: deque[tuple[float, Echo]] = deque(maxlen=2000)
 
     @property
     def is_open(self) -> bool:
-        """Whether requests can be sent."""
         return self.link.is_open
 
     async def open(self) -> None:
-        """Connect anew.
-
-        Raises:
-            RobotiqConnectionError: nobody answers.
-        """
         await self._whole(self.link.open())
 
     async def close(self) -> None:
-        """Disconnect."""
         await self._whole(self.link.close())
 
     async def read(self) -> RobotiqStatus:
-        """The status.
-
-        Raises:
-            RobotiqConnectionError: no clean answer in time; the link is closed.
-        """
         loop = asyncio.get_running_loop()
         began = loop.time()
         try:
@@ -110,11 +76,7 @@ class RecordedLink:
         return self.shown
 
     async def write(self, request: Request) -> float:
-        """Write an image, once; returns when that was acknowledged, in the loop's time.
-
-        Raises:
-            RobotiqConnectionError: no clean acknowledgement in time; the link is closed.
-        """
+        """Write an image, once; returns when that was acknowledged, in the loop's time."""
         loop = asyncio.get_running_loop()
         began = loop.time()
         # Before it is sent: what is cut off may have arrived.

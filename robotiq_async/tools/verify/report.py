@@ -14,39 +14,24 @@ from .catalogue import CATALOGUE, ENDINGS, LAST, Check, Verdict, checks_of
 
 T = TypeVar("T")
 
-SCHEMA: Final = 1
-"""Version of what stands in report.json; docs/hardware.md describes it."""
+SCHEMA: Final = 1  # version of what stands in report.json; docs/hardware.md describes it
 
 
 @dataclass
 class Report:
-    """A run, while it goes on and after it.
+    """A run, while it goes on and after it."""
 
-    Attributes:
-        link: "tcp", "rtu" or "rtu+tcp".
-        model: of the gripper.
-        stages: those that have come to their end.
-        entered: those that have begun.
-        checks: by name.
-        why: how it ended, see :mod:`.endings`; empty while it goes on.
-        words: the same in a sentence.
-        registers: how the gripper is asked; None if it was not found.
-        found: the first status; None if there was none.
-        last: the newest status after the fingers were stopped; None if there was none.
-        label: what the user wants it to be called.
-    """
-
-    link: str
-    model: Model = THREE_FINGER
-    stages: list[int] = field(default_factory=list)
-    entered: list[int] = field(default_factory=list)
-    checks: dict[str, Check] = field(default_factory=dict)
-    why: str = ""
-    words: str = ""
-    registers: RegisterMap | None = None
-    found: RobotiqStatus | None = None
-    last: RobotiqStatus | None = None
-    label: str = ""
+    link: str  # "tcp", "rtu" or "rtu+tcp"
+    model: Model = THREE_FINGER  # of the gripper
+    stages: list[int] = field(default_factory=list)  # those that have come to their end
+    entered: list[int] = field(default_factory=list)  # those that have begun
+    checks: dict[str, Check] = field(default_factory=dict)  # by name
+    why: str = ""  # how it ended, see endings; empty while it goes on
+    words: str = ""  # the same in a sentence
+    registers: RegisterMap | None = None  # how the gripper is asked; None if it was not found
+    found: RobotiqStatus | None = None  # the first status; None if there was none
+    last: RobotiqStatus | None = None  # the newest after the fingers were stopped; None if none came
+    label: str = ""  # what the user wants it to be called
 
     def complete(self) -> None:
         """Say of the checks of stages that have begun and were not reached that they could not be told."""
@@ -56,12 +41,10 @@ class Report:
 
     @property
     def differing(self) -> list[Check]:
-        """The checks that differ, in their order."""
         return self._in_order(Verdict.DIFFERS)
 
     @property
     def untold(self) -> list[Check]:
-        """Those that could not be told."""
         return self._in_order(Verdict.UNTOLD)
 
     @property
@@ -81,7 +64,6 @@ class Report:
         ]
 
     def as_dict(self) -> dict[str, Any]:
-        """All of it in types that JSON takes."""
         registers = self.registers
         return {
             "schema": SCHEMA,
@@ -185,13 +167,7 @@ MARKS: Final = {
 
 
 def page(report: Report, pictures: tuple[str, ...] = (), why_none: str = "") -> str:
-    """The text of the page.
-
-    Args:
-        report: what it tells.
-        pictures: files beside it.
-        why_none: why there are no pictures.
-    """
+    """The text of the page."""
     fields = report.as_dict()
     head = [
         f"# A gripper, looked at by robotiq_async {fields['library']}",

@@ -29,45 +29,28 @@ LEFT_SET: Final = (
 
 
 class Tape(Protocol):
-    """Where frames go."""
+    """Where frames go. It never blocks or fails; ``failure`` says why nothing more is kept, or is empty."""
 
     @property
-    def failure(self) -> str:
-        """Why nothing is kept any more; empty as long as it is."""
+    def failure(self) -> str: ...
 
-    def keep(self, frame: Frame) -> None:
-        """Take a frame; never blocks and never fails."""
+    def keep(self, frame: Frame) -> None: ...
 
-    def begin(self, stage: int) -> None:
-        """Note that a stage begins."""
+    def begin(self, stage: int) -> None: ...
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What is to be done.
+    """What is to be done."""
 
-    Attributes:
-        address: the gripper; tcp, rtu or rtu+tcp.
-        first: the stage to begin with.
-        last: the last stage.
-        agreed: up to this stage nobody is asked; -1 for none, at most 2.
-        label: what the report is called.
-        lengths: of the long checks.
-    """
-
-    address: Address
-    first: int = 0
-    last: int = LAST
-    agreed: int = -1
-    label: str = ""
-    lengths: Lengths = field(default_factory=Lengths)
+    address: Address  # the gripper; tcp, rtu or rtu+tcp
+    first: int = 0  # the stage to begin with
+    last: int = LAST  # the last stage
+    agreed: int = -1  # up to this stage nobody is asked; -1 for none, at most 2
+    label: str = ""  # what the report is called
+    lengths: Lengths = field(default_factory=Lengths)  # of the long checks
 
     def __post_init__(self) -> None:
-        """Check it.
-
-        Raises:
-            ValueError: a stage that there is not, or consent beforehand to one that moves.
-        """
         if not 0 <= self.first <= self.last <= LAST:
             raise ValueError(f"--from and --up-to must be 0 <= from <= up-to <= {LAST}")
         if not -1 <= self.agreed <= HARMLESS:
@@ -120,17 +103,13 @@ class Runner:
             raise
         finally:
             report.complete()
-            closing = asyncio.ensure_future(self._close())
-            with suppress(asyncio.CancelledError):
-                await wait_shielded(closing)
+            if self._is_found:
+                closing = asyncio.ensure_future(self._bench.link.close())
+                with suppress(asyncio.CancelledError):
+                    await wait_shielded(closing)
         return report
 
-    async def _close(self) -> None:
-        if self._is_found:
-            await self._bench.link.close()
-
     async def _do(self, stage: Stage) -> None:
-        """Look, ask, run, stop."""
         image = await self._look_first(stage)
         await self._ask(stage)
         if stage.number == 1 and not self._is_found:

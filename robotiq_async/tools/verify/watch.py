@@ -35,25 +35,15 @@ class Person(Protocol):
         """Ask; only Enter agrees. What was typed before the question counts for nothing."""
 
     async def chooses(self, question: str, answers: Mapping[str, str]) -> str | None:
-        """Ask for a key.
-
-        Args:
-            question: what is asked.
-            answers: the keys, each with its meaning.
-
-        Returns:
-            One of the keys; None to end the run.
-        """
+        """Ask for one of the keys of ``answers``, which say what they mean; None ends the run."""
 
 
-Envelope = Mapping[Finger, tuple[int, int]]
-"""The lowest and the highest position that each axis may have."""
+Envelope = Mapping[Finger, tuple[int, int]]  # the lowest and the highest position that each axis may have
 
 ANYWHERE: Final[Envelope] = dict.fromkeys(Finger.ALL, (0, 255))
 LASTING: Final = 3
 """Reads in which 0x09 must be seen to be a fault: siblings show it once after a second of silence."""
-SLICE_S: Final = 0.05
-"""While nothing may be sent the person is looked at so often."""
+SLICE_S: Final = 0.05  # while nothing may be sent the person is looked at so often
 STILL_S: Final = 0.15
 """What has not moved for so long stands: at the slowest speed a count takes 43 ms (thesis, table A1.1)."""
 LIMITS: Final = 20, 225
@@ -61,33 +51,17 @@ LIMITS: Final = 20, 225
 
 
 class Watch:
-    """Looks after one stage.
-
-    Attributes:
-        model: of the gripper.
-        envelope: where each axis may be; changed by the stage before each motion.
-        needs_active: whether the gripper must be active.
-        bears_faults: whether faults are what the stage is about.
-        last: the newest status.
-    """
+    """Looks after one stage."""
 
     def __init__(
         self, link: RecordedLink, person: Person, *, seconds: float, interval: float, spacing: float
     ) -> None:
-        """Begin.
-
-        Args:
-            link: to the gripper.
-            person: is asked before every exchange whether to stop.
-            seconds: for the whole stage.
-            interval: seconds between two reads.
-            spacing: seconds from one write to the next.
-        """
-        self.envelope = ANYWHERE
-        self.needs_active = True
-        self.bears_faults = False
-        self.last: RobotiqStatus | None = None
-        self.model = link.model
+        """Begin: so many seconds for the whole stage, between two reads, and from one write to the next."""
+        self.envelope = ANYWHERE  # where each axis may be; changed by the stage before each motion
+        self.needs_active = True  # whether the gripper must be active
+        self.bears_faults = False  # whether faults are what the stage is about
+        self.last: RobotiqStatus | None = None  # the newest status
+        self.model = link.model  # of the gripper
         self._link = link
         self._person = person
         self._interval = interval
@@ -98,12 +72,7 @@ class Watch:
         self._not_ready = 0
 
     async def look(self) -> RobotiqStatus:
-        """Read, and see that all is well.
-
-        Raises:
-            EndError: it is not.
-            RobotiqConnectionError: the link failed.
-        """
+        """Read, and see that all is well."""
         self.heed()
         status = self.last = await self._link.read()
         self.heed()
@@ -111,16 +80,7 @@ class Watch:
         return status
 
     async def write(self, request: Request, *, spaced: bool = True) -> float:
-        """Write an image unless the person has stopped; returns when it was acknowledged.
-
-        Args:
-            request: the image.
-            spaced: whether to wait until the last write is long enough ago to be kept.
-
-        Raises:
-            EndError: they have, or the time is over.
-            RobotiqConnectionError: the link failed.
-        """
+        """Write an image unless the person has stopped; returns when it was acknowledged."""
         self.heed()
         due = self._link.wrote + self._spacing if spaced else 0.0
         if (left := due - self._loop.time()) > 0:
@@ -162,11 +122,7 @@ class Watch:
         return await self.until(stands, seconds)
 
     async def rest(self, seconds: float) -> None:
-        """Ask nothing of the gripper for some seconds; the person still stops it.
-
-        Raises:
-            EndError: they do.
-        """
+        """Ask nothing of the gripper for some seconds; the person still stops it."""
         end = self._loop.time() + seconds
         while (left := end - self._loop.time()) > 0:
             self.heed()
@@ -174,11 +130,7 @@ class Watch:
         self.heed()
 
     def heed(self) -> None:
-        """See whether the person has stopped, or the time is over.
-
-        Raises:
-            EndError: so it is.
-        """
+        """See whether the person has stopped, or the time is over."""
         if self._person.has_stopped:
             raise EndError("stopped", "a key was pressed, or the terminal was closed")
         if self._loop.time() > self._until:
@@ -226,7 +178,6 @@ def _may_echo(asked: tuple[int, ...], shown: tuple[int, ...]) -> bool:
 
 
 def show_echo(echo: tuple[int, ...]) -> str:
-    """An echo for a sentence."""
     return ", ".join(str(int(each)) for each in echo)
 
 

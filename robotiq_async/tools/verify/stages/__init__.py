@@ -11,33 +11,19 @@ from . import first_motions, full_strokes, loss, reading, soak, soft_part, stopp
 
 
 class Stage(NamedTuple):
-    """One stage.
+    """One stage."""
 
-    Attributes:
-        number: 0..9.
-        title: a few words.
-        run: does it; what must end the run raises.
-        moves: what moves.
-        how_far: how far.
-        how_fast: how fast.
-        clear: what must be clear.
-        lasts: how long it takes.
-        is_moving: whether fingers move.
-        needs_active: whether the gripper must be active before.
-        jaw_moves: what moves of a gripper with a jaw, if that is something else.
-    """
-
-    number: int
-    title: str
-    run: Callable[[Bench], Awaitable[None]]
-    moves: str
-    how_far: str
-    how_fast: str
-    clear: str
-    lasts: str
-    is_moving: bool = True
-    needs_active: bool = True
-    jaw_moves: str = ""
+    number: int  # 0..9
+    title: str  # a few words
+    run: Callable[[Bench], Awaitable[None]]  # does it; what must end the run raises
+    moves: str  # what moves
+    how_far: str  # how far
+    how_fast: str  # how fast
+    clear: str  # what must be clear
+    lasts: str  # how long it takes
+    is_moving: bool = True  # whether fingers move
+    needs_active: bool = True  # whether the gripper must be active before
+    jaw_moves: str = ""  # what moves of a gripper with a jaw, if that is something else
 
     def as_text(self, model: Model = THREE_FINGER) -> str:
         """What a person reads before it."""

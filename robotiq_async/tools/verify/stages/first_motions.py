@@ -17,8 +17,7 @@ from ..watch import Watch
 
 SECONDS: Final = ACTIVATION_S + 20
 USUAL_S: Final = 20.0
-ROOM: Final = 1.5
-"""An activation_timeout is so many times what an activation took."""
+ROOM: Final = 1.5  # an activation_timeout is so many times what an activation took
 
 
 async def activation(bench: Bench) -> None:
@@ -27,24 +26,15 @@ async def activation(bench: Bench) -> None:
     took = await activate(watch)
     status = await watch.pass_by(1.0)
     found = f"{took:.1f} s"
-    if took <= USUAL_S:
-        bench.as_assumed("activation.time", found, seconds=took)
-    else:
-        wanted = round(ROOM * took)
-        options = {"activation_timeout": wanted} if wanted > ACTIVATION_TIMEOUT_S else {}
-        waits = options.get("activation_timeout", ACTIVATION_TIMEOUT_S)
-        follows = f"A hand waits {waits:g} s; others may wait less."
-        bench.differs("activation.time", found, follows, options, seconds=took)
+    wanted = round(ROOM * took)
+    options = {"activation_timeout": wanted} if wanted > ACTIVATION_TIMEOUT_S else {}
+    waits = options.get("activation_timeout", ACTIVATION_TIMEOUT_S)
+    follows = f"A hand waits {waits:g} s; others may wait less."
+    bench.judge("activation.time", took <= USUAL_S, found, follows, options, seconds=took)
     words = f"registers {status.registers[0]:04X} {status.registers[1]:04X}"
-    if not status.go_echo and all(
-        status.finger_status(axis) is ObjectStatus.IN_MOTION for axis in status.model.axes
-    ):
-        bench.as_assumed("activation.words", words)
-    else:
-        follows = (
-            "Nothing is to be set: a hand believes no gDT before it has asked for a position. Report this."
-        )
-        bench.differs("activation.words", words, follows)
+    zeros = all(status.finger_status(axis) is ObjectStatus.IN_MOTION for axis in status.model.axes)
+    follows = "Nothing is to be set: a hand believes no gDT before it has asked for a position. Report this."
+    bench.judge("activation.words", zeros and not status.go_echo, words, follows)
     bench.is_active = True
 
 
@@ -53,8 +43,7 @@ STEP_S: Final = 6.0
 """For one way: 1.3 s at the slowest speed (thesis, table A1.1), and what a gripper may take to begin."""
 LAG_WINDOW_S: Final = 0.5
 LAG_READ_S: Final = 0.002
-LAG_S: Final = 0.25
-"""So long a hand does not believe an object status that nothing else speaks for."""
+LAG_S: Final = 0.25  # so long a hand does not believe an object status that nothing else speaks for
 END_COUNTS: Final = 2
 
 QUESTION: Final = "Which finger has moved, there and back?"
@@ -157,23 +146,15 @@ def _judge(bench: Bench, found: _Found) -> None:
     if found.lags:
         worst = max(found.lags)
         words = f"at most {1000 * worst:.0f} ms after the echo"
-        if worst <= max(0.01, bench.interval):
-            bench.as_assumed("axis.lag", words, worst_ms=1000 * worst)
-        else:
-            follows = "Nothing is to be set: a hand does not believe an object status for 250 ms."
-            if worst > LAG_S:
-                follows = (
-                    "That is longer than a hand waits: its moves may end before they begin. Please report."
-                )
-            bench.differs("axis.lag", words, follows, worst_ms=1000 * worst)
-            if worst > LAG_S:
-                raise EndError("deviation", f"axis.lag: {words}, longer than a hand waits")
+        follows = "Nothing is to be set: a hand does not believe an object status for 250 ms."
+        if worst > LAG_S:
+            follows = "That is longer than a hand waits: its moves may end before they begin. Please report."
+        bench.judge("axis.lag", worst <= max(0.01, bench.interval), words, follows, worst_ms=1000 * worst)
+        if worst > LAG_S:
+            raise EndError("deviation", f"axis.lag: {words}, longer than a hand waits")
     else:
         bench.untold("axis.lag", "gDT showed no motion that began at a known status")
     worst_error = max(found.errors)
     words = f"at most {worst_error} counts beside the request"
-    if worst_error <= END_COUNTS:
-        bench.as_assumed("axis.end", words, counts=worst_error)
-    else:
-        follows = "Do not compare positions with requests; a hand goes by gDT."
-        bench.differs("axis.end", words, follows, counts=worst_error)
+    follows = "Do not compare positions with requests; a hand goes by gDT."
+    bench.judge("axis.end", worst_error <= END_COUNTS, words, follows, counts=worst_error)

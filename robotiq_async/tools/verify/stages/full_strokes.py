@@ -17,8 +17,7 @@ from ..watch import Watch
 
 SECONDS: Final = 180.0
 SPEEDS: Final = (0, 64, 255)
-STROKE_S: Final = 20.0
-"""Twice what the slowest one takes."""
+STROKE_S: Final = 20.0  # twice what the slowest one takes
 SCISSOR_SPEED: Final = 64
 SHARE: Final = 0.2
 CLOSED_AT_LEAST: Final = 240
@@ -75,7 +74,6 @@ async def _stroke(watch: Watch, image: Request, axes: tuple[Finger, ...]) -> tup
 
 
 async def _scissor(bench: Bench, watch: Watch, home: int) -> None:
-    """Both ends, and what is echoed there."""
     echoes: list[Figure] = []
     readings: list[Figure] = []
     for goal in (0, 255, home):
@@ -87,11 +85,8 @@ async def _scissor(bench: Bench, watch: Watch, home: int) -> None:
             echoes.append(status.requested_position(Finger.SCISSOR))
             readings.append(status.position(Finger.SCISSOR))
     words = f"0 and 255 are echoed as {echoes[0]} and {echoes[1]}, and read {readings[0]} and {readings[1]}"
-    if echoes == [0, 255]:
-        bench.as_assumed("stroke.scissor", words, echoes=echoes, readings=readings)
-    else:
-        follows = "Nothing is to be set: a hand learns the limits, and its moves end there."
-        bench.differs("stroke.scissor", words, follows, echoes=echoes, readings=readings)
+    follows = "Nothing is to be set: a hand learns the limits, and its moves end there."
+    bench.judge("stroke.scissor", echoes == [0, 255], words, follows, echoes=echoes, readings=readings)
 
 
 def _judge_times(bench: Bench, times: dict[int, float]) -> None:
@@ -99,12 +94,10 @@ def _judge_times(bench: Bench, times: dict[int, float]) -> None:
     usual = units_of(None, None, bench.model).closing_s
     share = max(abs(took / usual(speed) - 1) for speed, took in times.items())
     words = ", ".join(f"{took:.2f} s at speed {speed}" for speed, took in times.items())
-    if share <= SHARE:
-        bench.as_assumed("stroke.time", words, **figures)
-    else:
+    if share > SHARE:
         words += f"; up to {100 * share:.0f} % beside what is assumed"
-        follows = "Run robotiq-async measure speed, and give its table to the hand as calibration."
-        bench.differs("stroke.time", words, follows, **figures)
+    follows = "Run robotiq-async measure speed, and give its table to the hand as calibration."
+    bench.judge("stroke.time", share <= SHARE, words, follows, **figures)
 
 
 def _judge_readings(bench: Bench, readings: list[list[int]]) -> None:

@@ -17,11 +17,9 @@ from ..watch import ENTER, Watch
 
 SECONDS: Final = 900.0
 STEP: Final = 60
-GONE_S: Final = 4.0
-"""Longer than the motion takes."""
+GONE_S: Final = 4.0  # longer than the motion takes
 BEGINS_S: Final = 1.0
-BACK_S: Final = 60.0
-"""A gripper may boot for so long."""
+BACK_S: Final = 60.0  # A gripper may boot for so long
 RETRY_S: Final = 0.5
 AFTER_S: Final = 3.0
 RESETS: Final = 2
@@ -44,21 +42,18 @@ async def loss(bench: Bench) -> None:
     """One after the other; what needs hands is asked for, and may be skipped."""
     await _client(bench)
     await _alone(bench)
-    if await _wants(bench, CABLE, "loss.cable"):
-        await _cable(bench)
-    if await _wants(bench, ESTOP, "loss.estop"):
-        await _estop(bench)
-    if await _wants(bench, POWER, "loss.power"):
-        await _power(bench)
-
-
-async def _wants(bench: Bench, words: str, name: str) -> bool:
-    answer = await bench.person.chooses(words, GO_OR_SKIP)
-    if answer is None:
-        raise EndError("declined", f"{name} was neither done nor skipped")
-    if answer == "s":
-        bench.untold(name, "skipped")
-    return answer == ENTER
+    for words, name, part in (
+        (CABLE, "loss.cable", _cable),
+        (ESTOP, "loss.estop", _estop),
+        (POWER, "loss.power", _power),
+    ):
+        answer = await bench.person.chooses(words, GO_OR_SKIP)
+        if answer is None:
+            raise EndError("declined", f"{name} was neither done nor skipped")
+        if answer == "s":
+            bench.untold(name, "skipped")
+        else:
+            await part(bench)
 
 
 async def _client(bench: Bench) -> None:
@@ -99,11 +94,11 @@ async def _wake(bench: Bench, watch: Watch, image: Request, home: dict[Finger, i
             break
     else:
         raise EndError("time", "two motions on a new connection were not followed")
-    if number == 0:
-        bench.as_assumed("loss.wake", "the first motion on the new connection was followed")
-    else:
-        follows = "The first move after a connection raises MoveIgnoredError: call it again."
-        bench.differs("loss.wake", "the first motion was echoed and not followed; the second was", follows)
+    follows = "The first move after a connection raises MoveIgnoredError: call it again."
+    found = "the first motion on the new connection was followed"
+    if number:
+        found = "the first motion was echoed and not followed; the second was"
+    bench.judge("loss.wake", number == 0, found, follows)
     if await watch.until(lambda status: are_near(status, home, MARGIN), 6.0) is None:
         raise EndError("time", f"{bench.first} did not come back within 6 s")
     await watch.until_still(2.0)
@@ -159,7 +154,6 @@ async def _back(bench: Bench) -> tuple[list[RobotiqStatus], float]:
 
 
 def _faults(statuses: list[RobotiqStatus]) -> list[Figure]:
-    """The faults shown, in their order."""
     shown: list[Figure] = []
     for status in statuses:
         if status.fault.name not in shown[-1:]:
@@ -207,9 +201,7 @@ async def _power(bench: Bench) -> None:
         found = "rACT or rGTO is still set after the loss of power"
         bench.differs("loss.power", found, follows, **figures)
     else:
-        words = (
-            f"answered {answered:.1f} s later, reset; showed {', '.join(map(str, figures['faults'] or []))}"  # type: ignore[arg-type]
-        )
+        words = f"answered {answered:.1f} s later, reset; showed {', '.join(map(str, _faults(statuses)))}"
         bench.as_assumed("loss.power", words, **figures)
     if not statuses[-1].is_activated and not await _activated_anew(bench):
         raise EndError("inactive", "the gripper could not be activated after the loss of power")

@@ -6,10 +6,9 @@ import asyncio
 import math
 from collections import Counter
 from dataclasses import replace
-from pathlib import Path
 from typing import Final
 
-from ....link.serial_ports import USB_SERIAL, latency_file, latency_timer
+from ....link.serial_ports import latency_file, latency_timer
 from ....session.gripper_link import registers_of
 from ....values.enums import Fault
 from ....values.errors import RobotiqConnectionError
@@ -26,13 +25,8 @@ LATE_S: Final = 0.001
 KEPT_MS: Final = 2
 
 
-async def host(bench: Bench, folder: Path = USB_SERIAL) -> None:
-    """Measure the timers, and read the latency timer of a serial adapter.
-
-    Args:
-        bench: has the address.
-        folder: where the system tells of its adapters.
-    """
+async def host(bench: Bench) -> None:
+    """Stage 0: measure the timers, and read the latency timer of a serial adapter."""
     loop, late = asyncio.get_running_loop(), []
     for _ in range(TIMERS):
         due = loop.time() + SLEEP_S
@@ -46,48 +40,36 @@ async def host(bench: Bench, folder: Path = USB_SERIAL) -> None:
         "p99_ms": 1000 * p99,
         "worst_ms": 1000 * late[-1],
     }
-    if p99 < LATE_S:
-        bench.as_assumed("host.timer", found, **figures)
-    else:
-        follows = "The times below are partly this computer's: let nothing else run on it."
-        bench.differs("host.timer", found, follows, **figures)
-    _adapter(bench, folder)
+    follows = "The times below are partly this computer's: let nothing else run on it."
+    bench.judge("host.timer", p99 < LATE_S, found, follows, **figures)
+    _adapter(bench)
 
 
-def _adapter(bench: Bench, folder: Path) -> None:
+def _adapter(bench: Bench) -> None:
     if bench.address.kind != "rtu":
         bench.as_assumed("host.adapter", "there is none: the gripper is reached through a socket")
         return
-    kept = latency_timer(bench.address.host, folder)
+    kept = latency_timer(bench.address.host)
     if kept is None:
-        bench.untold(
-            "host.adapter", "the system does not say; only FTDI adapters on Linux have a timer to read"
-        )
-    elif kept <= KEPT_MS:
-        bench.as_assumed("host.adapter", f"passes on what it hears after {kept} ms", latency_ms=kept)
-    else:
-        file = latency_file("PORT", folder)
-        follows = (
-            f"Every read waits for that: echo 1 | sudo tee {file}, with PORT as ttyUSB0 or what yours is."
-        )
-        bench.differs("host.adapter", f"passes on what it hears after {kept} ms", follows, latency_ms=kept)
+        why = "the system does not say; only FTDI adapters on Linux have a timer to read"
+        bench.untold("host.adapter", why)
+        return
+    found = f"passes on what it hears after {kept} ms"
+    file = latency_file("PORT")
+    follows = f"Every read waits for that: echo 1 | sudo tee {file}, with PORT as ttyUSB0 or what yours is."
+    bench.judge("host.adapter", kept <= KEPT_MS, found, follows, latency_ms=kept)
 
 
 UNITS: Final = (0, 1, 2, 9, 255)
-NOWHERE: Final = 3000
-"""No source has registers of a 3-Finger there."""
-PERIODS_S: Final = (0.02, 0.01)
-"""Between reads, beside the usual interval."""
-LET_GO_S: Final = 0.5
-"""For a gateway that serves one client to see that one has gone."""
-GONE_S: Final = 0.05
-"""For a gripper to see that a connection has been closed."""
+NOWHERE: Final = 3000  # no source has registers of a 3-Finger there
+PERIODS_S: Final = (0.02, 0.01)  # between reads, beside the usual interval
+LET_GO_S: Final = 0.5  # for a gateway that serves one client to see that one has gone
+GONE_S: Final = 0.05  # for a gripper to see that a connection has been closed
 LONGEST_INTERVAL_S: Final = 0.1
 OTHERS: Final = 2
 
 
 async def reading(bench: Bench) -> None:
-    """Everything that reading tells."""
     _registers(bench)
     await _others(bench)
     await _counts(bench)
@@ -98,11 +80,7 @@ async def reading(bench: Bench) -> None:
 
 
 async def _unchanged(bench: Bench) -> None:
-    """Nothing was written, so what is requested is what it was.
-
-    Raises:
-        EndError: it is not; or there is a fault.
-    """
+    """Nothing was written, so what is requested is what it was."""
     assert bench.found is not None
     statuses = [await bench.link.read() for _ in range(LASTING)]
     if statuses[-1].echo != bench.found.echo:
@@ -127,13 +105,8 @@ def _registers(bench: Bench) -> None:
         f"unit {found.device_id}, function {found.read_function}, "
         f"requests at {found.request}, status at {found.status}"
     )
-    if options:
-        follows = (
-            "Give the hand the options below. See that what is read is the status, and not the requests."
-        )
-        bench.differs("read.registers", words, follows, options)
-    else:
-        bench.as_assumed("read.registers", words)
+    follows = "Give the hand the options below. See that what is read is the status, and not the requests."
+    bench.judge("read.registers", not options, words, follows, options)
 
 
 async def _others(bench: Bench) -> None:
@@ -205,8 +178,7 @@ async def _counts(bench: Bench) -> None:
 
 
 async def _round_trip(bench: Bench) -> None:
-    limit, figures = bench.interval, dict[str, Figure]()
-    worst = 0.0
+    worst, figures = 0.0, dict[str, Figure]()
     for period in (*PERIODS_S, bench.interval):
         times = sorted(await _trips(bench.link, bench.lengths.reads, period))
         p50, p99 = percentile(times, 0.5), percentile(times, 0.99)
@@ -215,14 +187,12 @@ async def _round_trip(bench: Bench) -> None:
         figures[f"{name}_histogram"] = _histogram(times)
         worst = max(worst, p99)
     found = f"99 of 100 reads take at most {1000 * worst:.1f} ms"
-    if worst < limit:
-        bench.as_assumed("read.round_trip", found, **figures)
-        return
     interval = min(LONGEST_INTERVAL_S, math.ceil(1000 * worst * 1.2) / 1000)
     follows = (
         f"Fingers are watched every {1000 * interval:g} ms at best; use a wired network if this is none."
     )
-    bench.differs("read.round_trip", found, follows, {"poll_interval": interval}, **figures)
+    options = {"poll_interval": interval}
+    bench.judge("read.round_trip", worst < bench.interval, found, follows, options, **figures)
 
 
 def _histogram(seconds: list[float]) -> list[Figure]:
@@ -242,7 +212,6 @@ async def _trips(link: RecordedLink, count: int, period: float) -> list[float]:
 
 
 async def _connections(bench: Bench) -> None:
-    """Others come while the first reads."""
     assert bench.registers is not None
     if bench.address.kind == "rtu":
         bench.as_assumed("read.connections", "a serial port has one owner", connections=1)
@@ -287,16 +256,13 @@ async def _silence(bench: Bench) -> None:
         if statuses[1].is_activated != first.is_activated:
             lost = f"after {seconds:g} s"
             break
-    longest = sum(bench.lengths.idle)
     if lost:
         follows = "A program that polls keeps it; after a pause the next start activates: it MOVES."
         bench.differs("read.idle", f"the activation was lost {lost} of silence", follows)
     else:
-        bench.as_assumed("read.idle", f"answers after each of {longest:g} s of silence in all")
-    _judge_silence(bench, shown, lasting)
-
-
-def _judge_silence(bench: Bench, shown: list[Figure], lasting: str) -> None:
+        bench.as_assumed(
+            "read.idle", f"answers after each of {sum(bench.lengths.idle):g} s of silence in all"
+        )
     passing = [each for each in shown if isinstance(each, list) and each[1] == Fault.COMMUNICATION_NOT_READY]
     if lasting:
         follows = "A hand takes that for a fault: poll all the time, and report this, please."

@@ -20,8 +20,7 @@ RATES: Final = (10, 20, 50, 100)
 SPEED: Final = 64
 SWING: Final = 15
 FAILED: Final = 1e-4
-LEAST_READS: Final = 10_000
-"""With fewer a single failure would be too many."""
+LEAST_READS: Final = 10_000  # with fewer a single failure would be too many
 MOST_FAILURES: Final = 20
 
 
@@ -61,11 +60,8 @@ async def _read(bench: Bench) -> None:
         "failures": failures,
     }
     words = f"{failed} of {len(times) + len(failures)} reads failed"
-    if failed <= FAILED * max(len(times), LEAST_READS):
-        bench.as_assumed("soak.reads", words, **figures)
-    else:
-        follows = "Look at cable, shield and switch: each lost connection ends the moves that are awaited."
-        bench.differs("soak.reads", words, follows, **figures)
+    follows = "Look at cable, shield and switch: each lost connection ends the moves that are awaited."
+    bench.judge("soak.reads", failed <= FAILED * max(len(times), LEAST_READS), words, follows, **figures)
 
 
 def _repeats(bench: Bench) -> int:
@@ -108,18 +104,14 @@ async def _burst(
     moving = replace(image, go=True)
     while loop.time() - began < bench.lengths.commands:
         due = loop.time() + 1 / rate
-        await watch.write(_at(moving, home + step * (5 + sent % 6)), spaced=False)
+        await watch.write(moving.with_positions({Finger.A: home + step * (5 + sent % 6)}), spaced=False)
         sent += 1
         await watch.look()
         await asyncio.sleep(max(0.0, due - loop.time()))
     seconds = loop.time() - began
     await asyncio.sleep(0.1)
     last = {Finger.A: home + step * SWING}
-    await watch.write(_at(moving, last[Finger.A]))
+    await watch.write(moving.with_positions(last))
     ends = await watch.until(lambda status: are_near(status, last, MARGIN), 3.0) is not None
     await watch.until_still(2.0)
     return sent, seconds, ends
-
-
-def _at(image: Request, position: int) -> Request:
-    return image.with_positions({Finger.A: position})

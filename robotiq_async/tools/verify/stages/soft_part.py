@@ -80,21 +80,17 @@ def _judge_contact(bench: Bench, held: RobotiqStatus) -> None:
     drawn = max(held.current_ma(finger) for finger in bench.fingers)
     if not held.contacts:
         bench.untold("soft.current", "nothing was held")
-    elif drawn == 0:
-        bench.as_assumed("soft.current", "0 mA while it is held", milliampere=0)
     else:
+        words = f"up to {drawn} mA while it is held" if drawn else "0 mA while it is held"
         follows = "Nothing is to be set: a hand takes no current for a sign of a grip."
-        bench.differs("soft.current", f"up to {drawn} mA while it is held", follows, milliampere=drawn)
+        bench.judge("soft.current", drawn == 0, words, follows, milliampere=drawn)
 
 
 def _judge_halt(bench: Bench, answer: str, held: RobotiqStatus, left: RobotiqStatus) -> None:
     moved = max(abs(left.position(finger) - held.position(finger)) for finger in bench.fingers)
-    if answer == "y":
-        bench.as_assumed("soft.halt", f"held for {LEFT_S:g} s; fingers moved by {moved} counts", counts=moved)
-    elif answer == "n":
-        follows = "A stop, and the end of a program without keep_grip, lets go of the part."
-        bench.differs(
-            "soft.halt", f"the part came loose; fingers moved by {moved} counts", follows, counts=moved
-        )
-    else:
+    if answer not in ANSWERS:
         bench.untold("soft.halt", "nothing was held")
+        return
+    what = f"held for {LEFT_S:g} s" if answer == "y" else "the part came loose"
+    follows = "A stop, and the end of a program without keep_grip, lets go of the part."
+    bench.judge("soft.halt", answer == "y", f"{what}; fingers moved by {moved} counts", follows, counts=moved)

@@ -57,11 +57,8 @@ async def _halt(bench: Bench, watch: Watch, away: Request, home: dict[Finger, in
     )
     counts, seconds = await _stop(bench, watch, replace(away, go=False), status)
     words = f"{counts} counts and {1000 * seconds:.0f} ms at speed {SPEED}"
-    if counts <= COUNTS:
-        bench.as_assumed("stop.halt", words, counts=counts, seconds=seconds)
-    else:
-        follows = "Do not rely on a stop by software; report this."
-        bench.differs("stop.halt", words, follows, counts=counts, seconds=seconds)
+    follows = "Do not rely on a stop by software; report this."
+    bench.judge("stop.halt", counts <= COUNTS, words, follows, counts=counts, seconds=seconds)
 
 
 async def _stop(bench: Bench, watch: Watch, image: Request, status: RobotiqStatus) -> tuple[int, float]:
@@ -94,28 +91,29 @@ async def _resume(bench: Bench, watch: Watch, away: Request, far: dict[Finger, i
     await watch.until_still(2.0)
 
 
-async def _new_target(bench: Bench, watch: Watch, image: Request, home: dict[Finger, int]) -> None:
-    """Towards home; half way back out a little."""
+async def _half_way_home(
+    bench: Bench, watch: Watch, image: Request, home: dict[Finger, int]
+) -> RobotiqStatus:
     near = {finger: home[finger] + 10 for finger in bench.fingers}
     await watch.write(replace(image, go=True).with_positions(near))
-    await _until_past(watch, lambda s: all(s.position(f) <= home[f] + STROKE - 30 for f in bench.fingers))
+    return await _until_past(
+        watch, lambda s: all(s.position(f) <= home[f] + STROKE - 30 for f in bench.fingers)
+    )
+
+
+async def _new_target(bench: Bench, watch: Watch, image: Request, home: dict[Finger, int]) -> None:
+    """Towards home; half way back out a little."""
+    await _half_way_home(bench, watch, image, home)
     turned = {finger: home[finger] + STROKE - 10 for finger in bench.fingers}
     await watch.write(replace(image, go=True).with_positions(turned))
-    if await watch.until(lambda status: are_near(status, turned, MARGIN), LEG_S) is None:
-        bench.differs(
-            "stop.target", "the new request is not followed", "A motion cannot be replaced: report this."
-        )
-    else:
-        bench.as_assumed("stop.target", "fingers turn round, and stop at the new request")
+    turns = await watch.until(lambda status: are_near(status, turned, MARGIN), LEG_S) is not None
+    found = "fingers turn round, and stop at the new request" if turns else "the new request is not followed"
+    bench.judge("stop.target", turns, found, "A motion cannot be replaced: report this.")
     await watch.until_still(2.0)
 
 
 async def _hold(bench: Bench, watch: Watch, image: Request, home: dict[Finger, int]) -> None:
-    near = {finger: home[finger] + 10 for finger in bench.fingers}
-    await watch.write(replace(image, go=True).with_positions(near))
-    status = await _until_past(
-        watch, lambda s: all(s.position(f) <= home[f] + STROKE - 30 for f in bench.fingers)
-    )
+    status = await _half_way_home(bench, watch, image, home)
     here = {finger: status.position(finger) for finger in bench.fingers}
     counts, seconds = await _stop(bench, watch, replace(image, go=True).with_positions(here), status)
     words = f"within {counts} counts, {1000 * seconds:.0f} ms"
