@@ -1,7 +1,9 @@
-"""Admission: nothing twice, late, out of turn, under an old lease, or by the wrong gripper."""
+"""What is carried out: nothing twice, late, out of order, under an old lease, or by the wrong gripper."""
 
 from __future__ import annotations
 
+import asyncio
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
@@ -9,13 +11,33 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robotiq_async.fleet.agent.agent import Questions
 from robotiq_async.fleet.control.admission import Admission
-from robotiq_async.fleet.control.lease import Lease
+from robotiq_async.fleet.control.budget import ALL, EACH, Budget
+from robotiq_async.fleet.control.lease import Holder, Lease
+from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.wire.envelope import Call
 from robotiq_async.values.errors import AgentError, ControlLostError
+from tests.fleet.cell import LEFT
+from tests.fleet.lab import Lab, lab
+from tests.virtual import virtual
 
 BASE, EPOCH = "robotiq/v1/lab/cell/left", 77
 NOW = 100.0
+CLIENTS = st.sampled_from(["anna", "ben", "cleo"])
+STEP = st.tuples(
+    st.sampled_from(["acquire", "take", "admit", "admit", "admit", "renew", "release", "bar", "wait"]),
+    CLIENTS,
+    st.integers(0, 4),  # the request is so many numbers old
+    st.integers(0, 2),  # the lease is so many old
+    st.sampled_from([-3.0, -0.9, -0.2, 0.0, 0.0, 0.0, 0.1]),  # when the agent was heard
+)
+ANNA, BEN = Holder("a", "anna@cell:1"), Holder("b", "ben@cell:2")
+FLOOD = 8000
+"""Questions a second: they took an agent from 203 polls a second to 119."""
+
+
+# -- admission ---------------------------------------------------------------------------------------------
 
 
 def admission(holder: str = "anna", number: int = 1) -> tuple[Admission, Call]:
@@ -23,12 +45,6 @@ def admission(holder: str = "anna", number: int = 1) -> tuple[Admission, Call]:
     one = Admission(BASE, EPOCH, Lease(1.0))
     lease = one.acquire(Call(BASE, holder, EPOCH, 0, number, NOW), holder)
     return one, Call(BASE, holder, EPOCH, lease, number + 1, NOW)
-
-
-def test_what_is_let_in() -> None:
-    one, call = admission()
-    for number in (2, 3, 10):
-        one.admit(replace(call, number=number), NOW)
 
 
 @pytest.mark.parametrize(
@@ -47,14 +63,6 @@ def test_for_another_run_of_the_agent() -> None:
     for epoch in (EPOCH - 1, EPOCH + 1, 1):
         with pytest.raises(AgentError, match="the agent was restarted"):
             one.check_meant(replace(call, epoch=epoch))
-
-
-@pytest.mark.parametrize("number", [0, 1, 2])
-def test_overtaken_or_repeated(number: int) -> None:
-    one, call = admission()
-    one.admit(call, NOW)
-    with pytest.raises(AgentError, match="a later request overtook"):
-        one.admit(replace(call, number=number), NOW)
 
 
 def test_of_somebody_else_or_under_another_lease() -> None:
@@ -95,21 +103,6 @@ def test_too_long_on_its_way_or_from_the_future(seen: float) -> None:
     one.admit(replace(call, seen=NOW - 0.999), NOW)
 
 
-def test_a_refused_request_does_not_count() -> None:
-    one, call = admission()
-    with pytest.raises(ControlLostError):
-        one.admit(replace(call, number=50, seen=NOW - 5), NOW)
-    one.admit(replace(call, number=3), NOW)
-
-
-def test_a_request_prolongs_the_lease_and_a_renewal_does_not_count() -> None:
-    one, call = admission()
-    one.renew(replace(call, number=9, seen=NOW + 0.5), NOW + 0.5)
-    assert one.lease.expires == NOW + 1.5
-    one.admit(replace(call, number=3, seen=NOW + 0.7), NOW + 0.8)
-    assert one.lease.expires == NOW + 1.7
-
-
 def test_a_bar() -> None:
     one, call = admission()
     one.bar(replace(call, number=20))
@@ -119,19 +112,6 @@ def test_a_bar() -> None:
     with pytest.raises(AgentError, match="overtook"):
         one.admit(replace(call, number=19), NOW)
     one.admit(replace(call, number=21), NOW)
-
-
-def test_the_lease_is_not_given_to_two() -> None:
-    one, _ = admission()
-    with pytest.raises(ControlLostError, match="anna commands the gripper") as caught:
-        one.acquire(Call(BASE, "ben", EPOCH, 0, 1, NOW), "ben")
-    assert caught.value.reason == "held"
-
-
-def test_nothing_asked_before_the_lease_is_let_in_under_it() -> None:
-    one, call = admission(number=10)
-    with pytest.raises(AgentError, match="overtook"):
-        one.admit(replace(call, number=9), NOW)
 
 
 def test_a_repeated_request_for_the_lease() -> None:
@@ -172,16 +152,6 @@ class Model:
     carried_out: dict[int, list[int]] = field(default_factory=dict)
     proven: float = 0.0
     holder: str | None = None
-
-
-CLIENTS = st.sampled_from(["anna", "ben", "cleo"])
-STEP = st.tuples(
-    st.sampled_from(["acquire", "take", "admit", "admit", "admit", "renew", "release", "bar", "wait"]),
-    CLIENTS,
-    st.integers(0, 4),  # the request is so many numbers old
-    st.integers(0, 2),  # the lease is so many old
-    st.sampled_from([-3.0, -0.9, -0.2, 0.0, 0.0, 0.0, 0.1]),  # when the agent was heard
-)
 
 
 @settings(max_examples=1500)
@@ -244,3 +214,102 @@ def raises(ask: Callable[[], object]) -> Exception | None:
     except (ControlLostError, AgentError) as error:
         return error
     return None
+
+
+# -- lease -------------------------------------------------------------------------------------------------
+
+
+def test_it_is_nobody_s_at_first() -> None:
+    lease = Lease()
+    assert lease.holder is None
+    assert lease.number == 0
+    assert not lease.has_expired(1e9)
+    assert lease.end("taken") is None
+    assert lease.number == 0, "nothing has changed"
+
+
+@pytest.mark.parametrize(
+    ("seen", "fresh"), [(9.0, True), (8.999, False), (10.0, True), (10.001, False), (-1e300, False)]
+)
+def test_fresh_is_within_the_window_and_not_from_the_future(seen: float, fresh: bool) -> None:
+    assert Lease(1.0).is_fresh(seen, 10.0) is fresh
+
+
+def test_it_is_known_why_a_lease_ended_for_a_while() -> None:
+    lease = Lease()
+    first = lease.grant(ANNA, 0.0)
+    lease.end("taken")
+    second = lease.grant(BEN, 0.0)
+    lease.end("halted")
+    assert (lease.end_of(first), lease.end_of(second)) == ("taken", "halted")
+    for _ in range(1000):
+        lease.grant(ANNA, 0.0)
+        lease.end("released")
+    assert lease.end_of(first) == "expired", "so long ago nobody remembers"
+    assert len(lease._ends) <= 64
+
+
+# -- questions ---------------------------------------------------------------------------------------------
+
+
+def test_each_client_has_a_second_s_worth_and_then_its_rate() -> None:
+    budget = Budget()
+    assert sum(budget.allows("a", 10.0) for _ in range(FLOOD)) == EACH
+    assert budget.allows("b", 10.0), "others are not concerned"
+    assert sum(budget.allows("a", 11.0 + each / 1000) for each in range(1000)) in range(190, 202)
+    assert sum(budget.allows("a", 99.0) for _ in range(FLOOD)) == EACH, "what was not used is not saved up"
+
+
+def test_all_together_have_one_as_well() -> None:
+    """Who calls itself something else each time."""
+    budget = Budget()
+    assert sum(budget.allows(f"client {each}", 5.0) for each in range(FLOOD)) == ALL
+    assert len(budget._each) <= 1000
+
+
+def test_a_client_is_told_by_what_it_says() -> None:
+    questions = Questions(lambda: 1.0)
+    payloads = [Call(LEFT.base, "one").pack(), b'{"client":"one"}', b"", b"{}", b'{"client": 3}', b"\xff"]
+    for payload, left in zip(payloads, (EACH, 0, EACH, 0, 0, 0), strict=True):
+        assert sum(questions.allow(payload) for _ in range(FLOOD)) == left
+
+
+def test_what_is_dropped_is_said_once_in_a_while(caplog: pytest.LogCaptureFixture) -> None:
+    at = 1.0
+    questions = Questions(lambda: at)
+    with caplog.at_level(logging.WARNING):
+        for _ in range(3000):
+            questions.allow(b"")
+            at += 0.005
+    assert caplog.text.count("were dropped: a client asks too many") in (0, 1, 2)
+    with caplog.at_level(logging.WARNING):
+        for _ in range(FLOOD):
+            questions.allow(b"")
+    assert caplog.text.count("were dropped: a client asks too many") in (1, 2)
+
+
+@virtual
+async def test_a_flood_of_questions_leaves_other_clients_and_the_log_alone(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async with lab() as here, here.client() as hand:
+        flooding = asyncio.create_task(flood(here))
+        await asyncio.sleep(0.5)
+        async with here.client("reader", control=False) as reader:
+            await hand.move(30)
+            await reader.halt()
+        answered = await flooding
+        assert answered <= 4 * EACH < FLOOD
+        assert caplog.text.count("questions were dropped") == 1
+
+
+async def flood(here: Lab) -> int:
+    """Ask for a second; returns how many answers came."""
+    bus, answers = here.network.bus("flooding"), []
+    for number in range(FLOOD // 8):
+        call = Call(LEFT.base, "curious", number=number)
+        answers += [
+            bus.ask(LEFT.key("info"), call.pack(), timeout=1.0, urgency=Urgency.COMMAND) for _ in range(8)
+        ]
+        await asyncio.sleep(0.001)
+    return sum(reply is not None for reply in await asyncio.gather(*answers))

@@ -1,7 +1,4 @@
-"""Halts: of one gripper and of all, from anybody, and what a halt that failed says.
-
-A project and a number in a docstring: the issue in which it went wrong with that project's robots.
-"""
+"""Halts, by any client, of one gripper and of all; and fingers without a client are held."""
 
 from __future__ import annotations
 
@@ -11,17 +8,21 @@ import gc
 
 import pytest
 
-from robotiq_async import Finger, State
+from robotiq_async import Finger, RobotiqError, State
 from robotiq_async.fleet.fleet import Fleet
+from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.remote.requests import NoAnswerError
 from robotiq_async.fleet.remote.stops import until_answered
-from robotiq_async.fleet.wire.envelope import Call
+from robotiq_async.fleet.wire.envelope import Answer, Call
 from robotiq_async.fleet.wire.names import GripperName
-from robotiq_async.values.errors import NotAllowedError, NotAllStoppedError, RobotiqStateError
-from tests.fleet.by_hand import LEFT, ask, move_slowly
-from tests.fleet.cell import told
+from robotiq_async.values.errors import AgentError, NotAllowedError, NotAllStoppedError, RobotiqStateError
+from tests.fleet.cell import LEFT, ask, move_slowly, told
+from tests.fleet.lab import Spoiling, lab
 from tests.fleet.world import motions, world
+from tests.grippers import Restless
 from tests.virtual import VirtualLoop, virtual
+
+# -- halts -------------------------------------------------------------------------------------------------
 
 
 @virtual
@@ -36,16 +37,6 @@ async def test_a_second_halt_is_not_dropped_as_a_duplicate() -> None:
             assert await call == "ControlLost halted"
             await here.holder.do(here.holder.hand.acquire())
             await here.holder.do(here.holder.hand.move(0, Finger.A, speed=255))
-
-
-@virtual
-async def test_a_halt_needs_no_lease() -> None:
-    """strands-labs/robots 3450: a stop was refused under somebody else's lock."""
-    async with world() as here:
-        call = await move_slowly(here)
-        await here.other.do(here.other.hand.halt())
-        assert not here.gripper.is_moving
-        assert await call == "ControlLost halted"
 
 
 @virtual
@@ -180,3 +171,149 @@ async def test_a_halt_that_was_denied_is_not_called_lost_because_the_last_attemp
 
     with pytest.raises(NotAllowedError):
         await until_answered(attempt, 2.0)
+
+
+# -- unattended motion -------------------------------------------------------------------------------------
+
+
+async def cut_off(hand: RemoteHand) -> None:
+    """Begin a slow move, and cancel it on its way."""
+    with pytest.raises(TimeoutError):
+        async with asyncio.timeout(0.3):
+            await hand.move(255, Finger.A, speed=0)
+
+
+@virtual
+async def test_what_moves_is_held_as_soon_as_the_gripper_is_reached_again() -> None:
+    """The lease ends while the agent has lost its gripper, which goes on to its target."""
+    async with world() as here:
+        await move_slowly(here)
+        await here.servers["left"].stop()
+        await here.until(lambda: here.other.hand.state is State.DISCONNECTED)
+        here.kill(here.holder.host)
+        await asyncio.sleep(1.5)
+        assert here.gripper.is_moving
+        await here.servers["left"].start()
+        await here.until(lambda: here.other.hand.state is State.RUNNING_IDLE)
+        await asyncio.sleep(0.2)
+        assert not here.gripper.is_moving
+
+
+@virtual
+async def test_a_refused_command_does_not_forget_the_hold_that_is_owed() -> None:
+    """It was forgotten before the command was known to be carried out, and a dead holder's fingers ran on."""
+    async with lab() as here:
+        gone, other = here.client("gone"), here.client("other", control=False)
+        await gone.start()
+        await other.start()
+        moving = asyncio.create_task(gone.move(255, Finger.ABC, speed=0))
+        while not here.gripper.is_moving:  # noqa: ASYNC110  # what is waited for tells nobody
+            await asyncio.sleep(0.001)
+        await here.server.stop()
+        here.network.cut(("gone", "agent"), ("agent", "gone"))
+        await asyncio.sleep(1.2)
+        await other.acquire()
+        with pytest.raises(RobotiqError):
+            await other.set_speed(10)
+        await here.server.start()
+        await asyncio.sleep(1.0)
+        assert not here.gripper.is_moving
+        await asyncio.gather(moving, return_exceptions=True)
+        await other.stop()
+        await gone.stop()
+
+
+@virtual
+@pytest.mark.parametrize("lost", [1, 1_000_000])
+async def test_a_cancelled_move_is_called_off_although_that_was_lost(lost: int) -> None:
+    """It was asked once, and the fingers ran on under a lease that was renewed."""
+    async with lab() as here:
+        bus = Spoiling(here.network.bus("client"), "cmd/cancel", times=lost)
+        async with here.client_over(bus) as hand:
+            await cut_off(hand)
+            await asyncio.sleep(2.5)
+            assert not here.gripper.is_moving
+            assert here.gripper.position(Finger.A) < 220
+
+
+@virtual
+async def test_a_cancelled_move_is_called_off_although_that_was_misrouted() -> None:
+    """Any refusal counted as the end of the lease, and the fingers ran on under one that was renewed."""
+    async with lab() as here:
+        answer = Answer("robotiq/v1/lab/cell/right", 3, 1, {}).pack()
+        bus = Spoiling(here.network.bus("client"), "cmd/cancel", times=1, answer=answer, is_sent=False)
+        async with here.client_over(bus) as hand:
+            await cut_off(hand)
+            await asyncio.sleep(0.2)
+            assert not here.gripper.is_moving
+            assert hand.is_in_control
+
+
+@virtual
+async def test_a_move_whose_answer_was_anothers_is_called_off() -> None:
+    async with lab() as here:
+        answer = Answer("robotiq/v1/lab/cell/right", 3, 1, {}).pack()
+        async with here.client_over(Spoiling(here.network.bus("client"), "cmd/move", answer=answer)) as hand:
+            with pytest.raises(AgentError, match="another answer"):
+                await hand.move(255, Finger.A, speed=0)
+            await asyncio.sleep(0.5)
+            assert not here.gripper.is_moving
+
+
+# -- kept grips --------------------------------------------------------------------------------------------
+
+
+@virtual
+async def test_a_grip_is_kept_by_a_hand_that_was_made_for_it() -> None:
+    async with lab() as here:
+        here.gripper.place_object(Finger.B | Finger.C, 100)
+        async with here.client(keep_grip=True) as hand:
+            await hand.close(Finger.B | Finger.C)
+            await hand.set_speed(0, Finger.A)
+            await hand.set_position(255, Finger.A)
+        await asyncio.sleep(5)
+        assert here.gripper.grips == Finger.B | Finger.C
+        assert here.gripper.position(Finger.A) < 40
+        async with here.client("next") as hand:
+            await hand.move(60, Finger.A)
+            assert here.gripper.grips == Finger.B | Finger.C, "and by who comes next"
+        assert not here.gripper.grips
+
+
+@virtual
+async def test_a_grip_is_kept_when_the_lease_is_given_back() -> None:
+    async with lab() as here, here.client() as hand:
+        here.gripper.place_object(Finger.ABC, 100)
+        await hand.close()
+        await hand.release(keep_grip=True)
+        assert here.gripper.grips == Finger.ABC
+        await hand.acquire()
+        await hand.release()
+        assert not here.gripper.grips
+
+
+@virtual
+async def test_what_does_not_come_to_rest_is_halted() -> None:
+    async with lab(kind=Restless) as here, here.client() as hand:
+        await hand.release(keep_grip=True)
+        assert not here.local.status.go_echo
+
+
+@virtual
+async def test_what_does_not_come_to_rest_is_left_to_whoever_commands_it_by_then() -> None:
+    async with lab(kind=Restless) as here, here.client() as hand:
+        releasing = asyncio.create_task(hand.release(keep_grip=True))
+        await asyncio.sleep(0.1)
+        async with here.client("next"):
+            await releasing
+            assert here.local.status.go_echo
+
+
+@virtual
+async def test_an_agent_may_keep_a_grip_at_its_own_end() -> None:
+    async with lab(keep_grip=True) as here:
+        here.gripper.place_object(Finger.ABC, 100)
+        async with here.client(keep_grip=True) as hand:
+            await hand.close()
+        await here.end_agent()
+        assert here.gripper.grips == Finger.ABC

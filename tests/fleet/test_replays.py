@@ -1,7 +1,4 @@
-"""Nothing old counts: neither requests that waited, nor statuses, nor answers of another run.
-
-A project and a number in a docstring: the issue in which it went wrong with that project's robots.
-"""
+"""Nothing old counts: neither requests that waited, nor statuses, nor answers of another run."""
 
 from __future__ import annotations
 
@@ -9,13 +6,20 @@ import asyncio
 
 import pytest
 
-from robotiq_async import ConnectionLostError, Finger, State
-from tests.fleet.by_hand import LEFT
-from tests.fleet.cell import told
-from tests.fleet.lab import lab
-from tests.fleet.spoiling import Garbling
-from tests.fleet.world import World, motions, world
-from tests.virtual import virtual
+from robotiq_async import ConnectionLostError, Finger, RobotiqError, State
+from robotiq_async.simulator.physics.inbox import Write
+from robotiq_async.values.request import Request
+from tests.fleet.cell import LEFT, move_slowly, told
+from tests.fleet.lab import Garbling, lab
+from tests.fleet.world import POLL_S, World, motions, world
+from tests.virtual import LATENCY_S, virtual
+
+A = Finger.A
+FROZEN_S = 2.1
+"""Longer than the window of a lease."""
+
+
+# -- replays -----------------------------------------------------------------------------------------------
 
 
 async def status_on_its_way(here: World) -> tuple[str, bytes]:
@@ -157,3 +161,41 @@ async def test_what_another_run_of_the_agent_says_acknowledges_nothing() -> None
             bus.verb = "/halt"
             await hand.halt()
             bus.verb = "nothing"
+
+
+# -- late settings -----------------------------------------------------------------------------------------
+
+
+def has_it(write: Write) -> bool:
+    asked = Request.from_registers(write.registers).axes[0]
+    return 201 in (asked.speed, asked.force)
+
+
+@pytest.mark.parametrize(
+    "delay", [each * POLL_S / 8 for each in range(0, 10, 2)], ids=lambda s: f"{s * 1000:g}ms"
+)
+@pytest.mark.parametrize("name", ["speed", "force", "command"])
+@virtual
+async def test_an_agent_that_was_frozen_writes_no_part_of_a_late_command(name: str, delay: float) -> None:
+    """Frozen between letting it in and writing it, it wrote the speed on waking, 2.14 s late."""
+    async with world() as here:
+        await move_slowly(here)
+        hand = here.holder.hand
+
+        async def ask() -> None:
+            if name == "command":
+                hand.command(A, speed=201, force=201)
+            else:
+                await getattr(hand, f"set_{name}")(201, A)
+
+        asking = asyncio.create_task(here.holder.do(ask()))
+        await asyncio.sleep(delay)
+        here.agent.host.freeze()
+        frozen_at = here.now()
+        await asyncio.sleep(FROZEN_S)
+        here.agent.host.thaw()
+        await asyncio.sleep(1.0)
+        first = [write.time for write in here.gripper.writes if has_it(write)][:1]
+        assert all(at < frozen_at + 2 * LATENCY_S for at in first), "it was written late"
+        await asyncio.wait({asking})
+        assert asking.exception() is None or isinstance(asking.exception(), RobotiqError)

@@ -1,4 +1,4 @@
-"""Speed and force of a client outlive its agent: they have no echo, and the next one would not know them."""
+"""Speed and force of a client outlive its agent: they have no echo, and the next would not know them."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from robotiq_async import Finger, State
+from robotiq_async.fleet.remote.requests import Settings
 from robotiq_async.fleet.wire.envelope import Call
 from robotiq_async.fleet.wire.settings import read_settings, settings_fields, settings_of
 from robotiq_async.values.request import Request
@@ -16,6 +17,17 @@ from tests.fleet.world import World, world
 from tests.virtual import virtual
 
 A, ALL = Finger.A, Finger.ALL
+MOTIONS: dict[str, Any] = {
+    "grasp": lambda hand: hand.grasp(A, timeout=60),
+    "move": lambda hand: hand.move(30, A),
+    "set_position": lambda hand: hand.set_position(30, A),
+    "hold": lambda hand: hand.hold(),
+}
+A, ABC = Finger.A, Finger.ABC
+GENTLE = (10, 5)
+
+
+# -- settings ----------------------------------------------------------------------------------------------
 
 
 def images(here: World, since: int) -> list[Request]:
@@ -33,13 +45,6 @@ async def next_agent(here: World) -> int:
     if not hand.is_in_control:
         await here.holder.do(hand.acquire())
     return len(here.gripper.writes)
-
-
-MOTIONS: dict[str, Any] = {
-    "move": lambda hand: hand.move(30, A),
-    "set_position": lambda hand: hand.set_position(30, A),
-    "hold": lambda hand: hand.hold(),
-}
 
 
 @pytest.mark.parametrize("motion", [*MOTIONS, "command"])
@@ -164,3 +169,33 @@ async def test_a_lease_with_settings_that_are_none_is_refused() -> None:
         with pytest.raises(Exception, match="speed"):
             await session.send(call, "lease", timeout=1.0)
         assert here.lease == 0
+
+
+# -- restarted agents --------------------------------------------------------------------------------------
+
+
+@virtual
+async def test_what_is_asked_for_anew_goes_before_what_was_asked_before() -> None:
+    async with world() as here:
+        hand = here.holder.hand
+
+        async def set_up() -> None:
+            await hand.set_speed(10)
+            await hand.set_force(5)
+
+        await here.holder.do(set_up())
+        writes = await next_agent(here)
+        await here.holder.do(hand.move(40, A, speed=33))
+        found = [image for image in images(here, writes) if image.go]
+        assert (found[-1].axes[0].speed, found[-1].axes[0].force) == (33, 5)
+        assert (found[-1].axes[1].speed, found[-1].axes[1].force) == GENTLE
+
+
+def test_what_was_never_asked_for_is_not_given() -> None:
+    settings = Settings()
+    assert not settings.fields
+    settings.note("cmd/move", Call("", "", number=2, arguments={"position": 9, "fingers": 1, "speed": 3}))
+    assert settings.fields == {"1": {"speed": 3}}
+    settings.note("cmd/set_force", Call("", "", number=4, arguments={"value": 7, "fingers": 7}))
+    settings.note("cmd/set_force", Call("", "", number=3, arguments={"value": 200, "fingers": 3}))
+    assert settings.fields == {"1": {"speed": 3, "force": 7}, "2": {"force": 7}, "4": {"force": 7}}

@@ -7,9 +7,7 @@ import asyncio
 import pytest
 
 from robotiq_async import Finger
-from tests.fleet.cell import PHASES, TARGET, Doing, moving, outcome, told
-from tests.fleet.table import Cell, cells
-from tests.fleet.troubles import TROUBLES
+from tests.fleet.cell import PHASES, TARGET, TROUBLES, Cell, Doing, cells, moving, outcome, told
 from tests.fleet.world import world
 from tests.virtual import run, virtual
 

@@ -1,24 +1,165 @@
-"""What unknown clients call themselves and send is harmless in logs, in answers and on terminals."""
+"""Malformed requests and messages are answered with an error, move no finger, and are harmless in logs."""
 
 from __future__ import annotations
 
 import asyncio
+import json
+from typing import Any
 
 import pytest
 
-from robotiq_async import State
+from robotiq_async import Finger, State
 from robotiq_async.fleet.limited_log import EVERY_S
 from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.wire.envelope import Call, unpack_answer
+from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.fleet.wire.status_message import StatusMessage
 from robotiq_async.fleet.wire.values import read_error
-from robotiq_async.values.errors import AgentError, ControlLostError
-from tests.fleet.by_hand import LEFT
-from tests.fleet.lab import lab
+from robotiq_async.values.errors import AgentError, ControlLostError, ProtocolError, RobotiqError
+from tests.fleet.cell import LEFT, ask, move_slowly
+from tests.fleet.lab import Lab, lab
+from tests.fleet.world import world
 from tests.virtual import virtual
 
+INFINITE = float("inf")  # JSON of Python has it
+STRANGE: list[tuple[str, Any]] = [
+    ("cmd/cancel", {"number": INFINITE}),
+    ("cmd/cancel", {"number": [1]}),
+    ("cmd/cancel", {"number": "x"}),
+    ("cmd/move", {"position": 255, "fingers": INFINITE}),
+    ("cmd/move", {"position": 255.0}),
+    ("cmd/move", {"position": 255, "timeout": "soon"}),
+    ("cmd/move", {"position": 255, "more": 1}),
+    ("cmd/command", {}),
+    ("cmd/command", {"axes": 3}),
+    ("cmd/command", {"axes": {"16": {"position": 255}}}),
+    ("cmd/command", {"axes": {"1": {"position": 256}}}),
+    ("cmd/command", {"axes": {"1": 3}}),
+    ("cmd/stop", {}),
+    ("cmd/_session", {}),
+    ("cmd/__init__", {}),
+    ("lease", {"what": "steal"}),
+    ("lease", {}),
+]
 NAME = "eve\nrobotiq-async: all is well\x1b[2J"
 OTHERS = StatusMessage(LEFT.mark + 1, 2, 3.0, State.RUNNING_IDLE, 4, False, 5, False, 6, 0.5, None)
+
+
+# -- malformed requests ------------------------------------------------------------------------------------
+
+
+async def asked(here: Lab, verb: str, call: Call) -> Any:
+    reply = await here.network.bus("stranger").ask(
+        LEFT.key(verb), call.pack(), timeout=1.0, urgency=Urgency.COMMAND
+    )
+    assert reply is not None
+    return unpack_answer(reply.payload).outcome(lambda stamp: stamp)
+
+
+@virtual
+@pytest.mark.parametrize(("verb", "arguments"), STRANGE)
+async def test_from_who_holds_the_lease(verb: str, arguments: Any) -> None:
+    async with lab() as here, here.client() as hand:
+        session = hand._session
+        assert session is not None
+        writes = len(here.gripper.writes)
+        call = session.call(arguments)
+        reply = await here.network.bus("stranger").ask(
+            session.name.key(verb), call.pack(), timeout=1.0, urgency=Urgency.COMMAND
+        )
+        assert reply is not None
+        answer = unpack_answer(reply.payload)
+        assert answer.number == call.number
+        with pytest.raises((RobotiqError, TypeError, ValueError)):
+            answer.outcome(lambda stamp: stamp)
+        assert len(here.gripper.writes) == writes
+        await hand.move(20, 1)
+
+
+@virtual
+@pytest.mark.parametrize(
+    "payload", [b"", b"{}", b"[1", b"null", b"\xff", json.dumps({"version": 9}).encode()]
+)
+@pytest.mark.parametrize("verb", ["info", "lease", "halt", "cmd/move"])
+async def test_that_are_none(verb: str, payload: bytes) -> None:
+    async with lab() as here, here.client() as hand:
+        session = hand._session
+        assert session is not None
+        bus = here.network.bus("stranger")
+        reply = await bus.ask(session.name.key(verb), payload, timeout=1.0, urgency=Urgency.COMMAND)
+        assert reply is not None
+        with pytest.raises((ProtocolError, AgentError)):
+            unpack_answer(reply.payload).outcome(lambda stamp: stamp)
+        await hand.move(20, 1)
+
+
+@virtual
+@pytest.mark.parametrize(("later", "refusal"), [(0, ControlLostError), (1, AgentError)])
+async def test_a_command_without_a_lease_or_for_another_run(later: int, refusal: type[RobotiqError]) -> None:
+    """The arguments are valid for no command, so the refusal comes before they are read."""
+    async with lab() as here:
+        epoch = (await asked(here, "info", Call(LEFT.base, "stranger", number=1)))["epoch"]
+        call = Call(LEFT.base, "stranger", epoch + later, number=2, arguments={"fingers": 0})
+        writes = len(here.gripper.writes)
+        with pytest.raises(refusal):
+            await asked(here, "cmd/hold", call)
+        assert len(here.gripper.writes) == writes
+
+
+@virtual
+async def test_of_a_command_for_several_axes_all_is_carried_out_or_nothing() -> None:
+    async with lab() as here, here.client() as hand:
+        session = hand._session
+        assert session is not None
+        axes = {"1": {"position": 90}, "2": {"position": 999}}
+        with pytest.raises(ValueError, match="999"):
+            await session.ask("cmd/command", {"axes": axes}, timeout=1.0)
+        await asyncio.sleep(1)
+        assert here.gripper.position(Finger.A) < 10
+
+
+@virtual
+async def test_arguments_that_do_not_fit_leave_nothing_behind() -> None:
+    """The axes counted as commanded, and what others had set going was held at the end of the lease."""
+    async with lab() as here, here.client() as hand:
+        session = hand._session
+        assert session is not None
+        await here.local.set_speed(0)
+        await here.local.set_position(250, Finger.B)
+        for arguments in ({"position": 9, "fingers": 2, "more": 1}, {"position": 9, "fingers": float("inf")}):
+            with pytest.raises((TypeError, ValueError, OverflowError, AgentError)):
+                await session.ask("cmd/move", arguments, timeout=1.0)
+        async with here.client("other", control=False) as other:
+            await other.take()
+            await asyncio.sleep(0.2)
+            assert here.gripper.is_moving
+            await other.release()
+        assert not here.gripper.is_moving
+
+
+@pytest.mark.parametrize("key", ["robotiq/v1/lab/cell/*/halt", "robotiq/v1/lab/cell/a$b/halt"])
+@virtual
+async def test_a_request_under_a_wildcard_is_refused(key: str) -> None:
+    async with world() as here:
+        call = await move_slowly(here)
+        refused = await ask(here.other, "halt", Call(LEFT.base, "somebody", number=1), key)
+        assert refused is not None
+        assert here.gripper.is_moving
+        await here.holder.do(here.holder.hand.halt())
+        await call
+
+
+@virtual
+async def test_a_request_for_another_gripper_is_refused() -> None:
+    """It came under the wrong key."""
+    async with world() as here:
+        right = Call(GripperName("lab", "cell", "right").base, "somebody", number=1)
+        refused = await ask(here.other, "lease", right)
+        assert "right" in str(refused)
+        assert here.holder.hand.is_in_control
+
+
+# -- untrusted input ---------------------------------------------------------------------------------------
 
 
 @virtual

@@ -1,23 +1,40 @@
-"""Who gets in, and what each may do there: real sessions of zenoh, over loopback."""
+"""Real sessions of zenoh over loopback: who gets in, what each role may do, many at once, uvloop."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import socket
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 
+from robotiq_async import Finger, RobotiqHand
+from robotiq_async.fleet.agent.agent import Agent
+from robotiq_async.fleet.fleet import Fleet
 from robotiq_async.fleet.keys.access import AccessList, Role, access_control, rights
 from robotiq_async.fleet.keys.authority import Authority, Pair
 from robotiq_async.fleet.keys.certificates import HERE, issue, make_authority
 from robotiq_async.fleet.keys.key_folder import ACCESS
 from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.network.configuration import agent_configuration, client_configuration
-from tests.fleet.sessions import LEFT, line
+from robotiq_async.fleet.network.route import Route
+from robotiq_async.fleet.network.zenoh_bus import open_bus
+from robotiq_async.fleet.remote.remote_hand import RemoteHand
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.values.errors import ConnectFailedError, NotAllowedError
+from tests.fleet.sessions import LEFT, PATIENCE, free_port, line
 
 ONE = f"{LEFT.base}/*"
 FLEET = "robotiq/v1/lab/*/*/summary"
+MANY = 600
+"""More than a channel of zenoh's holds: halting so many never began."""
+
+
+# -- access ------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -222,3 +239,171 @@ def test_clients_connect_encrypted_or_on_this_machine(keys: Path) -> None:
         client_configuration(["tls/cell-1:7447"], keys=keys)
     assert "access_control" not in client_configuration(["tls/cell-1:7447"], keys=keys / "operate-bob")
     assert client_configuration(["tcp/cell-1:7447"], insecure=True)["mode"] == "peer"
+
+
+# -- roles -------------------------------------------------------------------------------------------------
+
+
+@asynccontextmanager
+async def served(keys: Path) -> AsyncIterator[str]:
+    """An agent with a simulated gripper; gives the endpoint it listens on."""
+    endpoint = f"tls/127.0.0.1:{free_port()}"
+    configuration = agent_configuration("lab", "cell-1", [endpoint], keys=keys / "agent-cell-1")
+    bus = await open_bus(configuration, endpoint)
+    ready = asyncio.Event()
+    agent = Agent("lab", "cell-1", {"left": RobotiqHand("sim://")}, bus)
+    serving = asyncio.create_task(agent.run(ready.set))
+    try:
+        async with asyncio.timeout(PATIENCE):
+            await ready.wait()
+            yield endpoint
+    finally:
+        serving.cancel()
+        await asyncio.gather(serving, return_exceptions=True)
+        await bus.close()
+
+
+def hand(endpoint: str, folder: Path, connect_timeout: float = PATIENCE) -> RemoteHand:
+    address = f"zenoh://lab/cell-1/left?connect={endpoint}&keys={folder}"
+    return RemoteHand(address, control=False, connect_timeout=connect_timeout)
+
+
+@pytest.mark.parametrize(
+    ("who", "halts", "commands"),
+    [("read-alice", False, False), ("halt-panel", True, False), ("operate-bob", True, True)],
+)
+async def test_a_hand_does_what_its_role_allows(keys: Path, who: str, halts: bool, commands: bool) -> None:
+    async with served(keys) as endpoint, hand(endpoint, keys / who) as remote:
+        for attempt, is_allowed in ((remote.halt, halts), (remote.acquire, commands)):
+            if is_allowed:
+                await attempt()
+            else:
+                with pytest.raises(NotAllowedError):
+                    await attempt()
+        assert remote.is_in_control is commands
+
+
+async def test_a_hand_whose_client_is_not_in_the_list_finds_no_agent(keys: Path) -> None:
+    async with served(keys) as endpoint:
+        with pytest.raises(ConnectFailedError, match="certificate"):
+            await hand(endpoint, keys / "operate-eve", connect_timeout=0.1).start()
+
+
+async def test_a_fleet_is_halted_in_the_role_for_it(keys: Path) -> None:
+    async with (
+        served(keys) as endpoint,
+        hand(endpoint, keys / "read-alice"),  # waits until the agent has reached the gripper
+        Fleet("lab", route=Route((endpoint,), keys / "halt-panel")) as fleet,
+    ):
+        assert list((await fleet.halt_all()).values()) == ["stopped"]
+
+
+# -- idle connections --------------------------------------------------------------------------------------
+
+
+async def test_idle_connections_keep_nobody_out() -> None:
+    """300 of them, by somebody who only opens them, kept new clients out for 12 s."""
+    port = free_port()
+    endpoint = f"tcp/127.0.0.1:{port}"
+    async with contextlib.AsyncExitStack() as stack:
+        agent = await open_bus(agent_configuration("lab", "cell-1", [endpoint]), endpoint)
+        stack.push_async_callback(agent.close)
+        agent.serve("robotiq/v1/lab/cell-1/*/info", lambda query: query.reply(b"!"))
+        for _ in range(300):
+            idle = stack.enter_context(socket.socket())
+            idle.connect(("127.0.0.1", port))
+        client = await open_bus(client_configuration([endpoint]), endpoint)
+        stack.push_async_callback(client.close)
+        async with asyncio.timeout(8):
+            asked = None
+            while asked is None:
+                asked = await client.ask(
+                    "robotiq/v1/lab/cell-1/left/info", b"?", timeout=1.0, urgency=Urgency.COMMAND
+                )
+
+
+# -- announced ---------------------------------------------------------------------------------------------
+
+
+async def test_many_are_found_at_once() -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    agent = await open_bus(agent_configuration("lab", "cell", [endpoint]), endpoint)
+    client = await open_bus(client_configuration([endpoint]), endpoint)
+    try:
+        keys = {f"robotiq/v1/lab/cell/g{number}/alive/1" for number in range(MANY)}
+        tokens = [agent.announce(key) for key in keys]
+        found: set[str] = set()
+        async with asyncio.timeout(20):
+            while found != keys:
+                found = set(await client.announced("robotiq/v1/lab/*/*/alive/*", timeout=0.5))
+        assert await client.announced("robotiq/v1/nowhere/**", timeout=0.5) == []
+        for take_back in tokens:
+            take_back()
+    finally:
+        await client.close()
+        await agent.close()
+    assert await client.announced("robotiq/v1/**", timeout=0.5) == []
+
+
+async def test_endpoints_that_are_not_reached() -> None:
+    """One that is written as a name is another word for what zenoh is connected to."""
+    numbers = [free_port() for _ in range(3)]
+    agents = [
+        await open_bus(agent_configuration("lab", "cell", [f"tcp/127.0.0.1:{n}"]), "a") for n in numbers[:2]
+    ]
+    endpoints = [
+        f"tcp/{host}:{n}" for host, n in zip(("127.0.0.1", "localhost", "127.0.0.1"), numbers, strict=True)
+    ]
+    client = await open_bus(client_configuration(endpoints), "b")
+    try:
+        async with asyncio.timeout(20):
+            while len(await client.unreached()) > 1:  # noqa: ASYNC110  # it tells nobody
+                await asyncio.sleep(0.05)
+        assert await client.unreached() == endpoints[2:]
+        await agents[1].close()
+        async with asyncio.timeout(20):
+            while await client.unreached() != endpoints[1:]:  # noqa: ASYNC110
+                await asyncio.sleep(0.05)
+    finally:
+        for bus in (client, *agents):
+            await bus.close()
+
+
+# -- uvloop ------------------------------------------------------------------------------------------------
+
+
+async def moved() -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    async with SimulatorServer(SimulatedGripper(speedup=20, spread=False)) as server:
+        serving = await open_bus(agent_configuration("lab", "cell", [endpoint]), endpoint)
+        agent = asyncio.ensure_future(
+            Agent("lab", "cell", {"left": RobotiqHand(server.address)}, serving).run()
+        )
+        asking = await open_bus(client_configuration([endpoint]), endpoint)
+        async with RemoteHand("zenoh://lab/cell/left", bus=asking) as hand:
+            result = await hand.move(80, Finger.A, speed=255)
+            assert result.positions[Finger.A] == pytest.approx(80, abs=2)
+            first = await anext(statuses := hand.statuses(1000))
+            for position in range(80, 120):
+                hand.command(Finger.A, position=position)
+                await asyncio.sleep(0.005)
+            await hand.halt()
+            assert not hand.is_moving
+            assert hand.is_in_control
+            times = [first.timestamp, *(status.timestamp for status in statuses.drain())]
+            assert times == sorted(times)
+            assert len(times) > 5
+        agent.cancel()
+        await asyncio.gather(agent, return_exceptions=True)
+        for bus in (asking, serving):
+            await bus.close()
+
+
+def test_a_hand_moves_and_halts_in_uvloop() -> None:
+    uvloop = pytest.importorskip("uvloop")
+
+    async def main() -> None:
+        async with asyncio.timeout(3 * PATIENCE):
+            await moved()
+
+    uvloop.run(main())

@@ -1,0 +1,412 @@
+"""What goes over the network, in either direction; strangers may have written it."""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robotiq_async import (
+    Fault,
+    Finger,
+    MoveResult,
+    ObjectStatus,
+    RobotiqStatus,
+    SentRequest,
+    State,
+    Transition,
+)
+from robotiq_async.fleet.wire import values
+from robotiq_async.fleet.wire.envelope import Answer, Call, failure, unpack_answer, unpack_call
+from robotiq_async.fleet.wire.status_message import SIZE, StatusMessage, unpack
+from robotiq_async.values import errors
+from robotiq_async.values.errors import (
+    AgentError,
+    ConnectFailedError,
+    ControlLostError,
+    GripperFaultError,
+    InvalidStateError,
+    MoveTimeoutError,
+    ProtocolError,
+    RobotiqError,
+)
+from robotiq_async.values.model import MODELS
+from robotiq_async.values.request import AxisRequest, Request
+from robotiq_async.values.statistics import Statistics
+from robotiq_async.values.trigger import Trigger
+
+JSON: st.SearchStrategy[Any] = st.recursive(
+    st.none() | st.booleans() | st.integers(-(2**70), 2**70) | st.floats() | st.text(max_size=8),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3),
+    max_leaves=6,
+)
+PLAIN: st.SearchStrategy[Any] = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers(-(2**53), 2**53)
+    | st.floats(allow_nan=False)
+    | st.text(max_size=8),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3),
+    max_leaves=6,
+)
+CALLS = st.builds(
+    Call,
+    to=st.text(max_size=30),
+    client=st.text(min_size=1, max_size=64),
+    epoch=st.integers(0, 2**53),
+    lease=st.integers(0, 2**32),
+    number=st.integers(0, 2**53),
+    seen=st.floats(allow_nan=False, allow_infinity=False),
+    arguments=st.dictionaries(st.text(max_size=8), PLAIN, max_size=4),
+)
+FIELDS = ["version", "to", "client", "epoch", "lease", "number", "seen", "arguments"]
+KINDS = sorted(
+    (kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, RobotiqError)),
+    key=lambda kind: kind.__name__,
+)
+STATUS = RobotiqStatus.from_registers(range(8), timestamp=100.25, sequence=7)
+LATER = RobotiqStatus.from_registers(range(8), timestamp=105.25, sequence=7)
+GARBAGE: st.SearchStrategy[Any] = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3),
+    max_leaves=5,
+)
+READERS: dict[str, Any] = {
+    "result": values.read_result,
+    "transition": values.read_transition,
+    "request": values.read_request,
+    "status": values.read_status,
+    "statistics": lambda fields, _: values.read_statistics(fields),
+}
+U32, U64 = st.integers(0, 2**32 - 1), st.integers(0, 2**64 - 1)
+TIME = st.floats(allow_nan=False, allow_infinity=False, width=64)
+MESSAGES = st.builds(
+    StatusMessage,
+    mark=U32,
+    epoch=U64,
+    stamp=TIME,
+    state=st.sampled_from(State),
+    lease=U32,
+    is_held=st.booleans(),
+    events=U32,
+    is_moving=st.booleans(),
+    sequence=U64,
+    age=st.floats(allow_nan=False, allow_infinity=False, width=32),
+    registers=st.none() | st.tuples(*[st.integers(0, 65535)] * 8),
+    model=st.sampled_from([*MODELS.values()]),
+)
+
+
+# -- envelope ----------------------------------------------------------------------------------------------
+
+
+@given(CALLS)
+def test_a_request(call: Call) -> None:
+    assert unpack_call(call.pack()) == call
+
+
+@given(st.builds(Answer, to=st.text(), number=st.integers(0), epoch=st.integers(0, 2**53), value=PLAIN))
+def test_an_answer(answer: Answer) -> None:
+    read = unpack_answer(answer.pack())
+    assert read == answer
+    assert read.outcome(lambda stamp: stamp) == answer.value
+
+
+def test_the_answer_to_what_failed() -> None:
+    answer = unpack_answer(failure(Call("a", "me", number=7), 5, AgentError("no")).pack())
+    assert (answer.to, answer.number, answer.epoch) == ("a", 7, 5)
+    with pytest.raises(AgentError, match="no"):
+        answer.outcome(lambda stamp: stamp)
+
+
+@given(CALLS, st.sampled_from(FIELDS), JSON)
+def test_a_request_with_something_else_in_a_field(call: Call, name: str, value: Any) -> None:
+    fields = json.loads(call.pack()) | {name: value}
+    refused_or_well_formed(json.dumps(fields).encode())
+
+
+@given(CALLS, st.sampled_from(FIELDS))
+def test_a_request_without_a_field(call: Call, name: str) -> None:
+    fields = json.loads(call.pack())
+    del fields[name]
+    with pytest.raises((ProtocolError, AgentError)):
+        unpack_call(json.dumps(fields).encode())
+
+
+@given(
+    st.binary(max_size=300)
+    | st.text(max_size=300).map(str.encode)
+    | JSON.map(lambda each: json.dumps(each).encode())
+)
+def test_garbage(data: bytes) -> None:
+    refused_or_well_formed(data)
+    try:
+        answer = unpack_answer(data)
+    except (ProtocolError, AgentError):
+        return
+    assert isinstance(answer, Answer)
+
+
+@given(
+    st.dictionaries(st.sampled_from(["kind", "message", "state", "allowed", "fault", "status"]), JSON) | JSON
+)
+def test_an_answer_with_an_error_that_is_none(error: Any) -> None:
+    answer = unpack_answer(
+        json.dumps({"version": 1, "to": "a", "number": 1, "epoch": 1, "value": 3, "error": error}).encode()
+    )
+    if error is None:
+        assert answer.outcome(lambda stamp: stamp) == 3
+    else:
+        with pytest.raises((ProtocolError, AgentError)):
+            answer.outcome(lambda stamp: stamp)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"{}",
+        b"[" * 60_000,
+        b'{"version": 1, "to": ' + b"[" * 30_000 + b"]" * 30_000 + b"}",
+        b'{"version": 1, "number": ' + b"9" * 5000 + b"}",
+        b"{" + b" " * 70_000 + b"}",
+        b"\xff\xfe\x00",
+        b"null",
+        b"NaN",
+        b'"text"',
+    ],
+    ids=lambda data: repr(data[:20]),
+)
+def test_what_is_huge_deep_or_nothing(data: bytes) -> None:
+    for read in (unpack_call, unpack_answer):
+        with pytest.raises((ProtocolError, AgentError)):
+            read(data)
+
+
+@pytest.mark.parametrize("seen", ["1" + "0" * 400, "1e999", "-1e999", "NaN", "true", '"1"', "null"])
+def test_a_time_that_is_none(seen: str) -> None:
+    text = Call("a", "me", seen=0.125).pack().decode().replace("0.125", seen)
+    with pytest.raises(ProtocolError):
+        unpack_call(text.encode())
+
+
+@pytest.mark.parametrize("version", [0, 2, "1", None, 1.5, [1]])
+def test_another_version_says_what_to_do(version: object) -> None:
+    data = json.dumps(json.loads(Call("a", "me").pack()) | {"version": version}).encode()
+    for read in (unpack_call, unpack_answer):
+        with pytest.raises(AgentError, match="update the older side"):
+            read(data)
+
+
+def refused_or_well_formed(data: bytes) -> None:
+    try:
+        call = unpack_call(data)
+    except (ProtocolError, AgentError):
+        return
+    assert isinstance(call.to, str)
+    assert 0 < len(call.client) <= 64
+    assert all(type(each) is int and each >= 0 for each in (call.epoch, call.lease, call.number))
+    assert abs(call.seen) < float("inf")
+    assert isinstance(call.arguments, dict)
+
+
+# -- values ------------------------------------------------------------------------------------------------
+
+
+def five_later(stamp: float) -> float:
+    return stamp + 5.0
+
+
+def carried(fields: Any) -> Any:
+    return json.loads(json.dumps(fields))
+
+
+def an(kind: type[RobotiqError]) -> RobotiqError:
+    """An error of a kind."""
+    if kind is InvalidStateError:
+        return InvalidStateError("not now", State.RESET, {State.FAULT, State.RUNNING_IDLE})
+    if kind is GripperFaultError:
+        return GripperFaultError(Fault(0x0C))
+    if issubclass(kind, MoveTimeoutError):
+        return kind("slow", STATUS)
+    if kind is ConnectFailedError:
+        return ConnectFailedError("tcp://10.0.0.1:502", "refused")
+    if kind is ControlLostError:
+        return ControlLostError("gone", "taken")
+    return kind("why")
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind is not errors.NotAllStoppedError])
+def test_errors(kind: type[RobotiqError]) -> None:
+    error = an(kind)
+    read = values.read_error(carried(values.error_fields(error)), five_later)
+    assert type(read) is kind
+    assert str(read) == str(error)
+    assert vars(read) == vars(error) | ({"status": LATER} if issubclass(kind, MoveTimeoutError) else {})
+
+
+def test_the_name_of_the_agents_hand_stays_with_the_agent() -> None:
+    error = GripperFaultError(Fault.SCISSOR_BLOCKED)
+    error.hand = "left"
+    again = values.read_error(carried(values.error_fields(error)), five_later)
+    assert isinstance(again, GripperFaultError)
+    assert (str(again), again.hand) == (error.message, "")
+
+
+@pytest.mark.parametrize("kind", [TypeError, ValueError])
+def test_bad_arguments(kind: type[Exception]) -> None:
+    read = values.read_error(carried(values.error_fields(kind("value must be an int"))), five_later)
+    assert type(read) is kind
+    assert str(read) == "value must be an int"
+
+
+@pytest.mark.parametrize(
+    "name", ["ZeroDivisionError", "SystemExit", "Any", "annotations", "NotAllStoppedError"]
+)
+def test_errors_of_another_kind(name: str) -> None:
+    read = values.read_error({"kind": name, "message": "m"}, five_later)
+    assert type(read) is AgentError
+    assert str(read) == f"{name}: m"
+
+
+@pytest.mark.parametrize(
+    "kind", [InvalidStateError, GripperFaultError, MoveTimeoutError, ConnectFailedError, ControlLostError]
+)
+def test_an_error_without_what_its_kind_knows(kind: type[RobotiqError]) -> None:
+    assert type(values.read_error({"kind": kind.__name__, "message": "m"}, five_later)) is ProtocolError
+
+
+@given(
+    st.sampled_from([kind.__name__ for kind in KINDS]),
+    st.dictionaries(st.sampled_from(["state", "allowed", "fault", "status", "address", "reason"]), GARBAGE),
+)
+def test_an_error_made_of_garbage(kind: str, rest: dict[str, Any]) -> None:
+    assert isinstance(values.read_error({"kind": kind, "message": 3, **rest}, five_later), RobotiqError)
+
+
+@given(
+    st.dictionaries(
+        st.sampled_from([Finger.A, Finger.B, Finger.C, Finger.SCISSOR]),
+        st.tuples(st.sampled_from(ObjectStatus), st.integers(0, 255), st.integers(0, 2550)),
+        min_size=1,
+    ),
+    st.floats(0, 1000),
+)
+def test_results(axes: dict[Finger, tuple[ObjectStatus, int, int]], duration: float) -> None:
+    def result(status: RobotiqStatus) -> MoveResult:
+        return MoveResult(
+            outcomes={axis: how for axis, (how, _, _) in axes.items()},
+            positions={axis: at for axis, (_, at, _) in axes.items()},
+            contacts=Finger(sum(axis for axis, (how, _, _) in axes.items() if how.is_contact)),
+            duration=duration,
+            peak_current_ma={axis: peak for axis, (_, _, peak) in axes.items()},
+            status=status,
+        )
+
+    fields = values.result_fields(result(STATUS))
+    assert fields is not None
+    assert values.read_result(carried(fields), five_later) == result(LATER)
+    assert values.result_fields(None) is None
+
+
+@given(st.sampled_from(State), st.sampled_from(State), st.sampled_from(Trigger))
+def test_transitions(source: State, target: State, trigger: Trigger) -> None:
+    fields = carried(values.transition_fields(Transition(source, target, trigger, 100.25)))
+    assert fields["kind"] == "transition"
+    assert values.read_transition(fields, five_later) == Transition(source, target, trigger, 105.25)
+
+
+@pytest.mark.parametrize("acknowledged", [True, False])
+def test_requests(acknowledged: bool) -> None:
+    request = Request(activate=True, go=True, axes=(AxisRequest(1, 2, 3),) * 4)
+    fields = carried(values.request_fields(SentRequest(request, 100.25, acknowledged)))
+    assert fields["kind"] == "request"
+    assert values.read_request(fields, five_later) == SentRequest(request, 105.25, acknowledged)
+
+
+def test_statistics() -> None:
+    figures = Statistics(1, 2, 3, 0.4, 0.5, 0.6, 0.7, 0.8, 9, 10, "timerfd", 11, {"reached": 12})
+    fields = carried(figures.as_dict())
+    assert values.read_statistics(fields) == figures
+    assert values.read_statistics(fields | {"of another version": 3}) == figures
+
+
+@pytest.mark.parametrize("what", READERS)
+@given(fields=GARBAGE)
+def test_garbage_is_a_protocol_error(what: str, fields: Any) -> None:
+    def attempt() -> None:
+        with values.reading("something"):
+            READERS[what](fields, five_later)
+
+    with pytest.raises(ProtocolError, match="the agent sent something that cannot be read"):
+        attempt()
+
+
+# -- status message ----------------------------------------------------------------------------------------
+
+
+@given(MESSAGES)
+def test_what_is_packed_is_unpacked(message: StatusMessage) -> None:
+    data = message.pack()
+    assert len(data) == SIZE == 60
+    assert unpack(data) == message
+
+
+@given(st.binary(min_size=SIZE, max_size=SIZE))
+def test_any_bytes_of_the_right_size_are_a_message_or_refused(data: bytes) -> None:
+    for version in (b"\x01", b"\x00", b"\x02"):
+        try:
+            message = unpack(version + data[1:])
+        except ProtocolError:
+            assert not is_one(version + data[1:])
+        else:
+            assert isinstance(message.state, State)
+
+
+def is_one(data: bytes) -> bool:
+    if len(data) != SIZE or data[0] != 1 or data[1] >= len(State) or data[3] >= len(MODELS):
+        return False
+    return all(map(math.isfinite, struct.unpack("<df", data[32:44])))
+
+
+@pytest.mark.parametrize("value", [math.inf, -math.inf, math.nan])
+def test_a_time_that_is_none_is_refused(value: float) -> None:
+    """Nothing would be newer than it ever after."""
+    message = StatusMessage(1, 2, 3.0, State.RUNNING_IDLE, 4, False, 5, False, 6, 0.5, None)
+    assert unpack(message.pack()) == message
+    for other in (message._replace(stamp=value), message._replace(age=value)):
+        with pytest.raises(ProtocolError, match="no time"):
+            unpack(other.pack())
+
+
+@given(MESSAGES, st.integers(0, SIZE - 1))
+def test_a_piece_is_refused(message: StatusMessage, size: int) -> None:
+    with pytest.raises(ProtocolError):
+        unpack(message.pack()[:size])
+    with pytest.raises(ProtocolError):
+        unpack(message.pack() + b"\x00")
+
+
+def test_the_places_of_the_states_do_not_change() -> None:
+    # Agents and clients of different versions talk to each other: a new state goes to the end.
+    assert [state.name for state in State] == [
+        "DISCONNECTED",
+        "DO_ACTIVATION",
+        "WF_ACTIVATION",
+        "RUNNING_IDLE",
+        "RUNNING_CC",
+        "FAULT",
+        "DO_ATR",
+        "WF_ATR",
+        "ATR_DONE",
+        "DO_RESET",
+        "WF_RESET",
+        "RESET",
+        "DO_SHUTDOWN",
+        "SHUTDOWN",
+    ]
