@@ -89,7 +89,17 @@ async def lab(
 # -- buses that spoil requests -----------------------------------------------------------------------------
 
 
-class Spoiling:
+class Between:
+    """Stands before a bus, and does with requests what its kind says."""
+
+    def __init__(self, bus: MemoryBus) -> None:
+        self._bus = bus
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._bus, name)
+
+
+class Spoiling(Between):
     """A bus whose answers to one kind of request are spoiled: lost once, or another's."""
 
     def __init__(
@@ -101,11 +111,9 @@ class Spoiling:
         answer: bytes | None = None,
         is_sent: bool = True,
     ) -> None:
-        self._bus, self._verb, self._answer, self.left = bus, verb, answer, times
+        super().__init__(bus)
+        self._verb, self._answer, self.left = verb, answer, times
         self._is_sent = is_sent
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._bus, name)
 
     def ask(
         self, key: str, payload: bytes, *, timeout: float, urgency: Urgency, **how: Any
@@ -114,7 +122,7 @@ class Spoiling:
             return self._bus.ask(key, payload, timeout=timeout, urgency=urgency, **how)
         self.left -= 1
         if self._answer is None:  # never sent
-            return asyncio.ensure_future(_nothing(timeout))
+            return asyncio.ensure_future(nothing(timeout))
         return asyncio.ensure_future(self._another(key, payload, timeout, urgency))
 
     async def _another(self, key: str, payload: bytes, timeout: float, urgency: Urgency) -> Reply | None:
@@ -126,16 +134,13 @@ class Spoiling:
         return _Answered(self._answer)
 
 
-class Garbling:
+class Garbling(Between):
     """A bus whose answers to one kind of request are others: by default, that it is not understood."""
 
     def __init__(self, bus: MemoryBus, **others: Any) -> None:
-        self._bus = bus
+        super().__init__(bus)
         self._others = others or {"value": None, "error": error_fields(TypeError("what?"))}
         self.verb = "nothing yet"
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._bus, name)
 
     def ask(self, key: str, payload: bytes, **how: Any) -> asyncio.Future[Reply | None]:
         asking = self._bus.ask(key, payload, **how)
@@ -155,5 +160,5 @@ class _Answered:
         self.payload = payload
 
 
-async def _nothing(timeout: float) -> None:
+async def nothing(timeout: float) -> None:
     await asyncio.sleep(timeout)

@@ -102,33 +102,33 @@ async def test_nobody_at_all() -> None:
     assert "robotiq-async agent" in found["agent"].advice
 
 
+def out_of_reach(here: Lab) -> None:
+    here.server.refuse()
+    here.server.cut()
+
+
+def slow(here: Lab) -> None:
+    for stream in here.network.both("agent", "doctor"):
+        stream.delay = 0.15
+
+
+@pytest.mark.parametrize(
+    ("ail", "what", "words"),
+    [
+        (lambda here: here.network.bus("other").announce(LEFT.key("alive", "1")), "agent", "2 serve"),
+        (out_of_reach, "gripper", "robotiq-async doctor tcp://"),
+        (lambda here: here.gripper.inject_fault(13), "fault", "0x0D"),
+        (slow, "round trip", "lose the lease"),
+    ],
+)
 @virtual
-async def test_two_agents_for_one_gripper() -> None:
+async def test_an_ailment(ail: Callable[[Lab], object], what: str, words: str) -> None:
     async with lab() as here:
-        here.network.bus("other").announce(LEFT.key("alive", "1"))
-        found = await examined(here)
-    assert found["agent"].level is Level.BAD
-    assert "2 serve" in found["agent"].found
-
-
-@virtual
-async def test_an_agent_that_does_not_reach_its_gripper() -> None:
-    async with lab() as here:
-        here.server.refuse()
-        here.server.cut()
-        found = await examined(here)
-    assert found["gripper"].level is Level.BAD
-    assert "robotiq-async doctor tcp://" in found["gripper"].advice
-
-
-@virtual
-async def test_a_fault() -> None:
-    async with lab() as here:
-        here.gripper.inject_fault(13)
+        ail(here)
         await asyncio.sleep(0.1)
-        found = await examined(here)
-    assert found["fault"].level is Level.BAD
-    assert "0x0D" in found["fault"].found
+        found = (await examined(here))[what]
+    assert found.level is Level.BAD
+    assert words in found.found + found.advice
 
 
 @virtual
@@ -146,16 +146,6 @@ async def test_messages_under_the_wrong_key() -> None:
         found = await examined(here)
         task.cancel()
     assert found["misrouted"].level is Level.DOUBT
-
-
-@virtual
-async def test_a_slow_network() -> None:
-    async with lab() as here:
-        for stream in here.network.both("agent", "doctor"):
-            stream.delay = 0.15
-        found = await examined(here)
-    assert found["round trip"].level is Level.BAD
-    assert "lose the lease" in found["round trip"].advice
 
 
 # -- agents of another kind --------------------------------------------------------------------------------

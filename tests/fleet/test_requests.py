@@ -21,7 +21,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.errors import AgentError, ControlLostError
 from robotiq_async.values.request import Request
 from tests.fleet.cell import LEFT, ask
-from tests.fleet.lab import Lab, lab
+from tests.fleet.lab import Between, Lab, lab, nothing
 from tests.fleet.network import MemoryBus, Network
 from tests.fleet.world import world
 from tests.grippers import activate_beforehand
@@ -35,17 +35,14 @@ PROMISE_S = 2.5
 # -- outbox ------------------------------------------------------------------------------------------------
 
 
-class CountingBus:
+class CountingBus(Between):
     """A bus that notes what is asked, and how much at a time."""
 
     def __init__(self, bus: MemoryBus) -> None:
-        self._bus = bus
+        super().__init__(bus)
         self.commands: list[Call] = []
         self.under_way = 0
         self.most = 0
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._bus, name)
 
     def ask(
         self, key: str, payload: bytes, *, timeout: float, urgency: Urgency, **how: Any
@@ -67,7 +64,7 @@ async def slow_network(delay: float) -> AsyncIterator[tuple[Lab, CountingBus, Re
     """A hand in control, and requests that take a while to the agent."""
     async with lab() as here:
         bus = CountingBus(here.network.bus("client"))
-        async with RemoteHand("zenoh://lab/cell/left", bus=cast("Bus", bus)) as hand:
+        async with here.client_over(bus) as hand:
             here.network.stream("client", "agent").delay = delay
             yield here, bus, hand
             await asyncio.sleep(2 * delay)
@@ -247,7 +244,7 @@ async def test_a_move_that_is_cancelled_on_its_way_moves_until_the_agent_has_cal
 # -- said again --------------------------------------------------------------------------------------------
 
 
-class Losing:
+class Losing(Between):
     """A bus that drops requests, or their answers, and tells nobody.
 
     Attributes:
@@ -255,11 +252,9 @@ class Losing:
     """
 
     def __init__(self, bus: MemoryBus, drops: Callable[[Call], bool], *, answers: bool = False) -> None:
-        self._bus, self._drops, self._answers = bus, drops, answers
+        super().__init__(bus)
+        self._drops, self._answers = drops, answers
         self.said: list[Call] = []
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._bus, name)
 
     def ask(
         self, key: str, payload: bytes, *, timeout: float, urgency: Urgency, **how: Any
@@ -273,10 +268,6 @@ class Losing:
         if self._answers:
             self._bus.ask(key, payload, timeout=timeout, urgency=urgency, **how)
         return asyncio.ensure_future(nothing(timeout))
-
-
-async def nothing(timeout: float) -> None:
-    await asyncio.sleep(timeout)
 
 
 def first_copy_of(*numbers: int) -> Callable[[Call], bool]:
@@ -299,7 +290,7 @@ async def test_a_burst_of_moves_of_which_many_are_lost(seed: int) -> None:
     lost = random.Random(seed).sample(range(48), 19)
     async with lab() as here:
         bus = Losing(here.network.bus("client"), first_copy_of(*lost))
-        async with RemoteHand("zenoh://lab/cell/left", bus=cast("Bus", bus)) as hand:
+        async with here.client_over(bus) as hand:
             loop = asyncio.get_running_loop()
             begun, moves = loop.time(), [asyncio.create_task(hand.move(100 + n, A)) for n in range(48)]
             await asyncio.wait(moves)
@@ -314,7 +305,7 @@ async def test_what_comes_later_does_not_take_the_place_of_what_was_lost() -> No
     """It was refused as overtaken, or never heard of again."""
     async with lab() as here:
         bus = Losing(here.network.bus("client"), first_copy_of(0, 2))
-        async with RemoteHand("zenoh://lab/cell/left", bus=cast("Bus", bus)) as hand:
+        async with here.client_over(bus) as hand:
             hand.command(A, position=60)
             hand.command(B, position=70)
             hand.command(A, speed=7)
@@ -330,7 +321,7 @@ async def test_what_comes_later_does_not_take_the_place_of_what_was_lost() -> No
 async def test_a_lost_answer_is_given_again_and_nothing_is_done_twice() -> None:
     async with lab() as here:
         bus = Losing(here.network.bus("client"), first_copy_of(0, 1), answers=True)
-        async with RemoteHand("zenoh://lab/cell/left", bus=cast("Bus", bus)) as hand:
+        async with here.client_over(bus) as hand:
             assert (await hand.move(80, A)).positions[A] == pytest.approx(80, abs=2)
             await hand.set_speed(50)
             images = [Request.from_registers(write.registers).axes[0] for write in here.gripper.writes]
@@ -343,7 +334,7 @@ async def test_no_call_is_open_for_longer_than_it_says(what: str) -> None:
     """Nothing gets through, and statuses come on: a move waited for 100 s."""
     async with lab() as here:
         bus = Losing(here.network.bus("client"), lambda _: True)
-        async with RemoteHand("zenoh://lab/cell/left", bus=cast("Bus", bus)) as hand:
+        async with here.client_over(bus) as hand:
             loop = asyncio.get_running_loop()
             begun = loop.time()
             here.network.cut(("client", "agent"))

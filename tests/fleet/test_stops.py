@@ -181,29 +181,21 @@ async def test_a_command_that_waits_for_its_lease_is_not_sent_after_stop(after: 
         assert not here.gripper.is_moving
 
 
+@pytest.mark.parametrize("how", ["a cancelled move", "hold()"])
 @virtual
-async def test_a_gentle_stop_does_not_give_up_the_hold_of_a_cancelled_move() -> None:
+async def test_a_gentle_stop_does_not_give_up_a_hold(how: str) -> None:
     async with lab() as here:
         hand = here.client()
         await hand.start()
-        moving = await slowly(here, hand)
-        moving.cancel()
-        await asyncio.wait({moving})
+        held = await slowly(here, hand)
+        if how == "hold()":
+            held = asyncio.create_task(hand.hold())
+            await asyncio.sleep(0)
+        else:
+            held.cancel()
+            await asyncio.wait({held})
         await hand.stop(halt=False)
-        await asyncio.sleep(0.1)
-        assert not here.gripper.is_moving
-
-
-@virtual
-async def test_a_gentle_stop_does_not_give_up_a_hold() -> None:
-    async with lab() as here:
-        hand = here.client()
-        await hand.start()
-        await slowly(here, hand)
-        holding = asyncio.create_task(hand.hold())
-        await asyncio.sleep(0)
-        await hand.stop(halt=False)
-        await asyncio.gather(holding, return_exceptions=True)
+        await asyncio.gather(held, return_exceptions=True)
         await asyncio.sleep(0.1)
         assert not here.gripper.is_moving
 
