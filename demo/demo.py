@@ -35,7 +35,7 @@ from robotiq_async import (
 from robotiq_async.cli.addresses import gripper_words, is_simulated
 from robotiq_async.cli.consent import consent
 from robotiq_async.cli.failures import CommandError, UsageError
-from robotiq_async.cli.output.log_capture import forget
+from robotiq_async.cli.output.messages import forget
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.hand import Hand
 from robotiq_async.link.address import is_remote, parse_address

@@ -19,7 +19,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
 
 from robotiq_async import Finger, RobotiqHand, State  # noqa: E402
-from robotiq_async.cli.output.log_capture import forwarded_warnings  # noqa: E402
+from robotiq_async.cli.output.messages import forwarded_warnings  # noqa: E402
 from robotiq_async.cli.tui.screen import Monitor  # noqa: E402
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer  # noqa: E402
 from robotiq_async.tools.actions import ACTIONS, Operator  # noqa: E402

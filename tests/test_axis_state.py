@@ -7,8 +7,8 @@ from collections.abc import Callable
 import pytest
 
 from robotiq_async import RobotiqStatus, State
+from robotiq_async.cli.output.lines import status_line
 from robotiq_async.cli.output.tables import print_status
-from robotiq_async.cli.output.text import status_line
 from robotiq_async.cli.tui.widgets import STILL, Axes
 from robotiq_async.ros2.translation.diagnosis import diagnose, status_text
 from robotiq_async.tools.recording.payloads import reading_fields

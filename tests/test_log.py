@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from robotiq_async.cli.output.log_capture import collected_warnings, forwarded_warnings
+from robotiq_async.cli.output.messages import collected_warnings, forwarded_warnings
 from robotiq_async.runtime.log import Log, log, printable
 
 FORMAT = logging.Formatter("[%(hand)s] %(message)s")

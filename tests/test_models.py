@@ -27,7 +27,7 @@ from robotiq_async import (
     State,
     WrongModelError,
 )
-from robotiq_async.cli.output.text import status_line
+from robotiq_async.cli.output.lines import status_line
 from robotiq_async.link.address import parse_address
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import ACTIONS

@@ -21,7 +21,7 @@ from robotiq_async import (
     RobotiqHand,
     State,
 )
-from robotiq_async.cli.output.stream_output import print_objects
+from robotiq_async.cli.output.lines import print_objects
 from robotiq_async.cli.output.tables import print_outcomes, print_status
 from robotiq_async.cli.tui.screen import Monitor
 from robotiq_async.fleet import RemoteHand

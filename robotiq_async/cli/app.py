@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
+from itertools import groupby
 from typing import Final
 
 from cyclopts import App
@@ -11,20 +13,16 @@ from .. import __version__
 from .commands.agent import agent
 from .commands.demo import demo
 from .commands.doctor import doctor
-from .commands.fleet import fleet, halt
-from .commands.fleet_keys import keys as fleet_keys
-from .commands.measure.force import force as measure_force
-from .commands.measure.speed import speed as measure_speed
-from .commands.monitor import monitor
+from .commands.fleet import fleet, halt, keys
+from .commands.measure import speed
+from .commands.measure_force import force
+from .commands.monitor import monitor, status
 from .commands.move import move
-from .commands.recording.record import record
-from .commands.recording.recordings import export, plot, recover, replay
+from .commands.recordings import export, plot, record, recover, replay
 from .commands.simulate import simulate
-from .commands.status import status
 from .commands.verify import verify
 from .commands.view import view
 from .commands.web import web
-from .output.reflow import reflow
 
 COMMANDS: Final = (
     *(demo, simulate, status, move, monitor, web, view, doctor, verify),
@@ -71,23 +69,40 @@ def build() -> App:
 
 
 def _app(name: str, words: str) -> App:
-    return App(name=name, help=reflow(words), help_format="plaintext", version=__version__)
+    return App(name=name, help=_reflow(words), help_format="plaintext", version=__version__)
 
 
 def _add(app: App, command: Callable[..., object]) -> None:
-    app.command(command, help=reflow(command.__doc__ or ""))
+    app.command(command, help=_reflow(command.__doc__ or ""))
 
 
 def _fleet() -> App:
     app = _app("fleet", fleet.__doc__ or "")
     app.default(fleet)
     _add(app, halt)
-    _add(app, fleet_keys)
+    _add(app, keys)
     return app
 
 
 def _measure() -> App:
     app = _app("measure", "Measure what the values 0..255 mean on your own gripper. THE FINGERS MOVE.")
-    _add(app, measure_speed)
-    _add(app, measure_force)
+    _add(app, speed)
+    _add(app, force)
     return app
+
+
+def _reflow(text: str) -> str:
+    """Join the lines of each paragraph; a terminal wraps them to its own width.
+
+    Indented lines, such as examples, stay as they are.
+    """
+    lines = inspect.cleandoc(text).splitlines()
+    return "\n".join(
+        line
+        for is_prose, block in groupby(lines, key=_is_prose)
+        for line in ([" ".join(block)] if is_prose else block)
+    )
+
+
+def _is_prose(line: str) -> bool:
+    return bool(line.strip()) and not line.startswith(" ")

@@ -19,8 +19,7 @@ from cyclopts import CycloptsError
 from ..values.errors import RobotiqError
 from .app import build
 from .failures import CommandError, UsageError
-from .output.log_capture import collected_warnings, forget
-from .output.notices import tell
+from .output.messages import collected_warnings, forget, tell
 
 _ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 SUCCESS, FAILURE, WRONG_USAGE, SIGNALLED = 0, 1, 2, 128

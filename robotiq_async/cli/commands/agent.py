@@ -13,8 +13,7 @@ from ...runtime.log import log
 from ..addresses import gripper_words, is_simulated
 from ..arguments import Flag, need
 from ..failures import UsageError
-from ..output.log_capture import forget, forwarded_warnings
-from ..output.notices import tell
+from ..output.messages import forget, forwarded_warnings, tell
 
 if TYPE_CHECKING:
     from ...fleet.agent.agent import Agent

@@ -1,20 +1,23 @@
-"""``robotiq-async fleet`` and ``robotiq-async fleet halt``."""
+"""``robotiq-async fleet``, ``fleet halt`` and ``fleet keys``."""
 
 from __future__ import annotations
 
 import asyncio
 import json
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Parameter
 
 from ...runtime.clock import now
 from ...runtime.log import printable
 from ..arguments import Flag, need
-from ..failures import CommandError, usage
+from ..failures import CommandError, UsageError, usage
 
 if TYPE_CHECKING:
     from ...fleet.fleet import Fleet, Member
+    from ...fleet.keys.access import Role
 
 SETTLE_S = 1.5
 """Time to collect: agents publish a summary of each gripper once a second."""
@@ -134,3 +137,118 @@ def _print_object(member: Member) -> None:
 
 def _age(member: Member) -> str:
     return "-" if member.seen_at is None else f"{now() - member.seen_at:.1f} s"
+
+
+_MAY: Final = {"read": "watch", "halt": "watch and halt", "operate": "watch, halt and command"}
+
+Names = Annotated[tuple[str, ...], Parameter(metavar="NAME", negative=(), show_default=False)]
+Agents = Annotated[tuple[str, ...], Parameter(metavar="NAME[=HOST,...]", negative=(), show_default=False)]
+
+
+def keys(
+    folder: Path,
+    /,
+    *,
+    agent: Agents = (),
+    read: Names = (),
+    halt: Names = (),
+    operate: Names = (),
+    days: Annotated[int | None, Parameter(metavar="N", show_default=False)] = None,
+) -> None:
+    """Make keys for agents and clients, and set who may do what.
+
+    The first time it makes a certificate authority in FOLDER. Every agent and every client
+    (that reads, that also halts, that operates) gets a folder in it, for you to copy to its
+    machine. Nothing is overwritten. Treat these folders as you would a password.
+
+    For example:
+
+        robotiq-async fleet keys keys --agent cell-1=192.168.1.20 --operate bob
+        robotiq-async fleet keys keys --read alice --halt panel --days 30
+
+    Args:
+        folder: The folder of the authority. It stays on your own machine.
+        agent: A host with grippers, and the addresses that clients connect to (default: its name).
+        read: A client that watches.
+        halt: A client that watches and halts.
+        operate: A client that watches, halts and commands.
+        days: How long the certificates are valid (default: 825; the authority: ten years).
+    """
+    need("cryptography", "fleet")
+    from ...fleet.keys.access import Role
+    from ...fleet.keys.key_folder import DAYS
+
+    days = DAYS if days is None else days
+    clients = {Role.READ: read, Role.HALT: halt, Role.OPERATE: operate}
+    subjects = [_agent(text) for text in dict.fromkeys(agent)]
+    subjects += [Subject(role, name) for role, names in clients.items() for name in dict.fromkeys(names)]
+    _check(folder, subjects, days)
+    try:
+        _make(folder, subjects, days)
+    except (OSError, ValueError) as error:
+        raise CommandError(str(error)) from error
+
+
+@dataclass(frozen=True)
+class Subject:
+    """The owner of a certificate."""
+
+    role: Role
+    name: str
+    hosts: tuple[str, ...] = ()
+
+
+def _agent(text: str) -> Subject:
+    from ...fleet.keys.access import Role
+
+    name, equals, hosts = text.partition("=")
+    return Subject(Role.AGENT, name, tuple(hosts.split(",")) if equals else (name,))
+
+
+def _check(folder: Path, subjects: list[Subject], days: int) -> None:
+    """Check everything before anything is written."""
+    from ...fleet.keys.access import check_subject
+    from ...fleet.keys.authority import DAYS_MAX, check_host
+    from ...fleet.keys.certificates import subject_folder
+
+    if not 1 <= days <= DAYS_MAX:
+        raise UsageError(f"--days must be an integer in 1..{DAYS_MAX}, got {days}")
+    if len({(subject.role, subject.name) for subject in subjects}) < len(subjects):
+        raise UsageError("an agent is named twice")
+    for subject in subjects:
+        with usage():
+            check_subject(subject.name)
+            for host in subject.hosts:
+                check_host(host)
+        path = subject_folder(folder, subject.name, subject.role)
+        if path.exists():
+            raise CommandError(f"{path} exists already: nothing was made")
+
+
+def _make(folder: Path, subjects: list[Subject], days: int) -> None:
+    """Make the missing files, and print for each folder where it goes."""
+    from ...fleet.keys.access import Role
+    from ...fleet.keys.certificates import AUTHORITY_KEY, access_lists, has_authority, issue, make_authority
+
+    if not has_authority(folder):
+        print(f"{make_authority(folder)}: the authority. {AUTHORITY_KEY} beside it never leaves this folder.")
+    for subject in subjects:
+        path = issue(folder, subject.name, subject.role, hosts=subject.hosts, days=days)
+        print(f"{path}: {_destination(subject)}")
+    if any(subject.role is not Role.AGENT for subject in subjects):
+        _tell_lists(access_lists(folder))
+
+
+def _destination(subject: Subject) -> str:
+    from ...fleet.keys.access import Role
+
+    if subject.role is Role.AGENT:
+        return f"for the agent on {subject.name}; clients connect to it by {', '.join(subject.hosts)}"
+    return f"for {subject.name}, who may {_MAY[subject.role.value]}"
+
+
+def _tell_lists(lists: list[Path]) -> None:
+    own, *copies = lists
+    print(f"{own}: who may do what")
+    for copy in copies:
+        print(f"{copy}: a copy; agents use it from their next start on")

@@ -1,21 +1,22 @@
-"""``robotiq-async monitor``."""
+"""``robotiq-async monitor`` and ``status``."""
 
 from __future__ import annotations
 
 import asyncio
+import json
 import os
 import sys
 from typing import Annotated, Final
 
 from cyclopts import Parameter
 
+from ...tools.recording.payloads import reading_fields
 from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..addresses import gripper_words
 from ..arguments import USUAL, Address, Byte, Flag, Link, need
 from ..consent import forget_keys
 from ..failures import CommandError, UsageError
-from ..output.log_capture import forget, forwarded_warnings
-from ..output.notices import tell
+from ..output.messages import forget, forwarded_warnings, tell
 
 SCREEN_S: Final = 1.0
 """Maximum time for the screen to restore the terminal."""
@@ -84,7 +85,7 @@ def _is_terminal() -> bool:
 
 async def _look(address: str, link: Link, *, as_json: bool) -> None:
     from ..connect import connected
-    from ..output.stream_output import print_objects, watch
+    from ..output.lines import print_objects, watch
 
     if not as_json:
         print(gripper_words(address), flush=True)
@@ -124,3 +125,33 @@ def _say(words: str) -> None:
         print(words, flush=True)
     except OSError:  # the terminal is gone
         forget(sys.stdout)
+
+
+async def status(
+    address: Address = "sim://",
+    /,
+    *,
+    as_json: Annotated[Flag, Parameter(name="--json")] = False,
+    link: Link = USUAL,
+) -> None:
+    """Read the gripper once and print its status. Nothing moves and nothing is written.
+
+    For example:
+
+        robotiq-async status tcp://192.168.1.11
+        robotiq-async status --json 192.168.1.11 | jq .A.position
+
+    Args:
+        as_json: Print one JSON object instead of the table.
+    """
+    from ..connect import connected
+    from ..output.tables import print_status
+
+    if not as_json:
+        print(gripper_words(address), flush=True)
+    async with connected(address, link, halt=False) as hand:
+        if as_json:
+            tell(gripper_words(address))
+            print(json.dumps(reading_fields(hand), indent=2))
+        else:
+            print_status(hand)

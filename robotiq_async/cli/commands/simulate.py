@@ -15,7 +15,7 @@ from ...values.model import model_of
 from ...values.registers import RTU_REGISTERS
 from ..arguments import Byte, Flag, Host, Port, Unit
 from ..failures import usage
-from ..output.notices import tell
+from ..output.messages import tell
 
 if TYPE_CHECKING:
     from ...simulator import SimulatedGripper, Trouble

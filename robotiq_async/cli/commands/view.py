@@ -13,7 +13,7 @@ from ...runtime.sockets import is_loopback
 from ..addresses import gripper_words
 from ..arguments import USUAL, Address, Host, Link, Port, need
 from ..failures import CommandError
-from ..output.notices import tell
+from ..output.messages import tell
 
 
 async def view(
@@ -49,7 +49,7 @@ async def view(
     need("foxglove", "view")
     from ...tools.viewer import Viewer
     from ..connect import connected
-    from ..output.log_capture import forwarded_warnings
+    from ..output.messages import forwarded_warnings
 
     if not is_loopback(host):
         tell(f"anyone who reaches {host} can see this gripper: there is no password")

@@ -19,7 +19,7 @@ from ..addresses import gripper_words
 from ..arguments import USUAL, Address, Byte, Flag, Host, Link, Port, need
 from ..browser import opened
 from ..failures import CommandError, UsageError, usage
-from ..output.notices import tell
+from ..output.messages import tell
 
 if TYPE_CHECKING:
     from ...tools.web.server import PageServer
@@ -74,7 +74,7 @@ async def web(
     from ...tools.web.server import PageServer
     from ...tools.web.settings import PageSettings
     from ..connect import make_operator
-    from ..output.log_capture import forwarded_warnings
+    from ..output.messages import forwarded_warnings
 
     shown = addresses or ("sim://",)
     operators = [make_operator(each, link, speed=speed, force=force) for each in shown]

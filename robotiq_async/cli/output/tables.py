@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ...values.enums import Fault, Finger
-from .text import axis_words
+from .lines import axis_words
 
 if TYPE_CHECKING:
     from ... import MoveResult, RobotiqStatus

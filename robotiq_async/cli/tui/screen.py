@@ -24,10 +24,9 @@ from ...tools.wording import refusal_words
 from ...values.enums import Finger, State
 from ...values.errors import RobotiqError
 from ...values.status import RobotiqStatus
-from ..output.text import clock, event_line
+from ..output.lines import clock, event_line
 from .asking import Asking, Question, Target
-from .widgets import Axes, Line, link_text, state_text
-from .words import HINTS, KEYS, transition_words
+from .widgets import HINTS, KEYS, Axes, Line, link_text, state_text, transition_words
 
 if sys.platform == "win32":
     DRIVER, NONBLOCKING = None, ()

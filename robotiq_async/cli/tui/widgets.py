@@ -1,4 +1,4 @@
-"""The parts of the monitor's screen. They have no access to a hand."""
+"""The parts of the monitor's screen, and its texts. They have no access to a hand."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from rich.text import Text
 from textual.widget import Widget
 from textual.widgets import Static
 
-from ...tools.wording import AXIS_WORDS, STATE_WORDS
+from ...tools.recording.payloads import Fields
+from ...tools.wording import AXIS_WORDS, STATE_WORDS, without_methods
 from ...values.enums import Fault, Finger, ObjectStatus, Severity, State
 from ...values.model import Model
 from ...values.statistics import Statistics
 from ...values.status import NO_REQUEST, RobotiqStatus
-from .words import HINTS
+from ...values.trigger import Trigger
 
 HISTORY: Final = 60
 """Currents kept, one per paint: five seconds."""
@@ -196,3 +197,24 @@ def link_text(figures: Statistics, rate: float, held_up: bool, speed: int, force
             f"  ANOTHER CLIENT commands this gripper ({figures.foreign_commands} times)", "bold yellow"
         )
     return text
+
+
+KEYS: Final = """\
+o open  c close  1 wide  2 normal  3 pinch  SPACE halt  + - speed  ] [ force
+a activate  r reset  l release  v recover  p position of axes         q quit"""
+
+HINTS: Final = {
+    State.FAULT: "v does what it needs",
+    State.ATR_DONE: "r resets it",
+    State.RESET: "a activates it",
+}
+"""The key that helps in a state."""
+
+
+def transition_words(event: Fields) -> str | None:
+    """The new state and its cause; None if both states have the same description.
+
+    That drops the transitions between sending a request and its acknowledgement.
+    """
+    before, after = (STATE_WORDS[State[event[end]]] for end in ("source", "target"))
+    return None if before == after else f"{after} ({without_methods(Trigger[event['trigger']].value)})"

@@ -1,12 +1,15 @@
-"""Redirects the library's log while a command runs."""
+"""Messages of a command beside its output, among them the library's warnings."""
 
 from __future__ import annotations
 
 import logging
 import os
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TextIO
+
+from ...runtime.log import printable
 
 
 def forget(stream: TextIO) -> None:
@@ -57,3 +60,8 @@ def forwarded_warnings(to: Callable[[str], object], *, of: str = "") -> Iterator
         log.removeHandler(forwarder)
         for other in others:
             log.addHandler(other)
+
+
+def tell(words: str) -> None:
+    """Print a line on stderr. Makes text of clients and agents printable."""
+    print("robotiq-async:", printable(words), file=sys.stderr, flush=True)

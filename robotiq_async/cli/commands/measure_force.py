@@ -4,35 +4,26 @@ from __future__ import annotations
 
 import asyncio
 import re
+import threading
 from collections.abc import Awaitable, Callable, Coroutine
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from ....values.enums import DEFAULT_SPEED
-from ....values.model import THREE_FINGER
-from ...addresses import full_address, gripper_words, is_simulated, named_model
-from ...arguments import Address, Byte, Yes
-from ...consent import consent
-from ...failures import CommandError, UsageError
-from .campaign import (
-    NoPlot,
-    Runs,
-    Speedup,
-    carry_out,
-    check,
-    file_errors,
-    gripper,
-    load_rich,
-    print_files,
-    prompt,
-)
+from ...values.enums import DEFAULT_SPEED, Finger
+from ...values.model import THREE_FINGER
+from ..addresses import full_address, gripper_words, is_simulated, named_model
+from ..arguments import Address, Byte, Yes
+from ..consent import consent, read_line
+from ..failures import CommandError, UsageError
+from .measure import NoPlot, Runs, Speedup, carry_out, check, file_errors, gripper, load_rich, print_files
 
 if TYPE_CHECKING:
-    from ....simulator import SimulatedGripper
-    from ....tools.measure.campaigns import Campaign, Currents
-    from ....values.calibration.csv_tables import Table
+    from ...simulator import SimulatedGripper
+    from ...tools.measure.campaigns import Campaign, Currents
+    from ...values.calibration.csv_tables import Table
 
 WARNING = """the fingers MOVE: they open and close on what lies between them, {count} times.
 If it is not active yet it is activated first, and what it holds drops."""
@@ -84,8 +75,8 @@ def force(
     if (model := named_model(address)) is not THREE_FINGER:
         raise UsageError(f"forces are measured with three fingers, and {address} names a {model}")
     factor = check(address, path, speedup, runs, step, not no_plot)
-    from ....tools.measure.campaigns import force_campaign
-    from ....values.calibration.csv_tables import FORCE, read_table
+    from ...tools.measure.campaigns import force_campaign
+    from ...values.calibration.csv_tables import FORCE, read_table
 
     with file_errors():
         readings = None if scale is None else read_table(scale, FORCE)
@@ -113,8 +104,8 @@ async def _measure(
     bar: bool,
     plot: bool,
 ) -> None:
-    from ....tools.measure.campaigns import GRASP_S, grasp, write_currents
-    from ....values.calibration.closing_time import closing_time
+    from ...tools.measure.campaigns import GRASP_S, grasp, write_currents
+    from ...values.calibration.closing_time import closing_time
 
     output = campaign.path
     currents_file = currents_beside(output)
@@ -148,7 +139,7 @@ def currents_beside(output: Path) -> Path:
 
 def _currents_of(campaign: Campaign) -> Currents:
     """The currents that are already in the file."""
-    from ....tools.measure.campaigns import read_currents
+    from ...tools.measure.campaigns import read_currents
 
     file = currents_beside(campaign.path)
     currents = read_currents(file) if campaign.table else {}
@@ -159,8 +150,6 @@ def _currents_of(campaign: Campaign) -> Currents:
 
 
 def _place_scale(simulated: SimulatedGripper, surface: str) -> None:
-    from ....values.enums import Finger
-
     simulated.place_object(Finger.ABC, position=150, soft=40 if surface == "foam" else 0)
 
 
@@ -179,7 +168,7 @@ def _scale(
 
     async def typed(value: int, run: int) -> int:
         while True:
-            text = await prompt(f"Force {value}, run {run}: what does the scale show, in grams?")
+            text = await _prompt(f"Force {value}, run {run}: what does the scale show, in grams?")
             if re.fullmatch("[0-9]{1,6}", text) and int(text) <= MOST_GRAMS:
                 return int(text)
             print(f"An integer in 0..{MOST_GRAMS}, please.")
@@ -188,7 +177,7 @@ def _scale(
         return from_table
     if not is_simulated(address):
         return typed
-    from ....simulator.physics.mechanics.scale import SimulatedScale
+    from ...simulator.physics.mechanics.scale import SimulatedScale
 
     simulated = SimulatedScale(surface)
 
@@ -198,9 +187,36 @@ def _scale(
     return shown
 
 
+async def _prompt(question: str) -> str:
+    """A line that the user types; the event loop keeps running.
+
+    Raises:
+        CommandError: the input has ended.
+    """
+    loop = asyncio.get_running_loop()
+    answer: asyncio.Future[str] = loop.create_future()
+    print(question, end=" ", flush=True)
+
+    def read() -> None:
+        line = read_line()
+        with suppress(RuntimeError):  # the loop has been closed meanwhile
+            loop.call_soon_threadsafe(take, line)
+
+    def take(line: str) -> None:
+        if not answer.done():
+            answer.set_result(line)
+
+    # A daemon thread: an interrupted program does not wait for the line.
+    threading.Thread(target=read, daemon=True).start()
+    line = await answer
+    if not line:
+        raise CommandError("no answer: the input has ended")
+    return line.strip()
+
+
 def _plot(output: Path, surface: str, table: Table, label: str) -> None:
-    from ....tools.measure.campaigns import read_currents
-    from ....tools.measure.plots import plot_current_over_time, plot_force, plot_peak_currents
+    from ...tools.measure.campaigns import read_currents
+    from ...tools.measure.plots import plot_current_over_time, plot_force, plot_peak_currents
 
     with file_errors():
         currents = read_currents(currents_beside(output))

@@ -1,29 +1,28 @@
-"""Shared by ``robotiq-async measure speed`` and ``measure force``."""
+"""``robotiq-async measure speed``, and what it shares with ``measure force``."""
 
 from __future__ import annotations
 
-import asyncio
 import sys
-import threading
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
-from contextlib import asynccontextmanager, contextmanager, suppress
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ....link.address import parse_address
-from ....link.simulation import Simulation
-from ....values.errors import MeasuringError
-from ...addresses import is_simulated, named_model
-from ...arguments import Flag, need
-from ...consent import read_line
-from ...failures import CommandError, UsageError
+from ...link.address import parse_address
+from ...link.simulation import Simulation
+from ...values.enums import Finger
+from ...values.errors import MeasuringError
+from ..addresses import full_address, gripper_words, is_simulated, named_model
+from ..arguments import Address, Fingers, Flag, Yes, need
+from ..consent import consent
+from ..failures import CommandError, UsageError
 
 if TYPE_CHECKING:
-    from ....hand import Hand
-    from ....simulator import SimulatedGripper
-    from ....tools.measure.campaigns import Campaign
+    from ...hand import Hand
+    from ...simulator import SimulatedGripper
+    from ...tools.measure.campaigns import Campaign
 
 SPEEDUP = 15.0
 """How much faster than real time the simulated gripper of sim:// runs by default."""
@@ -73,13 +72,13 @@ async def gripper(
     Raises:
         RobotiqError: no gripper there, or it cannot be activated.
     """
-    from ...connect import make_hand
+    from ..connect import make_hand
 
     if not is_simulated(address):
         async with make_hand(address) as hand:
             yield hand
         return
-    from ....simulator import SimulatedGripper, SimulatorServer
+    from ...simulator import SimulatedGripper, SimulatorServer
 
     simulated = SimulatedGripper(speedup=speedup, model=named_model(address))
     interval = POLL_S if speedup > 1 else 5 * POLL_S
@@ -114,7 +113,7 @@ async def carry_out(
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-    from ....values.calibration.csv_tables import TableError
+    from ...values.calibration.csv_tables import TableError
 
     done, left = len(campaign.table), campaign.left
     if done and left:
@@ -156,33 +155,6 @@ async def carry_out(
             raise CommandError(f"{error}; {kept}") from error
 
 
-async def prompt(question: str) -> str:
-    """A line that the user types; the event loop keeps running.
-
-    Raises:
-        CommandError: the input has ended.
-    """
-    loop = asyncio.get_running_loop()
-    answer: asyncio.Future[str] = loop.create_future()
-    print(question, end=" ", flush=True)
-
-    def read() -> None:
-        line = read_line()
-        with suppress(RuntimeError):  # the loop has been closed meanwhile
-            loop.call_soon_threadsafe(take, line)
-
-    def take(line: str) -> None:
-        if not answer.done():
-            answer.set_result(line)
-
-    # A daemon thread: an interrupted program does not wait for the line.
-    threading.Thread(target=read, daemon=True).start()
-    line = await answer
-    if not line:
-        raise CommandError("no answer: the input has ended")
-    return line.strip()
-
-
 @contextmanager
 def file_errors() -> Iterator[None]:
     """Turn TableError and OSError of tables and pictures into CommandError.
@@ -190,7 +162,7 @@ def file_errors() -> Iterator[None]:
     Raises:
         CommandError: in place of TableError and OSError.
     """
-    from ....values.calibration.csv_tables import TableError
+    from ...values.calibration.csv_tables import TableError
 
     try:
         yield
@@ -202,3 +174,78 @@ def print_files(files: list[Path]) -> None:
     """Print the names of the files that were written."""
     for file in files:
         print(file)
+
+
+WARNING = """the fingers MOVE: they open and close fully, {count} times. Nothing may be between them.
+If it is not active yet it is activated first, and what it holds drops."""
+
+
+def speed(
+    address: Address,
+    /,
+    *,
+    output: Annotated[Path, Parameter(metavar="FILE.csv")] = Path("closing_time_ms.csv"),
+    step: Annotated[int, Parameter(metavar="N")] = 4,
+    runs: Runs = 3,
+    fingers: Fingers = Finger.ABC,
+    speedup: Speedup = None,
+    no_plot: NoPlot = False,
+    yes: Yes = False,
+) -> Coroutine[None, None, None]:
+    """Measure how long a full closing takes at each speed value. THE FINGERS MOVE.
+
+    As the thesis did (Pekonen 2012, table A1.1): every 4th value from 0, and 255, slowest first,
+    three runs, from the command until nothing moves. It takes 20 minutes. The file is
+    written after every row; started again, it continues there. Beside it a plot is drawn
+    (PNG and SVG) with the thesis's own curve. Unless the gripper is that of sim:// it asks
+    first; without a terminal it needs --yes.
+
+    For example:
+
+        robotiq-async measure speed sim://
+        robotiq-async measure speed 192.168.1.11 --step 25 --runs 1
+
+    Args:
+        output: The table; the plot is named after it.
+        step: Distance between speed values.
+        runs: Closings at each speed value.
+        fingers: The axes that move: ABC, A,B, all.
+        speedup: How much faster than real time sim:// runs (default: 15); times are simulated ones.
+        no_plot: Draw no plot.
+        yes: Do not ask.
+    """
+    if Finger.SCISSOR in fingers:
+        raise UsageError("--fingers takes A, B and C only: the scissor has a different stroke")
+    factor = check(address, output, speedup, runs, step, not no_plot)
+    from ...tools.measure.campaigns import speed_campaign
+
+    with file_errors():
+        origin = {"gripper": full_address(address), "fingers": str(fingers.name)}
+        campaign = speed_campaign(output, step, runs, **origin)
+    if campaign.left:
+        consent(address, WARNING.format(count=runs * len(campaign.left)), yes=yes)
+    return _measure(address, campaign, fingers, factor, not no_plot)
+
+
+async def _measure(address: str, campaign: Campaign, fingers: Finger, speedup: float, plot: bool) -> None:
+    from ...tools.measure.campaigns import expected_seconds, time_closing
+
+    output = campaign.path
+    if not campaign.left:
+        print(f"{output} is complete: nothing is measured again.")
+    if campaign.left:
+        print(gripper_words(address), flush=True)
+        load_rich()
+        async with gripper(address, speedup) as hand:
+
+            async def run(value: int, _: int) -> int:
+                return round(1000 * await time_closing(hand, value, fingers, speedup))
+
+            await carry_out(campaign, run, lambda value: expected_seconds(value) / speedup, "speed")
+    print_files([output])
+    if plot:
+        from ...tools.measure.plots import plot_speed
+
+        label = "simulated" if is_simulated(address) else "measured"
+        with file_errors():
+            print_files(plot_speed(output.with_suffix(""), campaign.table, label))

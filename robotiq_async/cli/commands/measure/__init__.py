@@ -1,1 +1,0 @@
-"""``robotiq-async measure speed`` and ``measure force``."""

@@ -1,1 +1,0 @@
-"""``robotiq-async record``, and the commands that use a recording."""
