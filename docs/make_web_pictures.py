@@ -26,8 +26,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer  # noqa: E
 from robotiq_async.tools.actions import Operator  # noqa: E402
 from robotiq_async.tools.web.server import PageServer  # noqa: E402
 from robotiq_async.tools.web.settings import PageSettings  # noqa: E402
-from tests.web.browser import Browser  # noqa: E402
-from tests.web.pace import Pace  # noqa: E402
+from tests.web.browser import Browser, Pace  # noqa: E402
 
 FOLDER: Final = ROOT / "docs" / "measured"
 FRAME_S: Final = 0.3

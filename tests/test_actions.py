@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import inspect
 from collections.abc import AsyncIterator
 from typing import Any
 
@@ -25,19 +24,26 @@ from robotiq_async import (
 )
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import ACTIONS, Operator
-from robotiq_async.values.enums import DEFAULT_FORCE, DEFAULT_SPEED
+from robotiq_async.values.enums import DEFAULT_SPEED
 
 pytestmark = pytest.mark.virtual_time
+LEFT, STOPPED, MOVING = "left as they are", "were stopped", "may STILL MOVE"
 
 
 @pytest.fixture
-async def operator(gripper: SimulatedGripper) -> AsyncIterator[Operator]:
-    async with SimulatorServer(gripper) as server:
-        hand = RobotiqHand(server.address)
-        operator = Operator(hand)
-        await hand.start(activate=False)
-        yield operator
-        await hand.stop()
+async def operator(server: SimulatorServer) -> AsyncIterator[Operator]:
+    """Of a gripper that is reset."""
+    operator = Operator(RobotiqHand(server.address))
+    await operator.hand.start(activate=False)
+    yield operator
+    await operator.hand.stop()
+
+
+@pytest.fixture
+async def active(operator: Operator) -> Operator:
+    """Of a gripper that was activated, and not by this operator."""
+    await operator.hand.activate()
+    return operator
 
 
 async def test_open_close_and_widths(operator: Operator, gripper: SimulatedGripper) -> None:
@@ -69,6 +75,9 @@ async def test_halt_reset_release_and_recover(operator: Operator, gripper: Simul
 
 
 async def test_speed_and_force_stay_in_range(operator: Operator) -> None:
+    with pytest.raises(NotActivatedError):
+        await operator.change_speed(16)
+    assert operator.speed == DEFAULT_SPEED, "what is refused changes nothing"
     await operator.act(ACTIONS["activate"])
     assert await operator.change_speed(1000) == "255"
     assert await operator.change_speed(-5) == "250"
@@ -84,181 +93,117 @@ async def test_a_small_integer_of_numpy_does_not_wrap(operator: Operator) -> Non
     assert await Operator(operator.hand, force=byte).change_force(16) == "255"
 
 
-async def test_what_is_refused_changes_nothing(operator: Operator) -> None:
-    with pytest.raises(NotActivatedError):
-        await operator.change_speed(16)
-    assert operator.speed == DEFAULT_SPEED
-
-
-def test_they_begin_where_the_hand_begins() -> None:
-    for either in (RobotiqHand, Operator):
-        defaults = inspect.signature(either).parameters
-        assert (defaults["speed"].default, defaults["force"].default) == (DEFAULT_SPEED, DEFAULT_FORCE)
-
-
-def test_what_is_dangerous_is_warned_about() -> None:
-    assert {name for name, action in ACTIONS.items() if action.warning} == {
-        "activate",
-        "reset",
-        "release",
-        "recover",
-    }
-
-
 # -- whether anything was moved ----------------------------------------------------------------------------
 
 
-async def test_nobody_has_moved_what_was_only_looked_at(operator: Operator) -> None:
-    assert not operator.has_moved
+async def test_speed_alone_and_what_is_refused_move_nothing(
+    active: Operator, gripper: SimulatedGripper
+) -> None:
+    await active.set_speed(10)
+    assert not active.has_moved
+    gripper.inject_fault(0x0E)
+    await active.hand.wait_for_state(State.FAULT)
+    with pytest.raises(GripperFaultError):
+        await active.move(30, Finger.A)
+    assert not active.has_moved
+    gripper.clear_faults()
+    await active.hand.wait_for_state(State.RUNNING_IDLE)
+    await active.move(30, Finger.A)
+    assert active.has_moved
 
 
-async def test_what_was_refused_has_not_moved_anything(operator: Operator) -> None:
-    with pytest.raises(NotActivatedError):
-        await operator.act(ACTIONS["close"])
-    assert not operator.has_moved
-
-
-async def test_speed_alone_moves_nothing(gripper: SimulatedGripper) -> None:
-    async with SimulatorServer(gripper) as server:
-        async with RobotiqHand(server.address):
-            pass
-        hand = RobotiqHand(server.address)
-        operator = Operator(hand)
-        await hand.start(activate=False)
-        await operator.set_speed(10)
-        assert not operator.has_moved
-        gripper.inject_fault(0x0E)
-        await hand.wait_for_state(State.FAULT)
-        with pytest.raises(GripperFaultError):
-            await operator.move(30, Finger.A)
-        assert not operator.has_moved
-        gripper.clear_faults()
-        await hand.wait_for_state(State.RUNNING_IDLE)
-        await operator.move(30, Finger.A)
-        assert operator.has_moved
-        await hand.stop()
-
-
-LEFT, STOPPED, MOVING = "left as they are", "were stopped", "may STILL MOVE"
-
-
-@pytest.fixture
-async def new(gripper: SimulatedGripper) -> AsyncIterator[tuple[Operator, SimulatorServer]]:
-    """Somebody at a hand that is active, and whom the test lets leave."""
-    async with SimulatorServer(gripper) as server:
-        hand = RobotiqHand(server.address)
-        operator = Operator(hand)
-        await hand.start()
-        yield operator, server
-        await hand.stop()
-
-
-Someone = tuple[Operator, SimulatorServer]
-
-
-async def test_leaving_stops_what_was_moved(new: Someone, gripper: SimulatedGripper) -> None:
-    operator, _ = new
-    await operator.move(100, Finger.A)
-    assert operator.has_moved
-    assert STOPPED in await operator.leave()
+async def test_leaving_stops_what_was_moved(active: Operator, gripper: SimulatedGripper) -> None:
+    await active.move(100, Finger.A)
+    assert active.has_moved
+    assert STOPPED in await active.leave()
     assert not gripper.request_registers[0] & 0x0800
 
 
-async def test_leaving_leaves_alone_what_was_not(new: Someone, gripper: SimulatedGripper) -> None:
-    operator, _ = new
-    await operator.hand.move(100)
-    await operator.set_speed(9)
-    assert LEFT in await operator.leave()
+async def test_leaving_leaves_alone_what_was_not(active: Operator, gripper: SimulatedGripper) -> None:
+    await active.hand.move(100)
+    await active.set_speed(9)
+    assert LEFT in await active.leave()
     assert gripper.request_registers[0] & 0x0800
 
 
-async def test_a_gripper_that_is_gone_was_not_stopped(new: Someone) -> None:
-    operator, server = new
-    await operator.move(100, Finger.A)
+async def test_a_gripper_that_is_gone_was_not_stopped(active: Operator, server: SimulatorServer) -> None:
+    await active.move(100, Finger.A)
     server.refuse()
     server.cut()
-    await operator.hand.wait_for_state(State.DISCONNECTED)
-    assert MOVING in await operator.leave()
+    await active.hand.wait_for_state(State.DISCONNECTED)
+    assert MOVING in await active.leave()
 
 
-async def test_a_release_is_not_stopped_by_leaving(new: Someone, gripper: SimulatedGripper) -> None:
-    operator, _ = new
-    await operator.move(200, Finger.ABC)
+async def test_a_release_is_not_stopped_by_leaving(active: Operator, gripper: SimulatedGripper) -> None:
+    await active.move(200, Finger.ABC)
     gripper.inject_fault(0x0E)
-    await operator.hand.wait_for_state(State.FAULT)
-    releasing = asyncio.create_task(operator.act(ACTIONS["release"]))
-    await operator.hand.wait_for_state(State.WF_ATR)
-    assert MOVING in await operator.leave()
+    await active.hand.wait_for_state(State.FAULT)
+    releasing = asyncio.create_task(active.act(ACTIONS["release"]))
+    await active.hand.wait_for_state(State.WF_ATR)
+    assert MOVING in await active.leave()
     with pytest.raises(NotStartedError):
         await releasing
 
 
-async def test_a_gripper_that_came_back_reset_stands_still(new: Someone) -> None:
-    operator, server = new
-    await operator.move(100, Finger.A)
+async def test_a_gripper_that_came_back_reset_stands_still(active: Operator, server: SimulatorServer) -> None:
+    await active.move(100, Finger.A)
     await server.power_cycle()
-    await operator.hand.wait_for_state(State.RESET)
-    assert STOPPED in await operator.leave()
+    await active.hand.wait_for_state(State.RESET)
+    assert STOPPED in await active.leave()
 
 
 async def test_what_was_refused_does_not_count_with_what_comes_after(
-    new: Someone, gripper: SimulatedGripper
+    active: Operator, gripper: SimulatedGripper
 ) -> None:
-    operator, _ = new
     with pytest.raises(ValueError, match="position"):
-        await operator.move(300, Finger.A)
-    await operator.set_force(3)
-    assert not operator.has_moved
+        await active.move(300, Finger.A)
+    await active.set_force(3)
+    assert not active.has_moved
 
 
-async def test_what_was_cancelled_may_have_moved(new: Someone) -> None:
-    operator, _ = new
+async def test_it_keeps_nothing_of_what_others_write(active: Operator) -> None:
+    """A control loop beside it writes for days."""
+    for position in (10, 20, 30):
+        await active.hand.set_position(position)
+    assert len(list(active._requests.drain())) == 1
+
+
+async def test_steps_of_the_speed_add_up(active: Operator) -> None:
+    await asyncio.gather(*(active.change_speed(16) for _ in range(3)))
+    assert active.speed == DEFAULT_SPEED + 48
+
+
+async def test_what_was_cancelled_may_have_moved(active: Operator) -> None:
     with pytest.raises(TimeoutError):
         async with asyncio.timeout(0):
-            await operator.move(200, Finger.A)
-    assert operator.has_moved
+            await active.move(200, Finger.A)
+    assert active.has_moved
 
 
-async def test_it_still_knows_after_the_hand_was_started_again(new: Someone) -> None:
-    operator, _ = new
-    await operator.hand.stop()
-    await operator.hand.start()
-    assert not operator.has_moved
-    await operator.move(200, Finger.A)
-    assert operator.has_moved
-    assert STOPPED in await operator.leave()
-
-
-async def test_it_keeps_nothing_of_what_others_write(new: Someone) -> None:
-    """A control loop beside it writes for days."""
-    operator, _ = new
-    for position in (10, 20, 30):
-        await operator.hand.set_position(position)
-    assert len(list(operator._requests.drain())) == 1
-
-
-async def test_steps_of_the_speed_add_up(new: Someone) -> None:
-    operator, _ = new
-    await asyncio.gather(*(operator.change_speed(16) for _ in range(3)))
-    assert operator.speed == DEFAULT_SPEED + 48
+async def test_it_still_knows_after_the_hand_was_started_again(active: Operator) -> None:
+    await active.hand.stop()
+    await active.hand.start()
+    assert not active.has_moved
+    await active.move(200, Finger.A)
+    assert active.has_moved
+    assert STOPPED in await active.leave()
 
 
 async def test_a_recovery_does_not_go_on_after_a_halt_or_a_reset(
-    new: Someone, gripper: SimulatedGripper
+    active: Operator, gripper: SimulatedGripper
 ) -> None:
     """It waits for a minor fault to clear; what comes after that would surprise whoever has halted."""
-    operator, _ = new
     for name in ("halt", "reset"):
         gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
-        await operator.hand.wait_for_state(State.FAULT)
-        recovering = asyncio.create_task(operator.act(ACTIONS["recover"]))
-        await anext(operator.hand.statuses())
-        await operator.act(ACTIONS[name])
+        await active.hand.wait_for_state(State.FAULT)
+        recovering = asyncio.create_task(active.act(ACTIONS["recover"]))
+        await anext(active.hand.statuses())
+        await active.act(ACTIONS[name])
         with pytest.raises(MoveSupersededError):
             await recovering
     for _ in range(20):
-        await anext(operator.hand.statuses())
-    assert operator.hand.state is State.RESET
+        await anext(active.hand.statuses())
+    assert active.hand.state is State.RESET
 
 
 async def test_a_halt_ends_an_activation_and_says_how(operator: Operator, gripper: SimulatedGripper) -> None:
@@ -271,52 +216,52 @@ async def test_a_halt_ends_an_activation_and_says_how(operator: Operator, grippe
 
 
 @pytest.mark.parametrize("pause", [0.0, 0.1])
-async def test_fingers_that_a_halt_has_stopped_are_seen_to_stand_still(new: Someone, pause: float) -> None:
+async def test_fingers_that_a_halt_has_stopped_stand_still(active: Operator, pause: float) -> None:
     """Nothing is left to write then, and nothing was read: that was taken for a gripper that is not seen."""
-    operator, _ = new
-    moving = asyncio.create_task(operator.move(255, Finger.ABC))
-    async for status in operator.hand.statuses():
+    moving = asyncio.create_task(active.move(255, Finger.ABC))
+    async for status in active.hand.statuses():
         if status.is_moving:
             break
-    await operator.hand.halt()
+    await active.hand.halt()
     with pytest.raises(MoveSupersededError):
         await moving
     await asyncio.sleep(pause)
-    assert await operator.leave() == "The fingers were stopped: they had been moved from here."
+    assert await active.leave() == "The fingers were stopped: they had been moved from here."
 
 
-async def test_an_old_halt_is_no_stop(new: Someone, gripper: SimulatedGripper) -> None:
+async def test_an_old_halt_is_no_stop(
+    active: Operator, server: SimulatorServer, gripper: SimulatedGripper
+) -> None:
     """Another client goes on after it, and the link is lost."""
-    operator, server = new
-    await operator.move(50, Finger.A)
-    await operator.act(ACTIONS["halt"])
+    await active.move(50, Finger.A)
+    await active.act(ACTIONS["halt"])
     image = list(gripper.request_registers)
     image[0] |= 0x0800
     gripper.write(0, image)
     server.refuse()
     server.cut()
-    await operator.hand.wait_for_state(State.DISCONNECTED)
-    assert MOVING in await operator.leave()
+    await active.hand.wait_for_state(State.DISCONNECTED)
+    assert MOVING in await active.leave()
 
 
-async def test_a_release_that_is_done_is_at_rest(new: Someone, gripper: SimulatedGripper) -> None:
-    operator, _ = new
+async def test_a_release_that_is_done_is_at_rest(active: Operator, gripper: SimulatedGripper) -> None:
     gripper.inject_fault(0x0E)
-    await operator.hand.wait_for_state(State.FAULT)
-    await operator.act(ACTIONS["release"])
-    assert STOPPED in await operator.leave()
+    await active.hand.wait_for_state(State.FAULT)
+    await active.act(ACTIONS["release"])
+    assert STOPPED in await active.leave()
 
 
-async def test_a_motion_that_is_on_its_way_counts(new: Someone, gripper: SimulatedGripper) -> None:
+async def test_a_motion_that_is_on_its_way_counts(
+    active: Operator, server: SimulatorServer, gripper: SimulatedGripper
+) -> None:
     """Its request has arrived, and its acknowledgement has not."""
-    operator, server = new
     server.policy = lambda frame: [(0.05, frame)]
-    closing = asyncio.create_task(operator.act(ACTIONS["close"]))
+    closing = asyncio.create_task(active.act(ACTIONS["close"]))
     async with asyncio.timeout(20):
         while not gripper.request_registers[0] & 0x0800:  # noqa: ASYNC110
             await asyncio.sleep(0.0001)
-    assert operator.has_moved
-    assert STOPPED in await operator.leave()
+    assert active.has_moved
+    assert STOPPED in await active.leave()
     assert not gripper.is_moving
     with pytest.raises(NotStartedError):
         await closing

@@ -9,7 +9,7 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import AsyncIterator, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 from typing import TYPE_CHECKING
 
@@ -46,12 +46,6 @@ class WatchedGripper(SimulatedGripper):
         self.age += 60.0
 
 
-@pytest.fixture
-async def server() -> AsyncIterator[SimulatorServer]:
-    async with SimulatorServer(SimulatedGripper(speedup=20.0)) as server:
-        yield server
-
-
 def test_status_as_json(call: Call, there: SimulatorServer) -> None:
     there.gripper.write(0, ACTIVATE)
     outcome = call("status", "--json", there.address)
@@ -72,12 +66,6 @@ def test_status_of_a_gripper_at_rest_and_in_words(call: Call, there: SimulatorSe
     outcome.assert_succeeded()
     assert outcome.out.splitlines()[1] == "RESET: reset, not moving"
     assert "SCISSOR" in outcome.out
-
-
-def test_status_only_reads(call: Call, there: SimulatorServer) -> None:
-    for form in (["status"], ["status", "--json"]):
-        assert call(*form, there.address).code == 0
-    assert there.gripper.writes == ()
 
 
 def test_status_shows_a_fault(call: Call, there: SimulatorServer) -> None:
@@ -117,22 +105,14 @@ def test_an_axis_that_the_model_lacks_is_wrong_usage_and_moves_nothing(call: Cal
     assert "Activating" not in outcome.out
 
 
-def test_a_contact_is_a_success(call: Call, there: SimulatorServer) -> None:
-    there.gripper.write(0, ACTIVATE)
-    assert call("move", "0", "--yes", there.address).code == 0
-    there.gripper.place_object(Finger.B, position=120)
-    outcome = call("move", "255", "--yes", there.address)
-    assert outcome.code == 0
-    assert outcome.out.count("CONTACT_CLOSING") == 1
-    assert "an object is in the way" in outcome.out
-
-
 def test_a_grip_is_kept_from_one_move_to_the_next(call: Call, there: SimulatorServer) -> None:
     held = Finger.B | Finger.C
     call("move", "0", "--yes", there.address).assert_succeeded()
     there.gripper.place_object(held, position=120)
     outcome = call("move", "255", "--keep", "--yes", there.address)
     outcome.assert_succeeded()
+    assert outcome.out.count("CONTACT_CLOSING") == 2
+    assert "an object is in the way" in outcome.out
     assert "the grip is in force" in outcome.out
     assert there.gripper.grips == held
     outcome = call("move", "60", "--fingers", "A", "--keep", "--yes", there.address)
@@ -140,25 +120,11 @@ def test_a_grip_is_kept_from_one_move_to_the_next(call: Call, there: SimulatorSe
     assert "rGTO" not in outcome.err
     assert "the grip is in force" in outcome.out
     assert there.gripper.grips == held
-    assert (
-        "no one has measured it. With --keep"
-        in call("move", "9", "--fingers", "A", "--yes", there.address).out
-    )
-    assert not there.gripper.grips
-
-
-def test_a_grip_that_was_let_go_is_not_taken_up_again_without_a_word(
-    call: Call, there: SimulatorServer
-) -> None:
-    there.gripper.write(0, ACTIVATE)
-    call("move", "0", "--yes", there.address).assert_succeeded()
-    there.gripper.place_object(Finger.B | Finger.C, position=120)
-    outcome = call("move", "255", "--fingers", "B,C", "--yes", there.address)
-    assert "rGTO is clear now: the vendor says that what is held stays held" in outcome.out
+    outcome = call("move", "9", "--fingers", "A", "-y", there.address)
+    assert "the vendor says that what is held stays held; no one has measured it. With --keep" in outcome.out
     assert not there.gripper.grips
     outcome = call("move", "60", "--fingers", "A", "--yes", there.address)
-    outcome.assert_succeeded()
-    assert "B|C in contact while rGTO was clear" in outcome.err
+    assert "B|C in contact while rGTO was clear" in outcome.err, "it is not taken up again without a word"
 
 
 class InterruptingGripper(SimulatedGripper):
@@ -190,9 +156,7 @@ def test_move_in_fault_fails(call: Call, there: SimulatorServer) -> None:
     call("move", "255", "--yes", there.address).assert_failed(1, "fault")
 
 
-@pytest.mark.parametrize(
-    "command", [["status"], ["status", "--json"], ["move", "3", "--yes"], ["demo", "--yes"]]
-)
+@pytest.mark.parametrize("command", [["status"], ["monitor"], ["move", "3", "--yes"], ["demo", "--yes"]])
 def test_nobody_there(call: Call, command: list[str]) -> None:
     # Bound and not listening: connections are refused, and nobody else gets the port.
     with socket.socket() as reserved:
@@ -200,10 +164,6 @@ def test_nobody_there(call: Call, command: list[str]) -> None:
         address = f"127.0.0.1:{reserved.getsockname()[1]}"
         outcome = call(command[0], *command[1:], address)
     outcome.assert_failed(1, address)
-
-
-def test_no_such_serial_port(call: Call) -> None:
-    call("status", "rtu:///dev/no-such-port").assert_failed(1, "/dev/no-such-port")
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
@@ -248,8 +208,6 @@ async def test_a_reader_that_has_had_enough(shell: Shell, server: SimulatorServe
     "command",
     [
         "--help",
-        "move --help",
-        "--version",
         "move 30",
         "status",
         "doctor sim://",
@@ -322,12 +280,3 @@ def test_doctor_of_an_agent_that_is_not_there(call: Call) -> None:
     outcome = call("doctor", "zenoh://lab/cell/left?connect=tcp/127.0.0.1:1")
     outcome.assert_failed(1, "zenoh://lab/cell/left: port: see above")
     assert "FAIL  port           tcp/127.0.0.1:1: nothing listens" in outcome.out
-
-
-def test_doctor_of_an_agent_takes_no_unit_id(call: Call) -> None:
-    outcome = call("doctor", "zenoh://lab/cell/left", "--device-id", "3")
-    outcome.assert_failed(2, "its agent's file has device_id")
-
-
-def test_doctor_of_a_malformed_address(call: Call) -> None:
-    call("doctor", "zenoh://lab/cell").assert_failed(2, "zenoh://SITE/HOST/GRIPPER")

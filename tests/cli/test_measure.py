@@ -5,20 +5,18 @@ from __future__ import annotations
 import asyncio
 import signal
 from asyncio.subprocess import PIPE
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
-from robotiq_async.cli import main
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.measure.campaigns import read_currents
 from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, read_table, thesis_table
 from tests.cli.conftest import served
 
 if TYPE_CHECKING:
-    from tests.cli.conftest import Call, Outcome, Shell
+    from tests.cli.conftest import Call, Shell
 
 
 def files_in(folder: Path) -> list[str]:
@@ -90,41 +88,6 @@ async def test_the_scale_is_read_by_a_person(
     assert read_table(tmp_path / "f.csv", FORCE) == {0: (1500,), 250: (2500,)}
 
 
-def test_nobody_there_to_read_the_scale(call: Call, tmp_path: Path) -> None:
-    gripper = SimulatedGripper(speedup=30)
-    gripper.place_object(7, 150)
-    with served(gripper) as server:
-        outcome = call(
-            *("measure", "force", "--yes", server.address, "--output", str(tmp_path / "f.csv")),
-            *("--step", "250", "--runs", "1", "--speed", "255", "--no-plot"),
-        )
-    assert outcome.code == 1
-    assert "no answer: the input has ended" in outcome.err
-    assert not (tmp_path / "f.csv").exists()
-
-
-@pytest.mark.usefixtures("virtually")
-def test_the_scale_is_read_from_a_table(call: Call, tmp_path: Path) -> None:
-    readings = tmp_path / "readings.csv"
-    readings.write_text("force_value,run_1_g\n0,1111\n250,2222\n", encoding="utf-8")
-    options = (
-        "--output",
-        str(tmp_path / "f.csv"),
-        "--speed",
-        "255",
-        "--speedup",
-        "30",
-        "--no-plot",
-        "--runs",
-        "1",
-    )
-    outcome = call("measure", "force", "sim://", "--scale", str(readings), "--step", "250", *options)
-    outcome.assert_succeeded()
-    assert read_table(tmp_path / "f.csv", FORCE) == {0: (1111,), 250: (2222,)}
-    outcome = call("measure", "force", "sim://", "--scale", str(readings), "--step", "125", *options)
-    outcome.assert_failed(1, "has no 1 runs for the force values [125]")
-
-
 async def test_ctrl_c_keeps_the_rows_and_stops_the_fingers(shell: Shell, tmp_path: Path) -> None:
     gripper = SimulatedGripper(speedup=30)
     async with SimulatorServer(gripper) as server:
@@ -145,132 +108,87 @@ async def test_ctrl_c_keeps_the_rows_and_stops_the_fingers(shell: Shell, tmp_pat
     assert files_in(tmp_path) == ["t.csv", "t.csv.origin.csv"]
 
 
-def test_fingers_that_meet_something_end_it(call: Call, tmp_path: Path) -> None:
-    gripper = SimulatedGripper(speedup=30)
-    gripper.place_object(7, 150)
-    with served(gripper) as server:
-        outcome = call(
-            *("measure", "speed", "--yes", server.address, "--output", str(tmp_path / "t.csv"), "--no-plot")
-        )
-    assert outcome.code == 1
-    assert "the fingers met something" in outcome.err
-    assert "nothing was written" in outcome.err
-    assert "t.csv" not in outcome.err, "there is no such file"
+# -- in one line -------------------------------------------------------------------------------------------
 
-
-def test_without_matplotlib_nothing_is_begun(
-    call: Call, without: Callable[[str], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    without("matplotlib")
-    call("measure", "speed", "sim://").assert_failed(1, "pip install 'matplotlib", "--no-plot")
-    assert files_in(tmp_path) == []
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["speed", "sim://", "--runs", "0"], "--runs must be an integer in 1..100, got 0"),
-        (["speed", "sim://", "--step", "0"], "--step must be an integer in 1..255, got 0"),
-        (["speed", "sim://", "--speedup", "51"], "--speedup must be a number in 1..50, got 51"),
-        (["speed", "192.168.1.11", "--speedup", "2"], "--speedup is for sim:// only"),
-        (["speed", "sim://?speedup=2"], "takes no option but ?model=; there is --speedup"),
-        (["force", "sim://?model=2f85"], "with three fingers, and sim://?model=2f85 names a 2F-85"),
-        (["speed", "tcp://"], "malformed address"),
-        (["speed", "sim://", "--output", "mine.png"], "--output must be a file named .csv, got 'mine.png'"),
-        (["speed", "sim://", "--output", "mine"], "--output must be a file named .csv"),
-        (["force", "sim://", "--output", "."], "--output must be a file named .csv"),
-        (["speed", "sim://", "--fingers", "scissor"], "--fingers takes A, B and C only"),
-        (["force", "sim://", "--output", "a.csv", "--scale", "a.csv"], "--scale must be another file than"),
-        (["force", "sim://", "--surface", "wood"], "wood"),
-        (["force", "sim://", "--speed", "256"], "256"),
-    ],
-)
-def test_wrong_usage(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["measure", *arguments]) == 2
-    assert words in capsys.readouterr().err
+SPEEDS = ("measure", "speed", "sim://", "--step", "255", "--runs", "1", "--no-plot", "--speedup", "30")
+FORCES = ("measure", "force", "sim://", "--step", "250", "--speed", "255", "--no-plot", "--speedup", "30")
+IN_THE_WAY = ("--yes", "--step", "250", "--runs", "1", "--speed", "255", "--no-plot")
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
         ("speed_value\n", "line 1: expected the columns"),
-        ("speed_value,run_1_ms\n0,5\n", "has 1 runs instead"),
+        ("speed_value,run_1_ms,run_2_ms\n0,5,5\n", "has 2 runs instead"),
     ],
 )
-def test_a_bad_table_is_refused(
-    text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_bad_table_is_refused(call: Call, text: str, words: str, tmp_path: Path) -> None:
     table = tmp_path / "t.csv"
     table.write_text(text, encoding="utf-8")
-    assert main(["measure", "speed", "sim://", "--output", str(table)]) == 1
-    assert words in capsys.readouterr().err
+    call(*SPEEDS, "--output", str(table)).assert_failed(1, words)
     assert table.read_text(encoding="utf-8") == text
 
 
-QUICK = ("--runs", "1", "--no-plot")
-
-
-def gave_up(outcome: Outcome, *words: str) -> None:
-    """It ended with 1 and said why, without a traceback."""
-    assert outcome.code == 1
-    assert "Traceback" not in outcome.err
-    for word in words:
-        assert word in outcome.err
+def test_fingers_that_meet_something_or_an_input_that_has_ended(call: Call, tmp_path: Path) -> None:
+    gripper = SimulatedGripper(speedup=30)
+    gripper.place_object(7, 150)
+    with served(gripper) as server:
+        for what, options, words in (
+            ("speed", ("--yes", "--no-plot"), "the fingers met something"),
+            ("force", IN_THE_WAY, "no answer: the input has ended"),
+        ):
+            outcome = call("measure", what, server.address, "--output", str(tmp_path / "t.csv"), *options)
+            assert outcome.code == 1
+            assert words in outcome.err
+            assert "t.csv" not in outcome.err, "there is no such file"
+            assert not (tmp_path / "t.csv").exists()
 
 
 @pytest.mark.usefixtures("virtually")
-def test_what_was_measured_on_another_gripper_is_not_gone_on_with(call: Call, tmp_path: Path) -> None:
-    table = str(tmp_path / "t.csv")
-    first = call("measure", "speed", "sim://", "--output", table, "--step", "255", "--speedup", "30", *QUICK)
-    first.assert_succeeded()
+def test_the_scale_is_read_from_a_table(call: Call, tmp_path: Path) -> None:
+    readings = tmp_path / "readings.csv"
+    readings.write_text("force_value,run_1_g\n0,1111\n250,2222\n", encoding="utf-8")
+    options = ("--output", str(tmp_path / "f.csv"), "--scale", str(readings), "--runs", "1")
+    call(*FORCES, *options).assert_succeeded()
+    assert read_table(tmp_path / "f.csv", FORCE) == {0: (1111,), 250: (2222,)}
+    finer = ["125" if each == "250" else each for each in FORCES]
+    outcome = call(*finer, "--output", str(tmp_path / "other.csv"), *options[2:])
+    outcome.assert_failed(1, "has no 1 runs for the force values [125]")
+
+
+@pytest.mark.usefixtures("virtually")
+def test_what_was_measured_with_other_settings_is_not_gone_on_with(call: Call, tmp_path: Path) -> None:
+    table = ("--output", str(tmp_path / "t.csv"))
+    call(*SPEEDS, *table).assert_succeeded()
     for options in (("10.255.255.1",), ("sim://", "--fingers", "A")):
-        outcome = call("measure", "speed", *options, "--output", table, "--step", "255", *QUICK)
+        outcome = call("measure", "speed", *options, *table, "--step", "255", "--runs", "1", "--no-plot")
         outcome.assert_failed(1, "was measured with other settings")
-
-
-@pytest.mark.usefixtures("virtually")
-def test_another_surface_is_another_table(call: Call, tmp_path: Path) -> None:
-    table = str(tmp_path / "t.csv")
-    options = ("--output", table, "--step", "250", "--speed", "255", "--speedup", "30", *QUICK)
-    call("measure", "force", "sim://", *options).assert_succeeded()
-    outcome = call("measure", "force", "sim://", "--surface", "rigid", *options)
+    table = ("--output", str(tmp_path / "f.csv"), "--runs", "1")
+    call(*FORCES, *table).assert_succeeded()
+    outcome = call(*FORCES, "--surface", "rigid", *table)
     outcome.assert_failed(1, "was measured with other settings: surface foam there and rigid here")
 
 
 @pytest.mark.usefixtures("virtually")
 def test_readings_without_their_currents_are_refused(call: Call, tmp_path: Path) -> None:
-    table, currents = tmp_path / "t.csv", tmp_path / "t_currents.csv"
-    options = ("--output", str(table), "--step", "250", "--speed", "255", "--speedup", "30", "--no-plot")
-    call("measure", "force", "sim://", *options, "--runs", "2").assert_succeeded()
-    whole = currents.read_bytes()
-    for damage in ("gone", "empty", "short"):
-        currents.write_bytes(whole)
-        damaged(currents, damage)
-        outcome = call("measure", "force", "sim://", *options, "--runs", "2")
-        outcome.assert_failed(1, "t_currents.csv")
-
-
-def damaged(file: Path, how: str) -> None:
-    if how == "gone":
-        file.unlink()
-    elif how == "empty":
-        file.write_text(file.read_text(encoding="utf-8").splitlines()[0] + "\n", encoding="utf-8")
-    else:
-        lines = file.read_text(encoding="utf-8").splitlines(keepends=True)
-        file.write_text("".join(line for line in lines if not line.startswith("0,2,")), encoding="utf-8")
+    currents = tmp_path / "t_currents.csv"
+    options = ("--output", str(tmp_path / "t.csv"), "--runs", "2")
+    call(*FORCES, *options).assert_succeeded()
+    lines = currents.read_text(encoding="utf-8").splitlines(keepends=True)
+    for left in (None, lines[:1], [line for line in lines if not line.startswith("0,2,")]):
+        currents.unlink()
+        if left is not None:
+            currents.write_text("".join(left), encoding="utf-8")
+        call(*FORCES, *options).assert_failed(1, "t_currents.csv")
+        currents.touch()
 
 
 @pytest.mark.usefixtures("virtually")
-def test_a_picture_that_cannot_be_written_is_one_line(call: Call, tmp_path: Path) -> None:
-    table = tmp_path / "t.csv"
-    (tmp_path / "t.png").mkdir()
-    options = ("--output", str(table), "--step", "255", "--runs", "1", "--speedup", "30")
-    outcome = call("measure", "speed", "sim://", *options)
-    gave_up(outcome, "t.png")
-    assert len(read_table(table, SPEED)) == 2
-
-
-def test_a_name_that_is_too_long_is_one_line(call: Call, tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_written_is_one_line(call: Call, tmp_path: Path) -> None:
     name = str(tmp_path / ("x" * 300 + ".csv"))
-    call("measure", "speed", "sim://", "--output", name, *QUICK).assert_failed(1, "File name too long")
+    call(*SPEEDS, "--output", name).assert_failed(1, "File name too long")
+    (tmp_path / "t.png").mkdir()
+    table = tmp_path / "t.csv"
+    outcome = call(*(each for each in SPEEDS if each != "--no-plot"), "--output", str(table))
+    assert (outcome.code, "t.png" in outcome.err, "Traceback" in outcome.err) == (1, True, False)
+    assert len(read_table(table, SPEED)) == 2

@@ -24,8 +24,7 @@ from robotiq_async import (
 )
 from robotiq_async.cli.tui.asking import NO, Question, Target
 from robotiq_async.cli.tui.screen import Monitor
-from robotiq_async.cli.tui.widgets import Axes, position_bar, sparkline
-from robotiq_async.cli.tui.words import HINTS
+from robotiq_async.cli.tui.widgets import HINTS, Axes, position_bar, sparkline
 from robotiq_async.control.state_machine import refusal
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import Operator
@@ -149,13 +148,6 @@ async def test_a_lost_gripper_is_a_state_and_comes_back(active: Operator, server
         assert pilot.app.is_running
 
 
-async def test_warnings_of_the_library_come_into_the_log(operator: Operator) -> None:
-    async with shown(operator) as pilot:
-        assert isinstance(pilot.app, Monitor)
-        pilot.app.write_log("polling is late")
-        await until(pilot, lambda: "polling is late" in log(pilot))
-
-
 async def test_an_activation_is_shown_as_a_motion() -> None:
     async with SimulatorServer(SimulatedGripper(speedup=2)) as slow:
         hand = RobotiqHand(slow.address, poll_interval=SLOWLY)
@@ -227,20 +219,6 @@ async def test_keys_open_close_and_spread(active: Operator) -> None:
     assert active.has_moved
 
 
-@pytest.mark.parametrize("key", ["space", "h"])
-async def test_halt_is_one_key(key: str) -> None:
-    async with SimulatorServer(active_gripper()) as slow:
-        hand = RobotiqHand(slow.address, poll_interval=SLOWLY)
-        operator = Operator(hand)
-        async with hand, shown(operator) as pilot:
-            await pilot.press("c")
-            await until(pilot, lambda: hand.is_moving)
-            await pilot.press(key)
-            await until(pilot, lambda: "halt: every axis has stopped" in log(pilot))
-            assert not hand.is_moving
-            await until(pilot, lambda: "close: " in log(pilot))
-
-
 async def test_speed_and_force_by_keys(active: Operator) -> None:
     async with shown(active) as pilot:
         await pilot.press("plus")
@@ -296,19 +274,6 @@ async def test_a_question_lies_on_the_same_screen(operator: Operator) -> None:
         assert pilot.app.query_one("#question").region.bottom == pilot.app.size.height
 
 
-async def test_halt_works_while_a_question_is_open() -> None:
-    async with SimulatorServer(active_gripper()) as slow:
-        hand = RobotiqHand(slow.address, poll_interval=SLOWLY)
-        async with hand, shown(Operator(hand)) as pilot:
-            await pilot.press("c")
-            await until(pilot, lambda: hand.is_moving)
-            await pilot.press("r")
-            await until(pilot, lambda: asked(pilot) is not None)
-            await pilot.press("space")
-            await until(pilot, lambda: not hand.is_moving)
-            assert asked(pilot) is not None
-
-
 async def test_any_axes_are_sent_to_any_position(active: Operator) -> None:
     hand = active.hand
     async with shown(active) as pilot:
@@ -349,16 +314,6 @@ async def test_a_position_that_is_not_entered_moves_nothing(key: str, active: Op
     assert requests.take_nowait() is None
 
 
-async def test_halt_works_while_a_position_is_written() -> None:
-    async with SimulatorServer(active_gripper()) as slow:
-        hand = RobotiqHand(slow.address, poll_interval=SLOWLY)
-        async with hand, shown(Operator(hand)) as pilot:
-            await pilot.press("c")
-            await until(pilot, lambda: hand.is_moving)
-            await pilot.press("p", "a", "1", "space")
-            await until(pilot, lambda: not hand.is_moving)
-
-
 def test_a_position_is_in_its_range() -> None:
     """A digit that would leave it is not taken, and is not moved to its end either."""
     moved: list[tuple[Finger, int]] = []
@@ -369,14 +324,6 @@ def test_a_position_is_in_its_range() -> None:
     assert not target.press("5")
     assert target.press("enter")
     assert moved == [(Finger.A | Finger.B, 255)]
-
-
-async def test_what_is_refused_is_told(operator: Operator) -> None:
-    async with shown(operator) as pilot:
-        await pilot.press("c")
-        await until(pilot, lambda: "close: " in log(pilot))
-        assert "close: the gripper is not activated; a activates it" in log(pilot)
-    assert not operator.has_moved
 
 
 async def test_it_speaks_of_keys_and_not_of_methods_and_states(active: Operator) -> None:
@@ -422,21 +369,44 @@ async def test_the_log_keeps_clear_of_its_scroll_bar(operator: Operator) -> None
         assert history.max_scroll_x == 0
 
 
-@pytest.mark.parametrize("key", ["q", "ctrl+c"])
-async def test_quitting_in_a_motion_holds_it(key: str) -> None:
+# -- in a motion -------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+async def closing() -> AsyncIterator[tuple[RobotiqHand, Screen]]:
+    """A hand whose monitor has just closed it."""
     async with SimulatorServer(active_gripper()) as slow:
         hand = RobotiqHand(slow.address, poll_interval=SLOWLY)
-        async with hand:
-            async with shown(Operator(hand)) as pilot:
-                await pilot.press("c")
-                await until(pilot, lambda: hand.is_moving)
-                await pilot.press(key)
-                await until(pilot, lambda: not pilot.app.is_running)
-            async with asyncio.timeout(5):
-                async for status in hand.statuses():
-                    if not status.is_moving:
-                        break
-            assert status.position(Finger.A) < 200
+        async with hand, shown(Operator(hand)) as pilot:
+            await pilot.press("c")
+            await until(pilot, lambda: hand.is_moving)
+            yield hand, pilot
+
+
+@pytest.mark.parametrize("key", ["space", "h"])
+@pytest.mark.parametrize("open_question", [[], ["r"], ["p", "a", "1"]], ids=["none", "reset", "position"])
+async def test_halt_is_one_key_also_during_a_question(
+    key: str, open_question: list[str], closing: tuple[RobotiqHand, Screen]
+) -> None:
+    hand, pilot = closing
+    await pilot.press(*open_question, key)
+    await until(pilot, lambda: "halt: every axis has stopped" in log(pilot))
+    assert not hand.is_moving
+    assert isinstance(pilot.app, Monitor)
+    assert (pilot.app.asking is not None) is bool(open_question)
+    await until(pilot, lambda: "close: " in log(pilot))
+
+
+@pytest.mark.parametrize("key", ["q", "ctrl+c"])
+async def test_quitting_in_a_motion_holds_it(key: str, closing: tuple[RobotiqHand, Screen]) -> None:
+    hand, pilot = closing
+    await pilot.press(key)
+    await until(pilot, lambda: not pilot.app.is_running)
+    async with asyncio.timeout(5):
+        async for status in hand.statuses():
+            if not status.is_moving:
+                break
+    assert status.position(Finger.A) < 200
 
 
 # -- pictures of numbers -----------------------------------------------------------------------------------

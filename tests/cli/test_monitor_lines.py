@@ -13,14 +13,12 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from robotiq_async import Fault, Finger, RobotiqHand
-from robotiq_async.cli import main
-from robotiq_async.cli.output.stream_output import print_objects
-from robotiq_async.cli.output.text import event_line
+from robotiq_async.cli.output.lines import print_objects
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.terminal import ROOT
 
 if TYPE_CHECKING:
-    from tests.cli.conftest import Call, Shell
+    from tests.cli.conftest import Shell
 
 
 async def test_in_a_pipe_it_prints_every_poll_as_an_object(shell: Shell, server: SimulatorServer) -> None:
@@ -95,19 +93,6 @@ async def test_a_hand_that_has_ended_ends_it(
     assert '"target":"SHUTDOWN"' in capfd.readouterr().out
 
 
-def test_what_the_library_says_is_an_object_too() -> None:
-    assert event_line({"kind": "log", "message": "polling is late"}) == "log      polling is late"
-
-
-async def test_it_only_looks(shell: Shell, server: SimulatorServer, gripper: SimulatedGripper) -> None:
-    before = gripper.request_registers
-    process = await shell.start("monitor", "--watch", server.address)
-    await shell.read_line(process)
-    process.send_signal(signal.SIGINT)
-    await shell.finish(process)
-    assert gripper.request_registers == before
-
-
 async def test_a_reader_that_stops_reading_does_not_hold_up_the_polling(
     server: SimulatorServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -138,15 +123,6 @@ async def test_a_reader_that_stops_reading_does_not_hold_up_the_polling(
     await hand.stop()
     assert objects[-1]["count"] > 100
     assert len(objects) < 500
-
-
-def test_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["monitor", "--watch", "--json"]) == 2
-    assert "exclude" in capsys.readouterr().err
-
-
-def test_nobody_there_is_one_line(call: Call) -> None:
-    call("monitor", "tcp://127.0.0.1:1").assert_failed(1, "127.0.0.1:1")
 
 
 async def test_a_signal_ends_it_although_nobody_reads(shell: Shell, server: SimulatorServer) -> None:

@@ -102,7 +102,7 @@ def test_the_help_says_which_extra_each_command_needs() -> None:
     commands = ROOT / "robotiq_async" / "cli" / "commands"
     for file in commands.rglob("*.py"):
         needed = {extra for _, extra in NEED.findall(file.read_text())}
-        names = {"recordings": "replay", "campaign": "measure", "fleet_keys": "fleet"}
+        names = {"recordings": "replay"}
         assert all(names.get(file.stem, file.stem) in told[extra] for extra in needed - {"plot"}), file
     for extra, words in {"record": "record replay export plot recover", "plot": "plot measure"}.items():
         assert set(words.split()) <= set(re.findall(r"\w+", told[extra]))

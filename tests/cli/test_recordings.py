@@ -1,15 +1,18 @@
-"""``robotiq-async record``, ``replay``, ``recover`` and ``plot``."""
+"""``robotiq-async record``, ``replay``, ``export``, ``plot`` and ``recover``."""
 
 from __future__ import annotations
 
 import asyncio
+import csv
 import itertools
 import json
 import os
 import re
 import signal
 import socket
+import time
 from collections.abc import Callable
+from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,12 +26,25 @@ from mcap.writer import Writer
 from rosbags.highlevel import AnyReader
 
 from robotiq_async import RobotiqHand, State
-from robotiq_async.cli import main
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.tools.recording.recorder import Recorder
 from robotiq_async.tools.recording.recordings import read_recording
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Call, Shell
+
+
+def rows_of(file: Path) -> list[dict[str, str]]:
+    with file.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def recorded(file: Path, topic: str) -> list[tuple[int, dict[str, object]]]:
+    entries = [(each.nanoseconds, each.fields) for each in read_recording(file) if each.topic == topic]
+    return sorted(entries, key=lambda pair: pair[0])
+
+
+# -- record ------------------------------------------------------------------------------------------------
 
 
 async def test_ctrl_c_ends_a_recording_that_is_whole_and_touches_nothing(
@@ -48,17 +64,15 @@ async def test_ctrl_c_ends_a_recording_that_is_whole_and_touches_nothing(
         assert outcome.code == 0
         assert not gripper.writes
     assert " 0 lost, " in outcome.out
-    recorded = [entry.sequence for entry in read_recording(file) if entry.topic == "/gripper/status"]
-    assert recorded == list(range(recorded[0], recorded[-1] + 1))
+    sequences = [entry.sequence for entry in read_recording(file) if entry.topic == "/gripper/status"]
+    assert sequences == list(range(sequences[0], sequences[-1] + 1))
 
 
-def test_it_ends_by_itself(call: Call, tmp_path: Path) -> None:
+def test_it_ends_by_itself_and_keeps_a_file_that_is_there(call: Call, tmp_path: Path) -> None:
     file = tmp_path / "it.mcap"
-    outcome = call("record", str(file), "--seconds", "0.5")
-    outcome.assert_succeeded()
+    call("record", str(file), "--seconds", "0.5").assert_succeeded()
     assert len(list(read_recording(file))) > 20
-    again = call("record", str(file), "--seconds", "0.5")
-    again.assert_failed(1, "it.mcap: File exists")
+    call("record", str(file), "--seconds", "0.5").assert_failed(1, "it.mcap: File exists")
 
 
 def test_for_ros_2(call: Call, tmp_path: Path) -> None:
@@ -72,6 +86,37 @@ def test_for_ros_2(call: Call, tmp_path: Path) -> None:
         call(command, str(file)).assert_failed(1, "it.mcap: it contains no")
 
 
+@pytest.mark.parametrize("option", [[], ["--csv"]])
+def test_a_recording_named_csv_is_a_table_and_needs_no_mcap(
+    call: Call, without: Callable[[str], None], option: list[str], there: SimulatorServer, tmp_path: Path
+) -> None:
+    without("mcap")
+    table = tmp_path / "it.csv"
+    outcome = call("record", str(table), "--seconds", "0.5", there.address, *option)
+    outcome.assert_succeeded()
+    rows = rows_of(table)
+    assert f"{len(rows)} polls, 0 lost" in outcome.out
+    assert rows[0]["state"] == "RESET"
+    assert all(int(after["sequence"]) == int(before["sequence"]) + 1 for before, after in pairwise(rows))
+    assert abs(datetime.fromisoformat(rows[-1]["time"]).timestamp() - time.time()) < 30
+    assert not there.gripper.writes
+
+
+async def test_a_recorder_makes_the_same_table(call: Call, tmp_path: Path) -> None:
+    """As an export of what was recorded at the same time; but for where a state begins."""
+    table, file, exported = tmp_path / "it.csv", tmp_path / "it.mcap", tmp_path / "exported.csv"
+    hand = RobotiqHand("sim://?speedup=20")
+    async with Recorder(hand, table), Recorder(hand, file), hand:
+        await hand.move(100)
+    call("export", str(file), str(exported)).assert_succeeded()
+    for one, other in zip(rows_of(table), rows_of(exported), strict=True):
+        for row in (one, other):
+            del row["state"], row["time"]  # each recorder compares the clocks by itself
+        assert one == other
+    with pytest.raises(ValueError, match="ros2 is for MCAP files"):
+        Recorder(hand, tmp_path / "joints.csv", ros2=True)
+
+
 def test_no_gripper_no_file(call: Call, tmp_path: Path) -> None:
     # Bound and not listening: connections are refused, and nobody else gets the port.
     with socket.socket() as reserved:
@@ -79,108 +124,6 @@ def test_no_gripper_no_file(call: Call, tmp_path: Path) -> None:
         outcome = call("record", str(tmp_path / "it.mcap"), f"127.0.0.1:{reserved.getsockname()[1]}")
     outcome.assert_failed(1, "refused")
     assert not (tmp_path / "it.mcap").exists()
-
-
-def test_replay_tells_the_story(grasp: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["replay", str(grasp)]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    story = [line.split(maxsplit=1)[1] for line in lines]
-    assert any("command  act=1 go=1 release=0 A=255@200/64" in line for line in story)
-    assert any("CONTACT_CLOSING" in line for line in story)
-    (fault,) = [
-        at for at, line in enumerate(story) if line.startswith("fault    0x09 COMMUNICATION_NOT_READY")
-    ]
-    assert story.index("state    FAULT -> RUNNING_IDLE (gripper is active)") > fault
-    statuses = [line for line in story if line.startswith("status")]
-    assert all(before != after for before, after in pairwise(statuses))
-
-
-def test_recover_makes_a_broken_one_whole(grasp: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    whole = grasp.read_bytes()
-    grasp.write_bytes(whole[: len(whole) // 2])
-    assert main(["recover", str(grasp)]) == 0
-    out = capsys.readouterr().out
-    assert "was complete" not in out
-    recovered = grasp.with_name("grasp.recovered.mcap")
-    assert f"{len(list(read_recording(recovered)))} messages in {recovered}" in out
-    assert main(["recover", str(grasp)]) == 1
-    assert "File exists" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("command", ["replay", "plot"])
-def test_of_a_broken_one_it_is_said_that_it_is(
-    command: str, grasp: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main([command, str(grasp)]) == 0
-    assert capsys.readouterr().err == ""
-    whole = grasp.read_bytes()
-    grasp.write_bytes(whole[: len(whole) * 2 // 3])
-    assert main([command, str(grasp), "--overwrite"]) == 0
-    out, err = capsys.readouterr()
-    assert out
-    assert err.count("\n") == 1
-    assert "grasp.mcap ends too early, after " in err
-    assert "robotiq-async recover" in err
-
-
-def test_plot_draws_it(grasp: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["plot", str(grasp)]) == 0
-    pictures = [grasp.with_name(f"grasp.{suffix}") for suffix in ("png", "svg")]
-    assert capsys.readouterr().out.splitlines() == [str(picture) for picture in pictures]
-    before = pictures[1].read_bytes()
-    assert b"COMMUNICATION_NOT_READY" in before or before.count(b"<use ") > 50, "words are drawn as glyphs"
-    assert main(["plot", str(grasp), str(grasp.with_name("other"))]) == 0
-    assert grasp.with_name("other.svg").exists()
-
-
-def test_replay_draws_it_too(grasp: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["replay", "--plot", str(grasp)]) == 0
-    assert capsys.readouterr().out.splitlines()[1] == str(grasp.with_suffix(".svg"))
-    assert grasp.with_suffix(".svg").exists()
-
-
-@pytest.mark.parametrize("command", ["replay", "recover", "plot", "export"])
-@pytest.mark.parametrize("content", [None, b"", b"hello", b"no recording"])
-def test_what_is_no_recording_is_one_line_and_nothing_is_written(
-    command: str, content: bytes | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = tmp_path / "it.mcap"
-    if content is not None:
-        file.write_bytes(content)
-    assert main([command, str(file)]) == 1
-    err = capsys.readouterr().err
-    assert err.count("\n") == 1
-    assert ("No such file" if content is None else "not an MCAP file") in err
-    assert [*tmp_path.iterdir()] == [file] * (content is not None)
-
-
-@pytest.mark.parametrize(
-    ("module", "arguments", "extra"),
-    [
-        ("mcap", ["record", "x.mcap"], "record"),
-        ("mcap", ["replay", "x"], "record"),
-        ("matplotlib", ["plot", "x"], "plot"),
-    ],
-)
-def test_a_missing_extra_is_named(
-    call: Call,
-    without: Callable[[str], None],
-    module: str,
-    arguments: list[str],
-    extra: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    without(module)
-    call(*arguments).assert_failed(1, f"(the extra {extra})")
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("seconds", ["0", "-1", "nan", "soon"])
-def test_wrong_usage(seconds: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["record", "x.mcap", "--seconds", seconds]) == 2
-    assert "--seconds" in capsys.readouterr().err
 
 
 FULL = """
@@ -197,26 +140,135 @@ async def test_a_disk_that_is_full_is_one_line(shell: Shell, server: SimulatorSe
     async with RobotiqHand(server.address) as hand:
         outcome = await shell.finish(await shell.python("-c", FULL.format(str(file), server.address)))
         assert hand.state is State.RUNNING_IDLE
-    assert (outcome.code, outcome.err.count("\n")) == (1, 1), outcome.err
-    assert "it.mcap: File too large" in outcome.err
+    outcome.assert_failed(1, "it.mcap: File too large")
     assert file.stat().st_size == 12_000
     there = [entry for entry in read_recording(file) if entry.topic == "/gripper/status"]
-    assert there
     told = re.search(r"ended early: (\d+) of (\d+) polls at least are in the file; .*recover", outcome.out)
     assert told is not None, outcome.out
     assert 0 < int(told[1]) <= len(there) <= int(told[2])
     assert "0 lost" not in outcome.out
 
 
-def test_a_picture_that_cannot_be_written(grasp: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["plot", str(grasp), str(grasp.parent / "nowhere" / "it")]) == 1
-    assert "No such file or directory" in capsys.readouterr().err
+# -- replay, export, plot, recover -------------------------------------------------------------------------
 
 
-def test_the_name_of_a_picture_may_have_its_suffix(grasp: Path) -> None:
-    assert main(["plot", str(grasp), str(grasp.with_name("there.png"))]) == 0
+def test_replay_tells_the_story(grasp: Path, call: Call) -> None:
+    story = [line.split(maxsplit=1)[1] for line in call("replay", str(grasp)).out.splitlines()]
+    assert any("command  act=1 go=1 release=0 A=255@200/64" in line for line in story)
+    assert any("CONTACT_CLOSING" in line for line in story)
+    (fault,) = [n for n, line in enumerate(story) if line.startswith("fault    0x09 COMMUNICATION_NOT_READY")]
+    assert story.index("state    FAULT -> RUNNING_IDLE (gripper is active)") > fault
+    statuses = [line for line in story if line.startswith("status")]
+    assert all(before != after for before, after in pairwise(statuses))
+
+
+def test_in_brief_there_are_states_faults_and_contacts(grasp: Path, call: Call) -> None:
+    *lines, last = call("replay", "--brief", str(grasp)).out.splitlines()
+    assert {line.split()[1] for line in lines} == {"state", "contact", "fault"}
+    assert not any("RUNNING_CC" in line for line in lines)
+    contacts = [line.split(maxsplit=2)[2] for line in lines if " contact " in line]
+    assert any(set("ABC") <= set(each) for each in contacts)
+    assert any("fault    0x09" in line for line in lines)
+    polls, commands = (len(recorded(grasp, f"/gripper/{each}")) for each in ("status", "command"))
+    assert last.startswith(f"{polls} polls and {commands} commands in ")
+
+
+def test_export_has_a_row_for_every_poll(grasp: Path, call: Call) -> None:
+    table = grasp.with_suffix(".csv")
+    outcome = call("export", str(grasp))
+    rows, polls = rows_of(table), recorded(grasp, "/gripper/status")
+    assert outcome.out == f"{len(polls)} statuses in {table}\n"
+    for row, (nanoseconds, fields) in zip(rows, polls, strict=True):
+        assert int(row["sequence"]) == fields["sequence"]
+        finger = fields["A"]
+        assert isinstance(finger, dict)
+        assert int(row["A.position"]) == finger["position"]
+        assert row["A.axis_state"] == finger["axis_state"]
+        assert row["fault"] == fields["fault"]
+        at = datetime.fromisoformat(row["time"])
+        assert at.tzinfo is UTC
+        assert abs(at.timestamp() - nanoseconds / 1e9) < 2e-6
+    assert {row["contacts"] for row in rows} >= {"", "A B C"}
+    assert {row["state"] for row in rows} == {"RUNNING_IDLE", "RUNNING_CC", "FAULT"}
+    assert len(rows[0]["registers"].split()) == 8
+
+
+@pytest.mark.parametrize(("kind", "topic"), [("commands", "/gripper/command"), ("events", "/gripper/event")])
+def test_commands_and_events_are_tables_too(grasp: Path, call: Call, kind: str, topic: str) -> None:
+    table = grasp.with_name("it.csv")
+    call("export", str(grasp), str(table), "--of", kind).assert_succeeded()
+    rows = rows_of(table)
+    for row, (_, fields) in zip(rows, recorded(grasp, topic), strict=True):
+        assert float(row["timestamp"]) == fields["timestamp"]
+    if kind == "commands":
+        assert {row["A.speed"] for row in rows} >= {"200"}
+    else:
+        assert [row["fault"] for row in rows if row["kind"] == "fault"] == ["COMMUNICATION_NOT_READY", "NONE"]
+
+
+def test_pandas_takes_it(grasp: Path, call: Call) -> None:
+    pandas = pytest.importorskip("pandas")
+    call("export", str(grasp)).assert_succeeded()
+    table = pandas.read_csv(grasp.with_suffix(".csv"), parse_dates=["time"], index_col="time")
+    assert table.index.tz is not None
+    assert abs(table.index[-1].timestamp() - time.time()) < 60
+    assert table["A.position"].dtype.kind == "i"
+    assert table["is_moving"].dtype.kind == "b"
+
+
+@pytest.mark.parametrize("command", ["plot", "replay --plot"])
+def test_a_plot_is_drawn(grasp: Path, call: Call, command: str) -> None:
+    outcome = call(*command.split(), str(grasp))
+    assert outcome.out.splitlines() == [str(grasp.with_suffix(suffix)) for suffix in (".png", ".svg")]
+    drawn = grasp.with_suffix(".svg").read_bytes()
+    assert b"COMMUNICATION_NOT_READY" in drawn or drawn.count(b"<use ") > 50, "words are drawn as glyphs"
+
+
+def test_the_name_of_a_picture_may_have_its_suffix(grasp: Path, call: Call) -> None:
+    call("plot", str(grasp), str(grasp.with_name("there.png"))).assert_succeeded()
     assert grasp.with_name("there.png").exists()
     assert grasp.with_name("there.svg").exists()
+    nowhere = str(grasp.parent / "nowhere" / "it")
+    call("plot", str(grasp), nowhere).assert_failed(1, "No such file or directory")
+
+
+def test_recover_makes_a_broken_one_whole(grasp: Path, call: Call) -> None:
+    whole = grasp.read_bytes()
+    grasp.write_bytes(whole[: len(whole) // 2])
+    out = call("recover", str(grasp)).out
+    assert "was complete" not in out
+    recovered = grasp.with_name("grasp.recovered.mcap")
+    assert f"{len(list(read_recording(recovered)))} messages in {recovered}" in out
+    call("recover", str(grasp)).assert_failed(1, "File exists")
+
+
+@pytest.mark.parametrize("command", ["replay", "plot"])
+def test_of_a_broken_one_it_is_said_that_it_is(command: str, grasp: Path, call: Call) -> None:
+    assert call(command, str(grasp)).err == ""
+    whole = grasp.read_bytes()
+    grasp.write_bytes(whole[: len(whole) * 2 // 3])
+    outcome = call(command, str(grasp), "--overwrite")
+    assert outcome.out
+    outcome.assert_failed(0, "grasp.mcap ends too early, after ", "robotiq-async recover")
+
+
+@pytest.mark.parametrize("command", ["plot", "replay --plot", "export"])
+def test_what_is_there_is_replaced_only_if_that_is_said(command: str, grasp: Path, call: Call) -> None:
+    there = grasp.with_suffix(".csv" if command == "export" else ".svg")
+    there.write_text("mine")
+    before = set(grasp.parent.iterdir())
+    call(*command.split(), str(grasp)).assert_failed(1, f"{there}: File exists; --overwrite replaces it")
+    assert there.read_text() == "mine"
+    assert set(grasp.parent.iterdir()) == before, "not half of it either"
+    call(*command.split(), str(grasp), "--overwrite").assert_succeeded()
+    assert there.read_text(encoding="utf-8") != "mine"
+
+
+def test_a_name_that_is_no_text_is_shown_all_the_same(grasp: Path, call: Call) -> None:
+    there = Path(os.fsdecode(os.fsencode(grasp.parent) + b"/\xff$\\frac{$.mcap"))
+    grasp.rename(there)
+    assert call("plot", str(there)).out.endswith(".svg\n")
+    assert "messages in" in call("recover", str(there)).out
 
 
 # -- recordings of others ----------------------------------------------------------------------------------
@@ -227,9 +279,9 @@ def event(**fields: object) -> bytes:
 
 
 STATE = event(kind="state", target="RESET")
+STEERING = "\x1b[2J\x9b31m\x07\r\nroot# \u202e\ud800"
 HOSTILE: dict[str, bytes] = {
     "not UTF-8": b'{"kind": "\xff"}',
-    "no JSON": b"{",
     "a list": b"[]",
     "deeply nested": b"[" * 100_000,
     "without what it is about": event(kind="transition"),
@@ -241,8 +293,6 @@ OTHER_NAMES = {
     "/gripper/event": (event(kind="fault", code=9, name="N", description="D"), "fault_code"),
 }
 """As they were recorded before, each with what it lacks first."""
-
-
 SHOWS = {
     "replay": ("/gripper/event", "/gripper/status", "/gripper/command"),
     "plot": ("/gripper/event", "/gripper/status"),
@@ -251,93 +301,90 @@ SHOWS = {
 """What each command looks at."""
 
 
+@pytest.mark.parametrize("command", ["replay", "recover", "plot", "export"])
+@pytest.mark.parametrize("content", [None, b"", b"no recording"])
+def test_what_is_no_recording_is_one_line_and_nothing_is_written(
+    command: str, content: bytes | None, tmp_path: Path, call: Call
+) -> None:
+    file = tmp_path / "it.mcap"
+    if content is not None:
+        file.write_bytes(content)
+    words = "No such file" if content is None else "not an MCAP file"
+    call(command, str(file)).assert_failed(1, words)
+    assert [*tmp_path.iterdir()] == [file] * (content is not None)
+
+
 @pytest.mark.parametrize("command", SHOWS)
 def test_what_is_not_ours_is_refused_in_one_line_and_nothing_is_written(
-    foreign: Callable[..., Path], command: str, capsys: pytest.CaptureFixture[str]
+    foreign: Callable[..., Path], command: str, call: Call
 ) -> None:
     for topic, (what, data) in itertools.product(SHOWS[command], HOSTILE.items()):
         if command != "replay" and "code" in what:
             continue
         file = foreign(data, topic=topic)
-        assert main([command, str(file)]) == 1
-        err = capsys.readouterr().err
-        assert err.count("\n") == 1
-        assert f"foreign.mcap: a message on '{topic}' is no" in err, what
+        call(command, str(file)).assert_failed(1, f"foreign.mcap: a message on '{topic}' is no")
         assert [*file.parent.iterdir()] == [file]
 
 
 @pytest.mark.parametrize("topic", OTHER_NAMES)
 @pytest.mark.parametrize("command", ["replay", "plot"])
 def test_a_recording_with_other_names_is_one_line_that_says_so(
-    foreign: Callable[..., Path], command: str, topic: str, capsys: pytest.CaptureFixture[str]
+    foreign: Callable[..., Path], command: str, topic: str, call: Call
 ) -> None:
     message, lacks = OTHER_NAMES[topic]
-    assert main([command, str(foreign(message, topic=topic))]) == 1
-    out, err = capsys.readouterr()
-    assert out == ""
     lacks = {"axis_state": "requested_position", "fault_code": "fault"}[lacks] if command == "plot" else lacks
+    outcome = call(command, str(foreign(message, topic=topic)))
+    assert outcome.out == ""
     why = f"is not one of ours, or of another version of robotiq_async: it has no '{lacks}'"
-    assert err == f"robotiq-async: {foreign()}: a message on '{topic}' {why}\n"
+    outcome.assert_failed(1, f"{foreign()}: a message on '{topic}' {why}\n")
 
 
 @pytest.mark.parametrize("command", ["replay", "plot", "recover"])
-def test_a_message_of_no_channel_is_one_line(
-    foreign: Callable[..., Path], command: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main([command, str(foreign(STATE, channel=7))]) == 1
-    err = capsys.readouterr().err
-    assert err.count("\n") == 1
-    assert "foreign.mcap: there is no channel 7" in err
+def test_a_message_of_no_channel_is_one_line(foreign: Callable[..., Path], command: str, call: Call) -> None:
+    outcome = call(command, str(foreign(STATE, channel=7)))
+    outcome.assert_failed(1, "foreign.mcap: there is no channel 7")
 
 
-STEERING = "\x1b[2J\x9b31m\x07\r\nroot# \u202e\ud800"
-
-
-def test_what_steers_a_terminal_is_written_out(
-    foreign: Callable[..., Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_steers_a_terminal_is_written_out(foreign: Callable[..., Path], call: Call) -> None:
     fault = event(kind="fault", fault_code=9, fault=STEERING, description=STEERING)
-    assert main(["replay", str(foreign(fault))]) == 0
-    out, err = capsys.readouterr()
-    assert out.count("\n") == 1
-    assert r"\x1b[2J\x9b31m\x07\r\nroot# \u202e\ud800" in out
-    assert out.rstrip("\n").isprintable()
-    assert err == ""
+    outcome = call("replay", str(foreign(fault)))
+    assert outcome.out.count("\n") == 1
+    assert r"\x1b[2J\x9b31m\x07\r\nroot# \u202e\ud800" in outcome.out
+    assert outcome.out.rstrip("\n").isprintable()
+    assert outcome.err == ""
 
 
 @pytest.mark.parametrize("command", ["replay", "plot", "recover"])
-def test_an_error_does_not_steer_the_terminal_either(
-    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main([command, str(tmp_path / f"{STEERING}.mcap".replace("\ud800", ""))]) == 1
-    err = capsys.readouterr().err
-    assert err.rstrip("\n").isprintable()
-    assert r"\x1b[2J" in err
+def test_an_error_does_not_steer_the_terminal_either(command: str, tmp_path: Path, call: Call) -> None:
+    outcome = call(command, str(tmp_path / f"{STEERING}.mcap".replace("\ud800", "")))
+    outcome.assert_failed(1, r"\x1b[2J")
+    assert outcome.err.rstrip("\n").isprintable()
 
 
-@pytest.mark.parametrize("options", [[], ["--brief"]])
-def test_nothing_to_show_is_said(
-    foreign: Callable[..., Path], options: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["replay", *options, str(foreign(b"{}", topic="/odometry"))]) == 1
-    assert "foreign.mcap: it contains nothing that this command shows" in capsys.readouterr().err
+def test_words_of_others_are_no_formulas(foreign: Callable[..., Path], call: Call) -> None:
+    words = '=HYPERLINK("http://192.0.2.1")\n,"'
+    file = foreign(json.dumps({"kind": "state", "target": words}).encode())
+    call("export", str(file), "--of", "events").assert_succeeded()
+    [row] = rows_of(file.with_suffix(".csv"))
+    assert row["target"] == f"'{words}"
 
 
-def test_a_name_that_is_no_text_is_shown_all_the_same(
-    grasp: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    there = Path(os.fsdecode(os.fsencode(grasp.parent) + b"/\xff$\\frac{$.mcap"))
-    grasp.rename(there)
-    assert main(["plot", str(there)]) == 0
-    assert capsys.readouterr().out.endswith(".svg\n")
-    assert main(["recover", str(there)]) == 0
-    assert "messages in" in capsys.readouterr().out
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("replay", "it contains nothing that this command shows"),
+        ("replay --brief", "it contains nothing that this command shows"),
+        ("export", "it contains no statuses"),
+    ],
+)
+def test_nothing_to_show_is_said(foreign: Callable[..., Path], command: str, words: str, call: Call) -> None:
+    file = foreign(b"{}", topic="/odometry")
+    call(*command.split(), str(file)).assert_failed(1, f"foreign.mcap: {words}")
+    assert not file.with_suffix(".csv").exists()
 
 
 @pytest.mark.parametrize("words", ["$\\frac{", "x" * 100_000, STEERING])
-def test_words_of_others_are_drawn_as_they_are(
-    grasp: Path, words: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_words_of_others_are_drawn_as_they_are(grasp: Path, words: str, call: Call) -> None:
     with grasp.open("rb") as stream:
         first = next(make_reader(stream).iter_messages(topics=["/gripper/status"]))[2]
     file = grasp.with_name("foreign.mcap")
@@ -350,7 +397,16 @@ def test_words_of_others_are_drawn_as_they_are(
             writer.add_message(1, first.log_time + second * 10**9, first.data, 0)
             writer.add_message(2, first.log_time + second * 10**9, event(kind="state", target=words), 0)
         writer.finish()  # type: ignore[no-untyped-call]
-    assert main(["plot", str(file)]) == 0, capsys.readouterr().err
+    call("plot", str(file)).assert_succeeded()
+
+
+LITTLE_MEMORY = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_AS, (1_500_000_000, 1_500_000_000))
+from robotiq_async.cli import main
+print(*(main([command, {!r}]) for command in ("replay", "recover", "plot")))
+"""
+"""Of addresses; matplotlib takes most of them."""
 
 
 async def test_two_gigabytes_in_a_small_chunk_are_one_line(shell: Shell, tmp_path: Path) -> None:
@@ -368,12 +424,3 @@ async def test_two_gigabytes_in_a_small_chunk_are_one_line(shell: Shell, tmp_pat
     for line in lines:
         assert line.startswith("robotiq-async: ")
         assert "bomb.mcap: a chunk of 2147483648 bytes" in line
-
-
-LITTLE_MEMORY = """
-import resource, sys
-resource.setrlimit(resource.RLIMIT_AS, (1_500_000_000, 1_500_000_000))
-from robotiq_async.cli import main
-print(*(main([command, {!r}]) for command in ("replay", "recover", "plot")))
-"""
-"""Of addresses; matplotlib takes most of them."""

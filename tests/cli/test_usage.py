@@ -1,10 +1,13 @@
-"""Help, versions and wrong usage; most of it in this process, for speed."""
+"""Help, versions and wrong usage: what every command refuses in one line, before anything is opened."""
 
 from __future__ import annotations
 
 import inspect
+import json
 import re
+from collections.abc import Callable
 from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -12,14 +15,13 @@ import pytest
 import robotiq_async
 from robotiq_async.cli import main
 from robotiq_async.cli.app import COMMANDS as FUNCTIONS
-from robotiq_async.cli.commands.fleet import fleet, halt
-from robotiq_async.cli.commands.fleet_keys import keys
-from robotiq_async.cli.commands.measure.force import force
-from robotiq_async.cli.commands.measure.speed import speed
-from robotiq_async.cli.output.reflow import reflow
+from robotiq_async.cli.commands.fleet import fleet, halt, keys
+from robotiq_async.cli.commands.measure import speed
+from robotiq_async.cli.commands.measure_force import force
+from robotiq_async.simulator import SimulatorServer
 
 if TYPE_CHECKING:
-    from tests.cli.conftest import Shell
+    from tests.cli.conftest import Beside, Call, Shell
 
 WITHOUT = """
 import sys
@@ -27,22 +29,7 @@ sys.modules["{}"] = None
 from robotiq_async.cli import main
 sys.exit(main([]))
 """
-
 COMMANDS = ("demo", "simulate", "status", "move", "monitor", "view", "doctor")
-
-
-def test_help_lists_every_command_and_the_addresses(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["--help"]) == 0
-    out = capsys.readouterr().out
-    for word in (*COMMANDS, "tcp://", "rtu://", "sim://", "real hardware"):
-        assert word in out
-
-
-def test_no_arguments_show_the_help(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([]) == 0
-    assert "Usage: robotiq-async COMMAND" in capsys.readouterr().out
-
-
 EVERY = {each.__name__: each for each in FUNCTIONS} | {
     "fleet": fleet,
     "fleet halt": halt,
@@ -51,6 +38,20 @@ EVERY = {each.__name__: each for each in FUNCTIONS} | {
     "measure force": force,
 }
 MOVE = {"demo", "move", "measure speed", "measure force"}
+SIMULATED = "Simulated gripper sim://"
+
+
+# -- help --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("arguments", [[], ["--help"]])
+def test_help_lists_every_command_and_the_addresses(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 0
+    out = capsys.readouterr().out
+    for word in ("Usage: robotiq-async COMMAND", *COMMANDS, "tcp://", "rtu://", "sim://", "real hardware"):
+        assert word in out
 
 
 @pytest.mark.parametrize("command", EVERY)
@@ -63,7 +64,7 @@ def test_the_help_of_a_command(
         out = capsys.readouterr().out
         words, _, examples = out.partition("\n\n")[2].partition("For example:")
         assert_wrapped_once(words.splitlines(), width)
-        assert f"robotiq-async {command}" in examples
+        assert f"\n    robotiq-async {command}" in examples, "an example keeps its line"
         assert command not in COMMANDS or "address" in out.lower()
         assert command not in MOVE or "FINGERS MOVE" in " ".join(out.split())
 
@@ -82,15 +83,12 @@ def test_the_help_of_an_option_is_one_line_of_the_source() -> None:
             assert re.match(r"    [a-z0-9_]+: ", line), f"it would break there in any terminal: {line}"
 
 
-def test_paragraphs_flow_and_examples_stay() -> None:
-    assert reflow("One\n    two.\n\n        a\n        b\n    Three\n    four.\n") == (
-        "One two.\n\n    a\n    b\nThree four."
-    )
-
-
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--version"]) == 0
     assert capsys.readouterr().out.strip() == robotiq_async.__version__
+
+
+# -- wrong usage -------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -103,32 +101,90 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
         ("move 1.5", ["POSITION", "1.5", "0..255"]),
         ("move ten", ["POSITION", "ten", "0..255"]),
         ("move 3 --speed 256", ["--speed", "256", "0..255"]),
-        ("move 3 --force -1", ["--force", "-1", "0..255"]),
-        ("move 3 --fingers D", ["--fingers", "'D'", "scissor"]),
         ("move 3 --fingers A,,B", ["--fingers", "''"]),
         ("move 3 --timeout 0", ["timeout", "0", "above 0"]),
-        ("move 3 --timeout nan", ["timeout", "nan"]),
         ("move 3 --timeout soon", ["--timeout", "soon"]),
         ("move 3 --wrong 4", ["--wrong"]),
         ("move 3 ftp://gripper", ["ftp://gripper", "tcp://", "rtu://", "sim://"]),
         ("move 3 sim:// 4", ["4"]),
-        ("status tcp://", ["tcp://", "rtu://", "sim://"]),
         ("status [/b]", ["[/b]"]),
         ("demo gripper:port", ["gripper:port", "tcp://"]),
+        ("doctor", ["ADDRESS"]),
+        ("doctor zenoh://lab/cell", ["zenoh://SITE/HOST/GRIPPER"]),
+        ("doctor zenoh://lab/cell/left --device-id 3", ["its agent's file has device_id"]),
+        ("move 3 --yes zenoh://lab/cell/left --device-id 3", ["a gripper on another host is set up there"]),
+        ("monitor --watch --json", ["exclude"]),
         ("simulate --port 65536", ["--port", "65536", "0..65535"]),
         ("simulate --speedup 0", ["speedup", "0"]),
-        ("simulate --speedup -2", ["speedup", "-2"]),
+        ("simulate --object 256", ["--object must be an integer in 0..255"]),
+        ("simulate --fixed", ["--fixed is about an object"]),
+        (
+            "simulate --serial /dev/no --device-id=9.5",
+            ["--device-id must be an integer in 0..255"],
+        ),
+        ("simulate --serial /dev/no --device-id 248", ["device_id must be in 1..247, got 248"]),
+        ("simulate --rtu-over-tcp --device-id 0", ["device_id must be in 1..247, got 0"]),
+        ("simulate --serial /dev/ttyS0 --rtu-over-tcp", ["--rtu-over-tcp"]),
+        ("simulate --unpaced", ["--unpaced"]),
+        ("simulate --trouble drop --trouble dorp", ["unknown trouble 'dorp'; known are: delay, late, drop"]),
+        ("simulate --trouble wrong-checksum", ["wrong-checksum does not fit a simulator on tcp"]),
+        ("simulate --serial /dev/no --trouble refuse", ["refuse does not fit a simulator on rtu"]),
+        ("simulate --model 2f85 --trouble interference", ["does not fit a 2F-85: it has no scissor"]),
+        ("record x.mcap --seconds 0", ["--seconds"]),
+        ("record x.mcap --seconds nan", ["--seconds"]),
+        ("record x.mcap --csv", ["name the file .csv"]),
+        ("record x.csv --ros2", ["--ros2 records an MCAP file"]),
+        ("export x.mcap out.txt", ["must be a file named .csv, got out.txt"]),
+        ("export x.csv", ["x.csv is the table itself"]),
+        ("export x.mcap --of everything", ["everything"]),
+        ("measure speed", ["ADDRESS"]),
+        ("measure speed sim:// --runs 0", ["--runs must be an integer in 1..100, got 0"]),
+        ("measure speed sim:// --step 0", ["--step must be an integer in 1..255, got 0"]),
+        ("measure speed sim:// --speedup 51", ["--speedup must be a number in 1..50, got 51"]),
+        ("measure speed 192.168.1.11 --speedup 2", ["--speedup is for sim:// only"]),
+        ("measure speed sim://?speedup=2", ["takes no option but ?model=; there is --speedup"]),
+        ("measure speed sim:// --output mine.png", ["--output must be a file named .csv, got 'mine.png'"]),
+        ("measure speed sim:// --fingers scissor", ["--fingers takes A, B and C only"]),
+        ("measure force", ["ADDRESS"]),
+        ("measure force sim://?model=2f85", ["with three fingers, and sim://?model=2f85 names a 2F-85"]),
+        ("measure force sim:// --output a.csv --scale a.csv", ["--scale must be another file than"]),
+        ("measure force sim:// --surface wood", ["wood"]),
+        ("verify", ["ADDRESS"]),
+        ("verify 127.0.0.1", ["without a terminal"]),
+        ("verify 127.0.0.1 --yes-to 2", ["without a terminal"]),
+        ("verify 127.0.0.1 --up-to 3 --yes-to 3", ["without a terminal"]),
+        ("verify 127.0.0.1 --up-to 2 --yes-to 1", ["without a terminal"]),
+        ("verify 127.0.0.1 --up-to 1 --yes-to 2 --from 2", ["--from"]),
+        ("verify 127.0.0.1 --up-to 2 --yes-to 9", ["--yes-to"]),
+        ("verify 127.0.0.1 --up-to 10", ["0..9"]),
+        ("verify 300.1.1.1 --up-to 2 --yes-to 2", ["300.1.1.1"]),
+        ("verify zenoh://lab/cell/left --up-to 2 --yes-to 2", ["agent"]),
+        ("fleet keys", ["FOLDER"]),
+        ("fleet keys keys --read a/b", ["'a/b'", "A-Z"]),
+        ("fleet keys keys --agent cell-1=", ["''", "host"]),
+        ("fleet keys keys --agent a --agent a=b", ["named twice"]),
+        ("fleet keys keys --read bob --days 0", ["--days", "1..36500", "0"]),
+        ("fleet keys keys --wirte bob", ["--wirte"]),
     ],
 )
-def test_wrong_usage_is_one_line_and_exit_code_2(
-    arguments: str, words: list[str], capsys: pytest.CaptureFixture[str]
+def test_wrong_usage_is_one_line_and_opens_nothing(
+    arguments: str,
+    words: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
+    monkeypatch.chdir(tmp_path)
     assert main(arguments.split()) == 2
     out, err = capsys.readouterr()
-    assert out == ""
+    assert re.fullmatch(r"(Gripper .*\n)?", out)
     assert err.count("\n") == 1
     for word in words:
         assert word in err
+    assert not list(tmp_path.iterdir())
+
+
+# -- extras ------------------------------------------------------------------------------------------------
 
 
 async def test_without_the_extra_one_line_names_it(shell: Shell) -> None:
@@ -140,3 +196,77 @@ async def test_another_missing_module_is_not_taken_for_the_extra(shell: Shell) -
     outcome = await shell.finish(await shell.python("-c", WITHOUT.format("json")))
     assert outcome.code == 1
     assert "pip install" not in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("module", "arguments", "words"),
+    [
+        ("cryptography", "fleet keys keys", "pip install 'cryptography"),
+        ("foxglove", "view", "pip install 'foxglove-sdk"),
+        ("matplotlib", "measure speed sim://", "or pass --no-plot"),
+        ("matplotlib", "plot x", "(the extra plot)"),
+        ("mcap", "record x.mcap", "(the extra record), or record a table, .csv"),
+        ("mcap", "replay x", "(the extra record)"),
+        ("nicegui", "demo --show", "pip install 'nicegui"),
+        ("nicegui", "web", "pip install 'nicegui"),
+    ],
+)
+def test_a_missing_module_is_one_line_that_names_the_extra(
+    call: Call,
+    without: Callable[[str], None],
+    module: str,
+    arguments: str,
+    words: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    without(module)
+    call(*arguments.split()).assert_failed(1, words)
+    assert list(tmp_path.iterdir()) == []
+
+
+# -- which gripper it is -----------------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("virtually")
+@pytest.mark.parametrize(
+    "command",
+    [
+        "status",
+        "move 30",
+        "demo",
+        "doctor sim://",
+        "record grasp.mcap --seconds 1",
+        "measure speed sim:// --step 250 --runs 1 --speedup 30 --no-plot",
+        "measure force sim:// --step 250 --runs 1 --speedup 30 --no-plot",
+    ],
+)
+def test_a_simulated_gripper_is_called_simulated_before_anything_else(
+    call: Call, command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A forgotten address must not look like a healthy gripper."""
+    monkeypatch.chdir(tmp_path)
+    outcome = call(*command.split())
+    outcome.assert_succeeded()
+    assert outcome.out.splitlines()[0] == SIMULATED
+
+
+@pytest.mark.parametrize("command", [["status"], ["move", "30", "--yes"], ["doctor"]])
+def test_any_other_is_named_by_its_full_address(
+    call: Call, command: list[str], there: SimulatorServer
+) -> None:
+    outcome = call(*command, there.address.removeprefix("tcp://"))
+    outcome.assert_succeeded()
+    assert outcome.out.splitlines()[0] == f"Gripper {there.address}"
+
+
+@pytest.mark.parametrize("command", ["monitor --json", "web --port 0", "view --port 0"])
+def test_what_programs_read_stays_what_they_can_read(beside: Callable[..., Beside], command: str) -> None:
+    shown = beside(*command.split())
+    assert shown.read_error() == f"robotiq-async: {SIMULATED}"
+    line = shown.read_line()
+    if command.startswith("monitor"):
+        assert json.loads(line)["kind"] in ("status", "log")  # of late polls, on a busy machine
+    else:
+        assert "://127.0.0.1:" in line

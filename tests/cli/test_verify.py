@@ -19,32 +19,6 @@ from tests.cli.terminal import Terminal
 if TYPE_CHECKING:
     from tests.cli.conftest import Call
 
-WITHOUT_TERMINAL = "without a terminal"
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["127.0.0.1"], WITHOUT_TERMINAL),
-        (["127.0.0.1", "--yes-to", "2"], WITHOUT_TERMINAL),
-        (["127.0.0.1", "--up-to", "3", "--yes-to", "3"], WITHOUT_TERMINAL),
-        (["127.0.0.1", "--up-to", "2", "--yes-to", "1"], WITHOUT_TERMINAL),
-        (["127.0.0.1", "--up-to", "1", "--yes-to", "2", "--from", "2"], "--from"),
-        (["127.0.0.1", "--up-to", "2", "--yes-to", "9"], "--yes-to"),
-        (["127.0.0.1", "--up-to", "10"], "0..9"),
-        (["127.0.0.1", "--from", "-1"], "0..9"),
-        (["300.1.1.1", "--up-to", "2", "--yes-to", "2"], "300.1.1.1"),
-        (["zenoh://lab/cell/left", "--up-to", "2", "--yes-to", "2"], "agent"),
-        ([], "ADDRESS"),
-    ],
-)
-def test_what_it_refuses_before_anything_is_opened(
-    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], words: str
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    call("verify", *arguments).assert_failed(2, words)
-    assert not list(tmp_path.iterdir())
-
 
 def test_without_the_extra_nothing_is_sent(
     call: Call, there: SimulatorServer, monkeypatch: pytest.MonkeyPatch, tmp_path: Path

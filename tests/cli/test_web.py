@@ -9,7 +9,6 @@ import signal
 import sys
 import threading
 import webbrowser
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
@@ -100,12 +99,6 @@ def test_bad_input_is_one_clear_line(
     assert words in outcome.err
     assert "Traceback" not in outcome.err
     assert outcome.err.count("\n") == 1
-
-
-def test_without_nicegui_one_line_names_the_extra(call: Call, without: Callable[[str], None]) -> None:
-    without("nicegui")
-    for command in (["web"], ["demo", "--show"]):
-        call(*command).assert_failed(1, "pip install 'nicegui")
 
 
 async def test_the_demo_waits_until_somebody_looks(shell: Shell) -> None:

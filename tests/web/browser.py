@@ -7,6 +7,7 @@ import json
 import shutil
 import tempfile
 from collections.abc import Callable
+from time import monotonic
 from typing import Any, Final, Literal, TypeVar
 
 from selenium import webdriver
@@ -142,3 +143,24 @@ class Browser:
     def complaints(self) -> list[str]:
         """What the page has complained about since the last time."""
         return [each["message"] for each in self._log("browser") if each["level"] == "SEVERE"]
+
+
+class Pace:
+    """The clock of a simulated gripper, which may run faster or slower than ours."""
+
+    def __init__(self, rate: float = 1.0) -> None:
+        """So many times as fast as ours."""
+        self._rate = rate
+        self._at = self._now = monotonic()
+
+    def __call__(self) -> float:
+        """The time there."""
+        at = monotonic()
+        self._now += self._rate * (at - self._at)
+        self._at = at
+        return self._now
+
+    def set(self, rate: float) -> None:
+        """From now on it runs so many times as fast as ours."""
+        self()
+        self._rate = rate

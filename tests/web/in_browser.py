@@ -22,23 +22,33 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 
 from robotiq_async import OPEN, WIDTH_NORMAL, Fault, Finger, RobotiqHand, RobotiqStatus, State
+from robotiq_async.hand import Hand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.tools.actions import Operator
 from robotiq_async.tools.description import hand_model
 from robotiq_async.tools.description.kinematics import JOINTS, joint_angles
 from robotiq_async.tools.web.page.widgets.positions import ROWS
 from robotiq_async.tools.web.server import PageServer
+from robotiq_async.tools.web.settings import PageSettings
 from robotiq_async.values.enums import DEFAULT_SPEED
 from robotiq_async.values.model import THREE_FINGER
 from tests.conftest import watched
 from tests.fake_hand import FakeHand
 from tests.virtual import HoldWatch
-from tests.web.browser import BROWSER, COLORS, DRIVER, MISSING, SMALL, VISIBLE, Browser
-from tests.web.pace import Pace
-from tests.web.showing import shown
+from tests.web.browser import BROWSER, COLORS, DRIVER, MISSING, SMALL, VISIBLE, Browser, Pace
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 
 FAST, SLOW = 20.0, 0.25
+
+
+@contextlib.asynccontextmanager
+async def shown(*hands: Hand, control: bool = True) -> AsyncIterator[PageServer]:
+    """The page of some hands."""
+    operators = [Operator(hand) for hand in hands] if control else []
+    settings = PageSettings(port=0, control=control, addresses=tuple(hand.address for hand in hands))
+    async with PageServer(hands, settings, operators=operators) as page:
+        yield page
 
 
 @dataclass

@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import http.client
 from collections.abc import AsyncIterator
-from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
@@ -157,12 +156,4 @@ async def test_a_port_that_is_taken(page: PageServer) -> None:
     taken = PageSettings(port=urlsplit(page.url).port or 0, addresses=("fake://hand",))
     with pytest.raises(ViewerError, match="in use"):
         async with PageServer([FakeHand()], taken):
-            pass
-
-
-async def test_a_certificate_that_is_none(tmp_path: Path) -> None:
-    file = tmp_path / "cert.pem"
-    file.write_text("no certificate")
-    with pytest.raises(ViewerError, match=r"cert\.pem"):
-        async with PageServer([FakeHand()], settings(certificate=str(file), key=str(file))):
             pass

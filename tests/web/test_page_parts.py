@@ -112,19 +112,35 @@ async def test_without_operators_nothing_is_carried_out() -> None:
         assert "only looks" in (await pages.answer())["words"]
 
 
+MOVING = (("close", {}), ("set_speed", {"value": 9}), ("reset", {"confirm": True}))
+
+
+@pytest.mark.parametrize("ago", [FRESH_S + 0.1, 1e9, -1.0])
 async def test_what_was_asked_for_too_long_ago_moves_nothing_but_a_halt_is_never_too_old(
-    hand: RobotiqHand,
+    hand: RobotiqHand, ago: float
 ) -> None:
     """Whether it waited in the browser, on the network, or for this loop, which something had held up."""
-    pages, requests = Pages(hand), hand.requests()
-    for ago in (FRESH_S + 0.1, 1e9, -1.0):
-        for name, arguments in (("close", {}), ("set_speed", {"value": 9}), ("reset", {"confirm": True})):
-            pages.do(name, ago=ago, **arguments)
-            assert "came too late" in (await pages.answer())["words"]
+    await assert_only_a_halt(Pages(hand), hand, "came too late", ago=ago)
+
+
+async def test_a_page_that_is_ending_takes_nothing_but_a_halt(hand: RobotiqHand) -> None:
+    """With several hands the others were still commanded while the first one stopped."""
+    pages = Pages(hand)
+    pages.commands.refuse()
+    await assert_only_a_halt(pages, hand, "the page is ending")
+
+
+async def assert_only_a_halt(pages: Pages, hand: RobotiqHand, words: str, ago: float = 0.0) -> None:
+    requests = hand.requests()
+    for name, arguments in MOVING:
+        pages.do(name, ago=ago, **arguments)
+        answer = await pages.answer()
+        assert (answer["ok"], words in answer["words"]) == (False, True)
     assert requests.take_nowait() is None
     assert hand.state is State.RUNNING_IDLE
-    pages.do("halt", ago=1e9)
-    assert (await pages.answer())["ok"]
+    pages.do("halt", ago=ago)
+    pages.commands.gone("one")  # and a halt of a page that has gone is completed
+    assert (await pages.answer())["words"] == "every axis has stopped"
 
 
 async def test_a_page_that_is_gone_has_its_motion_held_and_no_other() -> None:
@@ -142,27 +158,6 @@ async def test_a_page_that_is_gone_has_its_motion_held_and_no_other() -> None:
         assert (answers[0]["ok"], answers[1]["words"].partition(";")[0]) == (False, "B at 100")
         assert hand.status.position(Finger.A) < 200
         assert not pages.commands.under_way
-
-
-async def test_a_halt_of_a_page_that_is_gone_is_completed(hand: RobotiqHand) -> None:
-    pages = Pages(hand)
-    pages.do("halt")
-    pages.commands.gone("one")
-    assert (await pages.answer())["words"] == "every axis has stopped"
-
-
-async def test_a_page_that_is_ending_takes_nothing_but_a_halt(hand: RobotiqHand) -> None:
-    """With several hands the others were still commanded while the first one stopped."""
-    pages, requests = Pages(hand), hand.requests()
-    pages.commands.refuse()
-    for name, arguments in (("close", {}), ("set_speed", {"value": 9}), ("reset", {"confirm": True})):
-        pages.do(name, **arguments)
-        answer = await pages.answer()
-        assert not answer["ok"]
-        assert "the page is ending" in answer["words"]
-    assert requests.take_nowait() is None
-    pages.do("halt")
-    assert (await pages.answer())["ok"]
 
 
 async def test_a_command_is_answered_whenever_its_page_is_gone() -> None:
