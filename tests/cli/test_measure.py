@@ -163,9 +163,9 @@ def test_what_was_measured_with_other_settings_is_not_gone_on_with(call: Call, t
     for options in (("10.255.255.1",), ("sim://", "--fingers", "A")):
         outcome = call("measure", "speed", *options, *table, "--step", "255", "--runs", "1", "--no-plot")
         outcome.assert_failed(1, "was measured with other settings")
-    table = ("--output", str(tmp_path / "f.csv"), "--runs", "1")
-    call(*FORCES, *table).assert_succeeded()
-    outcome = call(*FORCES, "--surface", "rigid", *table)
+    forces = (*FORCES, "--output", str(tmp_path / "f.csv"), "--runs", "1")
+    call(*forces).assert_succeeded()
+    outcome = call(*forces, "--surface", "rigid")
     outcome.assert_failed(1, "was measured with other settings: surface foam there and rigid here")
 
 

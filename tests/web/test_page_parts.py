@@ -112,7 +112,11 @@ async def test_without_operators_nothing_is_carried_out() -> None:
         assert "only looks" in (await pages.answer())["words"]
 
 
-MOVING = (("close", {}), ("set_speed", {"value": 9}), ("reset", {"confirm": True}))
+MOVING: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("close", {}),
+    ("set_speed", {"value": 9}),
+    ("reset", {"confirm": True}),
+)
 
 
 @pytest.mark.parametrize("ago", [FRESH_S + 0.1, 1e9, -1.0])
