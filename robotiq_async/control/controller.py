@@ -250,7 +250,7 @@ class Controller:
         """The image that stops the fingers, whichever client moves them; None if there is nothing to stop."""
         if classify(status) is Trigger.SEEN_READY:
             self._shadow.follow(self._shadow.identify(), status)
-        return stopped(self._shadow.base, status, settled=self._shadow.is_settled)
+        return stopped(self._shadow.base, status, settled=self._shadow.acts())
 
     # -- what is known ---------------------------------------------------------------------------------
 
@@ -295,12 +295,12 @@ class Controller:
         if self._requests.halting and self._early_stop is None:
             self._requests.see_halt(status, self._shadow.acts)
         if after in RUNNING:
-            self._shadow.see_axes(status)
-            arrived = self._shadow.arrivals.axes
+            self._shadow.axes.see(status, self._shadow.now)
+            arrived = self._shadow.axes.resting
             if self._first_motion.is_watched:
                 arrived &= ~self._see_first_motion(status)
             if self._requests.moves:
-                self._requests.moves.see(status, self._shadow.acts, arrived, self._shadow.arrivals.limited)
+                self._requests.moves.see(status, self._shadow.acts, arrived, self._shadow.axes.limited)
 
     @property
     def is_undecided(self) -> bool:
@@ -324,7 +324,7 @@ class Controller:
             return True
         if self._keeps_grip and self._grip_keeper.rests(self._judged):
             return False  # the next status decides whether rGTO stays set
-        return self._activating or self._judged.go_echo or not self._shadow.is_settled
+        return self._activating or self._judged.go_echo or not self._shadow.acts()
 
     def wait(self, now: float) -> float:
         """Seconds until the next write may leave; 0 for a stop that is not a repetition."""
@@ -358,20 +358,20 @@ class Controller:
             return None  # if the fault lasts, no motion is sent at all
         base = shadow.base
         # After a halt a motion waits until the halt acts: only then is it known where the fingers stopped.
-        stopping = not base.go and status.go_echo and not shadow.is_settled
-        if pending.halting is None and (not shadow.is_certain or (pending.positions and stopping)):
+        stopping = not base.go and status.go_echo and not shadow.acts()
+        if pending.halting is None and (shadow.doubt is not None or (pending.positions and stopping)):
             return None  # only a halt does not wait
         image = merged(
             base,
             pending,
             status,
-            gripping=shadow.grips.held(status, base),
-            arrived=shadow.arrivals.axes,
-            doubtful=shadow.arrivals.doubtful(status, shadow.now) if pending.hold else NO_AXES,
+            gripping=shadow.axes.grips.held(status, base),
+            arrived=shadow.axes.resting,
+            doubtful=shadow.axes.doubtful(status, shadow.now) if pending.hold else NO_AXES,
         )
         if pending.holds_at_most and image == base:
             # No axis moves. If an earlier write does not act yet, one may begin to: ask again then.
-            if shadow.is_settled:
+            if shadow.acts():
                 self._requests.nothing_to_send()
                 self.machine.delivered()
             return None
@@ -429,7 +429,7 @@ class Controller:
         self.machine.begin(sequence)
         self._step, self._early_stop = 0, None
         self._hold_on_return = NO_AXES
-        self._shadow.grips.forget()
+        self._shadow.axes.grips.forget()
 
     def _next_step(self, status: RobotiqStatus, now: float) -> Request | None:
         """Advance the sequence under way; return the image that it wants written."""
@@ -466,7 +466,7 @@ class Controller:
         self._activating = not (
             condition is Trigger.SEEN_READY
             or status.fault.severity is Severity.MAJOR
-            or (condition is Trigger.SEEN_RESET and self._shadow.is_settled)
+            or (condition is Trigger.SEEN_RESET and self._shadow.acts())
         )
 
     def _look_past_fault(self, status: RobotiqStatus, asked: float) -> Trigger:
@@ -535,7 +535,7 @@ class Controller:
     def _take_over(self, status: RobotiqStatus) -> None:
         """Another client commands the gripper: adopt its requests, or our next write would undo them."""
         self.foreign_commands += 1
-        limited = self._shadow.arrivals.limited
+        limited = self._shadow.axes.limited
         if status.timestamp - self._warned >= WARNING_S:
             self._warned = status.timestamp
             self.machine.log.warning("another client commands the gripper: %r", status)

@@ -19,7 +19,7 @@ from ..values.status import RobotiqStatus
 from ..values.trigger import Trigger
 from .requests.merging import merged
 from .requests.pending import PendingCommand
-from .requests.shadow import RequestShadow, Whose
+from .requests.shadow import Doubt, RequestShadow, Whose
 from .sequences import Sequence, stop_fingers
 from .state_machine import RUNNING
 from .triggers import classify
@@ -53,8 +53,8 @@ class GripKeeper:
         """Whether every axis is known to rest under its last request, and there is no fault."""
         shadow = self._shadow
         ready = classify(status) is Trigger.SEEN_READY and status.fault is Fault.NONE and not self.doubt
-        rests = not status.moving and shadow.arrivals.axes is Finger.ALL and shadow.is_certain
-        return ready and status.go_echo and shadow.is_settled and rests
+        rests = not status.moving and shadow.axes.resting is Finger.ALL and shadow.doubt is None
+        return ready and status.go_echo and shadow.acts() and rests
 
     def sequence(self, image_to_stop: Callable[[RobotiqStatus], Request | None]) -> Sequence:
         """Hold what moves and leave rGTO set once everything rests.
@@ -65,13 +65,13 @@ class GripKeeper:
         # Rest is timed by when a status was asked for, because a busy loop may read the reply late.
         until, since, may_hold = status.timestamp + KEEP_S, math.inf, True
         while True:
-            self._shadow.see_axes(status)
+            self._shadow.axes.see(status, self._shadow.now)
             if doubt := self.doubt or self._trouble(status):
                 break
             self._shadow.follow(self._shadow.identify(), status)
             if doubt := self._unrest(status, until):
                 break
-            image = self._held(status) if may_hold and self._shadow.is_certain else None
+            image = self._held(status) if may_hold and self._shadow.doubt is None else None
             if image is not None:
                 may_hold, since = False, math.inf
                 status = yield image
@@ -100,10 +100,11 @@ class GripKeeper:
         if status.timestamp - self._shadow.now.time > KEEP_S:
             return "the newest status is old: something holds up the event loop"
         # A late object status is worth a wait. A write that was lost with the link is not.
-        is_late = self._shadow.is_adoption_late and not status.moving and status.timestamp < until
-        if not self._shadow.is_certain and not is_late:
+        is_late = not status.moving and status.timestamp < until
+        doubt = self._shadow.doubt
+        if doubt is Doubt.LOST_WRITE or (doubt is Doubt.ADOPTED_AXIS and not is_late):
             return "what the gripper was asked is not known for certain"
-        if self._shadow.is_settled and not status.go_echo:
+        if self._shadow.acts() and not status.go_echo:
             return "rGTO was clear"
         if status.timestamp >= until and not self.rests(status):
             return f"not every axis came to rest within {KEEP_S:g} s"
@@ -118,8 +119,8 @@ class GripKeeper:
             held,
             status,
             gripping=NO_AXES,
-            arrived=shadow.arrivals.axes,
-            doubtful=shadow.arrivals.doubtful(status, shadow.now),
+            arrived=shadow.axes.resting,
+            doubtful=shadow.axes.doubtful(status, shadow.now),
         )
         return None if image == shadow.base else image
 
@@ -128,7 +129,7 @@ class GripKeeper:
 
         ``moved`` are the axes that get a position.
         """
-        axes = status.contacts & ~self._shadow.grips.held(status, self._shadow.base) & ~moved
+        axes = status.contacts & ~self._shadow.axes.grips.held(status, self._shadow.base) & ~moved
         if axes:
             self._log.warning(
                 "%s in contact while rGTO was clear: held in place, and gripping no longer", axes

@@ -30,24 +30,24 @@ def test_before_anything_is_known_every_axis_has_the_settings_of_the_hand() -> N
 def test_what_a_gripper_shows_when_it_is_found_is_not_ours_but_settled(shadow: Shadow) -> None:
     assert shadow.base == image(100, speed=128, force=64)
     assert shadow.ours == NO_AXES
-    assert shadow.is_certain
-    assert shadow.is_settled
+    assert shadow.doubt is None
+    assert shadow.acts()
     assert not shadow.may_begin_to_move
 
 
 def test_a_gripper_that_was_found_reset_is_settled_too() -> None:
     shadow = Shadow()
     shadow.shown(status_of(0x00), 1.0)
-    assert shadow.is_settled
-    assert shadow.is_certain
+    assert shadow.acts()
+    assert shadow.doubt is None
 
 
 def test_a_moving_gripper_that_is_found_is_not_certain_before_it_has_shown_its_direction() -> None:
     shadow, moving = Shadow(), status_of(0x39, 0x00, echo=100, position=50)
     shadow.returned(shadow.shown(moving, 1.0))
-    assert not shadow.is_certain
+    assert shadow.doubt is not None
     assert shadow.follows(shadow.shown(moving, 1.0 + DIRECTION_WAIT_S))
-    assert shadow.is_certain
+    assert shadow.doubt is None
 
 
 def test_at_rest_nothing_could_be_woken(ours: Shadow) -> None:
@@ -71,13 +71,13 @@ def test_a_write_acts_once_it_shows(shadow: Shadow) -> None:
     number = shadow.write(image(200))
     assert shadow.follows(shadow.shown(shows(100, 1.01), 1.01))
     assert not shadow.acts(number)
-    assert not shadow.is_settled
+    assert not shadow.acts()
     assert shadow.may_begin_to_move
     assert shadow.follows(shadow.shown(shows(200, 1.02), 1.02))
     assert shadow.acts(number)
-    assert shadow.is_settled
+    assert shadow.acts()
     assert shadow.may_begin_to_move, "until gDT can be believed"
-    shadow.see_axes(shows(200, 1.02))
+    shadow.axes.see(shows(200, 1.02), shadow.now)
     assert not shadow.may_begin_to_move
 
 
@@ -95,7 +95,7 @@ def test_a_speed_that_does_not_act_yet_sets_nothing_in_motion_while_rgto_is_clea
     ours.shown(shows(200, 1.2 + WINDOW_S, go=False), 1.2 + WINDOW_S)
     ours.shown(shows(200, 1.3 + 2 * WINDOW_S, go=False), 1.3 + 2 * WINDOW_S)
     ours.write(image(200, go=False, speed=7))
-    assert not ours.is_settled
+    assert not ours.acts()
     assert not ours.may_begin_to_move
     ours.write(image(200, speed=7))
     assert ours.may_begin_to_move
@@ -128,11 +128,11 @@ def test_an_axis_that_another_client_leaves_alone_stays_ours(shadow: Shadow) -> 
 def test_our_write_that_shows_after_another_clients_is_gone_on_from(ours: Shadow) -> None:
     ours.write(image(30))
     ours.follow(Whose.FOREIGN, ours.shown(shows(77, 1.2), 1.2))
-    assert not ours.is_certain, "our write may still act"
+    assert ours.doubt is not None, "our write may still act"
     assert ours.follows(ours.shown(shows(30, 1.3), 1.3))
     assert ours.base == image(30)
     assert ours.ours == Finger.ALL
-    assert ours.is_certain
+    assert ours.doubt is None
 
 
 def test_who_writes_again_and_again_does_not_make_us_wait_again_and_again(shadow: Shadow) -> None:
@@ -142,7 +142,7 @@ def test_who_writes_again_and_again_does_not_make_us_wait_again_and_again(shadow
         moving = status_of(0x39, 0x00, echo=150 + n, position=50)
         assert not shadow.follows(shadow.shown(moving, at))
         shadow.follow(Whose.FOREIGN, moving)
-    assert shadow.is_certain
+    assert shadow.doubt is None
 
 
 # -- a link that comes back --------------------------------------------------------------------------------
@@ -153,7 +153,7 @@ def test_our_image_that_shows_when_the_link_is_back_is_still_ours(ours: Shadow) 
     ours.returned(ours.shown(shows(200, 9.0), 9.0))
     assert ours.base == image(200)
     assert ours.ours == Finger.ALL
-    assert ours.is_certain
+    assert ours.doubt is None
 
 
 def test_what_somebody_asked_while_the_link_was_down_is_theirs(ours: Shadow) -> None:
@@ -174,9 +174,9 @@ def test_a_write_that_may_have_arrived_is_waited_for(ours: Shadow) -> None:
     ours.write(image(30), answered=False)
     ours.returned(ours.shown(shows(200, 1.2), 1.2))
     assert ours.base == image(200)
-    assert not ours.is_certain
+    assert ours.doubt is not None
     assert ours.follows(ours.shown(shows(200, 1.15 + SILENT_S), 1.15 + SILENT_S))
-    assert ours.is_certain, "what has not shown by now has not arrived"
+    assert ours.doubt is None, "what has not shown by now has not arrived"
 
 
 def test_a_write_that_has_arrived_all_the_same_is_gone_on_from(ours: Shadow) -> None:
@@ -184,7 +184,7 @@ def test_a_write_that_has_arrived_all_the_same_is_gone_on_from(ours: Shadow) -> 
     ours.returned(ours.shown(shows(200, 1.2), 1.2))
     assert ours.follows(ours.shown(shows(30, 1.3), 1.3))
     assert ours.base == image(30)
-    assert ours.is_certain
+    assert ours.doubt is None
 
 
 def test_an_acknowledged_speed_is_kept_over_a_lost_link(ours: Shadow) -> None:
@@ -206,7 +206,7 @@ def test_a_speed_that_may_not_have_arrived_is_not_taken_for_the_axis_s_own(ours:
 def test_after_a_sequence_the_gripper_has_what_was_written_last(ours: Shadow) -> None:
     ours.write(image(30))
     assert ours.restart(ours.shown(shows(30, 1.2), 1.2))
-    assert ours.is_settled
+    assert ours.acts()
 
 
 def test_another_client_that_has_written_during_a_sequence_is_noticed(ours: Shadow) -> None:

@@ -19,13 +19,21 @@ from ...values.model import THREE_FINGER, Model
 from ...values.request import AxisRequest, Request
 from ...values.status import RobotiqStatus
 from .adoption import Adoption
-from .arrivals import Arrivals
-from .grips import Grips
+from .axes import Axes
 from .limits import ALONE_S
 from .standstill import Moment
 from .writes import SILENT_S, WINDOW_S, WriteHistory
 
 NEVER: Final = float("-inf")
+
+
+class Doubt(Enum):
+    """Why the image that the next one is made from cannot be relied on yet."""
+
+    __hash__ = object.__hash__  # see State
+
+    LOST_WRITE = "a write may have arrived that was not acknowledged: an image from before it would undo it"
+    ADOPTED_AXIS = "an adopted axis has not shown its direction, or that it is at rest"
 
 
 class Whose(Enum):
@@ -49,8 +57,7 @@ class RequestShadow:
         log: of the hand.
 
     Attributes:
-        grips: which axes grip.
-        arrivals: which axes have come to rest.
+        axes: which axes have come to rest, and which grip.
         now: when the newest status was asked for. It may show the state of that time, however late a busy
             loop reads the reply; so the age of a write is measured by this.
     """
@@ -67,8 +74,7 @@ class RequestShadow:
         """The image of ours that the newest status shows, if any."""
         self._moved = NO_AXES
         """The axes that we have given a position since the gripper was found."""
-        self.grips: Final = Grips()
-        self.arrivals: Final = Arrivals(model, self._writes, log)
+        self.axes: Final = Axes(model, self._writes, log)
         self.now = Moment(0.0, 0)
         self._others_at = NEVER
         """When another client was last seen."""
@@ -85,28 +91,16 @@ class RequestShadow:
         return self._image if self._adoption is None else self._adoption.request(self._image.axes)
 
     @property
-    def is_certain(self) -> bool:
-        """Whether the base can be relied on.
+    def doubt(self) -> Doubt | None:
+        """Why the base cannot be relied on yet; None if it can."""
+        if self._writes.is_in_doubt and self.now.time - self._sure_at < SILENT_S:
+            return Doubt.LOST_WRITE
+        is_certain = self._adoption is None or self._adoption.is_certain
+        return None if is_certain else Doubt.ADOPTED_AXIS
 
-        An adopted axis takes some time to show its direction, or that it is at rest. A write that was not
-        acknowledged before the link went down may have arrived, and shows within a device cycle: an image
-        written before that would undo it.
-        """
-        return not self._is_in_doubt and (self._adoption is None or self._adoption.is_certain)
-
-    @property
-    def is_adoption_late(self) -> bool:
-        """Whether only an adopted axis keeps the base from being certain."""
-        return not self._is_in_doubt and self._adoption is not None and not self._adoption.is_certain
-
-    @property
-    def _is_in_doubt(self) -> bool:
-        return self._writes.is_in_doubt and self.now.time - self._sure_at < SILENT_S
-
-    @property
-    def is_settled(self) -> bool:
-        """Whether the last image acts."""
-        return self.acts(self._writes.last_number)
+    def acts(self, number: int | None = None) -> bool:
+        """Whether the image of this number, or a later one, acts by now; None for the last one."""
+        return self._writes.acts(self._writes.last_number if number is None else number, self.now.time)
 
     @property
     def may_begin_to_move(self) -> bool:
@@ -114,9 +108,9 @@ class RequestShadow:
 
         While rGTO is clear a speed or a force does not: then all writes that wait have the same echo.
         """
-        if not self.is_settled:
+        if not self.acts():
             return self._image.go or not self._writes.all_look_alike
-        return self.arrivals.axes is not Finger.ALL and self._image.go and self._adoption is None
+        return self.axes.resting is not Finger.ALL and self._image.go and self._adoption is None
 
     @property
     def ours(self) -> Finger:
@@ -127,9 +121,6 @@ class RequestShadow:
         unchanged = (axis for axis, asked in image.by_axis if adopted.position(axis) == asked.position)
         return self._moved & reduce(or_, unchanged, NO_AXES)
 
-    def acts(self, number: int) -> bool:
-        return self._writes.acts(number, self.now.time)
-
     # -- what is written -------------------------------------------------------------------------------
 
     def writing(self, image: Request, moved: Finger, now: float) -> int:
@@ -137,9 +128,8 @@ class RequestShadow:
         before, self._image, self._adoption = self.base, image, None
         self._unsure_until = NEVER
         self._moved |= moved
-        self.grips.forget(moved)
         number = self._writes.writing(image, now)
-        self.arrivals.ask(number, before, image, moved)
+        self.axes.ask(number, before, image, moved)
         return number
 
     def acknowledged(self, now: float) -> int:
@@ -179,7 +169,7 @@ class RequestShadow:
         for axis, (request, limit) in replaced.items():
             if self._image.position(axis) == request:
                 self._image = self._image.with_positions({axis: limit})
-                self.arrivals.limit(axis, limit)
+                self.axes.limit(axis, limit)
 
     def returned(self, status: RobotiqStatus) -> None:
         """The link is back: go on from the image of ours that shows, or adopt the gripper."""
@@ -193,7 +183,7 @@ class RequestShadow:
 
     def _adopt(self, status: RobotiqStatus) -> None:
         """Take the gripper's request from its status; write nothing."""
-        self.grips.forget()
+        self.axes.grips.forget()
         # A client that keeps writing must not make us wait anew each time.
         since = self.now if self._adoption is None else self._adoption.since
         self._adoption = Adoption(status, self.now, since)
@@ -230,16 +220,5 @@ class RequestShadow:
             echo, so an image with rATR counts as not shown by a gripper that follows requests.
         """
         self._writes.restart(self._image, status.echo, self.now.time)
-        self.arrivals.clear()
+        self.axes.clear()
         return status.echo == self._image.echo and not self._image.release
-
-    def see_axes(self, status: RobotiqStatus) -> None:
-        """Note which axes have come to rest and which grip. Not in a fault: it keeps axes from starting."""
-        if not status.go_echo:
-            return  # gDT says nothing without rGTO
-        self.arrivals.see(status, self.now)
-        if self.grips or status.contacts:
-            contacts = status.contacts
-            if contacts & ~self.arrivals.axes:
-                contacts &= ~self.arrivals.doubtful(status, self.now)
-            self.grips.see(status, contacts)

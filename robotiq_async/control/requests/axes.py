@@ -1,52 +1,86 @@
-"""Which axes have come to rest under the position that they were asked last."""
+"""Which axes have come to rest under the position that they were asked last, and which of them grip."""
 
 from __future__ import annotations
 
+from functools import reduce
+from operator import or_
 from typing import Final
 
 from ...runtime.log import Log
 from ...values.enums import NO_AXES, Finger, ObjectStatus
-from ...values.model import Model
+from ...values.model import TOLERANCE, Model
 from ...values.request import Request
 from ...values.status import RobotiqStatus
+from ..contact import agrees
 from .standstill import Moment, Standstill
 from .writes import WriteHistory
 
 
-class Arrivals:
+class Grips:
+    """The contacts when rGTO was last seen set: gDT shows none while it is clear. False while it is empty."""
+
+    def __init__(self) -> None:
+        self._contacts: dict[Finger, tuple[ObjectStatus, int]] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._contacts)
+
+    def see(self, status: RobotiqStatus, contacts: Finger) -> None:
+        """Remember the axes that are in contact in a status that shows rGTO set."""
+        self._contacts = {axis: (status.finger_status(axis), status.position(axis)) for axis in contacts}
+
+    def forget(self, axes: Finger = Finger.ALL) -> None:
+        """Forget the grips of some axes, which are asked to move or let go."""
+        self._contacts = {axis: at for axis, at in self._contacts.items() if axis not in axes}
+
+    def held(self, status: RobotiqStatus, base: Request) -> Finger:
+        """The axes that gripped when rGTO was last set, have not moved since, and by ``base`` still grip."""
+        held = (
+            axis
+            for axis, (what, at) in self._contacts.items()
+            if abs(status.position(axis) - at) <= TOLERANCE
+            and agrees(status.model, base.position(axis), what, at, direction=0)
+        )
+        return reduce(or_, held, NO_AXES)
+
+
+class Axes:
     """Follows each axis from the write that asks it for something to the status that shows it at rest.
 
     Attributes:
-        axes: those that are known to rest, and those that the model lacks. The others move, or are about to,
-            or the object status that they show may be from before the write.
+        resting: those that are known to rest, and those that the model lacks. The others move, or are about
+            to, or the object status that they show may be from before the write.
         limited: what the gripper shows in place of requests that lie beyond a software limit.
+        grips: which axes grip.
     """
 
     def __init__(self, model: Model, writes: WriteHistory, log: Log) -> None:
-        self.axes: Finger = Finger.ALL
+        self.resting: Finger = Finger.ALL
         self.limited: dict[Finger, int] = {}
+        self.grips: Final = Grips()
         self._writes: Final = writes
         self._log: Final = log
         self._standstill = {axis: Standstill(model) for axis in model.axes}
 
     def ask(self, number: int, before: Request, image: Request, moved: Finger) -> None:
         """A write replaces ``before`` by ``image``, which gives the axes in ``moved`` a position."""
+        self.grips.forget(moved)
         self.limited = {axis: at for axis, at in self.limited.items() if axis not in moved}
         raised = image.go and not before.go
         for axis, old, new in zip(image.model.axes, before.axes, image.axes, strict=True):
             # More force lets an axis in contact try again; one that moves goes on as it did.
             pressed = new.force > old.force
             is_new = image.go is not before.go or new.position != old.position
-            if is_new or (pressed and axis in self.axes):
+            if is_new or (pressed and axis in self.resting):
                 self._standstill[axis].ask(
                     number,
                     new.position if image.go else None,
                     before=old.position if before.go else None,
                     again=raised or pressed,
-                    rested=axis in self.axes and before.go,
+                    rested=axis in self.resting and before.go,
                 )
                 if image.go:
-                    self.axes &= ~axis
+                    self.resting &= ~axis
 
     def limit(self, axis: Finger, limit: int) -> None:
         """The last request of an axis was replaced by a software limit."""
@@ -55,19 +89,28 @@ class Arrivals:
 
     def clear(self) -> None:
         """Every axis rests, and nothing that was asked before counts."""
-        self.axes = Finger.ALL
+        self.resting = Finger.ALL
         for standstill in self._standstill.values():
             standstill.clear()
 
     def see(self, status: RobotiqStatus, now: Moment) -> None:
-        """Take in a status that shows rGTO set: without it the object status says nothing."""
-        if self.axes is Finger.ALL:
-            return  # the usual case
+        """Take in a status. Not one with a fault: it keeps axes from starting."""
+        if not status.go_echo:
+            return  # gDT says nothing without rGTO
+        if self.resting is not Finger.ALL:  # usually it is
+            self._see_rest(status, now)
+        if self.grips or status.contacts:
+            contacts = status.contacts
+            if contacts & ~self.resting:
+                contacts &= ~self.doubtful(status, now)
+            self.grips.see(status, contacts)
+
+    def _see_rest(self, status: RobotiqStatus, now: Moment) -> None:
         for axis in self._standstill:
-            if not axis & self.axes:
+            if not axis & self.resting:
                 standstill, what = self._seen(axis, status, now), status.finger_status(axis)
                 if standstill.is_known(what, status.position(axis)):
-                    self.axes |= axis
+                    self.resting |= axis
                     self._prove_limit(axis, what, status.position(axis))
 
     def doubtful(self, status: RobotiqStatus, now: Moment) -> Finger:
