@@ -8,11 +8,7 @@ from .failures import usage
 
 
 def full_address(address: str) -> str:
-    """The full form of an address, of a local or a remote gripper.
-
-    Raises:
-        UsageError: malformed.
-    """
+    """The full form of an address, of a local or a remote gripper."""
     with usage():
         if not is_remote(address):
             return str(parse_address(address))

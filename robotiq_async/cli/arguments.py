@@ -18,11 +18,7 @@ from .failures import CommandError, UsageError, usage
 
 
 def need(module: str, extra: str, instead: str = "") -> None:
-    """Fail if the module of an extra is missing; ``instead`` names an alternative.
-
-    Raises:
-        CommandError: the module is missing.
-    """
+    """Fail if the module of an extra is missing; ``instead`` names an alternative."""
     if find_spec(module) is None:
         raise CommandError(f"this needs {module}: {install(extra)}{instead}")
 

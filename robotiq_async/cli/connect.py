@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from ..hand import Hand
@@ -27,15 +27,7 @@ def make_hand(
     """A hand that is not started. On the command line only this function knows which class an address needs.
 
     Args:
-        address: the gripper.
-        link: options of the link.
-        poll_interval: seconds between polls.
-        speed: what the axes get until set otherwise.
-        force: what the axes get until set otherwise.
         control: on another host, whether to take control; None for with the first command.
-
-    Raises:
-        UsageError: a malformed address.
     """
     if is_remote(address):
         need("zenoh", "fleet")
@@ -56,11 +48,7 @@ def make_hand(
 
 
 def make_operator(address: str, link: Link, *, speed: int, force: int) -> Operator:
-    """The operator of a hand that is not started.
-
-    Raises:
-        UsageError: a malformed address.
-    """
+    """The operator of a hand that is not started."""
     hand = make_hand(address, link, speed=speed, force=force, control=None)
     return Operator(hand, speed=speed, force=force)
 
@@ -76,10 +64,6 @@ async def connected(
         link: options of the link.
         halt: whether leaving stops the fingers; False for a command that only reads.
         keep_grip: whether a grip stays in force then.
-
-    Raises:
-        UsageError: a malformed address.
-        RobotiqError: no gripper there, or a link that failed.
     """
     hand = make_hand(address, link, control=halt)
     try:
@@ -87,23 +71,3 @@ async def connected(
         yield hand
     finally:
         await hand.stop(halt=halt, keep_grip=keep_grip)
-
-
-@asynccontextmanager
-async def operated(operator: Operator, report: Callable[[str], object]) -> AsyncIterator[None]:
-    """Start the hand of an operator; nothing is written before the operator acts.
-
-    Leaving stops the fingers only if the operator has moved them.
-
-    Args:
-        operator: of the hand.
-        report: called at the end with what happened to the fingers.
-
-    Raises:
-        RobotiqError: no gripper there, or a link that failed.
-    """
-    await operator.hand.start(activate=False)
-    try:
-        yield
-    finally:
-        report(await operator.leave())

@@ -16,11 +16,7 @@ class CommandError(Exception):
 
 @contextmanager
 def usage() -> Iterator[None]:
-    """Turn errors of constructors into wrong usage.
-
-    Raises:
-        UsageError: in place of ValueError and TypeError.
-    """
+    """Turn ValueError and TypeError of constructors into UsageError."""
     try:
         yield
     except (ValueError, TypeError) as error:

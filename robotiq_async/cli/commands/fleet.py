@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -97,8 +98,7 @@ async def halt(site: Site = None, /) -> None:
         print(f"{name}  {how}")
 
 
-async def _watch(seen: Fleet, show: object) -> None:
-    assert callable(show)
+async def _watch(seen: Fleet, show: Callable[[Member], None]) -> None:
     changes = seen.changes()
     try:
         for member in seen:

@@ -35,12 +35,7 @@ NoPlot = Annotated[Flag, Parameter(name="--no-plot")]
 
 
 def check(address: str, output: Path, speedup: float | None, runs: int, step: int, plot: bool) -> float:
-    """Check the arguments before anything moves; returns the speedup of the gripper's time.
-
-    Raises:
-        UsageError: an argument is out of range.
-        CommandError: matplotlib is missing.
-    """
+    """Check the arguments before anything moves; returns the speedup of the gripper's time."""
     simulated = is_simulated(address)
     if output.suffix != ".csv":
         raise UsageError(f"--output must be a file named .csv, got {str(output)!r}")
@@ -67,11 +62,7 @@ def check(address: str, output: Path, speedup: float | None, runs: int, step: in
 async def gripper(
     address: str, speedup: float, prepare: Callable[[SimulatedGripper], None] = lambda _: None
 ) -> AsyncIterator[Hand]:
-    """An active hand; sim:// runs in its own, faster time.
-
-    Raises:
-        RobotiqError: no gripper there, or it cannot be activated.
-    """
+    """An active hand; sim:// runs in its own, faster time."""
     from ..connect import make_hand
 
     if not is_simulated(address):
@@ -91,8 +82,7 @@ async def gripper(
 
 
 def load_rich() -> None:
-    """Import rich now: that takes 0.1 s, in which a hand could not poll."""
-    import rich.progress  # noqa: F401
+    import rich.progress  # noqa: F401  # now: that takes 0.1 s, in which a hand could not poll
 
 
 async def carry_out(
@@ -106,9 +96,6 @@ async def carry_out(
     """Measure the remaining values, with a progress bar that knows the duration of each row.
 
     Without ``bar`` there is no bar: it would overwrite the user's input.
-
-    Raises:
-        CommandError: the measurement failed, or a file could not be written; complete rows are kept.
     """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -157,11 +144,7 @@ async def carry_out(
 
 @contextmanager
 def file_errors() -> Iterator[None]:
-    """Turn TableError and OSError of tables and pictures into CommandError.
-
-    Raises:
-        CommandError: in place of TableError and OSError.
-    """
+    """Turn TableError and OSError of tables and pictures into CommandError."""
     from ...values.calibration.csv_tables import TableError
 
     try:
@@ -171,7 +154,6 @@ def file_errors() -> Iterator[None]:
 
 
 def print_files(files: list[Path]) -> None:
-    """Print the names of the files that were written."""
     for file in files:
         print(file)
 

@@ -188,11 +188,7 @@ def _scale(
 
 
 async def _prompt(question: str) -> str:
-    """A line that the user types; the event loop keeps running.
-
-    Raises:
-        CommandError: the input has ended.
-    """
+    """A line that the user types; the event loop keeps running."""
     loop = asyncio.get_running_loop()
     answer: asyncio.Future[str] = loop.create_future()
     print(question, end=" ", flush=True)

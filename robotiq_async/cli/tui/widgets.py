@@ -18,6 +18,16 @@ from ...values.statistics import Statistics
 from ...values.status import NO_REQUEST, RobotiqStatus
 from ...values.trigger import Trigger
 
+KEYS: Final = """\
+o open  c close  1 wide  2 normal  3 pinch  SPACE halt  + - speed  ] [ force
+a activate  r reset  l release  v recover  p position of axes         q quit"""
+
+HINTS: Final = {
+    State.FAULT: "v does what it needs",
+    State.ATR_DONE: "r resets it",
+    State.RESET: "a activates it",
+}
+"""The key that helps in a state."""
 HISTORY: Final = 60
 """Currents kept, one per paint: five seconds."""
 FULL: Final = 255
@@ -197,18 +207,6 @@ def link_text(figures: Statistics, rate: float, held_up: bool, speed: int, force
             f"  ANOTHER CLIENT commands this gripper ({figures.foreign_commands} times)", "bold yellow"
         )
     return text
-
-
-KEYS: Final = """\
-o open  c close  1 wide  2 normal  3 pinch  SPACE halt  + - speed  ] [ force
-a activate  r reset  l release  v recover  p position of axes         q quit"""
-
-HINTS: Final = {
-    State.FAULT: "v does what it needs",
-    State.ATR_DONE: "r resets it",
-    State.RESET: "a activates it",
-}
-"""The key that helps in a state."""
 
 
 def transition_words(event: Fields) -> str | None:
