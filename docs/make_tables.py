@@ -1,6 +1,4 @@
-"""Writes the tables and the diagram in docs/ that repeat what the code says, between their marks.
-
-    python docs/make_tables.py
+"""The tables and the diagram in docs/ that repeat what the code says; make_pages.py writes them.
 
 Each is between ``<!-- begin NAME -->`` and ``<!-- end NAME -->``; the rest of a page is written
 by hand. A test compares the pages with what this script makes.
@@ -11,32 +9,28 @@ from __future__ import annotations
 import ast
 import inspect
 import re
-import sys
 import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
-ROOT: Final = Path(__file__).parents[1]
-if __name__ == "__main__":
-    sys.path.insert(0, str(ROOT))
-
-from robotiq_async import ReconnectPolicy, RobotiqHand  # noqa: E402
-from robotiq_async.control.state_machine import SEQUENCES, TABLE, Verdict  # noqa: E402
-from robotiq_async.simulator.troubles.trouble import KINDS, Kind  # noqa: E402
-from robotiq_async.values import registers  # noqa: E402
-from robotiq_async.values.enums import (  # noqa: E402
+from robotiq_async import ReconnectPolicy, RobotiqHand
+from robotiq_async.control.state_machine import SEQUENCES, TABLE, Verdict
+from robotiq_async.simulator.troubles.trouble import KINDS, Kind
+from robotiq_async.values import registers
+from robotiq_async.values.enums import (
     Fault,
     Initialization,
     Mode,
     ObjectStatus,
     State,
 )
-from robotiq_async.values.model import MODELS  # noqa: E402
-from robotiq_async.values.registers import RTU_REGISTERS, TCP_REGISTERS, Field  # noqa: E402
-from robotiq_async.values.trigger import Trigger  # noqa: E402
+from robotiq_async.values.model import MODELS
+from robotiq_async.values.registers import RTU_REGISTERS, TCP_REGISTERS, Field
+from robotiq_async.values.trigger import Trigger
 
+ROOT: Final = Path(__file__).parents[1]
 DOCS: Final = ROOT / "docs"
 
 
@@ -347,14 +341,3 @@ def filled(page: str, text: str) -> str:
             raise ValueError(f"{page} has no place for the table {name!r}")
         text = f"{before}{begin}\n{make()}\n\n{end}{after}"
     return text
-
-
-def main() -> None:
-    """Fill every page."""
-    for page in PAGES:
-        path = DOCS / page
-        path.write_text(filled(page, path.read_text(encoding="utf-8")), encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 import re
 from itertools import pairwise
 from pathlib import Path
-from typing import Final, NamedTuple
+from types import CodeType, FunctionType
+from typing import Any, Final, NamedTuple
 
 ROOT: Final = Path(__file__).parents[2]
 DOCS: Final = ROOT / "docs"
@@ -53,3 +56,20 @@ def prose(text: str) -> str:
 def requirements(text: str) -> str:
     """What a page has its reader install, as it is typed behind ``pip install``."""
     return " ".join(re.findall(r"\bpip install (?!'robotiq-async|\.\.\. )([^`\n]+)", text))
+
+
+# -- code that awaits at the top, as ``python -m asyncio`` and notebooks run it --
+
+
+def compiled_prompt(source: str | ast.Module, where: str) -> CodeType:
+    """Compile it; errors name where it stands."""
+    code = compile(source, where, "exec", ast.PyCF_ALLOW_TOP_LEVEL_AWAIT, dont_inherit=True)
+    assert isinstance(code, CodeType)
+    return code
+
+
+async def run_prompt(code: CodeType, names: dict[str, Any]) -> None:
+    """Run it to its end; the names then hold what it defines."""
+    outcome = FunctionType(code, names)()
+    if inspect.iscoroutine(outcome):
+        await outcome

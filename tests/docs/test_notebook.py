@@ -9,7 +9,7 @@ import re
 from typing import Any
 
 from docs import make_notebook
-from tests.docs import prompt
+from tests.docs.pages import compiled_prompt, run_prompt
 
 NOTEBOOK: dict[str, Any] = json.loads(make_notebook.FILE.read_text(encoding="utf-8"))
 CELLS: list[dict[str, Any]] = NOTEBOOK["cells"]
@@ -28,7 +28,7 @@ async def test_its_cells_print_what_they_show() -> None:
             source = "".join(cell["source"]).replace("speedup=10", "speedup=100")
             printed = io.StringIO()
             with contextlib.redirect_stdout(printed):
-                await prompt.run(prompt.compiled(source, cell["id"]), names)
+                await run_prompt(compiled_prompt(source, cell["id"]), names)
             assert printed.getvalue() == shown(cell), cell["source"]
 
 

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import inspect
+import logging
 import re
+import subprocess
+import sys
+from collections.abc import Iterator
 from contextlib import AsyncExitStack, redirect_stdout
 from io import StringIO
 from pathlib import Path
@@ -16,9 +20,18 @@ import pytest
 from docs import make_layout, make_pages
 from robotiq_async import Finger, RobotiqHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from tests.docs import prompt
 from tests.docs.agents import ROOM, agent_of_the_pages
-from tests.docs.pages import DOCS, PAGES, ROOT, Block, blocks, outputs, requirements
+from tests.docs.pages import (
+    DOCS,
+    PAGES,
+    ROOT,
+    Block,
+    blocks,
+    compiled_prompt,
+    outputs,
+    requirements,
+    run_prompt,
+)
 from tests.docs.test_tutorial import agree
 
 FRONT = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")]
@@ -43,7 +56,7 @@ def awaits_at_the_top(block: Block) -> bool:
     """Whether it is for a prompt or a notebook; in a program it would be a syntax error."""
     if block.language != "python":
         return False
-    return bool(prompt.compiled(block.text, "page").co_flags & inspect.CO_COROUTINE)
+    return bool(compiled_prompt(block.text, "page").co_flags & inspect.CO_COROUTINE)
 
 
 def test_a_page_says_where_code_runs_that_awaits_at_the_top() -> None:
@@ -96,10 +109,20 @@ OUTPUTS = {
 """What the page shows behind a block."""
 
 
+@pytest.fixture
+def restored_logging() -> Iterator[None]:
+    loggers = [logging.getLogger(name) for name in ("", "robotiq_async", "pymodbus.logging")]
+    before = [(logger, logger.level, logger.handlers[:]) for logger in loggers]
+    yield
+    for logger, level, handlers in before:
+        logger.setLevel(level)
+        logger.handlers[:] = handlers
+
+
 def compiled(page: Path, block: Block, address: str) -> CodeType:
     quick = block.text.replace('"sim://"', '"sim://?speedup=20"')
     source = "\n" * (block.line - 1) + quick.replace("tcp://192.168.1.11", address)
-    return prompt.compiled(source, str(page))
+    return compiled_prompt(source, str(page))
 
 
 @pytest.mark.parametrize(("page", "block"), CODE, ids=lambda value: name(value) or f"line {value.line}")
@@ -113,7 +136,7 @@ async def test_code_runs(
                 monkeypatch.setenv(variable, value)
         names: dict[str, Any] = {}
         with redirect_stdout(StringIO()) as printed:
-            await prompt.run(compiled(page, block, server.address), names)
+            await run_prompt(compiled(page, block, server.address), names)
         shown = OUTPUTS.get((page, block))
         assert shown is None or agree(shown.text, printed.getvalue()), printed.getvalue()
         for function in [value for key, value in names.items() if key.startswith("test_")]:
@@ -131,9 +154,21 @@ async def test_the_first_move_of_a_real_gripper_ends_wherever_its_fingers_are(cl
         async with RobotiqHand(server.address) as hand:
             await (hand.close if closed else hand.open)()
         with redirect_stdout(StringIO()) as printed:
-            await prompt.run(compiled(page, block, server.address), {})
+            await run_prompt(compiled(page, block, server.address), {})
     assert printed.getvalue().count("<MoveResult A=") == block.text.count("await hand.") > 0
     assert gripper.position(Finger.B) > 200 or not closed, "only A has moved"
+
+
+def test_the_code_for_typed_projects_passes_mypy_strict(tmp_path: Path) -> None:
+    files: list[str] = []
+    for block in blocks(read(FIXTURES)):
+        if block.language == "python":
+            files.append(f"line_{block.line}.py")
+            (tmp_path / files[-1]).write_text(block.text, encoding="utf-8")
+    assert files
+    command = [sys.executable, "-m", "mypy", "--strict", "--no-incremental", "--config-file=", *files]
+    checked = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert checked.returncode == 0, checked.stdout + checked.stderr
 
 
 # -- messages ------------------------------------------------------------------------------------------

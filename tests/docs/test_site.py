@@ -14,7 +14,7 @@ from docs.site import check, versions
 from docs.site.docstrings import in_markdown
 from docs.site.pages import EXTRAS, PROJECT, described, places, stage, staged
 from robotiq_async import fleet, simulator, sync
-from tests.docs.pages import DOCS, PAGES, ROOT, blocks, prose
+from tests.docs.pages import DOCS, PAGES, ROOT, prose
 
 CONFIGURATION = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
 NAVIGATION = re.findall(r"^ +- (?:.*: )?(\S+\.md)$", CONFIGURATION.partition("\nnav:\n")[2], re.MULTILINE)
@@ -254,10 +254,3 @@ def test_the_environment_of_the_site_is_pinned_and_names_no_place() -> None:
     assert {"zensical", "mkdocstrings", "mkdocstrings-python"} <= {line.partition("==")[0] for line in lines}
     for line in lines:
         assert re.fullmatch(r"[a-z0-9.-]+==[0-9][a-z0-9.]*( ; .*)?", line), line
-
-
-def test_the_code_on_the_front_page_is_short() -> None:
-    (example,) = [
-        each for each in blocks((ROOT / "README.md").read_text(encoding="utf-8")) if each.language == "python"
-    ]
-    assert len(example.text.splitlines()) <= 20

@@ -17,8 +17,7 @@ from typing import Any
 import pytest
 
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from tests.docs import prompt
-from tests.docs.pages import DOCS, ROOT, Block, blocks
+from tests.docs.pages import DOCS, ROOT, Block, blocks, compiled_prompt, run_prompt
 
 BLOCKS = blocks((DOCS / "tutorial.md").read_text(encoding="utf-8"))
 TYPED = [
@@ -42,7 +41,7 @@ def statements(block: Block) -> Iterator[CodeType]:
     """Each statement of a block as ``python -m asyncio`` compiles it, with the page's line numbers."""
     lines = "\n" * (block.line - 1) + block.text
     for statement in ast.parse(lines).body:
-        yield prompt.compiled(ast.Module([statement], []), "tutorial.md")
+        yield compiled_prompt(ast.Module([statement], []), "tutorial.md")
 
 
 async def typed(block: Block, names: dict[str, Any]) -> str:
@@ -50,7 +49,7 @@ async def typed(block: Block, names: dict[str, Any]) -> str:
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         for code in statements(block):
-            await prompt.run(code, names)
+            await run_prompt(code, names)
             await asyncio.sleep(BETWEEN_STATEMENTS)
     return printed.getvalue()
 
