@@ -57,7 +57,6 @@ class HandPublisher:
             self.add(request_fields(what))
 
     def add(self, event: Fields) -> None:
-        """Number an event and publish it."""
         self._count += 1
         event = {"index": self._count, **event}
         self._events.append(event)
@@ -100,7 +99,6 @@ class HandPublisher:
         self._send_summary(json.dumps(self.summary()).encode())
 
     def summary(self) -> Fields:
-        """What an overview of the fleet shows."""
         stamp, holder, status = now(), self._lease.holder, self._status()
         return {
             **self._head(),

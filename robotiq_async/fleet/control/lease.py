@@ -130,5 +130,4 @@ class Lease:
         return is_last and self._ends.get(number) == "released"
 
     def end_of(self, number: int) -> str:
-        """Why the lease of a number ended."""
         return self._ends.get(number, "expired")

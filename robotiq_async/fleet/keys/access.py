@@ -62,7 +62,6 @@ Rule = dict[str, object]
 
 
 def check_subject(name: object) -> str:
-    """Check the name of the owner of a certificate."""
     checked = check_name("the name in a certificate", name)
     if len(checked) > NAME_MAX:
         raise ValueError(f"the name in a certificate must have at most {NAME_MAX} characters, got {name!r}")
@@ -81,7 +80,6 @@ class AccessList:
         return {Role.READ: self.read, Role.HALT: self.halt, Role.OPERATE: self.operate}[role]
 
     def including(self, role: Role, name: str) -> Self:
-        """A copy with one more client."""
         return replace(self, **{role.value: (*self.of(role), name)})
 
     @classmethod
@@ -137,7 +135,6 @@ def access_control(site: str, host: str, clients: AccessList) -> dict[str, objec
 
 
 def rights(role: Role) -> tuple[str, ...]:
-    """The names of all rules of a role."""
     roles = CLIENTS[: CLIENTS.index(role) + 1]
     return tuple(rule for each in roles for rule in _RIGHTS[each])
 

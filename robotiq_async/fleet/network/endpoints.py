@@ -29,7 +29,6 @@ class Endpoint:
 
     @property
     def is_loopback(self) -> bool:
-        """Whether only programs on this machine can connect."""
         return is_loopback(self.host)
 
 

@@ -48,7 +48,6 @@ class Agents:
         self.end: Undo = bus.watch(name.key("alive", "*"), self._update_token)
 
     async def check_one(self) -> None:
-        """Refuse to acquire the lease while two agents serve the gripper."""
         if len(self._tokens) > 1:  # one may be gone, and its sign-off lost
             self._tokens = set(await self._bus.announced(self._name.key("alive", "*"), timeout=LOOK_S))
         if len(self._tokens) > 1:
@@ -193,7 +192,6 @@ class LeaseKeeper:
             self._log.warning("lost control: %s", why)
 
     def check(self) -> None:
-        """Refuse commands without the lease."""
         if not self.is_in_control:
             if self.lost is None:
                 raise ControlLostError("this hand only reads: acquire() the lease first", "released")

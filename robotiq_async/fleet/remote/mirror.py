@@ -110,7 +110,6 @@ class Mirror:
 
     @property
     def stamp(self) -> float:
-        """The newest stamp of the agent that was received."""
         return 0.0 if self.newest is None else self.newest.stamp
 
     @property
@@ -197,7 +196,6 @@ class Mirror:
         self.events = max(self.events, index)
 
     def has_missed(self) -> bool:
-        """Whether a status announced more events than have arrived."""
         return self.newest is not None and self.newest.events > self.events
 
     def renumbered(self, status: RobotiqStatus) -> RobotiqStatus:

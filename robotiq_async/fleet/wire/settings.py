@@ -45,7 +45,6 @@ def _by_axis(changed: Mapping[str, Any]) -> Iterator[tuple[Setting, int]]:
 
 
 def settings_fields(settings: Mapping[Setting, int]) -> Fields:
-    """Settings as JSON, in the format of the axes of a ``command``."""
     fields: Fields = {}
     for (axis, what), value in settings.items():
         fields.setdefault(str(int(axis)), {})[what] = value
