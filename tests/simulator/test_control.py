@@ -37,16 +37,11 @@ def test_numbers_of_numpy_are_numbers() -> None:
     assert gripper.position(number) == gripper.position(Finger.A)
 
 
-def test_simple_control_lets_a_drive_all_fingers(active: Bench) -> None:
-    active.go({Finger.A: 200, Finger.B: 30, Finger.C: 40})
-    active.settle()
-    assert active.positions == (200, 200, 200, 137)
-
-
-def test_the_echoes_of_simple_control_are_the_own_registers(active: Bench) -> None:
-    """The trap: B and C stand at 200 and echo what nobody drives them to."""
+def test_simple_control_lets_a_drive_all_fingers_and_echoes_the_own_registers(active: Bench) -> None:
+    """The trap: B and C stand at 200 and echo what nothing drives them to."""
     active.go({Finger.A: 200, Finger.B: 30, Finger.C: 40, Finger.SCISSOR: 50})
     active.settle()
+    assert active.positions == (200, 200, 200, 137)
     assert [active.status.requested_position(axis) for axis in THREE_FINGER.axes] == [200, 30, 40, 50]
 
 
@@ -80,12 +75,6 @@ def test_raising_individual_control_with_loaded_registers_moves_nothing(active: 
     assert [active.gripper.travel(axis) for axis in THREE_FINGER.axes] == before
 
 
-def test_individual_axes_go_their_own_ways(individual: Bench) -> None:
-    individual.go({Finger.A: 50, Finger.B: 100, Finger.C: 150, Finger.SCISSOR: 200})
-    individual.settle()
-    assert individual.positions == (50, 100, 150, 200)
-
-
 @pytest.mark.parametrize(("mode", "scissor"), [(Mode.PINCH, 219), (Mode.WIDE, 24), (Mode.SCISSOR, 6)])
 def test_mode_change_opens_first_and_returns(active: Bench, mode: Mode, scissor: int) -> None:
     active.close(100)
@@ -115,19 +104,12 @@ def test_mode_change_without_go_leaves_the_fingers_open(active: Bench) -> None:
     assert active.words == (0x35, 0x00)
 
 
-def test_pinch_mode_closes_to_113(active: Bench) -> None:
-    active.write(mode=Mode.PINCH)
-    active.settle()
-    active.close()
-    assert active.positions == (113, 113, 113, 219)
-    assert active.outcomes == (ObjectStatus.AT_POSITION,) * 4
-
-
 def test_the_limit_of_the_pinch_mode_ends_with_the_mode(active: Bench) -> None:
     active.write(mode=Mode.PINCH)
     active.settle()
     active.close(120)
     assert active.positions == (113, 113, 113, 219)
+    assert active.outcomes == (ObjectStatus.AT_POSITION,) * 4
     active.write(individual_fingers=True)
     active.settle()
     assert active.positions == (113, 113, 113, 219), "fingers of their own in the pinch mode"
@@ -172,15 +154,6 @@ def test_scissor_mode_leaves_the_fingers_where_they_are_also_under_individual_co
     assert active.positions[:3] == (50, 100, 150)
 
 
-def test_scissor_mode_feels_an_object(active: Bench) -> None:
-    active.write(mode=Mode.SCISSOR)
-    active.settle()
-    active.gripper.place_object(Finger.SCISSOR, 150)
-    active.close()
-    assert active.positions[3] == 150
-    assert active.outcomes[3] is ObjectStatus.CONTACT_CLOSING
-
-
 def test_the_mode_is_ignored_under_individual_scissor_control(individual: Bench) -> None:
     before = individual.positions
     individual.write(mode=Mode.PINCH)
@@ -188,13 +161,6 @@ def test_the_mode_is_ignored_under_individual_scissor_control(individual: Bench)
     assert individual.positions == before
     assert individual.status.initialization is Initialization.COMPLETE
     assert individual.status.mode is Mode.PINCH
-
-
-def test_giving_the_scissor_back_to_the_mode_is_a_mode_change(individual: Bench) -> None:
-    individual.write(individual_scissor=False, mode=Mode.WIDE)
-    assert individual.status.initialization is Initialization.CHANGING_MODE
-    individual.settle()
-    assert individual.positions[3] == 24
 
 
 def test_another_mode_on_the_way_replaces_the_first(active: Bench) -> None:

@@ -13,14 +13,10 @@ from robotiq_async.simulator.physics.habits import REAL_ACTIVATION
 from robotiq_async.simulator.troubles.trouble import KINDS
 from robotiq_async.values.enums import Fault, Finger, Initialization
 from robotiq_async.values.request import AxisRequest, Request
-from tests.simulator.test_fault_injector import (
-    SerialClient,
-    activate,
-    is_answered,
-    serial_simulator,
-    simulator,
-    status,
-)
+from tests.simulator.test_fault_injector import activate, is_answered, simulator, status
+from tests.simulator.test_serial_frames import READ as READ_SERIAL
+from tests.simulator.test_serial_frames import RESET_READING, line
+from tests.simulator.test_serial_server import with_crc
 from tests.simulator.test_server import RawClient, raw_client
 from tests.virtual import virtual
 
@@ -84,33 +80,6 @@ def test_a_server_that_is_given_no_gripper_activates_as_slowly_as_a_real_one() -
 
 
 @virtual
-async def test_the_object_status_trails_the_echo() -> None:
-    async with simulator() as server, raw_client(server) as client:
-        await begin(server)
-        async with server.fault_injector.making(Trouble("status-lag")):
-            await client.write(image(200))
-            await asyncio.sleep(0.01)
-            seen = await client.read_status()
-            assert seen.requested_position(Finger.A) == 200
-            assert not seen.is_moving
-            await asyncio.sleep(0.05)
-            assert (await client.read_status()).is_moving
-
-
-@virtual
-async def test_a_fault_after_silence_whoever_asked_before() -> None:
-    async with simulator() as server, raw_client(server) as one, raw_client(server) as other:
-        await server.fault_injector.begin(Trouble("silence-fault"))
-        await asyncio.sleep(0.6)
-        assert (await one.read_status()).fault is Fault.NONE
-        await asyncio.sleep(0.6)
-        assert (await other.read_status()).fault is Fault.NONE
-        await asyncio.sleep(1.1)
-        assert (await one.read_status()).fault is Fault.COMMUNICATION_NOT_READY
-        assert (await other.read_status()).fault is Fault.NONE
-
-
-@virtual
 async def test_writes_that_are_acknowledged_and_forgotten() -> None:
     async with simulator() as server, raw_client(server) as client:
         async with server.fault_injector.making(Trouble("write-spacing")):
@@ -162,15 +131,12 @@ async def test_function_3_serves_where_4_would() -> None:
 
 @virtual
 async def test_function_3_on_a_serial_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    async with serial_simulator(monkeypatch) as (server, client):
+    read_with_4 = with_crc(bytes.fromhex("09 04 07d0 0001"))
+    async with line(monkeypatch) as (server, client):
         async with server.fault_injector.making(Trouble("function-3-only")):
-            assert await client.ask() == b"", "a serial line refuses by silence"
-            assert await asked_with_3(client) == bytes.fromhex("09 03 02 0000 5985")
-        assert await client.ask() != b""
-
-
-async def asked_with_3(client: SerialClient) -> bytes:
-    return await client.ask(bytes.fromhex("09 03 07d0 0001 85cf"))
+            assert await client.ask(read_with_4) == b"", "a serial line refuses by silence"
+            assert await client.ask(READ_SERIAL) == RESET_READING
+        assert await client.ask(read_with_4) != b""
 
 
 @virtual

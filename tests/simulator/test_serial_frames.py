@@ -121,7 +121,7 @@ async def test_requests_that_came_while_the_loop_was_held_up_are_all_answered(
 
 
 @virtual
-@pytest.mark.parametrize("unit", [*range(1, 9), 10, 247, 255])
+@pytest.mark.parametrize("unit", [1, 8, 10, 247])
 async def test_other_units_are_left_to_themselves(unit: int, monkeypatch: pytest.MonkeyPatch) -> None:
     async with line(monkeypatch) as (server, client):
         assert await client.ask(with_crc(bytes([unit]) + READ[1:-2])) == b""

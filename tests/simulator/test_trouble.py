@@ -79,32 +79,21 @@ def test_the_kinds_that_are_about_replies() -> None:
 @pytest.mark.parametrize(
     ("words", "trouble"),
     [
-        ("drop", Trouble("drop")),
+        ("drop", Trouble("drop", value=None, on="any", at=0.0, lasts=None, every=None)),
         ("drop at 5", Trouble("drop", at=5)),
-        ("delay 0.05", Trouble("delay", 0.05)),
         ("delay 0", Trouble("delay", 0)),
-        ("delay 10", Trouble("delay", 10)),
-        ("pieces 1", Trouble("pieces", 1)),
-        ("delay once", Trouble("delay", lasts=0)),
+        ("delay 10", Trouble("delay", 10.0)),
         ("silence once", Trouble("silence", lasts=0)),
         ("drop for ever", Trouble("drop", lasts=INF)),
-        ("drop for 2.5", Trouble("drop", lasts=2.5)),
         ("refuse for 86400 at 86400", Trouble("refuse", at=86400, lasts=86400)),
         ("drop every 0.001", Trouble("drop", every=0.001)),
-        ("drop every 86400", Trouble("drop", every=86400)),
         ("refuse for 1 every 1.001", Trouble("refuse", lasts=1, every=1.001)),
-        ("wrong-unit on write once", Trouble("wrong-unit", on="write", lasts=0)),
-        ("wrong-unit on read", Trouble("wrong-unit", on="read")),
         ("wrong-echo on write", Trouble("wrong-echo", on="write")),
         ("power-cut at 10 for 2 every 60", Trouble("power-cut", at=10, lasts=2, every=60)),
         ("late 0.9 every 60 once at 10 on read", Trouble("late", 0.9, on="read", at=10, lasts=0, every=60)),
-        ("foreign 0", Trouble("foreign", 0)),
-        ("foreign 255", Trouble("foreign", 255)),
-        ("fault 1", Trouble("fault", 1)),
-        ("fault 15", Trouble("fault", 15)),
-        ("exception 255", Trouble("exception", 255)),
+        ("foreign 255", Trouble("foreign", 255.0)),
         ("exception 1e0", Trouble("exception", 1)),
-        ("  drop   at\t5 ", Trouble("drop", at=5)),
+        ("  drop   at\t5 # lost; then found", Trouble("drop", at=5)),
     ],
 )
 def test_words_are_read(words: str, trouble: Trouble) -> None:
@@ -123,69 +112,34 @@ def test_several_on_lines_and_between_semicolons_in_their_order() -> None:
         Trouble("foreign", 0, at=30),
         Trouble("drop", every=10),
     ]
-
-
-@pytest.mark.parametrize("text", ["", " \n;; \n", "# nothing"])
-def test_no_words_are_no_trouble(text: str) -> None:
-    assert parse_troubles(text) == []
+    assert parse_troubles(" \n;; \n# nothing") == []
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         ("dorp at 5", "unknown trouble 'dorp'; known are: delay, late, drop, "),
-        ("Drop", "unknown trouble 'Drop'"),
         ("drop 1", "drop takes no value, got 1.0"),
-        ("silence 3", "silence takes no value, got 3.0"),
-        ("drop 0", "drop takes no value, got 0.0"),
         ("delay much", "delay must be followed by a number, got 'much'"),
         ("delay 10.5", "the value of delay must be seconds in 0..10, got 10.5"),
-        ("delay -0.1", "the value of delay must be seconds in 0..10, got -0.1"),
-        ("delay nan", "the value of delay must be seconds in 0..10, got nan"),
-        ("delay inf", "the value of delay must be seconds in 0..10, got inf"),
-        ("multiplexer 11", "the value of multiplexer must be seconds in 0..10, got 11.0"),
-        ("idle-reset 3601", "the value of idle-reset must be seconds in 0..3600, got 3601.0"),
-        ("late 11", "the value of late must be seconds in 0..10, got 11.0"),
-        ("pieces 1.1", "the value of pieces must be seconds in 0..1, got 1.1"),
-        ("slow-device 11", "the value of slow-device must be seconds in 0..10, got 11.0"),
         ("foreign 256", "the value of foreign must be a whole number in 0..255, got 256.0"),
-        ("foreign -1", "the value of foreign must be a whole number in 0..255, got -1.0"),
         ("foreign 1.5", "the value of foreign must be a whole number in 0..255, got 1.5"),
-        ("foreign nan", "the value of foreign must be a whole number in 0..255, got nan"),
-        ("foreign inf", "the value of foreign must be a whole number in 0..255, got inf"),
         ("fault 0", "the value of fault must be a whole number in 1..15, got 0.0"),
-        ("fault 16", "the value of fault must be a whole number in 1..15, got 16.0"),
-        ("e-stop 0", "the value of e-stop must be a whole number in 1..9, got 0.0"),
-        ("status-lag 1.1", "the value of status-lag must be seconds in 0..1, got 1.1"),
-        ("slow-activation 601", "the value of slow-activation must be seconds in 0..600, got 601.0"),
-        ("echoed-limits 1", "echoed-limits takes no value, got 1.0"),
-        ("exception 0", "the value of exception must be a whole number in 1..255, got 0.0"),
-        ("exception 256", "the value of exception must be a whole number in 1..255, got 256.0"),
         ("drop on both", "on must be read, write or any, got 'both'"),
         ("wrong-echo on read", "'on read' means nothing for wrong-echo"),
         ("drop at noon", "at must be followed by a number, got 'noon'"),
         ("drop at -1", "at must be seconds in 0..86400.0, got -1.0"),
-        ("drop at 86401", "at must be seconds in 0..86400.0, got 86401.0"),
-        ("drop at nan", "at must be seconds in 0..86400.0, got nan"),
-        ("drop at inf", "at must be seconds in 0..86400.0, got inf"),
         ("drop for long", "for must be followed by a number, got 'long'"),
         ("drop for -1", "for must be seconds in 0..86400.0, got -1.0"),
         ("drop for 86401", "for must be seconds in 0..86400.0, got 86401.0"),
-        ("drop for nan", "for must be seconds in 0..86400.0, got nan"),
         ("drop for -inf", "for must be seconds in 0..86400.0, got -inf"),
         ("drop every day", "every must be followed by a number, got 'day'"),
         ("drop every 0", "every must be seconds in 0.001..86400.0, got 0.0"),
-        ("drop every 86401", "every must be seconds in 0.001..86400.0, got 86401.0"),
-        ("drop every nan", "every must be seconds in 0.001..86400.0, got nan"),
-        ("drop every inf", "every must be seconds in 0.001..86400.0, got inf"),
         ("power-cut for 2 every 2", "power-cut cannot come again after 2 s: it lasts as long"),
         ("drop for 2 every 1.5", "drop cannot come again after 1.5 s: it lasts as long"),
-        ("silence every 60", "silence cannot come again after 60 s: it lasts as long"),
         ("drop once for 3", "cannot read 'drop once for 3': 'once' and 'for' contradict each other"),
-        ("drop for ever once", "cannot read 'drop for ever once': 'once' and 'for' contradict each other"),
         ("drop at", "cannot read 'drop at' at 'at'; the form is: KIND [VALUE] [on read|write] [at S] "),
         ("drop at 5 at 6", "cannot read 'drop at 5 at 6' at 'at'"),
-        ("drop once once", "cannot read 'drop once once' at 'once'"),
         ("drop at 5 sharp", "cannot read 'drop at 5 sharp' at 'sharp'"),
         ("delay 1 2", "cannot read 'delay 1 2' at '2'"),
         ("drop; silence; dorp", "unknown trouble 'dorp'"),
@@ -217,11 +171,8 @@ def test_a_condition_is_not_for_once() -> None:
         ({"value": "0.1"}, "the value of delay must be seconds in 0..10, got '0.1'"),
         ({"value": True}, "the value of delay must be seconds in 0..10, got True"),
         ({"at": "5"}, "at must be seconds in 0..86400.0, got '5'"),
-        ({"at": False}, "at must be seconds in 0..86400.0, got False"),
-        ({"lasts": "5"}, "for must be seconds in 0..86400.0, got '5'"),
         ({"lasts": True}, "for must be seconds in 0..86400.0, got True"),
         ({"lasts": 1, "every": "5"}, "every must be seconds in 0.001..86400.0, got '5'"),
-        ({"lasts": 0, "every": True}, "every must be seconds in 0.001..86400.0, got True"),
     ],
 )
 def test_what_is_no_number_is_refused(options: dict[str, Any], message: str) -> None:
@@ -229,47 +180,38 @@ def test_what_is_no_number_is_refused(options: dict[str, Any], message: str) -> 
         Trouble("delay", **options)
 
 
-def test_whole_numbers_may_be_written_as_floats() -> None:
-    assert Trouble("fault", 9.0) == Trouble("fault", 9)
-
-
-@pytest.mark.parametrize("on", ["", "READ", None])
-def test_a_direction_that_is_none_is_refused(on: Any) -> None:
-    with pytest.raises(ValueError, match=f"^on must be read, write or any, got {on!r}$"):
-        Trouble("drop", on=on)
+def test_a_direction_that_is_none_is_refused() -> None:
+    direction: Any = "READ"
+    with pytest.raises(ValueError, match=r"^on must be read, write or any, got 'READ'$"):
+        Trouble("drop", on=direction)
 
 
 # What is meant when nothing is said.
 
 
-def test_nothing_said() -> None:
-    trouble = Trouble("drop")
-    assert (trouble.value, trouble.on, trouble.at, trouble.lasts, trouble.every) == (
-        None,
-        "any",
-        0,
-        None,
-        None,
-    )
+VALUES = {
+    "delay": (0.05, 0, 10),
+    "late": (0.7, 0, 10),
+    "pieces": (0.002, 0, 1),
+    "multiplexer": (0.7, 0, 10),
+    "exception": (4, 1, 255),
+    "foreign": (128, 0, 255),
+    "fault": (9, 1, 15),
+    "e-stop": (1, 1, 9),
+    "idle-reset": (5, 0, 3600),
+    "slow-device": (0.2, 0, 10),
+    "status-lag": (0.05, 0, 1),
+    "silence-fault": (1, 0, 3600),
+    "slow-activation": (25, 0, 600),
+    "write-spacing": (0.01, 0, 1),
+}
+"""The usual value of each kind that has one, the least and the greatest."""
 
 
-@pytest.mark.parametrize(
-    ("kind", "amount"),
-    [
-        *(("delay", 0.05), ("late", 0.7), ("pieces", 0.002), ("exception", 4), ("foreign", 128)),
-        *(("multiplexer", 0.7), ("idle-reset", 5)),
-        *(("e-stop", 1), ("status-lag", 0.05), ("silence-fault", 1), ("slow-activation", 25)),
-        *(("write-spacing", 0.01), ("echoed-limits", 0), ("wake-needed", 0)),
-        *(("slow-device", 0.2), ("fault", 9), ("drop", 0), ("silence", 0)),
-    ],
-)
-def test_the_usual_value(kind: str, amount: float) -> None:
-    assert Trouble(kind).amount == amount
-
-
-@pytest.mark.parametrize("value", [0, 0.03, 10])
-def test_a_value_replaces_the_usual_one(value: float) -> None:
-    assert Trouble("delay", value).amount == value
+def test_the_values() -> None:
+    for name, kind in KINDS.items():
+        assert Trouble(name).amount == VALUES.get(name, (0, 0, 0))[0], name
+        assert (kind.low, kind.high) == VALUES.get(name, (0, 0, 0))[1:], name
 
 
 def test_conditions_last_for_ever_and_events_happen_once() -> None:
@@ -298,22 +240,13 @@ def test_what_replies_it_is_about(words: str, read: bool, write: bool) -> None:
 @pytest.mark.parametrize(
     "words",
     [
-        "drop",
-        "delay 0.05 on read at 2.5 for 3 every 10",
-        "silence once",
-        "drop for ever",
-        "foreign 0 at 30",
-        "late once every 60",
+        *("drop", "silence once", "drop for ever", "foreign 0 at 30", "late once every 60"),
+        *("delay 0.05 on read at 2.5 for 3 every 10", "delay 0.1234567 at 12345.678 for 86399.99"),
     ],
 )
 def test_a_trouble_in_words(words: str) -> None:
     (trouble,) = parse_troubles(words)
     assert str(trouble) == words
-
-
-@given(trouble=troubles())
-def test_its_words_give_an_equal_trouble(trouble: Trouble) -> None:
-    assert parse_troubles(str(trouble)) == [trouble]
 
 
 @given(plan=st.lists(troubles()), separator=st.sampled_from(["\n", ";", "; ", " # again\n"]))

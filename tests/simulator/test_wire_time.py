@@ -16,7 +16,7 @@ from robotiq_async.simulator.server.serial_connection import MOST_UNSENT
 from robotiq_async.simulator.server.wire_time import WireTime
 from tests.grippers import activate_beforehand
 from tests.simulator.test_serial_server import Line, with_crc
-from tests.virtual import run
+from tests.virtual import virtual
 from tests.virtual_line import VirtualLine
 
 BYTE_S = 10 / 115200
@@ -49,28 +49,27 @@ def test_directions_are_apart_and_nothing_overtakes() -> None:
     assert wire.sends(due + 1.0, 21) == pytest.approx(due + 1.0 + 21 * BYTE_S), "a reply that was late"
 
 
+@virtual
+@pytest.mark.parametrize("paced", [True, False])
 @pytest.mark.parametrize(("request_", "size"), EXCHANGES)
-def test_an_exchange_takes_what_its_bytes_take(
-    request_: bytes, size: int, monkeypatch: pytest.MonkeyPatch
+async def test_an_exchange_takes_what_its_bytes_take(
+    request_: bytes, size: int, paced: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    async def main() -> None:
-        loop = asyncio.get_running_loop()
-        cable = VirtualLine(monkeypatch)
-        async with SerialSimulatorServer(cable.FAR, SimulatedGripper(loop.time)):
-            port: Any = serial.serial_for_url(cable.NEAR)
-            for _ in range(3):
-                arrived: asyncio.Future[None] = loop.create_future()
-                loop.add_reader(port.fileno(), arrived.set_result, None)
-                began = loop.time()
-                port.write(request_)
-                await arrived
-                loop.remove_reader(port.fileno())
-                assert loop.time() - began == pytest.approx(on_the_wire(request_, size), abs=1e-6)
-                assert len(port.read(4096)) == size
-                await asyncio.sleep(SILENCE_S)
-            port.close()
-
-    run(main)
+    loop, cable = asyncio.get_running_loop(), VirtualLine(monkeypatch)
+    expected = pytest.approx(on_the_wire(request_, size), abs=1e-6) if paced else 0
+    async with SerialSimulatorServer(cable.FAR, SimulatedGripper(loop.time), paced=paced):
+        port: Any = serial.serial_for_url(cable.NEAR)
+        for _ in range(3):
+            arrived: asyncio.Future[None] = loop.create_future()
+            loop.add_reader(port.fileno(), arrived.set_result, None)
+            began = loop.time()
+            port.write(request_)
+            await arrived
+            loop.remove_reader(port.fileno())
+            assert loop.time() - began == expected
+            assert len(port.read(4096)) == size
+            await asyncio.sleep(SILENCE_S)
+        port.close()
 
 
 @pytest.mark.parametrize(("request_", "size"), EXCHANGES)
@@ -91,23 +90,6 @@ async def test_by_the_clock_of_the_machine(request_: bytes, size: int) -> None:
     assert sorted(took)[5] <= on_the_wire(request_, size) + 0.0025
 
 
-def test_without_pacing_bytes_take_no_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    async def main() -> None:
-        loop, cable = asyncio.get_running_loop(), VirtualLine(monkeypatch)
-        async with SerialSimulatorServer(cable.FAR, SimulatedGripper(loop.time), paced=False):
-            port: Any = serial.serial_for_url(cable.NEAR)
-            arrived: asyncio.Future[None] = loop.create_future()
-            loop.add_reader(port.fileno(), arrived.set_result, None)
-            began = loop.time()
-            port.write(READ)
-            await arrived
-            loop.remove_reader(port.fileno())
-            assert loop.time() == began
-            port.close()
-
-    run(main)
-
-
 @pytest.mark.parametrize("paced", ["yes", 1, None])
 def test_paced_or_not(paced: Any) -> None:
     with pytest.raises(TypeError, match="paced must be True or False"):
@@ -116,84 +98,71 @@ def test_paced_or_not(paced: Any) -> None:
         RtuOverTcpSimulatorServer(paced=paced)
 
 
-def test_a_line_keeps_no_more_than_it_carries_for_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
-    async def main() -> None:
-        loop = asyncio.get_running_loop()
-        cable = VirtualLine(monkeypatch)
-        async with SerialSimulatorServer(cable.FAR, SimulatedGripper(loop.time)) as server:
-            connection: Any = server.connections[0]
-            for _ in range(1000):
-                connection.data_received(100 * READ)
-                connection.pass_on(bytes(100))
-            assert connection._wire.unheard(loop.time()) <= MOST_UNREAD + 100 * len(READ)
-            assert connection._wire.unsent(loop.time()) <= MOST_UNSENT + 100
-            await asyncio.sleep(60)
-            assert not connection._inbox
-
-    run(main)
+@virtual
+async def test_a_line_keeps_no_more_than_it_carries_for_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
+    loop, cable = asyncio.get_running_loop(), VirtualLine(monkeypatch)
+    async with SerialSimulatorServer(cable.FAR, SimulatedGripper(loop.time)) as server:
+        connection: Any = server.connections[0]
+        for _ in range(1000):
+            connection.data_received(100 * READ)
+            connection.pass_on(bytes(100))
+        assert connection._wire.unheard(loop.time()) <= MOST_UNREAD + 100 * len(READ)
+        assert connection._wire.unsent(loop.time()) <= MOST_UNSENT + 100
+        await asyncio.sleep(60)
+        assert not connection._inbox
 
 
 # -- a hand on such a line ---------------------------------------------------------------------------------
 
 
+@virtual
 @pytest.mark.parametrize(
     ("interval", "streaming", "polls", "missed"),
     [
-        ({}, False, 66.7, 0),
         ({}, True, 66.7, 0),
         ({"poll_interval": 0.01}, False, 100, 0),
         ({"poll_interval": 0.01}, True, 80.8, 19.2),
         ({"poll_interval": 0.005}, False, 166.2, 33.8),
-        ({"poll_interval": 0.005}, True, 80.8, 119.2),
     ],
 )
-def test_how_often_a_hand_polls(
+async def test_how_often_a_hand_polls(
     interval: dict[str, float], streaming: bool, polls: float, missed: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What the interval of serial lines was chosen by: with it no command costs a poll.
 
     Commands go out as often as the line bears, which is oftener than a gripper does.
     """
-
-    async def main() -> None:
-        loop = asyncio.get_running_loop()
-        cable = VirtualLine(monkeypatch)
-        gripper = SimulatedGripper(loop.time)
-        async with SerialSimulatorServer(cable.FAR, gripper):
-            await activate_beforehand(gripper)
-            async with RobotiqHand(f"rtu://{cable.NEAR}", write_spacing=0.0, **interval) as hand:  # type: ignore[arg-type]
-                await asyncio.sleep(0.1)
-                before, until = hand.statistics, loop.time() + 10.0
-                while loop.time() < until:
-                    if streaming:
-                        hand.command(Finger.A, position=100 + int(20 * (loop.time() % 5)))
-                        hand.command(Finger.A, speed=int(1000 * loop.time()) % 256)
-                    await asyncio.sleep(0.001)
-                after = hand.statistics
-                assert (after.polls - before.polls) / 10 == pytest.approx(polls, rel=0.02)
-                assert (after.overruns - before.overruns) / 10 == pytest.approx(missed, rel=0.02)
-                assert not streaming or (after.writes - before.writes) / 10 == pytest.approx(polls, rel=0.05)
-                assert after.reconnects == 0
-
-    run(main)
+    loop, cable = asyncio.get_running_loop(), VirtualLine(monkeypatch)
+    gripper = SimulatedGripper(loop.time)
+    async with SerialSimulatorServer(cable.FAR, gripper):
+        await activate_beforehand(gripper)
+        async with RobotiqHand(f"rtu://{cable.NEAR}", write_spacing=0.0, **interval) as hand:  # type: ignore[arg-type]
+            await asyncio.sleep(0.1)
+            before, until = hand.statistics, loop.time() + 10.0
+            while loop.time() < until:
+                if streaming:
+                    hand.command(Finger.A, position=100 + int(20 * (loop.time() % 5)))
+                    hand.command(Finger.A, speed=int(1000 * loop.time()) % 256)
+                await asyncio.sleep(0.001)
+            after = hand.statistics
+            assert (after.polls - before.polls) / 10 == pytest.approx(polls, rel=0.02)
+            assert (after.overruns - before.overruns) / 10 == pytest.approx(missed, rel=0.02)
+            assert not streaming or (after.writes - before.writes) / 10 == pytest.approx(polls, rel=0.05)
+            assert after.reconnects == 0
 
 
-@pytest.mark.parametrize("delay", [0.05, 0.08])
-def test_a_line_as_slow_as_bluetooth_works_when_told(delay: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    async def main() -> None:
-        loop = asyncio.get_running_loop()
-        cable = VirtualLine(monkeypatch)
-        gripper = SimulatedGripper(loop.time)
-        async with SerialSimulatorServer(cable.FAR, gripper) as server:
-            await activate_beforehand(gripper)
-            server.policy = lambda reply: [(delay, reply)]
-            address = f"rtu://{cable.NEAR}"
-            async with RobotiqHand(address, poll_interval=0.1, response_timeout=0.5) as hand:
-                result = await hand.move(200)
-                assert result.positions[Finger.A] == pytest.approx(200, abs=2)
-                assert hand.statistics.reconnects == 0
-                began = loop.time()
-                await hand.set_speed(10)
-                assert loop.time() - began < 0.4
-
-    run(main)
+@virtual
+async def test_a_line_as_slow_as_bluetooth_works_when_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    loop, cable = asyncio.get_running_loop(), VirtualLine(monkeypatch)
+    gripper = SimulatedGripper(loop.time)
+    async with SerialSimulatorServer(cable.FAR, gripper) as server:
+        await activate_beforehand(gripper)
+        server.policy = lambda reply: [(0.08, reply)]
+        address = f"rtu://{cable.NEAR}"
+        async with RobotiqHand(address, poll_interval=0.1, response_timeout=0.5) as hand:
+            result = await hand.move(200)
+            assert result.positions[Finger.A] == pytest.approx(200, abs=2)
+            assert hand.statistics.reconnects == 0
+            began = loop.time()
+            await hand.set_speed(10)
+            assert loop.time() - began < 0.4

@@ -82,28 +82,8 @@ def test_the_worked_grasp(
     assert reader.comes_to_read(HELD)
     bench.wait(60)
     assert reader.reads(HELD), "for as long as it is held"
+    if not spread:
+        assert bench.positions[:3] == (0xBC, 0xC1, 0xBD), "exactly"
     reader.write(OPEN)
     assert reader.comes_to_read(OPENING)
     assert reader.comes_to_read(OPENED)
-
-
-def test_the_default_gripper_is_open_where_the_manuals_was(make_bench: Callable[..., Bench]) -> None:
-    bench = make_bench(spread=True)
-    reader = Reader(bench, within=0)
-    reader.write(ACTIVATE)
-    bench.settle()
-    reader.write(CLOSE)
-    bench.settle()
-    reader.write(OPEN)
-    assert reader.comes_to_read(OPENED)
-
-
-def test_where_the_fingers_are_held_is_where_the_manuals_were(make_bench: Callable[..., Bench]) -> None:
-    bench = make_bench()
-    reader = Reader(bench, within=0)
-    reader.write(ACTIVATE)
-    bench.settle()
-    each_finger_its_own(bench)
-    reader.write(CLOSE)
-    bench.settle()
-    assert reader.reads(HELD)
