@@ -17,8 +17,7 @@ The physics imports neither pymodbus nor asyncio.
 
 from .physics.gripper import SimulatedGripper
 from .physics.habits import Habits
-from .server.rtu_tcp_server import RtuOverTcpSimulatorServer
-from .server.serial_server import SerialSimulatorServer
+from .server.serial_server import RtuOverTcpSimulatorServer, SerialSimulatorServer
 from .server.tcp_server import SimulatorServer
 from .troubles.fault_injector import FaultInjector
 from .troubles.trouble import Trouble, parse_troubles

@@ -11,9 +11,8 @@ import pytest
 
 from robotiq_async import Finger, RobotiqHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.simulator.physics.mechanics.axis import PRESSING
-from robotiq_async.simulator.physics.mechanics.motor import peak
-from robotiq_async.simulator.physics.mechanics.scale import SimulatedScale
+from robotiq_async.simulator.physics.axis import PRESSING, peak
+from robotiq_async.simulator.physics.scale import SimulatedScale
 from robotiq_async.tools.measure.campaigns import (
     GRASP_S,
     Campaign,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from robotiq_async.simulator import Habits
-from robotiq_async.simulator.physics.mechanics.axis import PRESSING
+from robotiq_async.simulator.physics.axis import PRESSING
 from robotiq_async.values.enums import NO_AXES, Fault, Finger, Initialization, Mode, ObjectStatus
 from robotiq_async.values.model import THREE_FINGER
 from tests.simulator.conftest import CYCLE

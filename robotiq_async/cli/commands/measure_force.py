@@ -177,7 +177,7 @@ def _scale(
         return from_table
     if not is_simulated(address):
         return typed
-    from ...simulator.physics.mechanics.scale import SimulatedScale
+    from ...simulator.physics.scale import SimulatedScale
 
     simulated = SimulatedScale(surface)
 

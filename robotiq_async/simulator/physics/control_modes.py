@@ -18,7 +18,7 @@ from robotiq_async.values.enums import (
 )
 from robotiq_async.values.model import THREE_FINGER
 
-from .mechanics.goal import Goal
+from .axis import Goal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

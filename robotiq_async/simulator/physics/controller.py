@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from robotiq_async.values.calibration.scales import SpeedCalibration
 from robotiq_async.values.enums import (
@@ -22,18 +22,47 @@ from robotiq_async.values.enums import (
 from robotiq_async.values.request import Request
 
 from . import control_modes as control
-from .emergency_stop import EmergencyStop
-from .faults import PresentFaults
+from .axis import MOTORS, Axis, Motor
+from .faults import EmergencyStop, PresentFaults
 from .inbox import ZEROS
-from .mechanics.axis import Axis
-from .mechanics.motor import MOTORS, Motor
-from .mechanics.spread import Spread
-from .status_trail import Statuses, StatusTrail
+from .spread import Spread
 
 if TYPE_CHECKING:
     from robotiq_async.values.model import Model
 
     from .habits import Habits
+
+
+Statuses = tuple[ObjectStatus, ...]
+
+
+class _Entry(NamedTuple):
+    since: float
+    statuses: Statuses
+
+
+class StatusTrail:
+    """The object status of each axis over time. Times are simulated seconds and never decrease."""
+
+    def __init__(self, first: Statuses) -> None:
+        self._entries = deque([_Entry(-math.inf, first)])
+
+    def note(self, time: float, statuses: Statuses, lag: float) -> None:
+        """Add the present value, and drop values older than the lag."""
+        if statuses == self._entries[-1].statuses:
+            return
+        self._entries.append(_Entry(time, statuses))
+        while self._entries[1].since <= time - lag:
+            self._entries.popleft()
+            if len(self._entries) == 1:
+                return
+
+    def at(self, time: float) -> Statuses:
+        """The value at a time; for a time that is dropped, the oldest value kept."""
+        for entry in reversed(self._entries):
+            if entry.since <= time:
+                return entry.statuses
+        return self._entries[0].statuses
 
 
 class Controller:

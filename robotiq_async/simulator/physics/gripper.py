@@ -14,19 +14,18 @@ from robotiq_async.values.checks import check_int, check_seconds
 from robotiq_async.values.enums import NO_AXES, Fault, Finger
 from robotiq_async.values.model import Model, model_of
 
-from .clock import Clock
 from .control_modes import SCISSOR_HIGH, SCISSOR_LOW, check_scissor_limit
 from .controller import Controller
 from .habits import Habits
 from .inbox import Inbox, Write
-from .mechanics.spread import SEED
+from .spread import SEED
 from .status_report import status_registers
 from .surroundings import Surroundings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from .mechanics.axis import Axis
+    from .axis import Axis
 
 _LONGEST: Final = 1e9
 
@@ -40,8 +39,8 @@ class SimulatedGripper(Surroundings):
 
     A write takes effect one device cycle later, as on the device. Speeds are the measured ones of
     :mod:`robotiq_async.values.calibration.closing_time`; the scissor moves the same counts a second, as none
-    are published. What the motors draw is in :mod:`.mechanics.motor`; how much axes miss what they are asked
-    in :mod:`.mechanics.spread`: as with a real gripper, a program that waits for gPO = rPR may wait for ever.
+    are published. What the motors draw is in :mod:`.axis`; how much axes miss what they are asked
+    in :mod:`.spread`: as with a real gripper, a program that waits for gPO = rPR may wait for ever.
 
     Choices where no source settles the behaviour; those that can be changed are in :class:`Habits`:
 
@@ -93,7 +92,10 @@ class SimulatedGripper(Surroundings):
         limit, seed_or_none = check_scissor_limit(scissor_limit), number if spread else None
         super().__init__(Controller(model_of(model), limit, seed_or_none, habits or Habits()))
         self._clock = clock
-        self._own_clock = Clock(clock, speedup)
+        self._speedup = check_seconds("speedup", speedup, 0, _LONGEST)
+        if self._speedup == 0:
+            raise ValueError(f"speedup must be above 0, got {speedup!r}")
+        self._began = clock()
         self._off_until = -math.inf if powered else math.inf
         self._heard_at = 0.0
         self._inbox = Inbox(self.model)
@@ -191,12 +193,17 @@ class SimulatedGripper(Surroundings):
     @property
     def speedup(self) -> float:
         """Simulated seconds in one second of the clock."""
-        return self._own_clock.speedup
+        return self._speedup
+
+    @property
+    def _now(self) -> float:
+        """Simulated seconds since the gripper was made, by its clock."""
+        return (self._clock() - self._began) * self._speedup
 
     @property
     def is_powered(self) -> bool:
         """Whether the gripper is switched on."""
-        return max(self._time, self._own_clock.now) >= self._off_until
+        return max(self._time, self._now) >= self._off_until
 
     @property
     def _is_on(self) -> bool:
@@ -267,7 +274,7 @@ class SimulatedGripper(Surroundings):
 
     def _catch_up(self) -> None:
         """Let everything happen that is due, each thing at its own time."""
-        now = max(self._time, self._own_clock.now)
+        now = max(self._time, self._now)
         pending = self._inbox.pending
         while True:
             event = self._controller.next_event

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 from robotiq_async.values.checks import check_byte, check_int, check_seconds
 from robotiq_async.values.enums import Fault, Finger
 
-from .mechanics.axis import Axis, Obstacle
+from .axis import Axis, Obstacle
 
 if TYPE_CHECKING:
     from .controller import Controller

@@ -6,12 +6,12 @@ import asyncio
 import socket
 import struct
 from collections import deque
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final
 
-from .framing import BadFrameError, Frame
+from .framing import BadFrameError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from .endpoint import SimulatorEndpoint
 
 MOST_WAITING: Final = 1000
 """Replies that wait to be sent later; while there are so many, no more requests are taken."""
@@ -21,38 +21,6 @@ _LINGER_NOT: Final = struct.pack("ii", 1, 0)
 """SO_LINGER on, for no time at all: closing the socket then resets the connection."""
 
 
-class Endpoint(Protocol):
-    """What a connection asks of the simulator it belongs to."""
-
-    @property
-    def answers_nobody(self) -> bool:
-        """Whether the gripper is without power."""
-
-    def take(self, inbox: bytearray) -> Frame | None:
-        """Cut the next request out of what has arrived."""
-
-    def hears(self, frame: Frame) -> bool:
-        """Whether a request is heard, and meant for this gripper."""
-
-    def answer(self, frame: Frame) -> bytes:
-        """Carry out a request; the frame of the reply."""
-
-    def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
-        """What to send for a reply, as a reply policy gives it."""
-
-    def undelivered(self, part: bytes) -> None:
-        """Drop what is left for a client that is gone."""
-
-    def lets_in(self, client: Connection) -> bool:
-        """Take note of a client that has come; whether it may stay."""
-
-    def forget(self, client: Connection) -> None:
-        """Take note that a client has gone."""
-
-    def left_over(self) -> Iterable[bytes]:
-        """What a new client is sent before it has asked for anything."""
-
-
 class Connection(asyncio.Protocol):
     """Has one request answered in a turn of the loop, and sends the reply as the endpoint's policy says.
 
@@ -60,7 +28,7 @@ class Connection(asyncio.Protocol):
         transport: to the client; None before it has come, and once it is gone.
     """
 
-    def __init__(self, endpoint: Endpoint) -> None:
+    def __init__(self, endpoint: SimulatorEndpoint) -> None:
         self.transport: Any = None
         self._loop = asyncio.get_running_loop()
         self._endpoint = endpoint

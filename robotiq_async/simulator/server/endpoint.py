@@ -138,7 +138,7 @@ class SimulatorEndpoint(ABC):
         for connection in tuple(self.connections):
             connection.hang_up(reset=reset)
 
-    # What connections ask (see connection.Endpoint).
+    # What connections ask.
 
     def lets_in(self, client: Connection) -> bool:
         """Take note of a client that has come; whether it may stay."""

@@ -1,4 +1,4 @@
-"""SerialSimulatorServer: a simulated gripper behind Modbus RTU on a serial line."""
+"""A simulated gripper behind Modbus RTU: on a serial line, or behind a serial server."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from robotiq_async.values.registers import RTU_REGISTERS
 from ..functions import RTU_FUNCTIONS
 from .endpoint import SimulatorEndpoint
 from .framing import Frame, rtu_reply, take_rtu
-from .serial_connection import SerialConnection
-from .wire_time import BAUD
+from .serial_connection import BAUD, SerialConnection
+from .tcp_server import SimulatorServer
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -23,15 +23,28 @@ if TYPE_CHECKING:
     from ..physics.gripper import SimulatedGripper
 
 
-BROADCAST: Final = 0
+_BROADCAST: Final = 0
 
 
-def is_answered(reply: bytes) -> bool:
-    """Whether the gripper sends a reply over a serial line: no exceptions, and none to a broadcast."""
-    return reply[0] != BROADCAST and not reply[1] & 0x80
+class _RtuEndpoint(SimulatorEndpoint):
+    """What is the same for RTU frames, whatever carries them."""
+
+    functions = RTU_FUNCTIONS
+
+    def take(self, inbox: bytearray) -> Frame | None:
+        """Cut the next request out of what has arrived."""
+        return take_rtu(inbox)
+
+    def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
+        """What to send for a reply; nothing for an exception (manual), and nothing to a broadcast."""
+        is_exception = bool(reply[1] & 0x80)
+        return () if is_exception or reply[0] == _BROADCAST else super().deliver(reply)
+
+    def _reply(self, frame: Frame, pdu: bytes) -> bytes:
+        return rtu_reply(frame, pdu)
 
 
-class SerialSimulatorServer(SimulatorEndpoint):
+class SerialSimulatorServer(_RtuEndpoint):
     """Serves a simulated gripper over Modbus RTU at 115200 baud, 8N1.
 
     Bytes take the time that they take at that rate, both ways, and a request the silence that ends it: a
@@ -44,7 +57,6 @@ class SerialSimulatorServer(SimulatorEndpoint):
     """
 
     link = "rtu"
-    functions = RTU_FUNCTIONS
 
     def __init__(
         self,
@@ -101,19 +113,8 @@ class SerialSimulatorServer(SimulatorEndpoint):
         """Whether bytes take their time."""
         return self._paced
 
-    def take(self, inbox: bytearray) -> Frame | None:
-        """Cut the next request out of what has arrived."""
-        return take_rtu(inbox)
-
-    def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
-        """What to send for a reply; nothing for an exception, and nothing to a broadcast."""
-        return super().deliver(reply) if is_answered(reply) else ()
-
     def _is_meant(self, unit: int) -> bool:
-        return unit in (BROADCAST, self._device_id)
-
-    def _reply(self, frame: Frame, pdu: bytes) -> bytes:
-        return rtu_reply(frame, pdu)
+        return unit in (_BROADCAST, self._device_id)
 
     def _close(self) -> None:
         """There is nothing but the one connection."""
@@ -127,3 +128,49 @@ class SerialSimulatorServer(SimulatorEndpoint):
         # one after that; closing it earlier would fail.
         await asyncio.sleep(0)
         await asyncio.sleep(0)
+
+
+class RtuOverTcpSimulatorServer(_RtuEndpoint, SimulatorServer):
+    """Serves a simulated gripper as a serial server does, or an arm's tool port: RTU frames in a TCP socket.
+
+    It serves what :class:`~robotiq_async.simulator.SerialSimulatorServer` serves, at the speed of the
+    line behind. Who sends one request after the other without waiting loses those that the line cannot take.
+    """
+
+    link = "rtu+tcp"
+
+    def __init__(
+        self,
+        gripper: SimulatedGripper | None = None,
+        *,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        device_id: int = RTU_REGISTERS.device_id,
+        paced: bool = True,
+    ) -> None:
+        """A server that is not started; needs no running loop.
+
+        Args:
+            gripper: what answers; None for a new one.
+            host: address to listen on.
+            port: TCP port, 0 for any free one.
+            device_id: the unit id of the gripper.
+            paced: whether bytes take the time that they take on the line.
+
+        Raises:
+            TypeError: port or device_id is not an int, or paced is not a bool.
+            ValueError: port is outside 0..65535, or device_id outside 1..247.
+        """
+        super().__init__(gripper, host=host, port=port, device_id=check_int("device_id", device_id, 1, 247))
+        self.paced = check_flag("paced", paced)
+
+    @property
+    def address(self) -> str:
+        """The address for :class:`~robotiq_async.RobotiqHand`."""
+        return f"rtu+{super().address}"
+
+    def _is_meant(self, unit: int) -> bool:
+        return unit == _BROADCAST or super()._is_meant(unit)
+
+    def _connection(self) -> SerialConnection:
+        return SerialConnection(self, paced=self.paced)

@@ -18,7 +18,7 @@ from .trouble import KINDS, Trouble
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator
 
-    from .target import Target
+    from ..server.endpoint import SimulatorEndpoint
 
 
 @dataclass(slots=True, eq=False)
@@ -42,7 +42,7 @@ class FaultInjector:
     Of those that are about the same reply the oldest acts; with none of them, the simulator's policy.
     """
 
-    def __init__(self, target: Target) -> None:
+    def __init__(self, target: SimulatorEndpoint) -> None:
         self._target = target
         self._ongoing: list[Ongoing] = []
         self._device_cycle = target.gripper.device_cycle

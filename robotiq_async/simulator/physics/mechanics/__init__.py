@@ -1,1 +1,0 @@
-"""Axes, their motors and what makes one differ from another; a scale between the fingers."""
