@@ -13,18 +13,12 @@ import robotiq_async as package
 from robotiq_async import Fault, Finger, Initialization, Mode, ObjectStatus, Severity, State
 from robotiq_async.values.model import THREE_FINGER
 
-ASSIGNED = {
-    0x00: "NONE",
-    0x05: "PRIORITY",
-    0x06: "PRIORITY",
-    0x07: "PRIORITY",
-    0x09: "MINOR",
-    0x0A: "MINOR",
-    0x0B: "MINOR",
-    0x0D: "MAJOR",
-    0x0E: "MAJOR",
-    0x0F: "MAJOR",
-}
+ASSIGNED = (
+    {0x00: "NONE"}
+    | dict.fromkeys((0x05, 0x06, 0x07), "PRIORITY")
+    | dict.fromkeys((0x09, 0x0A, 0x0B), "MINOR")
+    | dict.fromkeys((0x0D, 0x0E, 0x0F), "MAJOR")
+)
 """The fault codes of the manual, with their class."""
 
 
@@ -33,14 +27,23 @@ def test_the_axes_have_the_bits_of_the_contract() -> None:
     assert values == {"A": 1, "JAW": 1, "B": 2, "C": 4, "SCISSOR": 8, "ABC": 7, "ALL": 15}
 
 
-def test_the_axes_are_listed_in_the_order_of_their_registers() -> None:
+def test_a_member_has_the_number_of_the_manual() -> None:
+    numbers: dict[type[IntEnum], list[str]] = {
+        ObjectStatus: ["IN_MOTION", "CONTACT_OPENING", "CONTACT_CLOSING", "AT_POSITION"],
+        Mode: ["BASIC", "PINCH", "WIDE", "SCISSOR"],
+        Initialization: ["RESET", "ACTIVATING", "CHANGING_MODE", "COMPLETE"],
+    }
+    for kind, names in numbers.items():
+        assert {member.name: int(member) for member in kind} == {name: n for n, name in enumerate(names)}
+    assert [member.is_contact for member in ObjectStatus] == [False, True, True, False]
     assert THREE_FINGER.axes == (Finger.A, Finger.B, Finger.C, Finger.SCISSOR)
-
-
-def test_masks_are_put_together_with_or() -> None:
-    assert Finger.A | Finger.B | Finger.C is Finger.ABC
-    assert Finger.ABC | Finger.SCISSOR is Finger.ALL
     assert ~Finger.A == Finger.B | Finger.C | Finger.SCISSOR
+
+
+def test_the_states_are_those_of_the_thesis_and_reset() -> None:
+    running = "DISCONNECTED DO_ACTIVATION WF_ACTIVATION RUNNING_IDLE RUNNING_CC FAULT DO_ATR WF_ATR ATR_DONE"
+    ending = "DO_RESET WF_RESET RESET DO_SHUTDOWN SHUTDOWN"
+    assert set(State.__members__) == {*running.split(), *ending.split()}
 
 
 def test_a_constant_has_the_value_of_the_contract() -> None:
@@ -53,48 +56,6 @@ def test_a_constant_has_the_value_of_the_contract() -> None:
     assert others == {Finger, package.Model}
 
 
-def test_one_is_a_contact_while_opening_and_two_a_contact_while_closing() -> None:
-    assert {int(member): member.name for member in ObjectStatus} == {
-        0: "IN_MOTION",
-        1: "CONTACT_OPENING",
-        2: "CONTACT_CLOSING",
-        3: "AT_POSITION",
-    }
-
-
-def test_only_the_two_contacts_are_contacts() -> None:
-    assert [member.is_contact for member in ObjectStatus] == [False, True, True, False]
-
-
-def test_modes_and_initialization_have_the_numbers_of_the_manual() -> None:
-    assert {int(member): member.name for member in Mode} == {0: "BASIC", 1: "PINCH", 2: "WIDE", 3: "SCISSOR"}
-    assert {int(member): member.name for member in Initialization} == {
-        0: "RESET",
-        1: "ACTIVATING",
-        2: "CHANGING_MODE",
-        3: "COMPLETE",
-    }
-
-
-def test_the_states_are_those_of_the_thesis_and_reset() -> None:
-    assert set(State.__members__) == {
-        "DISCONNECTED",
-        "DO_ACTIVATION",
-        "WF_ACTIVATION",
-        "RUNNING_IDLE",
-        "RUNNING_CC",
-        "FAULT",
-        "DO_ATR",
-        "WF_ATR",
-        "ATR_DONE",
-        "DO_RESET",
-        "WF_RESET",
-        "RESET",
-        "DO_SHUTDOWN",
-        "SHUTDOWN",
-    }
-
-
 # -- faults ------------------------------------------------------------------------------------------------
 
 
@@ -105,10 +66,6 @@ def test_the_ten_codes_of_the_manual_are_the_members_of_fault() -> None:
 def test_a_code_has_the_severity_of_the_manual_and_what_is_unassigned_is_major() -> None:
     for code in range(16):
         assert Fault(code).severity is Severity[ASSIGNED.get(code, "MAJOR")], code
-
-
-def test_there_are_four_severities() -> None:
-    assert list(Severity.__members__) == ["NONE", "PRIORITY", "MINOR", "MAJOR"]
 
 
 def test_minor_and_major_faults_are_serious_and_nothing_else_is() -> None:
@@ -134,7 +91,7 @@ def test_an_unassigned_code_is_a_fault_with_a_number_for_a_name(code: int) -> No
     assert fault not in list(Fault)
 
 
-@pytest.mark.parametrize("value", [16, -1, 255, "NONE", None, 1.5])
+@pytest.mark.parametrize("value", [16, -1, "NONE", None, 1.5])
 def test_what_does_not_fit_into_four_bits_is_no_fault_code(value: object) -> None:
     with pytest.raises(ValueError, match="not a valid Fault"):
         Fault(value)  # type: ignore[arg-type]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,15 +29,11 @@ def test_positions_and_openings_go_both_ways(position: int) -> None:
 
 
 @given(VALUES)
-def test_speeds_go_both_ways(speed: int) -> None:
+def test_speeds_and_force_labels_go_both_ways(value: int) -> None:
     for units in (THESIS, NOMINAL):
-        assert units.speed(mm_per_s=units.mm_per_s(speed)) == speed
-        assert units.speed(closing_s=units.closing_s(speed)) == speed
-
-
-@given(VALUES)
-def test_force_labels_go_both_ways(force: int) -> None:
-    assert THESIS.force(label_n=THESIS.label_n(force)) == force
+        assert units.speed(mm_per_s=units.mm_per_s(value)) == value
+        assert units.speed(closing_s=units.closing_s(value)) == value
+        assert units.force(label_n=units.label_n(value)) == value
 
 
 @given(st.floats(0, 155), st.floats(15.46, 73.16), st.floats(15, 60))
@@ -57,47 +54,31 @@ def test_the_figures() -> None:
     assert (THESIS.label_n(0), THESIS.label_n(255)) == (15, 60)
 
 
-REFUSED: dict[str, tuple[str, Callable[[Units, Any], int], tuple[float, ...]]] = {
-    "mm": ("millimetres in 0.0..155.0", lambda units, value: units.position(mm=value), (-0.01, 155.01)),
-    "mm_per_s": (
-        "millimetres a second in 15.46..73.16",
-        lambda units, value: units.speed(mm_per_s=value),
-        (0, 15.45, 73.17),
-    ),
-    "closing_s": (
-        "seconds in 2.11..10.03",
-        lambda units, value: units.speed(closing_s=value),
-        (0, 2.1, 10.04),
-    ),
-    "label_n": (
-        "newton of a label (no measured force) in 15.0..60.0",
-        lambda units, value: units.force(label_n=value),
-        (14.99, 60.01),
-    ),
+REFUSED: dict[str, tuple[str, str, tuple[float, ...]]] = {
+    "mm": ("position", "millimetres in 0.0..155.0", (-0.01, 155.01)),
+    "mm_per_s": ("speed", "millimetres a second in 15.46..73.16", (0, 15.45, 73.17)),
+    "closing_s": ("speed", "seconds in 2.11..10.03", (0, 2.1, 10.04)),
+    "label_n": ("force", "newton of a label (no measured force) in 15.0..60.0", (14.99, 60.01)),
 }
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_is_out_of_range_is_told_in_the_unit(name: str) -> None:
-    words, call, outside = REFUSED[name]
-    for value in (*outside, float("nan"), float("inf"), -1):
-        with pytest.raises(ValueError) as caught:  # noqa: PT011  # the whole message is compared
-            call(THESIS, value)
-        assert str(caught.value) == f"{name} must be {words}, got {value!r}"
-    for bad in ("3", True, [1]):
-        with pytest.raises(TypeError) as error:
-            call(THESIS, bad)
-        assert str(error.value) == f"{name} must be {words}, got {bad!r}"
+def test_what_is_out_of_range_is_refused_in_the_unit(name: str) -> None:
+    method, words, outside = REFUSED[name]
+    for value in (*outside, float("nan"), "3", True):
+        error = ValueError if isinstance(value, float | int) and value is not True else TypeError
+        with pytest.raises(error, match=f"^{re.escape(f'{name} must be {words}, got {value!r}')}$"):
+            getattr(THESIS, method)(**{name: value})
 
 
 @pytest.mark.parametrize("units", [THESIS, NOMINAL])
 def test_the_limits_that_are_told_are_accepted(units: Units) -> None:
-    for name, (_, call, _) in REFUSED.items():
+    for name, (method, *_) in REFUSED.items():
         with pytest.raises(ValueError, match=f"{name} must be") as caught:
-            call(units, 1e6)
-        low, _, high = str(caught.value).rpartition(",")[0].split()[-1].partition("..")
+            getattr(units, method)(**{name: 1e6})
+        limits = str(caught.value).rpartition(",")[0].split()[-1].split("..")
         ends = {6, 241} if name == "mm" else {0, 255}
-        assert {call(units, float(low)), call(units, float(high))} == ends
+        assert {getattr(units, method)(**{name: float(limit)}) for limit in limits} == ends
 
 
 def test_a_speed_takes_one_of_two() -> None:
@@ -113,13 +94,6 @@ def test_counts_are_refused_as_counts(call: Any) -> None:
         call(256)
     with pytest.raises(TypeError, match=r"must be an int in 0\.\.255, got 3\.0"):
         call(3.0)
-
-
-def test_what_is_no_calibration_is_refused() -> None:
-    with pytest.raises(TypeError, match="speeds must be a SpeedCalibration, got None"):
-        Units(None)  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match="forces must be a ForceCalibration, got 30"):
-        Units(forces=30)  # type: ignore[arg-type]
 
 
 def test_where_the_figures_come_from_is_told() -> None:
@@ -140,18 +114,17 @@ def test_the_table_of_the_page() -> None:
         assert getattr(THESIS, there)(**{unit: int(figure)}) == int(counts)
         assert back == unit
         low, high = map(float, limits.split()[0].split(".."))
-        assert REFUSED[unit][0].endswith(f" in {low}..{high}")
+        assert REFUSED[unit][1].endswith(f" in {low}..{high}")
 
 
 # -- of a hand ---------------------------------------------------------------------------------------------
 
 
-def hands(**options: Any) -> list[Hand]:
-    return [RobotiqHand(**options), RemoteHand("zenoh://lab/cell/left", **options)]
+HANDS: list[Callable[..., Hand]] = [RobotiqHand, partial(RemoteHand, "zenoh://lab/cell/left")]
 
 
 def test_a_hand_has_them_before_it_is_started() -> None:
-    assert [hand.units for hand in hands()] == [THESIS, THESIS]
+    assert [make().units for make in HANDS] == [THESIS, THESIS]
 
 
 def test_they_are_by_the_owners_calibrations(tmp_path: Path) -> None:
@@ -159,7 +132,8 @@ def test_they_are_by_the_owners_calibrations(tmp_path: Path) -> None:
     write_table(tmp_path / "force.csv", FORCE, {50: (1000,), 100: (3000,)})
     speeds = SpeedCalibration.from_csv(tmp_path / "speed.csv")
     forces = ForceCalibration.from_csv(tmp_path / "force.csv")
-    for hand in hands(calibration=speeds, force_calibration=forces):
+    for make in HANDS:
+        hand = make(calibration=speeds, force_calibration=forces)
         assert hand.units == Units(speeds, forces)
         assert hand.units.closing_s(255) == 5
         assert hand.units.force(label_n=19.62) == 75
@@ -169,10 +143,13 @@ def test_they_are_by_the_owners_calibrations(tmp_path: Path) -> None:
             hand.units.label_n(10)
 
 
-def test_a_hand_refuses_what_is_no_calibration() -> None:
-    kinds: list[Callable[..., Hand]] = [RobotiqHand, RemoteHand]
-    for kind in kinds:
+def test_what_is_no_calibration_is_refused() -> None:
+    with pytest.raises(TypeError, match="speeds must be a SpeedCalibration, got None"):
+        Units(None)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="forces must be a ForceCalibration, got 30"):
+        Units(forces=30)  # type: ignore[arg-type]
+    for make in HANDS:
         with pytest.raises(TypeError, match="force_calibration must be None or a ForceCalibration"):
-            kind("zenoh://lab/cell/left" if kind is RemoteHand else "sim://", force_calibration=30)
+            make(force_calibration=30)
         with pytest.raises(TypeError, match="calibration must be None or a SpeedCalibration"):
-            kind("zenoh://lab/cell/left" if kind is RemoteHand else "sim://", calibration="mine.csv")
+            make(calibration="mine.csv")

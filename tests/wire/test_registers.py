@@ -65,25 +65,11 @@ def test_no_other_fields_are_defined() -> None:
     assert names == {*REQUEST, *STATUS, "rARD", "gOBJ"}  # these two are the siblings'
 
 
-@pytest.mark.parametrize("table", [REQUEST, STATUS], ids=["request", "status"])
-def test_the_fields_of_a_block_do_not_overlap(table: dict[str, object]) -> None:
-    taken: set[tuple[int, int]] = set()
-    for field in fields_of(table):
-        bits = {(field.byte, field.shift + n) for n in range(field.width)}
-        assert not bits & taken
-        assert all(bit < 8 for _, bit in bits)
-        taken |= bits
-
-
 def test_the_request_fields_leave_the_reserved_bits_alone() -> None:
     covered = [0] * 16
     for field in fields_of({**REQUEST}):
         covered[field.byte] |= ((1 << field.width) - 1) << field.shift
     assert tuple(0xFF ^ byte for byte in covered) == REQUEST_RESERVED
-
-
-def test_every_field_says_what_it_means() -> None:
-    assert all(field.doc for field in ALL_FIELDS)
 
 
 def test_even_bytes_are_the_high_half_of_a_register_and_odd_ones_the_low_half() -> None:
@@ -97,12 +83,6 @@ def test_the_manual_s_status_of_a_held_object_reads_as_it_says() -> None:
     values = {name: getattr(reg, name).read(block) for name in ("gACT", "gMOD", "gGTO", "gIMC", "gSTA")}
     assert values == {"gACT": 1, "gMOD": 0, "gGTO": 1, "gIMC": 3, "gSTA": 2}
     assert [field.read(block) for field in reg.gDT] == [2, 2, 2, 3]
-
-
-def test_activation_alone_is_0x0100_in_the_first_register() -> None:
-    block = [0] * 8
-    reg.rACT.write(block, 1)
-    assert block == [0x0100, 0, 0, 0, 0, 0, 0, 0]
 
 
 @given(BLOCKS, st.sampled_from(ALL_FIELDS), st.data())
@@ -138,23 +118,3 @@ def test_over_tcp_both_blocks_begin_at_zero_and_function_four_reads() -> None:
 
 def test_over_rtu_the_blocks_lie_where_the_manual_says_and_function_three_reads() -> None:
     assert reg.RegisterMap(request=1000, status=2000, read_function=3, device_id=9) == reg.RTU_REGISTERS
-
-
-# -- blocks from outside -----------------------------------------------------------------------------------
-
-
-@given(st.lists(st.integers(0, 0xFFFF), min_size=8, max_size=8))
-def test_eight_registers_of_sixteen_bits_pass_as_a_tuple(block: list[int]) -> None:
-    assert reg.check_registers(block) == tuple(block)
-
-
-@pytest.mark.parametrize("count", [0, 7, 9])
-def test_any_other_number_of_registers_is_a_value_error(count: int) -> None:
-    with pytest.raises(ValueError, match=f"expected 8 of them, got {count}"):
-        reg.check_registers([0] * count)
-
-
-@pytest.mark.parametrize("register", [-1, 0x10000])
-def test_a_register_beyond_sixteen_bits_is_a_value_error(register: int) -> None:
-    with pytest.raises(ValueError, match=re.escape(f"registers[3] must be in 0..65535, got {register}")):
-        reg.check_registers([0, 0, 0, register, 0, 0, 0, 0])
