@@ -1,4 +1,4 @@
-"""Hand: who satisfies it, and that what stands around a hand needs nothing else."""
+"""Hand: which classes satisfy it, and that the tools around a hand need nothing else."""
 
 from __future__ import annotations
 
@@ -62,11 +62,6 @@ def test_a_kind_of_hand_leaves_checks_and_promises_to_hand(kind: type) -> None:
     supplied = {"state", "statistics"}
     assert members(Hand).keys() & vars(kind).keys() == supplied
     assert inspect.isabstract(Hand)
-
-
-def test_every_promise_is_described() -> None:
-    for name, each in members(Hand).items():
-        assert inspect.getdoc(each), name
 
 
 # -- nothing looks further ---------------------------------------------------------------------------------
@@ -169,12 +164,6 @@ async def test_the_monitor(hand: FakeHand) -> None:
             while not any("close: A in contact at 150" in line.text for line in log.lines):
                 await pilot.pause(0.02)
         assert f"  {hand.address}" in str(pilot.app.query_one("#state", Static).render())
-
-
-async def test_the_monitor_of_a_hand_with_a_name() -> None:
-    async with FakeHand("left") as hand, Monitor(Operator(hand)).run_test(size=(100, 30)) as pilot:
-        await pilot.pause()
-        assert "  left (fake://hand)" in str(pilot.app.query_one("#state", Static).render())
 
 
 async def test_what_is_printed(hand: FakeHand, capfd: pytest.CaptureFixture[str]) -> None:
