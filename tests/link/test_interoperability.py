@@ -140,12 +140,3 @@ async def test_the_simulator_with_a_client_that_is_not_pymodbus() -> None:
         client.close()
     assert held.position(A) >= 240
     assert held.registers[0] == 0xF9FF, "position reached, all axes"
-
-
-@pytest.mark.parametrize(("address", "count"), [(7, 2), (8, 1), (100, 8), (65535, 1)])
-async def test_a_bad_address_is_answered_with_the_modbus_exception(address: int, count: int) -> None:
-    async with SimulatorServer() as server:
-        client = ModbusClient(host="127.0.0.1", port=server.port, unit_id=2, auto_open=True)
-        assert await asyncio.to_thread(client.read_input_registers, address, count) is None
-        assert client.last_except == 2, client.last_except_as_txt
-        client.close()

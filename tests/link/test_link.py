@@ -341,14 +341,6 @@ async def test_a_closed_transport_says_so_and_closes_twice() -> None:
             await transport.write(IMAGE)
 
 
-async def test_opening_again_leaves_no_old_connection() -> None:
-    async with linked() as (transport, scripted):
-        for _ in range(3):
-            await transport.open()
-            await transport.read()
-        assert scripted.connections == 4
-
-
 # -- names -------------------------------------------------------------------------------------------------
 
 
