@@ -15,10 +15,6 @@ def delays(policy: ReconnectPolicy, tries: int) -> list[float]:
     return found
 
 
-def test_the_delay_doubles_up_to_its_limit() -> None:
-    assert delays(ReconnectPolicy(0.05, 0.3), 5) == [0.05, 0.1, 0.2, 0.3, 0.3]
-
-
 def test_a_first_try_at_once_is_not_followed_by_others_at_once() -> None:
     assert delays(ReconnectPolicy(0.0, 1.0), 4) == [0.0, SHORTEST_S, 2 * SHORTEST_S, 4 * SHORTEST_S]
 
@@ -41,10 +37,8 @@ def test_it_is_tried_for_ever_unless_said_otherwise() -> None:
     "wrong",
     [
         {"first_delay": -0.1},
-        {"first_delay": 10.1},
         {"max_delay": 0.0},
         {"max_delay": 61.0},
-        {"give_up_after": -1.0},
         {"give_up_after": float("nan")},
     ],
 )

@@ -37,13 +37,6 @@ async def test_a_state_that_lasts_no_time_at_all_is_not_missed(waiters: StateWai
         assert await reached is State.RUNNING_CC
 
 
-async def test_of_several_states_the_first_reached_counts(waiters: StateWaiters) -> None:
-    with waiters.watching({State.RUNNING_CC, State.RUNNING_IDLE}, {}) as reached:
-        waiters.reached(State.RUNNING_IDLE)
-        waiters.reached(State.RUNNING_CC)
-        assert await reached is State.RUNNING_IDLE
-
-
 async def test_a_state_that_means_it_will_not_come_fails_with_its_error(waiters: StateWaiters) -> None:
     failing = {State.FAULT: lambda: GripperFaultError(Fault.ACTIVATION_FAULT)}
     with waiters.watching({State.RUNNING_IDLE}, failing) as reached:
@@ -69,12 +62,6 @@ async def test_a_shutdown_alone_does_not_tell_why_and_ends_no_wait(waiters: Stat
             await reached
 
 
-async def test_a_shutdown_may_be_what_is_waited_for(waiters: StateWaiters) -> None:
-    with waiters.watching({State.SHUTDOWN}, {}) as reached:
-        waiters.reached(State.SHUTDOWN)
-        assert await reached is State.SHUTDOWN
-
-
 async def test_a_failure_ends_every_wait_with_an_error_of_its_own(waiters: StateWaiters) -> None:
     with waiters.watching({State.RESET}, {}) as one, waiters.watching({State.FAULT}, {}) as other:
         waiters.fail(lost)
@@ -91,26 +78,12 @@ async def test_who_has_been_told_is_not_told_again(waiters: StateWaiters) -> Non
         assert await reached is State.RESET
 
 
-async def test_several_callers_may_wait_for_the_same_state(waiters: StateWaiters) -> None:
-    with waiters.watching({State.RESET}, {}) as one, waiters.watching({State.RESET}, {}) as other:
-        waiters.reached(State.RESET)
-        assert await asyncio.gather(one, other) == [State.RESET, State.RESET]
-
-
 async def test_two_callers_with_the_same_wish_leave_one_by_one(waiters: StateWaiters) -> None:
     with waiters.watching({State.RESET}, {}) as stays:
         with waiters.watching({State.RESET}, {}):
             pass
         waiters.reached(State.RESET)
         assert await stays is State.RESET
-
-
-async def test_who_has_left_is_not_told_any_more(waiters: StateWaiters) -> None:
-    with waiters.watching({State.RESET}, {}) as reached:
-        pass
-    waiters.reached(State.RESET)
-    waiters.fail(lost)
-    assert not reached.done()
 
 
 async def test_who_leaves_with_an_error_is_not_told_any_more(waiters: StateWaiters) -> None:
@@ -136,15 +109,3 @@ async def test_an_error_nobody_fetches_is_not_complained_about(waiters: StateWai
         waiters.fail(lost)
     gc.collect()
     assert not complaints
-
-
-async def test_the_watch_begins_before_anything_is_asked(waiters: StateWaiters) -> None:
-    """A state that is reached inside the block, before the first await, counts."""
-    with waiters.watching({State.DO_RESET}, {}) as reached:
-        waiters.reached(State.DO_RESET)
-        assert reached.done()
-
-
-async def test_nobody_waiting_is_no_problem(waiters: StateWaiters) -> None:
-    waiters.reached(State.RESET)
-    waiters.fail(lost)

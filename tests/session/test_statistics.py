@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -13,22 +12,8 @@ from robotiq_async.values.statistics import Statistics
 
 
 def test_before_the_first_poll_every_figure_is_zero() -> None:
-    assert Counters().snapshot(0) == Statistics(
-        polls=0,
-        writes=0,
-        overruns=0,
-        period_p50=0.0,
-        period_p99=0.0,
-        round_trip_p50=0.0,
-        round_trip_p99=0.0,
-        longest_stall=0.0,
-        reconnects=0,
-        foreign_commands=0,
-        tick="",
-        faults=0,
-        moves={},
-        passing_faults=0,
-    )
+    numbers = {field.name: 0 for field in dataclasses.fields(Statistics)}
+    assert Counters().snapshot(0) == Statistics(**numbers | {"tick": "", "moves": {}})  # type: ignore[arg-type]
 
 
 def test_a_snapshot_tells_each_counter_under_its_own_name() -> None:
@@ -70,14 +55,6 @@ def test_percentiles_do_not_depend_on_the_order_of_what_was_measured() -> None:
     assert figures.period_p99 == figures.round_trip_p99 == 0.99
 
 
-def test_one_outlier_does_not_move_the_median_and_is_in_the_99th_percentile_only_when_frequent() -> None:
-    counters = Counters()
-    counters.periods.extend([0.005] * 999 + [1.0])
-    assert (counters.snapshot(0).period_p50, counters.snapshot(0).period_p99) == (0.005, 0.005)
-    counters.periods.extend([1.0] * 20)
-    assert (counters.snapshot(0).period_p50, counters.snapshot(0).period_p99) == (0.005, 1.0)
-
-
 @given(st.lists(st.floats(0, 10), min_size=1, max_size=300))
 def test_percentiles_are_measured_values_in_order(values: list[float]) -> None:
     counters = Counters()
@@ -99,17 +76,10 @@ def test_only_the_last_samples_count() -> None:
     assert len(counters.periods) == len(counters.round_trips) == SAMPLES
 
 
-def test_a_snapshot_is_frozen_and_does_not_change_with_what_is_counted_later() -> None:
+def test_a_snapshot_does_not_change_with_what_is_counted_later() -> None:
     counters = Counters()
     counters.polls = 5
     figures = counters.snapshot(0)
     counters.polls = 6
     counters.periods.append(1.0)
     assert (figures.polls, figures.period_p50) == (5, 0.0)
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        figures.polls = 7  # type: ignore[misc]
-
-
-def test_a_misspelled_counter_is_an_error() -> None:
-    with pytest.raises(AttributeError):
-        Counters().pols = 1  # type: ignore[attr-defined]
