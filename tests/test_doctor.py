@@ -31,8 +31,7 @@ from robotiq_async.values.request import AxisRequest, Request
 from tests.serial_line import SerialLine
 from tests.virtual import run
 
-virtual_time = pytest.mark.virtual_time
-"""For all but names and serial lines: two seconds pass in which somebody is watched for."""
+pytestmark = pytest.mark.virtual_time  # names and serial lines run loops of their own, in real time
 REACHED = ["name", "port", "Modbus", "unit id", "registers", "round trip", "rate"]
 HEALTHY = [*REACHED, "model", "activation", "fault"]
 
@@ -43,6 +42,14 @@ async def findings(address: str, *, seconds: float = 30.0, **options: Any) -> di
         await examine(parse_address(address), told.append, **options)
     assert all(finding.advice for finding in told if finding.level is not Level.GOOD)
     return {finding.what: finding for finding in told}
+
+
+async def helps(address: str, **options: Any) -> None:
+    """A hand starts with the options that were advised."""
+    async with asyncio.timeout(30):
+        hand = RobotiqHand(address, **options)
+        await hand.start(activate=False)
+        await hand.stop(halt=False)
 
 
 class Device(asyncio.Protocol):
@@ -78,7 +85,6 @@ def registers_in(request: bytes, block: bytes) -> bytes:
     return reply(request, bytes((request[7], size)) + block[:size])
 
 
-@virtual_time
 async def test_a_healthy_connection() -> None:
     gripper = SimulatedGripper()
     async with SimulatorServer(gripper) as server:
@@ -90,23 +96,24 @@ async def test_a_healthy_connection() -> None:
     assert "none seen" in found["other clients"].found
 
 
-@virtual_time
-async def test_a_simulated_one_too() -> None:
-    found = await findings("sim://")
+@pytest.mark.parametrize(
+    ("address", "model"),
+    [
+        ("sim://", "a 3-Finger"),
+        (
+            "sim://?model=hand-e",
+            "a 2F-85 or a 2F-140 or a Hand-E; the registers do not say which: taken as a Hand-E",
+        ),
+    ],
+)
+async def test_a_simulated_one_too(address: str, model: str) -> None:
+    found = await findings(address)
     assert list(found) == [*HEALTHY[2:], "other clients"]
-    assert found["model"].found == "a 3-Finger"
+    assert found["model"].found == model
 
 
-@virtual_time
-async def test_of_a_jaw_it_is_said_that_the_models_look_alike() -> None:
-    found = await findings("sim://?model=hand-e")
-    assert found["model"].found == (
-        "a 2F-85 or a 2F-140 or a Hand-E; the registers do not say which: taken as a Hand-E"
-    )
-
-
-async def test_a_name_that_does_not_exist() -> None:
-    found = await findings("nowhere.invalid")
+def test_a_name_that_does_not_exist() -> None:
+    found = asyncio.run(findings("nowhere.invalid"))
     assert list(found) == ["name"]
     assert found["name"].level is Level.BAD
 
@@ -121,18 +128,19 @@ def test_a_resolver_that_does_not_answer_does_not_keep_it(monkeypatch: pytest.Mo
     answer.set()
 
 
-async def test_a_name_of_several_addresses(monkeypatch: pytest.MonkeyPatch) -> None:
-    async with SimulatorServer() as server:
-        hosts = [
-            (socket.AF_INET, socket.SOCK_STREAM, 6, "", (host, 0)) for host in ("127.0.0.2", "127.0.0.1")
-        ]
-        monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: hosts)
-        found = await findings(f"gripper.example:{server.port}")
+def test_a_name_of_several_addresses(monkeypatch: pytest.MonkeyPatch) -> None:
+    hosts = [(socket.AF_INET, socket.SOCK_STREAM, 6, "", (host, 0)) for host in ("127.0.0.2", "127.0.0.1")]
+
+    async def look() -> dict[str, Finding]:
+        async with SimulatorServer() as server:
+            monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: hosts)
+            return await findings(f"gripper.example:{server.port}")
+
+    found = asyncio.run(look())
     assert found["name"].found == "gripper.example is 127.0.0.2, 127.0.0.1"
     assert found["other clients"].level is Level.GOOD
 
 
-@virtual_time
 async def test_nobody_listens() -> None:
     async with SimulatorServer() as server:
         address = server.address
@@ -141,7 +149,6 @@ async def test_nobody_listens() -> None:
     assert "right address and port" in found["port"].advice
 
 
-@virtual_time
 async def test_somebody_who_speaks_no_modbus() -> None:
     async with answering(lambda _: b"HTTP/1.1 400 Bad Request\r\n\r\n") as address:
         found = await findings(address)
@@ -149,18 +156,20 @@ async def test_somebody_who_speaks_no_modbus() -> None:
     assert "not this gripper" in found["Modbus"].advice
 
 
-@virtual_time
+def other_unit(request: bytes, unit: int) -> bytes:
+    if request[6] != unit:
+        return reply(request, bytes((request[7] | 0x80, 11)))
+    return registers_in(request, bytes(16))
+
+
 async def test_another_unit_id() -> None:
     async with answering(lambda request: other_unit(request, 9)) as address:
         found = await findings(address)
     assert found["unit id"].level is Level.DOUBT
     assert found["unit id"].advice == "Pass device_id=9, or --device-id 9."
-
-
-def other_unit(request: bytes, unit: int) -> bytes:
-    if request[6] != unit:
-        return reply(request, bytes((request[7] | 0x80, 11)))
-    return registers_in(request, bytes(16))
+    async with answering(lambda request: other_unit(request, 5)) as address:
+        assert (await findings(address))["Modbus"].level is Level.BAD, "not one of those that are tried"
+        assert (await findings(address, device_id=5))["unit id"].level is Level.GOOD
 
 
 def registers_at(function: int, address: bytes) -> Callable[[bytes], bytes]:
@@ -174,46 +183,29 @@ def registers_at(function: int, address: bytes) -> Callable[[bytes], bytes]:
     return answer
 
 
-@virtual_time
-async def test_registers_of_the_serial_kind_over_tcp() -> None:
-    async with answering(registers_at(4, b"\x07\xd0")) as address:
-        found = await findings(address)
-        hand = RobotiqHand(f"tcp://{address}", request_address=1000, status_address=2000)
-        await hand.start(activate=False)  # the advice helps
-        await hand.stop(halt=False)
-    assert found["registers"].level is Level.DOUBT
-    advice = "Pass request_address=1000, status_address=2000, or the options so called."
-    assert found["registers"].advice == advice
-
-
-@virtual_time
 @pytest.mark.parametrize(
     ("where", "options"),
     [
+        (b"\x07\xd0", {"request_address": 1000, "status_address": 2000}),
         (b"\x00\x00", {"read_function": 3}),
         (b"\x07\xd0", {"request_address": 1000, "status_address": 2000, "read_function": 3}),
     ],
 )
-async def test_firmware_that_reads_with_function_3_only(where: bytes, options: dict[str, int]) -> None:
-    async with answering(registers_at(3, where)) as address:
-        found = await findings(address)
-        hand = RobotiqHand(f"tcp://{address}", **options)  # type: ignore[arg-type]
-        await hand.start(activate=False)  # the advice helps
-        await hand.stop(halt=False)
-    assert found["registers"].level is Level.DOUBT
+async def test_registers_elsewhere(where: bytes, options: dict[str, int]) -> None:
+    async with answering(registers_at(options.get("read_function", 4), where)) as address:
+        found = (await findings(address))["registers"]
+        await helps(f"tcp://{address}", **options)
+    assert found.level is Level.DOUBT
     words = ", ".join(f"{name}={value}" for name, value in options.items())
-    assert found["registers"].advice.startswith(f"Pass {words}, or the options so called.")
-    assert "may be the requests" in found["registers"].advice
+    assert found.advice.startswith(f"Pass {words}, or the options so called.")
+    assert ("may be the requests" in found.advice) is ("read_function" in options)
 
 
-@virtual_time
 async def test_a_gateway_that_is_slower_than_was_waited_for() -> None:
     async with SimulatorServer() as server:
         server.policy = lambda frame: [(1.3, frame)]
         found = await findings(server.address, seconds=60)
-        hand = RobotiqHand(server.address, response_timeout=2.6)
-        await hand.start(activate=False)  # the advice helps
-        await hand.stop(halt=False)
+        await helps(server.address, response_timeout=2.6)
     assert found["Modbus"].level is Level.DOUBT
     assert re.search(r"response_timeout=2\.[67];", found["Modbus"].advice)
 
@@ -221,7 +213,6 @@ async def test_a_gateway_that_is_slower_than_was_waited_for() -> None:
 # -- serial lines ------------------------------------------------------------------------------------------
 
 
-@virtual_time
 async def test_a_serial_server() -> None:
     async with RtuOverTcpSimulatorServer() as server:
         found = await findings(server.address)
@@ -230,7 +221,6 @@ async def test_a_serial_server() -> None:
     assert found["unit id"].found == "9"
 
 
-@virtual_time
 async def test_the_other_kind_of_frames() -> None:
     async with RtuOverTcpSimulatorServer() as server:
         found = await findings(server.address.removeprefix("rtu+"), seconds=60)
@@ -242,7 +232,6 @@ async def test_the_other_kind_of_frames() -> None:
         assert f"write the address as {tcp.address}" in found["Modbus"].advice
 
 
-@virtual_time
 async def test_a_line_that_loses_bytes() -> None:
     async with RtuOverTcpSimulatorServer() as server:
         damage = Trouble("wrong-checksum", every=0.5, at=0.1)
@@ -255,7 +244,7 @@ async def test_a_line_that_loses_bytes() -> None:
     assert "link" not in found
 
 
-@pytest.mark.parametrize(("kept", "level"), [(1, Level.GOOD), (2, Level.GOOD), (16, Level.DOUBT)])
+@pytest.mark.parametrize(("kept", "level"), [(2, Level.GOOD), (3, Level.DOUBT)])
 def test_how_long_an_adapter_keeps_what_it_hears(kept: int, level: Level, tmp_path: Path) -> None:
     (tmp_path / "ttyUSB7").mkdir()
     (tmp_path / "ttyUSB7" / "latency_timer").write_text(f"{kept}\n", encoding="ascii")
@@ -265,15 +254,10 @@ def test_how_long_an_adapter_keeps_what_it_hears(kept: int, level: Level, tmp_pa
     assert finding.level is level
     assert f"{kept} ms" in finding.found
     assert (f"tee {tmp_path}/ttyUSB7/latency_timer" in finding.advice) is (level is Level.DOUBT)
-
-
-def test_a_port_without_an_adapter(tmp_path: Path) -> None:
-    told: list[Finding] = []
     report_adapter(parse_address("rtu:///dev/ttyS0"), told.append, tmp_path)
-    assert not told
+    assert told == [finding], "a port without an adapter"
 
 
-@virtual_time
 @pytest.mark.parametrize("words", ["drop", "wrong-function"])
 async def test_one_lost_reply_does_not_make_it_another_unit(words: str) -> None:
     async with SimulatorServer() as server, server.fault_injector.making(Trouble(words)):
@@ -282,7 +266,6 @@ async def test_one_lost_reply_does_not_make_it_another_unit(words: str) -> None:
     assert found["Modbus"].found == "answers when asked 2 times"
 
 
-@virtual_time
 @pytest.mark.parametrize(("byte", "level"), [(b"\0", Level.DOUBT), (b"\xff", Level.BAD)])
 async def test_a_device_that_is_no_gripper(byte: bytes, level: Level) -> None:
     async with answering(lambda request: registers_in(request, 16 * byte)) as address:
@@ -290,8 +273,7 @@ async def test_a_device_that_is_no_gripper(byte: bytes, level: Level) -> None:
     assert found["gripper"].level is level
 
 
-@virtual_time
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("changes", [True, False])
 async def test_the_memory_of_another_device_is_no_gripper(seed: int, changes: bool) -> None:
     memory = random.Random(seed)
@@ -308,7 +290,6 @@ async def test_the_memory_of_another_device_is_no_gripper(seed: int, changes: bo
     assert "Command nothing" in found["gripper"].advice
 
 
-@virtual_time
 async def test_a_gripper_beside_other_memory_is_found() -> None:
     """A gateway with registers of its own at 0, and those of the gripper at 2000."""
 
@@ -322,34 +303,21 @@ async def test_a_gripper_beside_other_memory_is_found() -> None:
 
 
 class Gateway:
-    """Serves one client at a time: others wait, or it hangs up. It sees late that one has gone."""
+    """Serves one client at a time: others wait, or it hangs up. It sees after 0.2 s that one has gone."""
 
-    def __init__(self, *, waits: bool, lag: float = 0.2, busy: float = 0.0) -> None:
-        self._waits = waits
-        self._lag = lag
-        self._loop = asyncio.get_running_loop()
-        self._client: object = None
-        if busy:
-            self._client = self
-            self._loop.call_later(busy, self._let_go, self)
+    def __init__(self, *, waits: bool, busy: float = 0.0) -> None:
+        self.waits = waits
+        self.client: object = self if busy else None
+        asyncio.get_running_loop().call_later(busy, self.let_go, self)
 
-    def come(self, client: object) -> bool:
-        """Whether a client is served."""
-        if self._client is not None:
-            return False
-        self._client = client
-        return True
-
-    def go(self, client: object) -> None:
-        self._loop.call_later(self._lag, self._let_go, client)
-
-    def _let_go(self, client: object) -> None:
-        if self._client is client:
-            self._client = None
+    def let_go(self, client: object) -> None:
+        if self.client is client:
+            self.client = None
 
     @contextlib.asynccontextmanager
     async def serving(self) -> AsyncIterator[str]:
-        server = await self._loop.create_server(lambda: _Client(self, self._waits), "127.0.0.1", 0)
+        loop = asyncio.get_running_loop()
+        server = await loop.create_server(lambda: _Client(self), "127.0.0.1", 0)
         try:
             yield f"127.0.0.1:{server.sockets[0].getsockname()[1]}"
         finally:
@@ -357,47 +325,38 @@ class Gateway:
 
 
 class _Client(Device):
-    def __init__(self, gateway: Gateway, waits: bool) -> None:
+    def __init__(self, gateway: Gateway) -> None:
         super().__init__(lambda request: registers_in(request, bytes(16)))
         self._gateway = gateway
-        self._waits = waits
-        self._is_served = False
 
     def connection_made(self, transport: Any) -> None:
         super().connection_made(transport)
-        self._is_served = self._gateway.come(self)
-        if not self._is_served and not self._waits:
+        if self._gateway.client is None:
+            self._gateway.client = self
+        elif not self._gateway.waits:
             transport.close()
 
     def data_received(self, data: bytes) -> None:
-        if self._is_served:
+        if self._gateway.client is self:
             super().data_received(data)
 
     def connection_lost(self, _reason: object) -> None:
-        if self._is_served:
-            self._gateway.go(self)
+        asyncio.get_running_loop().call_later(0.2, self._gateway.let_go, self)
 
 
-@virtual_time
 @pytest.mark.parametrize("waits", [True, False])
-async def test_a_gateway_for_one_client_is_no_bad_cable(waits: bool) -> None:
+async def test_a_gateway_for_one_client_is_no_bad_cable_unless_another_client_has_it(waits: bool) -> None:
     """The examination itself is one client."""
     async with Gateway(waits=waits).serving() as address:
         found = await findings(address)
     assert found["Modbus"] == Finding(Level.GOOD, "Modbus", "answers")
     assert found["port"].level is Level.GOOD
-
-
-@virtual_time
-@pytest.mark.parametrize("waits", [True, False])
-async def test_a_wait_for_another_client_is_told(waits: bool) -> None:
     async with Gateway(waits=waits, busy=0.4).serving() as address:
         found = await findings(address)
     assert found["Modbus"].level is Level.DOUBT
     assert "one client at a time" in found["Modbus"].advice
 
 
-@virtual_time
 async def test_slow_replies_are_no_lost_ones() -> None:
     async with SimulatorServer() as server:
         server.policy = lambda frame: [(0.6, frame)]
@@ -412,14 +371,11 @@ async def test_slow_replies_are_no_lost_ones() -> None:
     assert "link" not in found
 
 
-@virtual_time
 async def test_replies_that_take_a_longer_timeout() -> None:
     async with SimulatorServer() as server:
         server.policy = lambda frame: [(0.45, frame)]
         found = await findings(server.address)
-        hand = RobotiqHand(server.address, response_timeout=1.0)
-        await hand.start(activate=False)  # the advice helps
-        await hand.stop(halt=False)
+        await helps(server.address, response_timeout=1.0)
     assert found["Modbus"].level is Level.GOOD
     assert found["round trip"].advice.startswith("Pass response_timeout=")
 
@@ -430,7 +386,6 @@ def test_an_extra_that_is_missing_is_no_question_of_cables() -> None:
     ) == ("Install that, and look again.")
 
 
-@virtual_time
 async def test_a_slow_gripper() -> None:
     async with SimulatorServer() as server:
         server.policy = lambda frame: [(0.02, frame)]
@@ -440,7 +395,6 @@ async def test_a_slow_gripper() -> None:
     assert "poll_interval=0.03" in found["rate"].advice
 
 
-@virtual_time
 @pytest.mark.parametrize(
     ("code", "level", "words"),
     [(7, Level.GOOD, "a hint"), (9, Level.DOUBT, "clear on its own"), (13, Level.BAD, "DROPS")],
@@ -455,7 +409,6 @@ async def test_a_fault(code: int, level: Level, words: str) -> None:
     assert f"0x{code:02X}" in found["fault"].found
 
 
-@virtual_time
 async def test_another_client() -> None:
     gripper = SimulatedGripper()
 
@@ -473,7 +426,6 @@ async def test_another_client() -> None:
     assert "stop one" in found["other clients"].advice
 
 
-@virtual_time
 async def test_a_link_that_is_lost_in_the_middle() -> None:
     async with SimulatorServer() as server:
 
@@ -486,20 +438,16 @@ async def test_a_link_that_is_lost_in_the_middle() -> None:
     assert found["link"].level is Level.BAD
 
 
-async def test_a_serial_line(tmp_path: Any) -> None:
-    with SerialLine(tmp_path) as line:
-        async with SerialSimulatorServer(line.far):
-            found = await findings(f"rtu://{line.near}")
+def test_a_serial_line(tmp_path: Path) -> None:
+    async def look() -> dict[str, Finding]:
+        with SerialLine(tmp_path) as line:
+            async with SerialSimulatorServer(line.far):
+                return await findings(f"rtu://{line.near}")
+
+    found = asyncio.run(look())
     assert list(found) == [*HEALTHY[2:], "other clients"]
     assert found["unit id"].found == "9"
-    found = await findings(f"rtu://{tmp_path}/nothing")
+    found = asyncio.run(findings(f"rtu://{tmp_path}/nothing"))
     assert found["open"].level is Level.BAD
     assert "there is no such device" in found["open"].found
     assert "ls -l" in found["open"].advice
-
-
-@virtual_time
-async def test_the_unit_id_can_be_said() -> None:
-    async with answering(lambda request: other_unit(request, 5)) as address:
-        assert (await findings(address))["Modbus"].level is Level.BAD
-        assert (await findings(address, device_id=5))["unit id"].level is Level.GOOD

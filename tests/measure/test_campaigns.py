@@ -29,7 +29,7 @@ from robotiq_async.tools.measure.campaigns import (
 from robotiq_async.values.calibration.closing_time import closing_time
 from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, TableError, read_table, thesis_table
 from robotiq_async.values.errors import MeasuringError
-from tests.virtual import VirtualLoop, run
+from tests.virtual import VirtualLoop, virtual
 
 POLL_S = 0.005
 
@@ -44,12 +44,9 @@ async def active(speedup: float = 1.0) -> AsyncIterator[tuple[SimulatedGripper, 
 # -- the order -------------------------------------------------------------------------------------------
 
 
-def test_speeds_are_every_fourth_and_255_slowest_first() -> None:
+def test_the_values_are_those_of_the_thesis_in_its_order() -> None:
     assert speed_values() == sorted(thesis_table("closing_time_ms", SPEED))
     assert speed_values(100) == [0, 100, 200, 255]
-
-
-def test_forces_go_up_by_50_and_down_by_50() -> None:
     assert force_values() == [0, 50, 100, 150, 200, 250, 225, 175, 125, 75, 25]
     assert sorted(force_values()) == sorted(thesis_table("force_foam_grams", FORCE))
 
@@ -57,48 +54,38 @@ def test_forces_go_up_by_50_and_down_by_50() -> None:
 # -- speed -------------------------------------------------------------------------------------------------
 
 
+@virtual
 @pytest.mark.parametrize("speedup", [1.0, 10.0])
-def test_closing_times_are_those_of_the_thesis(speedup: float) -> None:
-    async def main() -> None:
-        async with active(speedup) as (_, hand):
-            for speed in (0, 30, 60, 128, 200, 255):
-                seconds = await time_closing(hand, speed, Finger.ABC, speedup)
-                expected = closing_time(speed)
-                assert expected <= seconds <= 1.01 * expected + 2 * POLL_S * speedup
-
-    run(main)
+async def test_closing_times_are_those_of_the_thesis(speedup: float) -> None:
+    async with active(speedup) as (_, hand):
+        for speed in (0, 30, 60, 128, 200, 255):
+            seconds = await time_closing(hand, speed, Finger.ABC, speedup)
+            expected = closing_time(speed)
+            assert expected <= seconds <= 1.01 * expected + 2 * POLL_S * speedup
 
 
-def test_a_finger_that_meets_something_is_no_closing_time() -> None:
-    async def main() -> None:
-        async with active() as (gripper, hand):
-            gripper.place_object(Finger.B, 150)
-            with pytest.raises(MeasuringError, match=r"met something \(.*B"):
-                await time_closing(hand, 255, Finger.ABC)
-
-    run(main)
-
-
-def test_an_opening_that_is_blocked_is_no_full_closing() -> None:
-    async def main() -> None:
-        async with active() as (gripper, hand):
-            await hand.close(speed=255)
-            gripper.place_object(Finger.ABC, 150, opening=True)
-            with pytest.raises(MeasuringError, match="met something"):
-                await time_closing(hand, 255, Finger.ABC)
-            with pytest.raises(MeasuringError, match="in the way of opening"):
-                await grasp(hand, 200, 255)
-
-    run(main)
+@virtual
+async def test_only_the_fingers_asked_for_move_and_one_that_meets_something_is_refused() -> None:
+    async with active() as (gripper, hand):
+        with pytest.raises(ValueError, match="got the scissor"):
+            await time_closing(hand, 255, Finger.ALL)
+        before = gripper.travel(Finger.A)
+        await time_closing(hand, 255, Finger.B)
+        assert gripper.travel(Finger.A) == before
+        gripper.place_object(Finger.B, 150)
+        with pytest.raises(MeasuringError, match=r"met something \(.*B"):
+            await time_closing(hand, 255, Finger.ABC)
 
 
-def test_the_scissor_is_refused() -> None:
-    async def main() -> None:
-        async with active() as (_, hand):
-            with pytest.raises(ValueError, match="got the scissor"):
-                await time_closing(hand, 255, Finger.ALL)
-
-    run(main)
+@virtual
+async def test_an_opening_that_is_blocked_is_no_full_closing() -> None:
+    async with active() as (gripper, hand):
+        await hand.close(speed=255)
+        gripper.place_object(Finger.ABC, 150, opening=True)
+        with pytest.raises(MeasuringError, match="met something"):
+            await time_closing(hand, 255, Finger.ABC)
+        with pytest.raises(MeasuringError, match="in the way of opening"):
+            await grasp(hand, 200, 255)
 
 
 def hold_up_after(seconds: float, times: int) -> None:
@@ -115,65 +102,42 @@ def hold_up_after(seconds: float, times: int) -> None:
     loop.call_later(seconds, hold_up, times)
 
 
-def test_a_run_in_which_the_loop_was_held_up_is_measured_again() -> None:
-    async def main() -> None:
-        async with active() as (_, hand):
-            hold_up_after(1.0, 1)
-            began = asyncio.get_running_loop().time()
-            seconds = await time_closing(hand, 255, Finger.ABC)
-            assert seconds == pytest.approx(closing_time(255), rel=0.02)
-            assert asyncio.get_running_loop().time() - began > 2 * closing_time(255)
-
-    run(main)
+@virtual
+async def test_a_run_in_which_the_loop_was_held_up_is_measured_again() -> None:
+    async with active() as (_, hand):
+        hold_up_after(1.0, 1)
+        began = asyncio.get_running_loop().time()
+        seconds = await time_closing(hand, 255, Finger.ABC)
+        assert seconds == pytest.approx(closing_time(255), rel=0.02)
+        assert asyncio.get_running_loop().time() - began > 2 * closing_time(255)
 
 
-def test_a_loop_that_is_held_up_all_the_time_is_no_place_to_measure() -> None:
-    async def main() -> None:
-        async with active() as (_, hand):
-            hold_up_after(1.0, 100)
-            with pytest.raises(MeasuringError, match="too busy to measure"):
-                await time_closing(hand, 255, Finger.ABC)
-
-    run(main)
-
-
-def test_only_the_fingers_asked_for_move() -> None:
-    async def main() -> None:
-        async with active() as (gripper, hand):
-            before = gripper.travel(Finger.A)
-            await time_closing(hand, 255, Finger.B)
-            assert gripper.travel(Finger.A) == before
-
-    run(main)
+@virtual
+async def test_a_loop_that_is_held_up_all_the_time_is_no_place_to_measure() -> None:
+    async with active() as (_, hand):
+        hold_up_after(1.0, 100)
+        with pytest.raises(MeasuringError, match="too busy to measure"):
+            await time_closing(hand, 255, Finger.ABC)
 
 
 # -- force -------------------------------------------------------------------------------------------------
 
 
-def test_the_currents_of_a_grasp() -> None:
-    async def main() -> None:
-        async with active() as (gripper, hand):
-            gripper.place_object(Finger.ABC, 150)
-            samples = await grasp(hand, 200, 255)
-            times = [sample[0] for sample in samples]
-            assert times == sorted(times)
-            assert times[0] < 50
-            moving = 1000 * closing_time(255) * (150 - 6) / 235
-            assert times[-1] == pytest.approx(moving + 1000 * (PRESSING + GRASP_S), abs=50)
-            assert len(samples) == pytest.approx(times[-1] / 1000 / POLL_S, rel=0.02)  # every poll
-            assert peak_currents([samples]) == (10 * round(peak(200)),) * 3
-            assert samples[-1][1:] == (0, 0, 0), "what is held draws nothing"
-
-    run(main)
-
-
-def test_a_grasp_of_nothing_is_refused() -> None:
-    async def main() -> None:
-        async with active() as (_, hand):
-            with pytest.raises(MeasuringError, match="closed on nothing"):
-                await grasp(hand, 200, 255)
-
-    run(main)
+@virtual
+async def test_the_currents_of_a_grasp() -> None:
+    async with active() as (gripper, hand):
+        with pytest.raises(MeasuringError, match="closed on nothing"):
+            await grasp(hand, 200, 255)
+        gripper.place_object(Finger.ABC, 150)
+        samples = await grasp(hand, 200, 255)
+        times = [sample[0] for sample in samples]
+        assert times == sorted(times)
+        assert times[0] < 50
+        moving = 1000 * closing_time(255) * (150 - 6) / 235
+        assert times[-1] == pytest.approx(moving + 1000 * (PRESSING + GRASP_S), abs=50)
+        assert len(samples) == pytest.approx(times[-1] / 1000 / POLL_S, rel=0.02)  # every poll
+        assert peak_currents([samples]) == (10 * round(peak(200)),) * 3
+        assert samples[-1][1:] == (0, 0, 0), "what is held draws nothing"
 
 
 def test_the_currents_survive_a_file(tmp_path: Path) -> None:
@@ -234,29 +198,19 @@ async def test_an_interrupted_campaign_goes_on_where_it_was(tmp_path: Path) -> N
     assert speed_campaign(file, step=85, runs=2).left == []
 
 
-async def test_other_runs_than_those_in_the_file_are_refused(tmp_path: Path) -> None:
-    file = tmp_path / "table.csv"
+async def test_what_does_not_fit_the_table_is_refused_and_not_written(tmp_path: Path) -> None:
+    file, reading = tmp_path / "table.csv", 100_001
 
     async def measure(value: int, number: int) -> int:
-        return 5
-
-    await force_campaign(file, step=250, runs=2).measure(measure)
-    with pytest.raises(TableError, match="has 2 runs instead of 3"):
-        force_campaign(file, step=250, runs=3)
-
-
-async def test_a_reading_beyond_the_layout_is_refused_and_not_written(tmp_path: Path) -> None:
-    file = tmp_path / "table.csv"
-
-    async def measure(value: int, number: int) -> int:
-        return 100_001
+        return reading
 
     with pytest.raises(TableError, match="a reading of 100001 is beyond"):
         await Campaign(file, FORCE, [0], 1).measure(measure)
     assert not file.exists()
-
-
-def test_a_folder_that_is_not_there_is_refused_before_anything_moves(tmp_path: Path) -> None:
+    reading = 5
+    await force_campaign(file, step=250, runs=2).measure(measure)
+    with pytest.raises(TableError, match="has 2 runs instead of 3"):
+        force_campaign(file, step=250, runs=3)
     with pytest.raises(TableError, match="there is no folder"):
         speed_campaign(tmp_path / "nowhere" / "table.csv")
 
@@ -278,8 +232,5 @@ def test_the_same_seed_the_same_readings() -> None:
     one, two, other = SimulatedScale("foam", 1), SimulatedScale("foam", 1), SimulatedScale("foam", 2)
     readings = [[scale.reading(force) for force in range(256)] for scale in (one, two, other)]
     assert readings[0] == readings[1] != readings[2]
-
-
-def test_another_surface_is_refused() -> None:
     with pytest.raises(ValueError, match="surface must be 'foam' or 'rigid'"):
         SimulatedScale("wood")  # type: ignore[arg-type]
