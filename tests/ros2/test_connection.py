@@ -19,6 +19,7 @@ from robotiq_async.runtime.clock import now
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.fake_hand import FakeHand
 from tests.fleet.lab import lab
+from tests.grippers import activate_beforehand
 from tests.virtual import LATENCY_S
 
 pytestmark = pytest.mark.virtual_time
@@ -109,6 +110,17 @@ async def test_a_node_that_was_never_active_leaves_the_fingers_alone(
         with pytest.raises(RefusedError, match="the connection has been closed"):
             await again()
     assert not inactive.takes_commands
+
+
+async def test_a_node_that_was_never_active_does_not_halt_what_another_client_has_activated(
+    server: SimulatorServer, gripper: SimulatedGripper
+) -> None:
+    await activate_beforehand(gripper)
+    writes = len(gripper.writes)
+    connection = Connection(RobotiqHand(server.address), SETTINGS)
+    await connection.open()
+    await connection.close("the end")
+    assert len(gripper.writes) == writes
 
 
 async def test_any_hand_will_do() -> None:

@@ -69,16 +69,10 @@ def choices(mark: pytest.Mark) -> list[dict[str, Any]]:
     names, values = mark.args[:2]
     names = [each.strip() for each in names.split(",")] if isinstance(names, str) else list(names)
     values = [getattr(each, "values", each) if hasattr(each, "marks") else each for each in values]
-    return [
-        dict(
-            zip(
-                names,
-                each if len(names) > 1 or isinstance(each, pytest.ParameterSet) else (each,),
-                strict=True,
-            )
-        )
-        for each in values
+    several = [
+        each if len(names) > 1 or isinstance(each, pytest.ParameterSet) else (each,) for each in values
     ]
+    return [dict(zip(names, each, strict=True)) for each in several]
 
 
 @pytest.mark.parametrize(("trouble", "option"), ROWS)

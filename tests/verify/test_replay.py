@@ -40,33 +40,21 @@ async def record(
         assert not await into.end(report)
 
 
-@pytest.fixture(scope="module")
-def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("plain")
-    run(lambda: record(folder))
-    return folder / NAME
+def recording(**options: Any) -> Any:
+    """A fixture: a recording that is made once."""
+
+    @pytest.fixture(scope="module")
+    def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+        folder = tmp_path_factory.mktemp("recording")
+        run(lambda: record(folder, **options))
+        return folder / NAME
+
+    return made
 
 
-@pytest.fixture(scope="module")
-def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Up to the activation."""
-    folder = tmp_path_factory.mktemp("short")
-    run(lambda: record(folder, last=3))
-    return folder / NAME
-
-
-@pytest.fixture(scope="module")
-def hardware_like(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("like hardware")
-    run(lambda: record(folder, like_hardware=True))
-    return folder / NAME
-
-
-@pytest.fixture(scope="module")
-def jaw(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("jaw")
-    run(lambda: record(folder, model=TWO_FINGER_85))
-    return folder / NAME
+plain, short = recording(), recording(last=3)
+"""To the last stage that is compared, and up to the activation."""
+hardware_like, jaw = recording(like_hardware=True), recording(model=TWO_FINGER_85)
 
 
 def test_a_recording_of_a_sibling_knows_its_model_and_differs_in_nothing(jaw: Path) -> None:
