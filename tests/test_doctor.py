@@ -355,6 +355,7 @@ async def test_a_gateway_for_one_client_is_no_bad_cable_unless_another_client_ha
         found = await findings(address)
     assert found["Modbus"].level is Level.DOUBT
     assert "one client at a time" in found["Modbus"].advice
+    assert ("It hung up first" in found["Modbus"].advice) is not waits
 
 
 async def test_slow_replies_are_no_lost_ones() -> None:

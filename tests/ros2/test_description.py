@@ -31,9 +31,10 @@ def test_a_prefix_stands_before_links_and_joints() -> None:
     assert robot_description("", "") == urdf()
     assert prefixed(URDF, "") == URDF
     text = prefixed(URDF, "left_").replace('"', "'")
+    expected = URDF
     for name in ("palm", "tip", "j", "i"):
-        text = text.replace(f"'left_{name}'", f"'{name}'")
-    assert text == URDF
+        expected = expected.replace(f"'{name}'", f"'left_{name}'")
+    assert text == expected
 
 
 def test_a_file_is_published_as_it_is_unless_it_is_no_urdf(tmp_path: Path) -> None:
