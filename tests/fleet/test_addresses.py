@@ -113,6 +113,11 @@ def test_what_is_no_key(key: str) -> None:
         GripperName.of_key(key)
 
 
+def test_different_grippers_have_different_marks() -> None:
+    names = [GripperName("lab", f"cell{host}", f"g{gripper}") for host in range(20) for gripper in range(50)]
+    assert len({name.mark for name in names}) == len(names)
+
+
 # -- route -------------------------------------------------------------------------------------------------
 
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async import State
-from robotiq_async.fleet.remote.mirror import AgentClock, Mirror
+from robotiq_async.fleet.remote.mirror import DRIFT, AgentClock, Mirror
 from robotiq_async.fleet.wire.status_message import StatusMessage
 from robotiq_async.fleet.wire.values import transition_fields
 from robotiq_async.session.streams import Channels
@@ -66,6 +66,15 @@ def event(index: int, source: State, target: State, at: float = 0.0) -> dict[str
 
 
 # -- statuses ----------------------------------------------------------------------------------------------
+
+
+def test_statuses_in_their_order_and_none_twice() -> None:
+    here = Bench()
+    for sequence in (3, 4, 4, 5, 4, 9):
+        here.receive(10.0 + sequence / 100, sequence)
+    assert here.sequences() == [3, 4, 5, 9]
+    assert here.mirror.status is not None
+    assert here.mirror.status.sequence == 9
 
 
 def test_an_answer_that_overtakes_takes_no_reader_s_status_away() -> None:
@@ -257,6 +266,18 @@ def test_the_guess_is_the_fastest_message() -> None:
     for stamp, delay in ((0.0, 0.5), (0.01, 0.1), (0.02, 0.001), (0.03, 0.4)):
         clock.receive(stamp, stamp + AHEAD + delay)
     assert clock(7.0) == pytest.approx(7.0 + AHEAD + 0.001, abs=1e-4)
+
+
+def test_it_follows_clocks_that_part_and_no_faster() -> None:
+    clock = AgentClock()
+    for second in range(1001):
+        arrival = second * (1 + DRIFT / 2) + AHEAD
+        clock.receive(float(second), arrival)
+        assert clock(float(second)) == pytest.approx(arrival, abs=1e-6)
+    slow = AgentClock()
+    slow.receive(0.0, AHEAD)
+    slow.receive(100.0, AHEAD + 105.0)  # congestion
+    assert slow(100.0) == pytest.approx(AHEAD + 100.0 + 105.0 * DRIFT)
 
 
 @given(

@@ -47,7 +47,7 @@ async def next_agent(here: World) -> int:
     return len(here.gripper.writes)
 
 
-@pytest.mark.parametrize("motion", [*MOTIONS, "command"])
+@pytest.mark.parametrize("motion", [*MOTIONS, "command", "many commands"])
 @virtual
 async def test_an_agent_that_was_started_anew_moves_with_what_was_asked_of_the_former(motion: str) -> None:
     """Speed 10 and force 5 were asked for; after a restart it moved with 128 and 64."""
@@ -56,10 +56,12 @@ async def test_an_agent_that_was_started_anew_moves_with_what_was_asked_of_the_f
         await here.holder.do(hand.set_speed(10, ALL))
         await here.holder.do(hand.set_force(5, ALL))
         since = await next_agent(here)
-        if motion == "command":
+        if "command" in motion:
 
             async def command() -> None:
-                hand.command(A, position=30)
+                for position in range(30, 31 if motion == "command" else 50):
+                    hand.command(A, position=position)
+                    await asyncio.sleep(0.005)
 
             await here.holder.do(command())
             await asyncio.sleep(0.5)
