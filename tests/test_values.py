@@ -49,8 +49,7 @@ from robotiq_async.fleet.control.lease import Holder
 from robotiq_async.fleet.keys.access import AccessList
 from robotiq_async.fleet.keys.credentials import Credentials
 from robotiq_async.fleet.network.endpoints import Endpoint
-from robotiq_async.link.address import parse_address
-from robotiq_async.link.simulation import Simulation
+from robotiq_async.link.address import Simulation, parse_address
 from robotiq_async.session.counters import Counters
 from robotiq_async.simulator import Habits, Trouble
 from robotiq_async.tools.doctor import Finding, Level

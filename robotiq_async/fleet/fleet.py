@@ -13,7 +13,7 @@ from types import TracebackType
 from typing import Any, Final, Self
 
 from ..runtime.clock import now
-from ..runtime.event_loop import running_loop
+from ..runtime.concurrency import running_loop
 from ..session.listeners import Listeners
 from ..session.streams import Channel, Stream
 from ..values.enums import Fault, State

@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Final, Literal, Self, TypeVar
 
 from ..control.grip_watch import SLIP_COUNTS, GripWatch
-from ..runtime.event_loop import running_loop
+from ..runtime.concurrency import running_loop
 from ..runtime.log import Log
 from ..session.options import LONGEST_WAIT_S
 from ..session.state_waiters import check_states

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from ipaddress import IPv4Address, IPv6Address
 from typing import Final, Literal
 
+from ..values.checks import check_byte
 from ..values.model import Model, model_of
-from .simulation import NOTHING_SPECIAL, Simulation, parse_simulation
 
 TCP_PORT: Final = 502
 """The port of Modbus TCP, and the gripper's."""
@@ -22,6 +22,34 @@ FORMS: Final = (
     "zenoh://SITE/HOST/GRIPPER (on another host: for robotiq_async.fleet.RemoteHand and for commands); "
     "?model=2f85, 2f140 or hand-e at the end for a sibling of the 3-Finger"
 )
+
+SLOWEST: Final = 0.01
+FASTEST: Final = 1000.0
+"""Speedups of a simulated gripper; faster than that, whole motions pass between two polls."""
+SIMULATION_OPTIONS: Final = ("speedup", "object")
+
+
+@dataclass(frozen=True, slots=True)
+class Simulation:
+    """The options of a simulated gripper.
+
+    Attributes:
+        speedup: simulated seconds in one second of the clock, 0.01..1000.
+        object: position in counts, 0..255, at which the fingers A, B and C meet an object when they close;
+            None for no object.
+    """
+
+    speedup: float = 1.0
+    object: int | None = None
+
+    def __str__(self) -> str:
+        speedup = int(self.speedup) if self.speedup == int(self.speedup) else self.speedup
+        options = [f"speedup={speedup!r}"] if speedup != 1 else []
+        options += [] if self.object is None else [f"object={self.object}"]
+        return f"?{'&'.join(options)}" if options else ""
+
+
+NOTHING_SPECIAL: Final = Simulation()
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,3 +194,36 @@ def _ends_in_a_number(host: str) -> bool:
     They do not agree on all of them: 192.168.1.011 ends in 9 for one and in 11 for another.
     """
     return re.fullmatch(r"[0-9]+|0x[0-9a-f]*", host.removesuffix(".").rpartition(".")[2]) is not None
+
+
+def parse_simulation(query: str) -> Simulation:
+    """Parse the part after ``sim://``: nothing, or ``?OPTION=VALUE&...``.
+
+    Raises:
+        ValueError: an unknown option, one given twice, or a value outside its range.
+    """
+    given: dict[str, str] = {}
+    for part in query.removeprefix("?").split("&") if query else ():
+        name, separator, value = part.partition("=")
+        if name not in SIMULATION_OPTIONS:
+            raise ValueError(f"no option {name!r}; known are: {', '.join(SIMULATION_OPTIONS)}")
+        if not separator or name in given:
+            raise ValueError(f"{name} must be given once, as {name}=VALUE")
+        given[name] = value
+    return Simulation(
+        speedup=_speedup(given["speedup"]) if "speedup" in given else 1.0,
+        object=_object(given["object"]) if "object" in given else None,
+    )
+
+
+def _speedup(text: str) -> float:
+    is_number = re.fullmatch(r"[0-9]{1,9}(\.[0-9]{1,9})?", text)
+    if not is_number or not SLOWEST <= float(text) <= FASTEST:
+        raise ValueError(f"speedup must be a number in {SLOWEST:g}..{FASTEST:g}, got {text!r}")
+    return float(text)
+
+
+def _object(text: str) -> int:
+    if not re.fullmatch(r"[0-9]{1,9}", text):
+        raise ValueError(f"object must be an integer in 0..255, got {text!r}")
+    return check_byte("object", int(text))

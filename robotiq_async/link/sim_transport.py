@@ -9,9 +9,8 @@ from ..values.enums import Finger
 from ..values.errors import ConnectFailedError
 from ..values.model import THREE_FINGER, Model
 from ..values.registers import RegisterMap, Registers
-from .address import parse_address
+from .address import Simulation, parse_address
 from .modbus import ModbusTransport
-from .simulation import Simulation
 
 if TYPE_CHECKING:
     from ..simulator import SimulatedGripper

@@ -1,4 +1,4 @@
-"""Waiting for work that must finish, and threads for calls that may block."""
+"""Work that must finish, threads for calls that may block, and the event loop that a hand belongs to."""
 
 from __future__ import annotations
 
@@ -60,3 +60,39 @@ def in_a_thread(work: Callable[[], T]) -> asyncio.Future[T]:
 
     threading.Thread(target=run, name="robotiq_async", daemon=True).start()
     return future
+
+
+def running_loop() -> asyncio.AbstractEventLoop:
+    """The running asyncio event loop.
+
+    Raises:
+        RuntimeError: there is none: called outside of a coroutine, or under trio.
+    """
+    try:
+        return asyncio.get_running_loop()
+    except RuntimeError:
+        raise RuntimeError(
+            "robotiq_async needs a running asyncio event loop (asyncio or uvloop; trio is not supported)"
+        ) from None
+
+
+def check_loop(own: asyncio.AbstractEventLoop, what: str) -> None:
+    """Refuse a call that does not come from the loop a hand runs in.
+
+    Args:
+        own: the hand's loop.
+        what: was called, for the message.
+
+    Raises:
+        RuntimeError: called from another thread, another event loop or another framework.
+    """
+    try:
+        running: asyncio.AbstractEventLoop | None = asyncio.get_running_loop()
+    except RuntimeError:
+        running = None
+    if running is not own:
+        raise RuntimeError(
+            f"{what} was used outside of the event loop that the hand runs in, and nothing was asked of the "
+            "gripper; from another thread use loop.call_soon_threadsafe(hand.command, ...) or "
+            "asyncio.run_coroutine_threadsafe(hand.move(...), loop)"
+        )

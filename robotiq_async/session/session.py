@@ -12,8 +12,7 @@ from ..control.controller import Controller
 from ..control.state_machine import RUNNING, SEQUENCES, StateMachine
 from ..control.waiters import Waiter
 from ..runtime.clock import now
-from ..runtime.concurrency import wait_shielded
-from ..runtime.event_loop import check_loop
+from ..runtime.concurrency import check_loop, wait_shielded
 from ..values.enums import Fault, State
 from ..values.errors import (
     ActivationTimeoutError,
@@ -29,12 +28,11 @@ from ..values.errors import (
 from ..values.events import Transition
 from ..values.status import RobotiqStatus
 from ..values.trigger import Trigger
-from .activation_progress import ActivationProgress
 from .claims import Claims
 from .counters import Counters
 from .options import HandOptions
 from .poller import Poller
-from .stall_watch import STALLED_S, StallWatch
+from .stall_watch import STALLED_S, ActivationProgress, StallWatch
 from .state_waiters import StateWaiters
 from .streams import Channels
 

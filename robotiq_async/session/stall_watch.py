@@ -1,7 +1,8 @@
-"""Detects an activation or a release without progress, as after an emergency stop."""
+"""Logs the progress of an activation, and detects when it, or a release, makes none: an emergency stop."""
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final, Self
@@ -9,6 +10,7 @@ from typing import Final, Self
 import anyio
 
 from ..control.state_machine import StateMachine
+from ..runtime.log import Log
 from ..values.enums import Severity, State
 from ..values.registers import Registers
 from ..values.status import RobotiqStatus
@@ -17,6 +19,9 @@ from .listeners import Listeners
 STALLED_S: Final = 5.0
 """A gripper that waits for its activation (gFLT 0x05 to 0x07) or releases, and shows nothing new for this
 time, makes no progress. While it moves, its currents and positions change. No figure is published."""
+TOLD_EVERY_S: Final = 4.0
+"""An activation may take half a minute on a real gripper."""
+ACTIVATING: Final = frozenset({State.DO_ACTIVATION, State.WF_ACTIVATION})
 
 
 class StallWatch:
@@ -58,3 +63,29 @@ class StallWatch:
             self._shown, self._since = shown, item.timestamp
         elif item.timestamp - self._since >= STALLED_S and self._scope is not None:
             self._scope.cancel()
+
+
+class ActivationProgress:
+    """Logs how long an activation has taken so far, whichever client began it."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, log: Log) -> None:
+        self._loop = loop
+        self._log = log
+        self._since = 0.0
+        self._timer: asyncio.TimerHandle | None = None
+
+    def reached(self, state: State) -> None:
+        if state in ACTIVATING:
+            if self._timer is None:
+                self._since = self._loop.time()
+                self._wait()
+        elif self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _wait(self) -> None:
+        self._timer = self._loop.call_later(TOLD_EVERY_S, self._tell)
+
+    def _tell(self) -> None:
+        self._log.info("activating, %.0f s so far", self._loop.time() - self._since)
+        self._wait()

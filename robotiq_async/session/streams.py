@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
 
-from ..runtime.event_loop import check_loop
+from ..runtime.concurrency import check_loop
 from ..runtime.log import Log, log
 from ..values.errors import RobotiqError
 from ..values.events import SentRequest, Transition

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.link.address import FORMS, Address, parse_address
-from robotiq_async.link.simulation import Simulation
+from robotiq_async.link.address import FORMS, Address, Simulation, parse_address
 
 NAMES = st.from_regex(r"[a-z0-9_][a-z0-9_-]{0,62}", fullmatch=True).filter(
     lambda name: not re.fullmatch("[0-9]+|0x[0-9a-f]*", name)

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ...link.address import parse_address
-from ...link.simulation import Simulation
+from ...link.address import Simulation, parse_address
 from ...values.enums import Finger
 from ...values.errors import MeasuringError
 from ..addresses import full_address, gripper_words, is_simulated, named_model

@@ -9,8 +9,7 @@ from contextlib import suppress
 from typing import Any, Final
 
 from ...runtime.clock import now
-from ...runtime.concurrency import wait_shielded
-from ...runtime.event_loop import check_loop
+from ...runtime.concurrency import check_loop, wait_shielded
 from ...runtime.log import Log
 from ...session.counters import Counters
 from ...session.ending import Ending
