@@ -289,7 +289,7 @@ def main() -> int:
         print(f"demo: {error}", file=sys.stderr)
         return 1
     except BrokenPipeError:
-        # Whoever read the output has had enough (demo.py | head); the fingers have been stopped.
+        # The reader of the output has gone (demo.py | head); the fingers have been stopped.
         forget(sys.stdout)
         return 1
     except KeyboardInterrupt:

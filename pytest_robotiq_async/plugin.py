@@ -1,7 +1,7 @@
-"""The plugin for pytest: a gripper, the server that it stands behind, a hand at it, and what goes wrong.
+"""The plugin for pytest: a gripper, its server, a hand, and what goes wrong.
 
-The fixtures that need an event loop have that of the test, whoever runs it: pytest-asyncio, in either mode,
-or anyio's own plugin, which comes with the library. Each has its own way to mark a fixture, and must not see
+The fixtures that need an event loop have that of the test. It is run by pytest-asyncio, in either mode, or by
+anyio's own plugin, which comes with the library. Each has its own way to mark a fixture, and must not see
 that of the other: :mod:`.with_asyncio`, :mod:`.with_anyio`.
 """
 

@@ -1,6 +1,6 @@
 """Asyncio-native client for the Robotiq 3-Finger gripper (S-Model) and its siblings 2F-85, 2F-140 and Hand-E.
 
-What a program needs is imported from here. Where it comes from, and what stands around it::
+What a program needs is imported from here. Where it comes from, and what surrounds it::
 
     values      what goes in and comes out: status, request, results, errors, units
     hand        RobotiqHand; what every hand can do

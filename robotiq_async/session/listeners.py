@@ -50,7 +50,7 @@ class Listeners:
                 listener(item)
             except (Exception, asyncio.CancelledError):  # noqa: BLE001  # no listener may end the poller task
                 self._remove(key)
-                self._log.exception("a listener raised, and is not called any more: %r", listener)
+                self._log.exception("a listener raised, and is no longer called: %r", listener)
 
     def _remove(self, key: object) -> None:
         self._listeners.pop(key, None)

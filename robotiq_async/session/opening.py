@@ -62,7 +62,7 @@ class Opener:
         try:
             return await self._open(policy, tell)
         except (ResponseTimeoutError, ConnectionLostError) as error:
-            why = f"connected, but nobody answers: {error}"
+            why = f"connected, but no device answers: {error}"
             raise ConnectFailedError(self._options.link.address, why) from error
 
     async def again(self, policy: ReconnectPolicy) -> bool:

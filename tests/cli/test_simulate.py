@@ -115,7 +115,7 @@ async def test_the_unit_id_on_a_serial_line(
         process = await shell.start("simulate", "--serial", line.far, *said)
         assert await shell.read_line(process) == f"rtu://{line.far}"
         address = f"rtu://{line.near}"
-        (await shell.run("status", "--device-id", other, address)).assert_failed(1, "nobody answers")
+        (await shell.run("status", "--device-id", other, address)).assert_failed(1, "no device answers")
         (await shell.run("status", "--device-id", unit, address)).assert_succeeded()
         process.send_signal(signal.SIGINT)
         (await shell.finish(process)).assert_succeeded()
@@ -124,7 +124,7 @@ async def test_the_unit_id_on_a_serial_line(
 def test_the_unit_id_over_tcp(call: Call, beside: Callable[..., Beside]) -> None:
     address = beside("simulate", "--port", "0", "--device-id", "7").read_line()
     call("status", "--device-id", "7", address).assert_succeeded()
-    call("status", address).assert_failed(1, "nobody answers")
+    call("status", address).assert_failed(1, "no device answers")
 
 
 def test_rtu_over_tcp(call: Call, beside: Callable[..., Beside]) -> None:
@@ -132,8 +132,8 @@ def test_rtu_over_tcp(call: Call, beside: Callable[..., Beside]) -> None:
     assert address.startswith("rtu+tcp://127.0.0.1:")
     call("status", address).assert_succeeded()
     call("status", "--read-function", "4", address).assert_succeeded()
-    call("status", "--device-id", "12", address).assert_failed(1, "nobody answers")
-    call("status", address.removeprefix("rtu+")).assert_failed(1, "nobody answers")
+    call("status", "--device-id", "12", address).assert_failed(1, "no device answers")
+    call("status", address.removeprefix("rtu+")).assert_failed(1, "no device answers")
 
 
 def test_other_than_loopback_is_warned_about(call: Call) -> None:

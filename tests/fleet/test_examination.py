@@ -70,7 +70,7 @@ async def test_a_healthy_one() -> None:
     assert list(found) == HEALTHY
     assert levels(found) == {Level.GOOD}
     assert " a second, 0.0 % lost" in found["statuses"].found
-    assert found["commanded by"].found == "nobody"
+    assert found["commanded by"].found == "no client"
 
 
 @virtual

@@ -49,7 +49,7 @@ async def examine_agent(name: GripperName, bus: Bus, report: Report) -> None:
     _report_statuses(listener, now() - began, info, report)
     _report_gripper(listener, info, report)
     holder = info["holder"]
-    report(Finding(Level.GOOD, "commanded by", "nobody" if holder is None else str(holder)))
+    report(Finding(Level.GOOD, "commanded by", "no client" if holder is None else str(holder)))
 
 
 class _Asker:

@@ -199,5 +199,5 @@ def report_damage(link: Link, reads: int, report: Report) -> None:
     repeats = link.repeats if isinstance(link, ModbusTransport) else 0
     if repeats:
         found = f"{repeats} of {reads} reads had to be repeated: answers get lost or damaged"
-        advice = "Look at cable, shield, ground and termination; now and then is usual with USB adapters."
+        advice = "Look at cable, shield, ground and termination; a few are usual with USB adapters."
         report(Finding(Level.DOUBT, "line", found, advice))

@@ -130,7 +130,7 @@ ENDINGS: Final = {
     "deviation": "a check about safety differs",
     "disk": "the report cannot be written",
 }
-"""By the word that stands in the report."""
+"""By the word in the report."""
 
 
 class EndError(Exception):

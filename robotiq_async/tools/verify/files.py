@@ -38,7 +38,7 @@ class Recording:
     """Takes frames, and cleans what they say; a task writes them to the disk in threads."""
 
     def __init__(self, folder: Path, clean: Callable[[str], str], model: Model) -> None:
-        self.failure = ""  # why nothing is written any more; empty as long as it is
+        self.failure = ""  # why writing has ended; empty while it goes on
         self._file = FileIO(folder / NAME, "x")
         self._waiting: list[bytes] = []
         self._count = 0
@@ -48,7 +48,7 @@ class Recording:
         self._epoch = time.time() - asyncio.get_running_loop().time()
         self._counts = {STATUS: 0, COMMAND: 0, EVENT: 0}
         self._over = asyncio.Event()
-        self._saving = asyncio.ensure_future(self._save_again_and_again())
+        self._saving = asyncio.ensure_future(self._keep_saving())
 
     # What the MCAP writer needs of a file.
 
@@ -100,7 +100,7 @@ class Recording:
             await self._save()
         self._file.close()
 
-    async def _save_again_and_again(self) -> None:
+    async def _keep_saving(self) -> None:
         while not (self._over.is_set() or self.failure):
             self._format.flush()
             await self._save()

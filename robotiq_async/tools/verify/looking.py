@@ -77,7 +77,7 @@ async def see_that_it_may_be_written_to(bench: Bench) -> RobotiqStatus:
                 "refused", "another client commands the gripper: its requests change. Stop that one."
             )
         if any(abs(last.position(axis) - first.position(axis)) > STILL_COUNTS for axis in last.model.axes):
-            raise EndError("refused", "the fingers move: wait until they stand, and find out who moves them")
+            raise EndError("refused", "the fingers move: wait until they rest, and find out who moves them")
         not_ready = not_ready + 1 if last.fault is Fault.COMMUNICATION_NOT_READY else 0
     bench.link.expect(last.echo)
     _check_rest(last, not_ready)

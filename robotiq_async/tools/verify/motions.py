@@ -80,7 +80,7 @@ async def activate(watch: Watch) -> float:
 async def go(
     watch: Watch, image: Request, targets: Mapping[Finger, int], seconds: float
 ) -> RobotiqStatus | None:
-    """Send axes to targets and wait until they stand there; None if they do not in time."""
+    """Send axes to targets and wait until they rest there; None if they do not in time."""
     assert watch.last is not None
     watch.envelope = way(watch.last, targets)
     await watch.write(replace(image, go=True).with_positions(targets))

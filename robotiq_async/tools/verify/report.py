@@ -14,7 +14,7 @@ from .catalogue import CATALOGUE, ENDINGS, LAST, Check, Verdict, checks_of
 
 T = TypeVar("T")
 
-SCHEMA: Final = 1  # version of what stands in report.json; docs/hardware.md describes it
+SCHEMA: Final = 1  # version of the fields in report.json; docs/hardware.md describes it
 
 
 @dataclass
@@ -92,7 +92,7 @@ class Report:
 
 
 UNUSABLE: Final = ("fault", "envelope", "time", "foreign", "deviation", "inactive")
-"""Endings after which nobody should rely on the gripper before they are understood."""
+"""Endings that must be understood before the gripper is relied on."""
 NOT_JUDGED: Final = ("refused", "link")
 WITHOUT_ROS: Final = ("activation_timeout", "request_address", "status_address")
 """Options that are no parameters of the ROS node."""

@@ -46,7 +46,7 @@ class Plan:
     address: Address  # the gripper; tcp, rtu or rtu+tcp
     first: int = 0  # the stage to begin with
     last: int = LAST  # the last stage
-    agreed: int = -1  # up to this stage nobody is asked; -1 for none, at most 2
+    agreed: int = -1  # the last stage that runs without asking; -1 for none, at most 2
     label: str = ""  # what the report is called
     lengths: Lengths = field(default_factory=Lengths)  # of the long checks
 

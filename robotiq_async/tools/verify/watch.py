@@ -23,7 +23,7 @@ class Person(Protocol):
 
     @property
     def has_stopped(self) -> bool:
-        """Whether a key was pressed since the last answer, or nobody is there any more."""
+        """Whether a key was pressed since the last answer, or the terminal has closed."""
 
     def tell(self, words: str) -> None:
         """Say something. While fingers move nothing is said: a terminal may keep who writes waiting."""
@@ -45,7 +45,7 @@ LASTING: Final = 3
 """Reads in which 0x09 must be seen to be a fault: siblings show it once after a second of silence."""
 SLICE_S: Final = 0.05  # while nothing may be sent the person is looked at so often
 STILL_S: Final = 0.15
-"""What has not moved for so long stands: at the slowest speed a count takes 43 ms (thesis, table A1.1)."""
+"""An axis that has not moved for this long is at rest: a count takes 43 ms at the slowest speed (table A1.1)."""
 LIMITS: Final = 20, 225
 """A request beyond may be echoed as a software limit (drivers keep the scissor within 15..232)."""
 
@@ -112,14 +112,14 @@ class Watch:
         positions: list[int] = []
         since = self._loop.time()
 
-        def stands(status: RobotiqStatus) -> bool:
+        def is_at_rest(status: RobotiqStatus) -> bool:
             nonlocal positions, since
             now = [status.position(axis) for axis in status.model.axes]
             if now != positions:
                 positions, since = now, self._loop.time()
             return self._loop.time() - since >= STILL_S
 
-        return await self.until(stands, seconds)
+        return await self.until(is_at_rest, seconds)
 
     async def rest(self, seconds: float) -> None:
         """Ask nothing of the gripper for some seconds; the person still stops it."""
@@ -142,7 +142,7 @@ class Watch:
         if not self.bears_faults:
             self._check_fault(status)
         if self.needs_active and not status.is_activated:
-            raise EndError("inactive", f"the gripper is not active any more: it reads {words_of(status)}")
+            raise EndError("inactive", f"the gripper is no longer active: it reads {words_of(status)}")
         for axis in self.model.axes:
             low, high = self.envelope.get(axis, (0, 255))
             if not low <= status.position(axis) <= high:

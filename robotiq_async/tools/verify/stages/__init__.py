@@ -1,4 +1,4 @@
-"""The ten stages and what a person is told before each."""
+"""The ten stages, and what the person reads before each."""
 
 from __future__ import annotations
 

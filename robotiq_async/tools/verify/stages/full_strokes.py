@@ -58,7 +58,7 @@ async def _stroke(watch: Watch, image: Request, axes: tuple[Finger, ...]) -> tup
     began = moved = await watch.write(image)
     at: list[int] = []
 
-    def stands(status: RobotiqStatus) -> bool:
+    def is_at_rest(status: RobotiqStatus) -> bool:
         nonlocal at, moved
         positions = [status.position(axis) for axis in axes]
         if positions != at:
@@ -66,8 +66,8 @@ async def _stroke(watch: Watch, image: Request, axes: tuple[Finger, ...]) -> tup
         rests = all(status.finger_status(axis) is not ObjectStatus.IN_MOTION for axis in axes)
         return status.echo == image.echo and rests and loop.time() - moved >= 0.5
 
-    # By the scissor's echo alone the end is not known where limits are echoed: it stands long enough then.
-    status = await watch.until(lambda now: stands(now) or loop.time() - moved >= 2.0, STROKE_S)
+    # Where limits are echoed, the scissor's echo does not show the end: two seconds of rest do.
+    status = await watch.until(lambda now: is_at_rest(now) or loop.time() - moved >= 2.0, STROKE_S)
     if status is None:
         raise EndError("time", f"a stroke was not over within {STROKE_S:g} s")
     return status, moved - began

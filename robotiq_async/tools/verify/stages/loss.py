@@ -124,7 +124,7 @@ async def _alone(bench: Bench) -> None:
 
 
 def report_lost_activation(bench: Bench, when: str) -> None:
-    """Nobody reset it, and it is not active any more."""
+    """It was not reset, and is no longer active."""
     follows = "Keep one program polling. A start after a pause activates: it MOVES, and lets go."
     bench.differs("loss.idle", f"the activation was lost {when}", follows)
 

@@ -170,7 +170,7 @@ async def _counts(bench: Bench) -> None:
         bench.differs(
             "read.counts",
             f"{len(refused)} of 7 openings failed, each of which reads another count",
-            "A hand reads so after each connection: connecting will fail now and then. Please report.",
+            "A hand reads so after each connection: connecting will fail at times. Please report.",
             refused=refused,
         )
     else:

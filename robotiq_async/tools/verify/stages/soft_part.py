@@ -40,7 +40,7 @@ async def soft_part(bench: Bench) -> None:
     left = await watch.pass_by(LEFT_S)
     answer = await person.chooses(STAYS, ANSWERS) if held.contacts else "?"
     if answer is None or not await person.consents(RELEASE):
-        raise EndError("declined", "the fingers were not opened: they stand closed, with rGTO = 0")
+        raise EndError("declined", "the fingers were not opened: they are still closed, with rGTO = 0")
     _judge_halt(bench, answer, held, left)
     watch = bench.watch(SECONDS)
     now = await watch.look()

@@ -69,14 +69,14 @@ async def _stop(bench: Bench, watch: Watch, image: Request, status: RobotiqStatu
     await watch.write(image)
     at = before
 
-    def stands(now: RobotiqStatus) -> bool:
+    def is_at_rest(now: RobotiqStatus) -> bool:
         nonlocal at, moved
         positions = {finger: now.position(finger) for finger in bench.fingers}
         if positions != at:
             at, moved = positions, loop.time()
         return loop.time() - moved >= 0.3
 
-    await watch.until(stands, 4.0)
+    await watch.until(is_at_rest, 4.0)
     return max(abs(at[finger] - before[finger]) for finger in bench.fingers), moved - began
 
 
@@ -85,7 +85,7 @@ async def _resume(bench: Bench, watch: Watch, away: Request, far: dict[Finger, i
     if await watch.until(lambda status: are_near(status, far, MARGIN), LEG_S) is None:
         where = [watch.last.position(finger) for finger in bench.fingers] if watch.last else []
         follows = "Nothing is to be set: a hand writes fresh requests after a stop. Please report."
-        bench.differs("stop.resume", f"stands at {where} although rGTO is set again", follows)
+        bench.differs("stop.resume", f"stays at {where} although rGTO is set again", follows)
     else:
         bench.as_assumed("stop.resume", "goes on to its request")
     await watch.until_still(2.0)
