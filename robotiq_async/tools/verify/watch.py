@@ -45,7 +45,7 @@ LASTING: Final = 3
 """Reads in which 0x09 must be seen to be a fault: siblings show it once after a second of silence."""
 SLICE_S: Final = 0.05  # while nothing may be sent the person is looked at so often
 STILL_S: Final = 0.15
-"""An axis that has not moved for this long is at rest: a count takes 43 ms at the slowest speed (table A1.1)."""
+"""An axis that has not moved for so long is at rest: the slowest takes 43 ms for a count (thesis, A1.1)."""
 LIMITS: Final = 20, 225
 """A request beyond may be echoed as a software limit (drivers keep the scissor within 15..232)."""
 
