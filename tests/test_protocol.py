@@ -166,6 +166,12 @@ async def test_the_monitor(hand: FakeHand) -> None:
         assert f"  {hand.address}" in str(pilot.app.query_one("#state", Static).render())
 
 
+async def test_the_monitor_of_a_hand_with_a_name() -> None:
+    async with FakeHand("left") as hand, Monitor(Operator(hand)).run_test(size=(100, 30)) as pilot:
+        await pilot.pause()
+        assert "  left (fake://hand)" in str(pilot.app.query_one("#state", Static).render())
+
+
 async def test_what_is_printed(hand: FakeHand, capfd: pytest.CaptureFixture[str]) -> None:
     print_outcomes(await hand.move(90, Finger.C))
     print_status(hand)
