@@ -25,10 +25,10 @@ from robotiq_async.values.enums import (
     Mode,
     ObjectStatus,
     State,
+    Trigger,
 )
 from robotiq_async.values.model import MODELS
 from robotiq_async.values.registers import RTU_REGISTERS, TCP_REGISTERS, Field
-from robotiq_async.values.trigger import Trigger
 
 ROOT: Final = Path(__file__).parents[1]
 DOCS: Final = ROOT / "docs"

@@ -21,7 +21,7 @@ Nothing of this has run on real hardware yet.
 from .hand.robotiq_hand import RobotiqHand
 from .link.transport import Transport
 from .runtime.version import __version__ as __version__
-from .session.reconnecting import ReconnectPolicy
+from .session.options import ReconnectPolicy
 from .session.streams import Stream
 from .values.calibration import Units
 from .values.enums import (
@@ -42,6 +42,7 @@ from .values.enums import (
     ObjectStatus,
     Severity,
     State,
+    Trigger,
 )
 from .values.errors import (
     ActivationTimeoutError,
@@ -62,13 +63,11 @@ from .values.errors import (
     WrongModelError,
 )
 from .values.events import SentRequest, Transition
-from .values.grasp_result import GraspResult
-from .values.grip_event import GripChange, GripEvent
+from .values.grip import GraspResult, GripChange, GripEvent
 from .values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model
 from .values.move_result import MoveResult
 from .values.statistics import Statistics
 from .values.status import RobotiqStatus
-from .values.trigger import Trigger
 
 __all__ = [
     "CLOSED",

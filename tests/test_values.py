@@ -50,7 +50,6 @@ from robotiq_async.fleet.keys.access import AccessList
 from robotiq_async.fleet.keys.credentials import Credentials
 from robotiq_async.fleet.network.endpoints import Endpoint
 from robotiq_async.link.address import Simulation, parse_address
-from robotiq_async.session.counters import Counters
 from robotiq_async.simulator import Habits, Trouble
 from robotiq_async.tools.doctor import Finding, Level
 from robotiq_async.tools.verify.catalogue import EndError
@@ -62,6 +61,7 @@ from robotiq_async.values.frozen_mapping import FrozenMapping
 from robotiq_async.values.model import HAND_E
 from robotiq_async.values.registers import TCP_REGISTERS, gDT
 from robotiq_async.values.request import AxisRequest, Request
+from robotiq_async.values.statistics import Counters
 from tests.register_words import status_of
 
 A, B = Finger.A, Finger.B

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from ..values.enums import NO_AXES, Finger, Severity, State
+from ..values.enums import NO_AXES, Finger, Severity, State, Trigger
 from ..values.errors import (
     ConnectionLostError,
     GripperFaultError,
@@ -26,7 +26,6 @@ from ..values.errors import (
 from ..values.model import THREE_FINGER, Model
 from ..values.request import Request
 from ..values.status import RobotiqStatus
-from ..values.trigger import Trigger
 from .first_motion import IGNORED_S, FirstMotion
 from .grip_keeper import GripKeeper
 from .motion import Move

@@ -13,10 +13,9 @@ from collections.abc import Callable
 from typing import Final
 
 from ..runtime.log import Log, log
-from ..values.enums import NO_AXES, Fault, Finger, State
+from ..values.enums import NO_AXES, Fault, Finger, State, Trigger
 from ..values.request import Request
 from ..values.status import RobotiqStatus
-from ..values.trigger import Trigger
 from .requests.merging import merged
 from .requests.pending import PendingCommand
 from .requests.shadow import Doubt, RequestShadow, Whose

@@ -7,7 +7,7 @@ from typing import Final
 
 from ..values.checks import check_int, check_mask
 from ..values.enums import Finger, ObjectStatus
-from ..values.grip_event import GripChange, GripEvent
+from ..values.grip import GripChange, GripEvent
 from ..values.model import Model
 from ..values.status import RobotiqStatus
 from .contact import agrees

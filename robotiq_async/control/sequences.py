@@ -16,11 +16,10 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from dataclasses import replace
 
-from ..values.enums import Fault, Severity
+from ..values.enums import Fault, Severity, Trigger
 from ..values.errors import GripperFaultError, NotActivatedError
 from ..values.request import Request
 from ..values.status import RobotiqStatus
-from ..values.trigger import Trigger
 from .requests.writes import WINDOW_S
 from .triggers import classify
 

@@ -17,7 +17,7 @@ from enum import Enum
 from typing import Final
 
 from ..runtime.log import Log, log
-from ..values.enums import Fault, State
+from ..values.enums import Fault, State, Trigger
 from ..values.errors import (
     ConnectionLostError,
     GripperFaultError,
@@ -28,7 +28,6 @@ from ..values.errors import (
 )
 from ..values.request import Request
 from ..values.status import RobotiqStatus
-from ..values.trigger import Trigger
 from .sequences import Sequence
 from .triggers import classify
 

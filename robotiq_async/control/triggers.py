@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from functools import cache
 
-from ..values.enums import Fault, Initialization
+from ..values.enums import Fault, Initialization, Trigger
 from ..values.model import Model
 from ..values.status import RobotiqStatus
-from ..values.trigger import Trigger
 
 
 def classify(status: RobotiqStatus) -> Trigger:

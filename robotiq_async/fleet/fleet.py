@@ -14,8 +14,7 @@ from typing import Any, Final, Self
 
 from ..runtime.clock import now
 from ..runtime.concurrency import running_loop
-from ..session.listeners import Listeners
-from ..session.streams import Channel, Stream
+from ..session.streams import Channel, Listeners, Stream
 from ..values.enums import Fault, State
 from ..values.errors import AgentError, NotAllStoppedError, ProtocolError, RobotiqError
 from ..values.model import model_of

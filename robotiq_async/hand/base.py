@@ -25,8 +25,7 @@ from ..values.checks import (
 from ..values.enums import CLOSED, OPEN, Finger, State
 from ..values.errors import ConnectionLostError, NotStartedError
 from ..values.events import SentRequest, Transition
-from ..values.grasp_result import GraspResult, check_at_least
-from ..values.grip_event import GripEvent
+from ..values.grip import GraspResult, GripEvent, check_at_least
 from ..values.model import THREE_FINGER, Model
 from ..values.move_result import MoveResult
 from ..values.statistics import Statistics

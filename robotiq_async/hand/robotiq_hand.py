@@ -14,7 +14,6 @@ from ..control.requests.pending import Command
 from ..control.state_machine import RUNNING, SEQUENCES, StateMachine
 from ..link.transport import Transport
 from ..runtime.clock import now
-from ..session.counters import Counters
 from ..session.options import (
     ACTIVATION_TIMEOUT_S,
     CONNECT_TIMEOUT_S,
@@ -22,12 +21,12 @@ from ..session.options import (
     RESPONSE_TIMEOUT_S,
     WRITE_SPACING_S,
     HandOptions,
+    ReconnectPolicy,
 )
-from ..session.reconnecting import ReconnectPolicy
 from ..session.session import Session
 from ..session.stall_watch import STALLED_S, StallWatch
 from ..values.calibration import ForceCalibration, SpeedCalibration
-from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED, Finger, Severity, State
+from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED, Finger, Severity, State, Trigger
 from ..values.errors import (
     InvalidStateError,
     MoveSupersededError,
@@ -39,9 +38,8 @@ from ..values.errors import (
 from ..values.events import SentRequest, Transition
 from ..values.model import Model
 from ..values.move_result import MoveResult
-from ..values.statistics import Statistics
+from ..values.statistics import Counters, Statistics
 from ..values.status import RobotiqStatus
-from ..values.trigger import Trigger
 from .base import Hand
 
 RESET_TIMEOUT_S: Final = 5.0

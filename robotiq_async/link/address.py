@@ -1,8 +1,12 @@
-"""Addresses: one string says which gripper."""
+"""Addresses: one string says which gripper, and one spelling says whether two lead to the same."""
 
 from __future__ import annotations
 
+import contextlib
+import os
 import re
+import socket
+import stat
 from dataclasses import dataclass
 from ipaddress import IPv4Address, IPv6Address
 from typing import Final, Literal
@@ -227,3 +231,53 @@ def _object(text: str) -> int:
     if not re.fullmatch(r"[0-9]{1,9}", text):
         raise ValueError(f"object must be an integer in 0..255, got {text!r}")
     return check_byte("object", int(text))
+
+
+# -- one spelling for all ways to write an address, without asking a name server --------------------------
+
+HERE: Final = "localhost"
+
+
+def canonical_address(address: Address) -> str:
+    """Where an address leads: equal strings for equal places.
+
+    Every spelling of this machine becomes localhost. A symbolic link to a serial port becomes that port. A
+    socket is the same place whatever protocol it carries.
+    """
+    host = _serial_port(address.host) if address.kind == "rtu" else _host(address.host)
+    return f"{'tcp' if address.is_socket else address.kind}://{host}:{address.port}"
+
+
+def _host(host: str) -> str:
+    """One spelling of a host. Names are not resolved."""
+    if ":" in host:
+        number, _, zone = host.partition("%")
+        address = IPv6Address(number)
+        if address.ipv4_mapped is None:
+            if address.is_loopback or address.is_unspecified:
+                return HERE
+            # Only link-local addresses depend on an interface.
+            return f"{address}%{_interface(zone)}" if address.is_link_local else str(address)
+        host = str(address.ipv4_mapped)
+    name = host.removesuffix(".")
+    # Connecting to 0.0.0.0 or :: reaches this machine. Other addresses in 127.0.0.0/8 are other places.
+    return HERE if name in (HERE, "127.0.0.1", "0.0.0.0") or name.endswith(f".{HERE}") else name
+
+
+def _interface(zone: str) -> str:
+    """The number of a network interface; its name as given if it does not exist."""
+    with contextlib.suppress(OSError):
+        return str(socket.if_nametoindex(zone))
+    return str(int(zone)) if zone.isdecimal() else zone
+
+
+def _serial_port(device: str) -> str:
+    """One spelling of a serial port: the device number if it exists, else its path."""
+    windows = re.fullmatch(r"(?:\\\\[.?]\\)?(com[0-9]+)", device, re.IGNORECASE)
+    if windows is not None:
+        return windows[1].upper()
+    with contextlib.suppress(OSError):
+        found = os.stat(device)
+        if stat.S_ISCHR(found.st_mode):
+            return f"device {os.major(found.st_rdev)}:{os.minor(found.st_rdev)}"
+    return os.path.realpath(device)

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
-from ..link.address import Address, parse_address
-from ..link.canonical import canonical_address
+from ..link.address import Address, canonical_address, parse_address
 from ..link.guard import GuardedTransport
 from ..link.modbus import ModbusTransport
 from ..link.sim_transport import SimulatedTransport, new_gripper

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
+from typing import Final
 
 import anyio
 
@@ -14,8 +15,9 @@ from ..values.errors import (
     ResponseTimeoutError,
     RobotiqConnectionError,
 )
-from .options import HandOptions
-from .reconnecting import Backoff, ReconnectPolicy
+from .options import HandOptions, ReconnectPolicy
+
+SHORTEST_S: Final = 0.01  # between two tries
 
 
 class Opener:
@@ -96,3 +98,30 @@ class Opener:
                 failed(error)
                 delay = backoff.delay
         return False
+
+
+class Backoff:
+    """The delays of one attempt to get a link back.
+
+    Attributes:
+        since: when the link was lost, in seconds of the caller's clock.
+        delay: seconds until the next try.
+    """
+
+    def __init__(self, policy: ReconnectPolicy, since: float) -> None:
+        self._policy = policy
+        self.since = since
+        self.delay = policy.first_delay
+
+    def gives_up(self, now: float) -> bool:
+        """Whether the try that has just failed was the last one. If not, lengthen the delay.
+
+        The last try begins when ``give_up_after`` is over, and no later.
+        """
+        limit = self._policy.give_up_after
+        self.delay = min(max(2 * self.delay, SHORTEST_S), self._policy.max_delay)
+        if limit is None:
+            return False
+        left = self.since + limit - now
+        self.delay = min(self.delay, max(left, 0.0))
+        return left <= 0

@@ -22,7 +22,6 @@ from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..values.model import MODELS, THREE_FINGER, Model, model_of
 from ..values.registers import RTU_REGISTERS, TCP_REGISTERS
 from .gripper_link import LAST_BLOCK, GripperLink, gripper_link
-from .reconnecting import ReconnectPolicy
 
 
 class Usual(float):
@@ -59,9 +58,6 @@ ACTIVATION_TIMEOUT_S: Final = 40.0
 the activation. What ends one early leaves a hand that does not know where its fingers are."""
 LONGEST_NAME: Final = 64
 """Characters of a hand's name: it begins every line of the log."""
-
-# Read when this is imported: a hand may be made in a running loop, which must not wait for a disk.
-_THESIS: Final = SpeedCalibration.thesis()
 
 
 class Place(Flag):
@@ -158,6 +154,41 @@ def _check_forces(_: str, forces: object) -> ForceCalibration | None:
     if not isinstance(forces, ForceCalibration | None):
         raise TypeError(f"force_calibration must be None or a ForceCalibration, got {forces!r}")
     return forces
+
+
+@dataclass(frozen=True, slots=True)
+class ReconnectPolicy:
+    """How a lost link is opened again.
+
+    Attributes:
+        first_delay: seconds before the first try, 0..10.
+        max_delay: the delay doubles up to this, in seconds, 0.01..60.
+        give_up_after: seconds after which the hand gives up; None tries for ever.
+        activate: whether a gripper that comes back without its activation is activated. The fingers MOVE
+            then, at a moment that you do not choose: leave it off unless nothing can be in their way.
+    """
+
+    first_delay: float = 0.05
+    max_delay: float = 2.0
+    give_up_after: float | None = None
+    activate: bool = False
+
+    def __post_init__(self) -> None:
+        """Check the values, and keep them as plain floats.
+
+        Raises:
+            TypeError: not a number, or activate is not a bool.
+            ValueError: outside its range.
+        """
+        self._keep("first_delay", 0.0, 10.0)
+        self._keep("max_delay", 0.01, 60.0)
+        if self.give_up_after is not None:
+            self._keep("give_up_after", 0.0, 86400.0)
+        if not isinstance(self.activate, bool):
+            raise TypeError(f"activate must be True or False, got {self.activate!r}")
+
+    def _keep(self, name: str, low: float, high: float) -> None:
+        object.__setattr__(self, name, check_seconds(name, getattr(self, name), low, high))
 
 
 @dataclass(frozen=True, slots=True)
@@ -305,5 +336,4 @@ def units_of(calibration: object, force_calibration: object, model: Model = THRE
     """
     speeds = _check_speeds("calibration", calibration)
     forces = _check_forces("force_calibration", force_calibration)
-    usual = _THESIS if model is THREE_FINGER else SpeedCalibration.usual(model)
-    return Units(speeds or usual, forces or ForceCalibration.nominal(model))
+    return Units(speeds or SpeedCalibration.usual(model), forces or ForceCalibration.nominal(model))

@@ -22,6 +22,7 @@ from ..control.waiters import fail, resolve
 from ..link.transport import Link
 from ..link.watchdog import HELD_S
 from ..runtime.tick import Tick
+from ..values.enums import Ending
 from ..values.errors import (
     NotStartedError,
     ResponseTimeoutError,
@@ -32,9 +33,8 @@ from ..values.events import SentRequest
 from ..values.model import names_that_fit
 from ..values.registers import Registers
 from ..values.request import Request
+from ..values.statistics import Counters
 from ..values.status import RobotiqStatus
-from .counters import Counters
-from .ending import Ending
 from .opening import Opener
 from .options import LONGEST_SPACING_S, HandOptions
 from .streams import Channels

@@ -13,7 +13,7 @@ from ..control.state_machine import RUNNING, SEQUENCES, StateMachine
 from ..control.waiters import Waiter
 from ..runtime.clock import now
 from ..runtime.concurrency import check_loop, wait_shielded
-from ..values.enums import Fault, State
+from ..values.enums import Fault, State, Trigger
 from ..values.errors import (
     ActivationTimeoutError,
     ConnectionLostError,
@@ -26,10 +26,9 @@ from ..values.errors import (
     StateTimeoutError,
 )
 from ..values.events import Transition
+from ..values.statistics import Counters
 from ..values.status import RobotiqStatus
-from ..values.trigger import Trigger
 from .claims import Claims
-from .counters import Counters
 from .options import HandOptions
 from .poller import Poller
 from .stall_watch import STALLED_S, ActivationProgress, StallWatch

@@ -14,7 +14,7 @@ from ..runtime.log import Log
 from ..values.enums import Severity, State
 from ..values.registers import Registers
 from ..values.status import RobotiqStatus
-from .listeners import Listeners
+from .streams import Listeners
 
 STALLED_S: Final = 5.0
 """A gripper that waits for its activation (gFLT 0x05 to 0x07) or releases, and shows nothing new for this

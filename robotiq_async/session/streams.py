@@ -1,6 +1,6 @@
-"""Async iterators over the statuses, transitions and requests of a hand.
+"""Async iterators over the statuses, transitions and requests of a hand, and callbacks for them.
 
-These are plain classes and not async generators: a reader that drops one leaves nothing to clean up.
+The iterators are plain classes and not async generators: a reader that drops one leaves nothing to clean up.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from ..runtime.log import Log, log
 from ..values.errors import RobotiqError
 from ..values.events import SentRequest, Transition
 from ..values.status import RobotiqStatus
-from .listeners import Listeners
 
 T = TypeVar("T")
 U = TypeVar("U")
+Listener = Callable[[Any], None]
 
 
 class Stream(Generic[T]):
@@ -158,6 +158,50 @@ class DerivedStream(Stream[T]):
 def _wake(waiting: asyncio.Future[None]) -> None:
     if not waiting.done():
         waiting.set_result(None)
+
+
+class Listeners:
+    """Calls every listener with every item, in order. A listener that raises is logged and removed."""
+
+    def __init__(self, log: Log = log) -> None:
+        self._log = log
+        self._listeners: dict[object, Listener] = {}
+        """By a key of their own: the same callback may be added twice."""
+        self._items: deque[object] = deque()
+        self._is_telling = False
+
+    def add(self, listener: Listener) -> Callable[[], None]:
+        """Add a listener; return a function that removes it, and may be called twice."""
+        key = object()
+        self._listeners[key] = listener
+        return lambda: self._remove(key)
+
+    def tell(self, item: object) -> None:
+        """Call every listener. What a listener itself brings about comes after the present item."""
+        if not self._listeners:
+            return  # the common case, at every poll
+        self._items.append(item)
+        if self._is_telling:
+            return
+        self._is_telling = True
+        try:
+            while self._items:
+                self._tell(self._items.popleft())
+        finally:
+            self._is_telling = False
+
+    def _tell(self, item: object) -> None:
+        for key, listener in list(self._listeners.items()):
+            if key not in self._listeners:
+                continue  # removed by another one, just now
+            try:
+                listener(item)
+            except (Exception, asyncio.CancelledError):  # noqa: BLE001  # no listener may end the poller task
+                self._remove(key)
+                self._log.exception("a listener raised, and is no longer called: %r", listener)
+
+    def _remove(self, key: object) -> None:
+        self._listeners.pop(key, None)
 
 
 class Channel(Generic[T]):

@@ -15,14 +15,13 @@ from ..session.options import (
     POLL_INTERVAL_S,
     RESPONSE_TIMEOUT_S,
     WRITE_SPACING_S,
+    ReconnectPolicy,
 )
-from ..session.reconnecting import ReconnectPolicy
 from ..session.streams import Stream as AsyncStream
 from ..values.calibration import ForceCalibration, SpeedCalibration, Units
 from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED, Finger, State
 from ..values.events import SentRequest, Transition
-from ..values.grasp_result import GraspResult
-from ..values.grip_event import GripEvent
+from ..values.grip import GraspResult, GripEvent
 from ..values.model import Model
 from ..values.move_result import MoveResult
 from ..values.statistics import Statistics

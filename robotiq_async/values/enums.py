@@ -1,10 +1,10 @@
-"""Enumerations and constants: axes, modes, object states, faults, states of the hand."""
+"""Enumerations and constants: axes, modes, object states, faults; states, triggers and stops of the hand."""
 
 from __future__ import annotations
 
 import operator
 from enum import Enum, IntEnum, IntFlag
-from typing import Final
+from typing import Final, Self
 
 
 class Finger(IntFlag):
@@ -273,3 +273,59 @@ class State(Enum):
     DO_SHUTDOWN = "do_shutdown"
     SHUTDOWN = "shutdown"
     """stop() has ended; the hand may be started again."""
+
+
+class Trigger(Enum):
+    """An event that can change the state of a hand.
+
+    ``ASK_`` marks a call of the user, ``SEEN_`` a condition that a status shows; the others concern the link
+    and the delivery of a request.
+    """
+
+    __hash__ = object.__hash__  # see State
+
+    ASK_START = "start()"
+    ASK_ACTIVATE = "activate()"
+    ASK_COMMAND = "a command"
+    ASK_HOLD = "hold()"
+    ASK_HALT = "halt()"
+    ASK_RELEASE = "atr()"
+    ASK_RESET = "reset()"
+    ASK_STOP = "stop()"
+    ACTIVATES = "gripper is reset, and is to be activated"
+    DELIVERED = "request acknowledged"
+    SEEN_READY = "gripper is active"
+    SEEN_BUSY = "gripper is activating"
+    SEEN_RESET = "gripper is reset"
+    SEEN_FAULT = "gripper reports a fault"
+    SEEN_RELEASED = "automatic release completed"
+    LINK_LOST = "link lost"
+    STOPPED = "shutdown finished"
+
+    @property
+    def is_seen(self) -> bool:
+        """Whether a status shows this."""
+        return self.name.startswith("SEEN_")
+
+
+class Ending(IntEnum):
+    """Ordered by strength: of several stops under way the strongest counts."""
+
+    LEAVE = 0
+    """The fingers go on."""
+    KEEP = 1
+    """Axes that move are held, and rGTO stays set if every axis is seen at rest."""
+    HALT = 2
+    """rGTO is cleared."""
+
+    @classmethod
+    def of(cls, *, halt: bool, keep_grip: bool) -> Self:
+        """The ending for the arguments of ``stop()``."""
+        if not halt:
+            return cls(cls.LEAVE)
+        return cls(cls.KEEP if keep_grip else cls.HALT)
+
+    @property
+    def done(self) -> str:
+        """The participle for messages: the fingers are ..."""
+        return ("left as they are", "held", "stopped")[self]

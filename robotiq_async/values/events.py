@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from .enums import State
+from .enums import State, Trigger
 from .request import Request
-from .trigger import Trigger
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,8 +26,7 @@ from robotiq_async.fleet.network.zenoh_bus import ZenohBus, open_bus
 from robotiq_async.fleet.wire.envelope import Answer, unpack_call
 from robotiq_async.fleet.wire.status_message import StatusMessage
 from robotiq_async.hand import Hand
-from robotiq_async.session.counters import Counters
-from robotiq_async.values.statistics import percentile
+from robotiq_async.values.statistics import Counters, percentile
 
 INTERVAL_S = 0.005
 SETTLE_S = 0.5

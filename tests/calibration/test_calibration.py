@@ -13,8 +13,8 @@ import pytest
 from robotiq_async import Finger, MoveTimeoutError, RobotiqHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.calibration import ForceCalibration, SpeedCalibration
-from robotiq_async.values.calibration.closing_time import closing_time
 from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, TableError, thesis_table, write_table
+from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.model import THREE_FINGER
 from tests.virtual import virtual
 

@@ -29,8 +29,8 @@ from robotiq_async.control.state_machine import refusal
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import Operator
 from robotiq_async.tools.wording import refusal_words
+from robotiq_async.values.enums import Trigger
 from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85
-from robotiq_async.values.trigger import Trigger
 from tests.grippers import active_gripper
 
 if TYPE_CHECKING:

@@ -16,10 +16,10 @@ from robotiq_async.control.requests.pending import Command
 from robotiq_async.control.state_machine import StateMachine
 from robotiq_async.session.options import units_of
 from robotiq_async.simulator import SimulatedGripper
+from robotiq_async.values.enums import Trigger
 from robotiq_async.values.model import THREE_FINGER, Model
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import Request
-from robotiq_async.values.trigger import Trigger
 from tests.control.outcome import Outcome
 from tests.register_words import with_object_status
 

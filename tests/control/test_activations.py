@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async import Fault, Finger, InvalidStateError, MoveSupersededError, NotActivatedError, State
+from robotiq_async.values.enums import Trigger
 from robotiq_async.values.request import Request
-from robotiq_async.values.trigger import Trigger
 from tests.control.other_client import going_to, reset_and_activated_by_another
 from tests.control.scan import POLL_S, Scan
 

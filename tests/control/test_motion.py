@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async.control.motion import MARGIN_S, Move
-from robotiq_async.values.calibration.closing_time import closing_time
+from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.enums import Finger, ObjectStatus
 from robotiq_async.values.errors import ConnectionLostError, MoveSupersededError, RobotiqError
 from robotiq_async.values.model import THREE_FINGER

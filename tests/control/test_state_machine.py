@@ -8,11 +8,10 @@ import pytest
 
 from robotiq_async.control.sequences import Sequence
 from robotiq_async.control.state_machine import TABLE, StateMachine
-from robotiq_async.values.enums import Fault, State
+from robotiq_async.values.enums import Fault, State, Trigger
 from robotiq_async.values.errors import GripperFaultError, InvalidStateError
 from robotiq_async.values.request import Request
 from robotiq_async.values.status import RobotiqStatus
-from robotiq_async.values.trigger import Trigger
 from tests.control.walks import Change, Recorded
 from tests.register_words import status_of
 

@@ -14,7 +14,7 @@ from robotiq_async.control.state_machine import (
     refusal,
     states_allowing,
 )
-from robotiq_async.values.enums import Fault, State
+from robotiq_async.values.enums import Fault, State, Trigger
 from robotiq_async.values.errors import (
     ConnectionLostError,
     GripperFaultError,
@@ -23,7 +23,6 @@ from robotiq_async.values.errors import (
     NotStartedError,
     RobotiqError,
 )
-from robotiq_async.values.trigger import Trigger
 from tests.control.walks import Recorded, path_to
 from tests.register_words import status_of
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async.control.triggers import classify
-from robotiq_async.values.trigger import Trigger
+from robotiq_async.values.enums import Trigger
 from tests.register_words import status_of
 
 

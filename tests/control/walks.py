@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections import deque
 
 from robotiq_async.control.state_machine import TABLE, StateMachine
-from robotiq_async.values.enums import State
-from robotiq_async.values.trigger import Trigger
+from robotiq_async.values.enums import State, Trigger
 
 Change = tuple[State, State, Trigger]
 

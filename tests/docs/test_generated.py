@@ -9,7 +9,7 @@ import pytest
 from docs import make_tables
 from robotiq_async import State
 from robotiq_async.control.state_machine import TABLE
-from robotiq_async.values.trigger import Trigger
+from robotiq_async.values.enums import Trigger
 
 LINE = re.compile(r"^ +(\w+) --> (\w+)(?:: (.+))?$", re.MULTILINE)
 

@@ -25,6 +25,7 @@ from robotiq_async.fleet.wire import values
 from robotiq_async.fleet.wire.envelope import Answer, Call, failure, unpack_answer, unpack_call
 from robotiq_async.fleet.wire.status_message import SIZE, StatusMessage, unpack
 from robotiq_async.values import errors
+from robotiq_async.values.enums import Trigger
 from robotiq_async.values.errors import (
     AgentError,
     ConnectFailedError,
@@ -38,7 +39,6 @@ from robotiq_async.values.errors import (
 from robotiq_async.values.model import MODELS
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.statistics import Statistics
-from robotiq_async.values.trigger import Trigger
 
 JSON: st.SearchStrategy[Any] = st.recursive(
     st.none() | st.booleans() | st.integers(-(2**70), 2**70) | st.floats() | st.text(max_size=8),

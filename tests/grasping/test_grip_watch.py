@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from robotiq_async.control.grip_watch import SLIP_COUNTS, GripWatch
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values.enums import Finger, ObjectStatus
-from robotiq_async.values.grip_event import GripChange, GripEvent
+from robotiq_async.values.grip import GripChange, GripEvent
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import AxisRequest, Request

@@ -26,8 +26,8 @@ from robotiq_async.tools.measure.campaigns import (
     time_closing,
     write_currents,
 )
-from robotiq_async.values.calibration.closing_time import closing_time
 from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, TableError, read_table, thesis_table
+from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.errors import MeasuringError
 from tests.virtual import VirtualLoop, virtual
 

@@ -10,17 +10,15 @@ from typing import TypeVar
 
 from robotiq_async.control.controller import Controller
 from robotiq_async.control.state_machine import StateMachine
-from robotiq_async.session.counters import Counters
-from robotiq_async.session.listeners import Listeners
+from robotiq_async.session.options import ReconnectPolicy
 from robotiq_async.session.poller import STOP_S, Poller
-from robotiq_async.session.reconnecting import ReconnectPolicy
-from robotiq_async.session.streams import Channel, Channels
-from robotiq_async.values.calibration.closing_time import closing_time
-from robotiq_async.values.enums import State
+from robotiq_async.session.streams import Channel, Channels, Listeners
+from robotiq_async.values.calibration.scales import closing_time
+from robotiq_async.values.enums import State, Trigger
 from robotiq_async.values.errors import ConnectionLostError
 from robotiq_async.values.events import SentRequest
+from robotiq_async.values.statistics import Counters
 from robotiq_async.values.status import RobotiqStatus
-from robotiq_async.values.trigger import Trigger
 from tests.session.sessions import options
 from tests.session.wire import Wire
 from tests.virtual import VirtualLoop

@@ -8,8 +8,7 @@ from contextlib import asynccontextmanager
 from robotiq_async.control.state_machine import StateMachine
 from robotiq_async.session.claims import Gripper
 from robotiq_async.session.gripper_link import GripperLink
-from robotiq_async.session.options import HandOptions
-from robotiq_async.session.reconnecting import ReconnectPolicy
+from robotiq_async.session.options import HandOptions, ReconnectPolicy
 from robotiq_async.session.session import Session
 from robotiq_async.session.streams import Channels
 from robotiq_async.values.errors import ConnectionLostError

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import pytest
 
-from robotiq_async.session.listeners import Listeners
+from robotiq_async.session.streams import Listeners
 
 
 @pytest.fixture

@@ -8,9 +8,9 @@ from itertools import pairwise
 import pytest
 
 from robotiq_async.control.requests.pending import Command
+from robotiq_async.session.options import ReconnectPolicy
 from robotiq_async.session.poller import READS, STOP_S
-from robotiq_async.session.reconnecting import ReconnectPolicy
-from robotiq_async.values.enums import Finger, State
+from robotiq_async.values.enums import Finger, State, Trigger
 from robotiq_async.values.errors import (
     ConnectFailedError,
     ConnectionLostError,
@@ -19,7 +19,6 @@ from robotiq_async.values.errors import (
     RobotiqConnectionError,
 )
 from robotiq_async.values.request import Request
-from robotiq_async.values.trigger import Trigger
 from tests.session.polled import LOST, POLL_S, Polled, polled
 from tests.virtual import virtual
 

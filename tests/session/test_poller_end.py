@@ -7,8 +7,8 @@ import asyncio
 import pytest
 
 from robotiq_async.control.requests.pending import Command
+from robotiq_async.session.options import ReconnectPolicy
 from robotiq_async.session.poller import SHUTDOWN_S
-from robotiq_async.session.reconnecting import ReconnectPolicy
 from robotiq_async.values.enums import Finger, State
 from robotiq_async.values.errors import NotStartedError
 from robotiq_async.values.request import Request

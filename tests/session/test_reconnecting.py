@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from robotiq_async.session.reconnecting import SHORTEST_S, Backoff, ReconnectPolicy
+from robotiq_async.session.opening import SHORTEST_S, Backoff
+from robotiq_async.session.options import ReconnectPolicy
 
 
 def delays(policy: ReconnectPolicy, tries: int) -> list[float]:

@@ -11,14 +11,13 @@ import pytest
 
 from robotiq_async.control.requests.pending import Command
 from robotiq_async.session.session import Session
-from robotiq_async.values.enums import Finger, State
+from robotiq_async.values.enums import Finger, State, Trigger
 from robotiq_async.values.errors import (
     ConnectFailedError,
     ConnectionLostError,
     InvalidStateError,
     NotStartedError,
 )
-from robotiq_async.values.trigger import Trigger
 from tests.session.sessions import LOST, Run, running
 from tests.session.wire import Wire
 from tests.virtual import VirtualLoop, run, virtual

@@ -7,7 +7,7 @@ import asyncio
 import pytest
 
 from robotiq_async.control.requests.pending import Command
-from robotiq_async.session.reconnecting import ReconnectPolicy
+from robotiq_async.session.options import ReconnectPolicy
 from robotiq_async.values.enums import Fault, Finger, State
 from robotiq_async.values.errors import (
     ActivationTimeoutError,

@@ -7,8 +7,7 @@ import dataclasses
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.session.counters import SAMPLES, Counters
-from robotiq_async.values.statistics import Statistics
+from robotiq_async.values.statistics import SAMPLES, Counters, Statistics
 
 
 def test_before_the_first_poll_every_figure_is_zero() -> None:

@@ -11,8 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 import anyio
 import pytest
 
-from robotiq_async.session.listeners import Listeners
-from robotiq_async.session.streams import Channel, Stream
+from robotiq_async.session.streams import Channel, Listeners, Stream
 from robotiq_async.values.errors import ConnectionLostError, RobotiqError
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 import robotiq_async
-from robotiq_async.values.calibration.closing_time import closing_time
+from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.enums import Finger, ObjectStatus
 from robotiq_async.values.model import THREE_FINGER
 from tests.simulator.conftest import CYCLE

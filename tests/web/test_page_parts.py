@@ -23,7 +23,7 @@ from robotiq_async.tools.web.server import PageServer
 from robotiq_async.tools.web.settings import PageSettings
 from robotiq_async.tools.web.updates import HandUpdates
 from robotiq_async.tools.wording import refusal_words
-from robotiq_async.values.trigger import Trigger
+from robotiq_async.values.enums import Trigger
 from tests.fake_hand import FakeHand
 from tests.grippers import active_gripper
 

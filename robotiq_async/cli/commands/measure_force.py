@@ -105,7 +105,7 @@ async def _measure(
     plot: bool,
 ) -> None:
     from ...tools.measure.campaigns import GRASP_S, grasp, write_currents
-    from ...values.calibration.closing_time import closing_time
+    from ...values.calibration.scales import closing_time
 
     output = campaign.path
     currents_file = currents_beside(output)

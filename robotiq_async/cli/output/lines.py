@@ -15,9 +15,8 @@ from ...tools.recording.feed import compact
 from ...tools.recording.payloads import Fields, is_command
 from ...tools.recording.raw_output import write_all
 from ...tools.recording.timeline import Timeline
-from ...values.enums import Finger, State
+from ...values.enums import Finger, State, Trigger
 from ...values.status import NO_REQUEST, RobotiqStatus
-from ...values.trigger import Trigger
 from .messages import forwarded_warnings
 
 if TYPE_CHECKING:

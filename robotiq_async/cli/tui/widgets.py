@@ -12,11 +12,10 @@ from textual.widgets import Static
 
 from ...tools.recording.payloads import Fields
 from ...tools.wording import AXIS_WORDS, STATE_WORDS, without_methods
-from ...values.enums import Fault, Finger, ObjectStatus, Severity, State
+from ...values.enums import Fault, Finger, ObjectStatus, Severity, State, Trigger
 from ...values.model import Model
 from ...values.statistics import Statistics
 from ...values.status import NO_REQUEST, RobotiqStatus
-from ...values.trigger import Trigger
 
 KEYS: Final = """\
 o open  c close  1 wide  2 normal  3 pinch  SPACE halt  + - speed  ] [ force

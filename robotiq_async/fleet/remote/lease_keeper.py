@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ...runtime.clock import now
 from ...runtime.log import Log
-from ...session.ending import Ending
+from ...values.enums import Ending
 from ...values.errors import AgentError, ControlLostError, RobotiqError
 from ..limited_log import LimitedLog
 from ..network.bus import Bus, Undo

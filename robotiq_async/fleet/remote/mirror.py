@@ -8,10 +8,9 @@ from typing import Final
 
 from ...runtime.log import Log, log
 from ...session.streams import Channels
-from ...values.enums import State
+from ...values.enums import State, Trigger
 from ...values.events import Transition
 from ...values.status import RobotiqStatus
-from ...values.trigger import Trigger
 from ..control.lease import WINDOW_S
 from ..wire.status_message import StatusMessage
 from ..wire.values import Fields, read_request, read_transition, reading

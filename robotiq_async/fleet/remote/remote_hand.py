@@ -11,12 +11,10 @@ from typing import Final, Literal
 
 from ...control.state_machine import RUNNING, refusal
 from ...hand import Hand
-from ...session.counters import Counters
-from ...session.ending import Ending
 from ...session.options import units_of
 from ...values.calibration import ForceCalibration, SpeedCalibration
 from ...values.checks import check_flag, check_seconds
-from ...values.enums import Finger, State
+from ...values.enums import Ending, Finger, State, Trigger
 from ...values.errors import (
     InvalidStateError,
     NotAllowedError,
@@ -26,9 +24,8 @@ from ...values.errors import (
 )
 from ...values.model import THREE_FINGER
 from ...values.move_result import MoveResult
-from ...values.statistics import Statistics
+from ...values.statistics import Counters, Statistics
 from ...values.status import RobotiqStatus
-from ...values.trigger import Trigger
 from ..network.bus import Bus, Urgency
 from ..network.route import parse_remote_address
 from ..wire.values import Fields, read_result, reading

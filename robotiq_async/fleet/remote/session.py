@@ -11,12 +11,10 @@ from typing import Any, Final
 from ...runtime.clock import now
 from ...runtime.concurrency import check_loop, wait_shielded
 from ...runtime.log import Log
-from ...session.counters import Counters
-from ...session.ending import Ending
 from ...session.state_waiters import StateWaiters
 from ...session.streams import Channels
 from ...values.checks import check_seconds
-from ...values.enums import State
+from ...values.enums import Ending, State, Trigger
 from ...values.errors import (
     AgentError,
     ConnectFailedError,
@@ -27,8 +25,7 @@ from ...values.errors import (
     NotStartedError,
     RobotiqError,
 )
-from ...values.statistics import Statistics
-from ...values.trigger import Trigger
+from ...values.statistics import Counters, Statistics
 from ..control.lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
 from ..limited_log import LimitedLog
 from ..network.bus import Bus, Undo

@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from ...runtime.clock import now
-from ...session.ending import Ending
+from ...values.enums import Ending
 from ...values.errors import AgentError, NotAllowedError, ProtocolError, RobotiqError
 from ..network.bus import Urgency
 from ..wire.envelope import Call

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from ...runtime.log import printable
 from ...values import errors
-from ...values.enums import Fault, Finger, ObjectStatus, State
+from ...values.enums import Fault, Finger, ObjectStatus, State, Trigger
 from ...values.errors import (
     AgentError,
     ConnectFailedError,
@@ -29,7 +29,6 @@ from ...values.move_result import MoveResult
 from ...values.request import Request
 from ...values.statistics import Statistics
 from ...values.status import RobotiqStatus
-from ...values.trigger import Trigger
 
 Fields = dict[str, Any]
 Clock = Callable[[float], float]  # converts a time of the agent to a time of this process

@@ -16,7 +16,6 @@ from typing import Final
 
 from ...hand import Hand
 from ...runtime.clock import now
-from ...values.calibration.closing_time import closing_time
 from ...values.calibration.csv_tables import (
     FORCE,
     SPEED,
@@ -29,6 +28,7 @@ from ...values.calibration.csv_tables import (
     write_rows,
     write_table,
 )
+from ...values.calibration.scales import closing_time
 from ...values.enums import Finger
 from ...values.errors import MeasuringError
 from ...values.model import THREE_FINGER
