@@ -14,11 +14,9 @@ from typing import Final, Literal
 from ..values.checks import check_byte
 from ..values.model import Model, model_of
 
-TCP_PORT: Final = 502
-"""The port of Modbus TCP, and the gripper's."""
+TCP_PORT: Final = 502  # the port of Modbus TCP, and the gripper's
 
-REMOTE_SCHEME: Final = "zenoh://"
-"""Of a gripper on another host, for a remote hand."""
+REMOTE_SCHEME: Final = "zenoh://"  # of a gripper on another host, for a remote hand
 FORMS: Final = (
     "tcp://HOST[:PORT] (or bare HOST or HOST:PORT), "
     "rtu:///dev/ttyUSB0 (a serial port; rtu://COM3 on Windows), "
@@ -100,12 +98,7 @@ def is_remote(address: object) -> bool:
 
 
 def parse_address(address: object) -> Address:
-    """The address in a string.
-
-    Raises:
-        TypeError: not a string.
-        ValueError: malformed; the message shows the accepted forms.
-    """
+    """The address in a string."""
     if not isinstance(address, str):
         raise TypeError(f"address must be a string, got {address!r}; accepted: {FORMS}")
     scheme, separator, rest = address.partition("://")
@@ -136,11 +129,7 @@ def parse_address(address: object) -> Address:
 
 
 def _without_model(text: str) -> tuple[str, Model | None]:
-    """Take ``model=NAME`` out of the options after a question mark.
-
-    Raises:
-        ValueError: no such model, or more than one.
-    """
+    """Take ``model=NAME`` out of the options after a question mark."""
     place, _, query = text.partition("?")
     options = query.split("&") if query else []
     names = [option.removeprefix("model=") for option in options if option.startswith("model=")]
@@ -201,11 +190,7 @@ def _ends_in_a_number(host: str) -> bool:
 
 
 def parse_simulation(query: str) -> Simulation:
-    """Parse the part after ``sim://``: nothing, or ``?OPTION=VALUE&...``.
-
-    Raises:
-        ValueError: an unknown option, one given twice, or a value outside its range.
-    """
+    """Parse the part after ``sim://``: nothing, or ``?OPTION=VALUE&...``."""
     given: dict[str, str] = {}
     for part in query.removeprefix("?").split("&") if query else ():
         name, separator, value = part.partition("=")

@@ -17,10 +17,8 @@ from .serial_ports import hasten, why_no_port
 
 Client = AsyncModbusTcpClient | AsyncModbusSerialClient
 
-BAUD: Final = 115200
-"""Baud rate of the gripper's serial line; 8 data bits, no parity, 1 stop bit (manual)."""
-LARGEST_READ: Final = 4096
-"""Bytes read from the socket at a time; the longest Modbus frame has 260."""
+BAUD: Final = 115200  # baud rate of the gripper's serial line; 8 data bits, no parity, 1 stop bit (manual)
+LARGEST_READ: Final = 4096  # bytes read from the socket at a time; the longest Modbus frame has 260
 KEEPALIVE: Final = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 5}
 """TCP keepalive: seconds of silence before the first probe, seconds between probes, probes without an answer.
 A polling hand is never that silent. But while its program is suspended (a debugger, a sleeping machine),

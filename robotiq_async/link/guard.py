@@ -36,15 +36,6 @@ class GuardedTransport:
         response_timeout: float,
         log: Log = log,
     ) -> None:
-        """Wrap a transport.
-
-        Args:
-            inner: the transport.
-            name: how messages call it.
-            connect_timeout: seconds for opening it.
-            response_timeout: seconds for a read or a write.
-            log: of the hand.
-        """
         self._log = log
         self._inner = inner
         self._is_open = False
@@ -52,8 +43,7 @@ class GuardedTransport:
         self._connect_timeout = connect_timeout
         self._response_timeout = response_timeout
         self._worker = Worker("robotiq_async transport")
-        self._is_begun = False
-        """Whether open() was called without a close() since."""
+        self._is_begun = False  # whether open() was called without a close() since
 
     @property
     def is_open(self) -> bool:
@@ -64,11 +54,6 @@ class GuardedTransport:
             return False
 
     async def open(self) -> None:
-        """Connect.
-
-        Raises:
-            RobotiqConnectionError: the call failed or took too long.
-        """
         self._drop()
         try:
             await self._bounded(self._open_inner, self._connect_timeout)
@@ -106,7 +91,6 @@ class GuardedTransport:
         return await self._bounded(write, self._response_timeout)
 
     async def close(self) -> None:
-        """Disconnect; never fails."""
         self._drop()
         with anyio.CancelScope(shield=True):
             if not await self._worker.ended(self._response_timeout):

@@ -13,8 +13,7 @@ FORBIDDEN: Final = "not allowed to open it; is this user in its group (ls -l; on
 TAKEN: Final = "another program has opened it"
 NO_PORT: Final = "it is not a serial port"
 
-USB_SERIAL: Final = Path("/sys/bus/usb-serial/devices")
-"""Where Linux has a folder for each USB adapter."""
+USB_SERIAL: Final = Path("/sys/bus/usb-serial/devices")  # where Linux has a folder for each USB adapter
 
 _WHY: Final = {
     **dict.fromkeys((errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR), MISSING),
@@ -42,21 +41,13 @@ def hasten(port: object) -> None:
 
     An FTDI adapter holds received bytes back for its latency timer, by default 16 ms, which triples the time
     of a read; in low-latency mode 1 ms (Linux). Other ports have no such mode.
-
-    Args:
-        port: the port object of pyserial.
     """
     with contextlib.suppress(AttributeError, NotImplementedError, OSError, ValueError):
         port.set_low_latency_mode(True)  # type: ignore[attr-defined]
 
 
 def latency_timer(device: str, folder: Path = USB_SERIAL) -> int | None:
-    """How long the adapter of a port holds received bytes back, in milliseconds; None if unknown.
-
-    Args:
-        device: the port, or a link to it.
-        folder: where the system lists its adapters.
-    """
+    """How long the adapter of a port holds received bytes back, in milliseconds; None if unknown."""
     with contextlib.suppress(OSError, ValueError):
         return int(latency_file(device, folder).read_text())
     return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 from ..values.enums import Finger
@@ -44,9 +45,12 @@ class SimulatedTransport:
         from ..simulator import SimulatorServer  # noqa: PLC0415
 
         self._server = SimulatorServer(gripper)
-        self._map = registers
-        self._connect_timeout = connect_timeout
-        self._response_timeout = response_timeout
+        self._make = partial(
+            ModbusTransport,
+            registers=registers,
+            connect_timeout=connect_timeout,
+            response_timeout=response_timeout,
+        )
         self._inner: ModbusTransport | None = None
 
     @property
@@ -54,39 +58,20 @@ class SimulatedTransport:
         return self._inner is not None and self._inner.is_open
 
     async def open(self) -> None:
-        """Start the simulator if it does not run, and connect to it.
-
-        Raises:
-            RobotiqConnectionError: loopback does not work.
-        """
+        """Start the simulator if it does not run, and connect to it."""
         if self._inner is None:
             try:
                 await self._server.start()
             except OSError as error:
                 why = f"the simulated gripper cannot listen: {error.strerror or error}"
                 raise ConnectFailedError("sim://", why) from error
-            self._inner = ModbusTransport(
-                parse_address(self._server.address),
-                self._map,
-                connect_timeout=self._connect_timeout,
-                response_timeout=self._response_timeout,
-            )
+            self._inner = self._make(parse_address(self._server.address))
         await self._inner.open()
 
     async def read(self) -> Registers:
-        """The eight status registers.
-
-        Raises:
-            RobotiqConnectionError: no clean answer in time; the connection is closed.
-        """
         return await self._connected().read()
 
     async def send(self, decide: Callable[[], Sequence[int] | None]) -> bool:
-        """Write what ``decide`` returns, if anything.
-
-        Raises:
-            RobotiqConnectionError: no clean acknowledgement in time; the connection is closed.
-        """
         return await self._connected().send(decide)
 
     async def close(self) -> None:

@@ -49,14 +49,11 @@ class Link(Protocol):
     """A transport as the poller uses it: the image is decided in the moment of the write."""
 
     @property
-    def is_open(self) -> bool:
-        """As :attr:`Transport.is_open`."""
+    def is_open(self) -> bool: ...
 
-    async def open(self) -> None:
-        """As :meth:`Transport.open`."""
+    async def open(self) -> None: ...
 
-    async def read(self) -> Registers:
-        """As :meth:`Transport.read`."""
+    async def read(self) -> Registers: ...
 
     async def send(self, decide: Callable[[], Sequence[int] | None]) -> bool:
         """Write what ``decide`` returns, exactly once, if it returns anything.
@@ -72,5 +69,4 @@ class Link(Protocol):
             RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
         """
 
-    async def close(self) -> None:
-        """As :meth:`Transport.close`."""
+    async def close(self) -> None: ...

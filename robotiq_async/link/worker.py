@@ -102,8 +102,7 @@ class _Calls:
 
     def __init__(self) -> None:
         self.waiting: deque[_Call] = deque()
-        self.has_ended = False
-        """Whether the call that was started last is the last one."""
+        self.has_ended = False  # whether the call that was started last is the last one
         self._more = asyncio.Event()
 
     def put(self, call: _Call) -> None:
@@ -125,8 +124,7 @@ class _Call:
         self.done: Final = done
         self.is_last: Final = is_last
         self.is_given_up = False
-        self.task: asyncio.Task[Any] | None = None
-        """The task that runs the call, once it has begun."""
+        self.task: asyncio.Task[Any] | None = None  # the task that runs the call, once it has begun
         self.result: Any = None
         self.error: BaseException | None = None
 

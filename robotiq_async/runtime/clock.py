@@ -25,9 +25,5 @@ def clock_of(loop: asyncio.AbstractEventLoop) -> Callable[[], float]:
 
 
 def now() -> float:
-    """The time by the clock of the running loop.
-
-    Raises:
-        RuntimeError: no event loop runs here.
-    """
+    """The time by the clock of the running loop."""
     return clock_of(asyncio.get_running_loop())()

@@ -63,11 +63,7 @@ def in_a_thread(work: Callable[[], T]) -> asyncio.Future[T]:
 
 
 def running_loop() -> asyncio.AbstractEventLoop:
-    """The running asyncio event loop.
-
-    Raises:
-        RuntimeError: there is none: called outside of a coroutine, or under trio.
-    """
+    """The running asyncio event loop."""
     try:
         return asyncio.get_running_loop()
     except RuntimeError:
@@ -77,15 +73,7 @@ def running_loop() -> asyncio.AbstractEventLoop:
 
 
 def check_loop(own: asyncio.AbstractEventLoop, what: str) -> None:
-    """Refuse a call that does not come from the loop a hand runs in.
-
-    Args:
-        own: the hand's loop.
-        what: was called, for the message.
-
-    Raises:
-        RuntimeError: called from another thread, another event loop or another framework.
-    """
+    """Refuse a call that does not come from the loop a hand runs in."""
     try:
         running: asyncio.AbstractEventLoop | None = asyncio.get_running_loop()
     except RuntimeError:

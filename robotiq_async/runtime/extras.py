@@ -16,14 +16,7 @@ _NESTED: Final = re.compile(rf"{NAME}\[(.+)\]$")
 
 
 def install(extra: str) -> str:
-    """The command that installs an extra, for the end of a message.
-
-    Args:
-        extra: its name in ``pyproject.toml``.
-
-    Raises:
-        ValueError: there is no such extra.
-    """
+    """The command that installs an extra, for the end of a message."""
     from importlib import metadata  # noqa: PLC0415  # a tenth of the time that a command needs to begin
 
     try:
@@ -34,11 +27,7 @@ def install(extra: str) -> str:
 
 
 def pip_command(extra: str, requirements: Sequence[str]) -> str:
-    """The command, from the requirements in a distribution's metadata.
-
-    Raises:
-        ValueError: the requirements have no such extra.
-    """
+    """The command, from the requirements in a distribution's metadata."""
     packages = [shlex.quote(each) for each in dict.fromkeys(_packages(extra, requirements))]
     if not packages:
         raise ValueError(f"there is no extra {extra!r}")

@@ -55,6 +55,5 @@ def _in_one_line(record: logging.LogRecord) -> bool:
     return True
 
 
-log: Final = Log()
-"""For messages about no particular hand."""
+log: Final = Log()  # for messages about no particular hand
 logging.getLogger("robotiq_async").addFilter(_in_one_line)

@@ -16,11 +16,7 @@ def is_loopback(host: str) -> bool:
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """A listening socket that no other program shares; port 0 takes a free one.
-
-    Raises:
-        OSError: the port is taken, or the interface does not exist.
-    """
+    """A listening socket that no other program shares; port 0 takes a free one."""
     family, kind, _, _, address = socket.getaddrinfo(
         host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
     )[0]

@@ -16,11 +16,6 @@ if sys.platform == "linux" and sys.version_info >= (3, 13):
         """A timer, and its descriptor: ready from the time it is set to until it is set again."""
 
         def __init__(self) -> None:
-            """Take a descriptor; the timer is not set yet.
-
-            Raises:
-                OSError: no descriptors left.
-            """
             self.descriptor = os.timerfd_create(time.CLOCK_MONOTONIC, flags=os.TFD_NONBLOCK | os.TFD_CLOEXEC)
 
         def arm(self, when: float) -> None:
@@ -51,11 +46,6 @@ elif sys.platform == "linux":
         """A timer, and its descriptor: ready from the time it is set to until it is set again."""
 
         def __init__(self) -> None:
-            """Take a descriptor; the timer is not set yet.
-
-            Raises:
-                OSError: no descriptors left.
-            """
             # TFD_NONBLOCK and TFD_CLOEXEC are those of open(2).
             self.descriptor = _checked(
                 _libc.timerfd_create(time.CLOCK_MONOTONIC, os.O_NONBLOCK | os.O_CLOEXEC)
@@ -81,20 +71,15 @@ elif sys.platform == "linux":
 else:
 
     class TimerFd:
-        """Not on this system."""
+        """Not on this system: making one is an OSError."""
 
         descriptor = -1
 
         def __init__(self) -> None:
-            """Refuse.
-
-            Raises:
-                OSError: always.
-            """
             raise OSError(errno.ENOSYS, "timerfd is Linux's")
 
         def arm(self, when: float) -> None:
-            """Not on this system."""
+            pass
 
         def close(self) -> None:
-            """Not on this system."""
+            pass

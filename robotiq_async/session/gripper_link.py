@@ -53,10 +53,6 @@ def gripper_link(
         registers: the options that :func:`registers_of` takes; a transport object has no use for them.
         name: of the hand, for the log; empty for the address.
         model: a Model or its name; None for that of the address.
-
-    Raises:
-        TypeError: neither a string nor a Transport, or an option of the wrong type.
-        ValueError: a malformed address, an option outside its range, or another model than the address names.
     """
     if isinstance(address, str):
         parsed = parse_address(address)
@@ -71,12 +67,7 @@ def gripper_link(
 
 
 def with_model(address: Address, model: object) -> Address:
-    """An address with the model of its gripper; None leaves it as it is.
-
-    Raises:
-        TypeError: neither a Model nor a text.
-        ValueError: no such model, or another one than the address names.
-    """
+    """An address with the model of its gripper; None leaves it as it is."""
     if model is None:
         return address
     found = model_of(model)
@@ -93,12 +84,7 @@ def registers_of(
     request_address: object = None,
     status_address: object = None,
 ) -> RegisterMap:
-    """How the registers of a gripper are read and written; None stands for the usual value of the link.
-
-    Raises:
-        TypeError: an option is no int.
-        ValueError: an option is outside its range.
-    """
+    """How the registers of a gripper are read and written; None stands for the usual value of the link."""
     model = model_of(address.model)
     usual = model.rtu if address.is_rtu else model.tcp
     # On a serial line 0 is a broadcast, which no device answers, and ids above 247 are reserved. Over TCP

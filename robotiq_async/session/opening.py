@@ -21,15 +21,12 @@ SHORTEST_S: Final = 0.01  # between two tries
 
 
 class Opener:
-    """Tries until the link is open. :meth:`end` ends that at any moment, and for good."""
+    """Tries until the link is open. :meth:`end` ends that at any moment, and for good.
+
+    ``connect`` is one try, and raises RobotiqConnectionError when it fails.
+    """
 
     def __init__(self, connect: Callable[[], Awaitable[None]], options: HandOptions) -> None:
-        """Prepare; must be made inside a running event loop.
-
-        Args:
-            connect: one try; raises RobotiqConnectionError when it fails.
-            options: of the hand.
-        """
         self._connect = connect
         self._options = options
         self._log = options.log
@@ -45,9 +42,6 @@ class Opener:
 
     async def first(self, wait: float) -> bool:
         """Open the link of a hand that starts; False when that was ended meanwhile.
-
-        Args:
-            wait: seconds for which there may be no gripper yet.
 
         Raises:
             RobotiqConnectionError: the last try has failed.

@@ -42,22 +42,18 @@ replies, so that a stream of commands misses no polls."""
 WRITE_SPACING_S: Final = 0.01
 """The manual of 2014 (chapters on TCP and RTU): registers are renewed at 100 Hz; leave 10 ms, or some writes
 are lost. Users of two-finger grippers on two arms saw that."""
-LONGEST_SPACING_S: Final = 0.1
-"""A command waits that long at most before it is written."""
+LONGEST_SPACING_S: Final = 0.1  # a command waits that long at most before it is written
 CONNECT_TIMEOUT_S: Final = 2.0
 """A lost first packet is sent again after 1 s; what answers neither is not there."""
 RESPONSE_TIMEOUT_S: Final = 0.4
 """Two of these, a read in flight and a write, still end within the second that a write may take; on a serial
 line also with the time in which the read may be asked once more."""
-LONGEST_RESPONSE_S: Final = 5.0
-"""For gateways that are slow; a write may take more than a second then."""
-LONGEST_WAIT_S: Final = 86400.0
-"""How long a start may wait for its gripper: a day."""
+LONGEST_RESPONSE_S: Final = 5.0  # for gateways that are slow; a write may take more than a second then
+LONGEST_WAIT_S: Final = 86400.0  # how long a start may wait for its gripper: a day
 ACTIVATION_TIMEOUT_S: Final = 40.0
 """Drivers that ran on hardware saw about 15 s, and wait for 25 to 30 s; the notes of one list time-outs of
 the activation. What ends one early leaves a hand that does not know where its fingers are."""
-LONGEST_NAME: Final = 64
-"""Characters of a hand's name: it begins every line of the log."""
+LONGEST_NAME: Final = 64  # characters of a hand's name: it begins every line of the log
 
 
 class Place(Flag):
@@ -196,10 +192,6 @@ class HandOptions:
     """The options of a hand, checked. Opens nothing and needs no running loop.
 
     :class:`~robotiq_async.RobotiqHand` documents each; ``link``, ``units`` and ``log`` follow from them.
-
-    Raises:
-        TypeError: an option of the wrong type; the message names option, value and range.
-        ValueError: an option outside its range, or a malformed address.
     """
 
     address: Annotated[
@@ -272,8 +264,7 @@ class HandOptions:
     """How the gripper is reached; made from the address."""
     units: Units = field(init=False, repr=False, compare=False)
     """What positions, speeds and forces mean to people; default timeouts of moves come from its speeds."""
-    log: Log = field(init=False, repr=False, compare=False)
-    """For what happens to the hand."""
+    log: Log = field(init=False, repr=False, compare=False)  # for what happens to the hand
 
     def __post_init__(self) -> None:
         self._keep("name", _check_name("name", self.name))  # the log of the link begins with it
@@ -318,8 +309,7 @@ def _table() -> Mapping[str, Option]:
     }
 
 
-OPTIONS: Final = _table()
-"""The table: every option by name, in the order of the arguments of a hand."""
+OPTIONS: Final = _table()  # the table: every option by name, in the order of the arguments of a hand
 
 
 def offered(place: Place) -> dict[str, Option]:
@@ -328,12 +318,7 @@ def offered(place: Place) -> dict[str, Option]:
 
 
 def units_of(calibration: object, force_calibration: object, model: Model = THREE_FINGER) -> Units:
-    """What the values of a hand mean; None for the usual speeds of its model, and for the manual's forces.
-
-    Raises:
-        TypeError: not a calibration of its kind.
-        ValueError: speeds that do not cover 0..255.
-    """
+    """What the values of a hand mean; None for the usual speeds of its model, and for the manual's forces."""
     speeds = _check_speeds("calibration", calibration)
     forces = _check_forces("force_calibration", force_calibration)
     return Units(speeds or SpeedCalibration.usual(model), forces or ForceCalibration.nominal(model))

@@ -49,18 +49,14 @@ STOP_S: Final = 1.4
 second to close."""
 IN_FLIGHT_S: Final = 0.9
 """Of STOP_S: how long the exchange in flight may take before the link is closed and opened anew."""
-SHUTDOWN_S: Final = 1.2
-"""Of STOP_S: time to reach the gripper and to see the fingers stop."""
-SHUTDOWN_PAUSE_S: Final = 0.05
-"""Between two attempts at that."""
-READS: Final = 3
-"""The most reads in a cycle that has a request to write, while the loop is held up."""
+SHUTDOWN_S: Final = 1.2  # of STOP_S: time to reach the gripper and to see the fingers stop
+SHUTDOWN_PAUSE_S: Final = 0.05  # between two attempts at that
+READS: Final = 3  # the most reads in a cycle that has a request to write, while the loop is held up
 SOON_S: Final = 0.0025
 """How long a cycle waits for write_spacing: half of a usual period, so that its status is still fresh."""
 LATE_S: Final = 0.05
 """A poll that is later than this is worth a warning; on a busy machine a few milliseconds are usual."""
-LATE_WARNING_S: Final = 1.0
-"""Seconds between two warnings about late polls."""
+LATE_WARNING_S: Final = 1.0  # seconds between two warnings about late polls
 HELD_UP: Final = (
     "something holds up the event loop, or it was not running (as between the prompts of IPython's terminal: "
     "use robotiq_async.sync there)"
@@ -69,14 +65,6 @@ HELD_UP: Final = (
 
 class Poller:
     """Runs the link of one hand from start to stop; :meth:`run` is the body of its task.
-
-    Args:
-        transport: the link; no other task may use it.
-        controller: decides what to write.
-        counters: for the statistics.
-        channels: get each status after the controller has seen it, and each write.
-        options: of the hand.
-        wait: seconds to keep trying while nothing answers.
 
     Attributes:
         connected: done after the first status; holds the error if there is none.
@@ -115,8 +103,7 @@ class Poller:
         self._tick = Tick(options.poll_interval)
         self._last_poll = 0.0
         self._warned = -math.inf
-        self._decided: tuple[Request, float] | None = None
-        """The last image decided on, and when."""
+        self._decided: tuple[Request, float] | None = None  # the last image decided on, and when
 
     def request_stop(self, *, halt: bool, keep_grip: bool = False) -> None:
         """End the task as :class:`Ending` says; the strongest of several requests counts. Never blocks.

@@ -44,14 +44,8 @@ Failing = Mapping[State, Callable[[], RobotiqError]]
 class Session:
     """A run: from start() to stop(), or until the link is given up or the event loop closed.
 
-    Making one claims the gripper and begins to connect. This needs a running event loop.
-
-    Args:
-        options: of the hand.
-        machine: the state of the hand; it outlives the session.
-        channels: the streams and listeners of the hand; they outlive the session.
-        activate: whether a gripper that is found reset is activated.
-        wait: seconds to keep trying while nothing answers.
+    Making one claims the gripper and begins to connect. This needs a running event loop. The machine and the
+    channels outlive it.
 
     Raises:
         InvalidStateError: another hand of this process owns the gripper.
@@ -197,11 +191,7 @@ class Session:
         return self._loop.create_future()
 
     def ask(self, request: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Make a request of the controller; listeners hear of its changes of state after it.
-
-        Raises:
-            RobotiqError: it is refused.
-        """
+        """Make a request of the controller; listeners hear of its changes of state after it."""
         try:
             return request(*args, **kwargs)
         finally:
@@ -288,12 +278,7 @@ class Session:
             raise ActivationTimeoutError(f"{error}{why}") from None
 
     async def next_status(self) -> None:
-        """Wait for the next status.
-
-        Raises:
-            RobotiqConnectionError: the link went down meanwhile.
-            NotStartedError: the hand was stopped.
-        """
+        """Wait for the next status."""
         ends: Failing = {State.DISCONNECTED: self.link_lost, State.DO_SHUTDOWN: self._stopped}
         with self._waiters.watching((), ends) as seen:
 

@@ -19,8 +19,7 @@ from .streams import Listeners
 STALLED_S: Final = 5.0
 """A gripper that waits for its activation (gFLT 0x05 to 0x07) or releases, and shows nothing new for this
 time, makes no progress. While it moves, its currents and positions change. No figure is published."""
-TOLD_EVERY_S: Final = 4.0
-"""An activation may take half a minute on a real gripper."""
+TOLD_EVERY_S: Final = 4.0  # an activation may take half a minute on a real gripper
 ACTIVATING: Final = frozenset({State.DO_ACTIVATION, State.WF_ACTIVATION})
 
 

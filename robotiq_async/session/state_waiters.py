@@ -31,12 +31,7 @@ class StateWaiters:
     def watching(
         self, states: Collection[State], failing: Mapping[State, Callable[[], RobotiqError]]
     ) -> Iterator[asyncio.Future[State]]:
-        """Yield a future for the first of some states from now on.
-
-        Args:
-            states: what to wait for.
-            failing: states in which the wait is in vain, each with the error for the caller.
-        """
+        """Yield a future for the first of some states from now on."""
         reached: asyncio.Future[State] = asyncio.get_running_loop().create_future()
         waiter = (states, failing, reached)
         self._waiters.append(waiter)

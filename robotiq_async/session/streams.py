@@ -211,8 +211,7 @@ class Channel(Generic[T]):
         self._listeners = listeners
         # A list of references and not a WeakSet, which takes several times as long, at every poll.
         self._streams: list[weakref.ref[Stream[Any]]] = []
-        self._has_dropped = False
-        """Whether some of these were dropped by their readers."""
+        self._has_dropped = False  # whether some of these were dropped by their readers
         self._waited_for: set[Stream[Any]] = set()
         self._failure: Callable[[], RobotiqError] | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -238,16 +237,12 @@ class Channel(Generic[T]):
     def reopen(self, loop: asyncio.AbstractEventLoop) -> None:
         """The hand starts in this loop: forget an earlier failure."""
         self._failure, self._loop = None, loop
-        for reference in self._streams:
-            stream = reference()
-            if stream is not None:
-                stream.belong_to(loop)
+        for stream in self._living():
+            stream.belong_to(loop)
 
     def push(self, item: T) -> None:
-        for reference in self._streams:
-            stream = reference()
-            if stream is not None:
-                stream.push(item)
+        for stream in self._living():
+            stream.push(item)
         if self._has_dropped:
             self._let_go()
         self._listeners.tell(item)
@@ -260,6 +255,11 @@ class Channel(Generic[T]):
             stream = reference()
             if stream is not None:
                 stream.end(failure)
+
+    def _living(self) -> Iterator[Stream[Any]]:
+        for reference in self._streams:
+            if (stream := reference()) is not None:
+                yield stream
 
     def _let_go(self) -> None:
         self._has_dropped = False

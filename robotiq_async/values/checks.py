@@ -1,5 +1,7 @@
 """Argument checks: each names the argument, the value and the range, and nothing is clamped.
 
+A wrong type is a TypeError, a value outside its range a ValueError.
+
 An int is any object with ``__index__``, such as numpy's integers; a number is a real number or an int. The
 result is a plain int or float. A bool is refused: it hints at a misplaced argument.
 """
@@ -18,32 +20,17 @@ _BY_VALUE: Final = {int(axis): axis for axis in (Finger.A, Finger.B, Finger.C, F
 
 
 def check_byte(name: str, value: object) -> int:
-    """A position, speed or force: an int in 0..255.
-
-    Raises:
-        TypeError: not an int (a bool is not one here).
-        ValueError: outside 0..255.
-    """
+    """A position, speed or force: an int in 0..255."""
     return check_int(name, value, 0, 255)
 
 
 def check_optional_byte(name: str, value: object) -> int | None:
-    """A value in 0..255, or None for no change.
-
-    Raises:
-        TypeError: neither None nor an int.
-        ValueError: outside 0..255.
-    """
+    """A value in 0..255, or None for no change."""
     return None if value is None else check_byte(name, value)
 
 
 def check_int(name: str, value: object, low: int, high: int) -> int:
-    """An int in low..high.
-
-    Raises:
-        TypeError: not an int (a bool is not one here).
-        ValueError: outside the range.
-    """
+    """An int in low..high."""
     number = as_int(value)
     if number is None:
         raise TypeError(f"{name} must be an int in {low}..{high}, got {value!r}")
@@ -63,12 +50,7 @@ def as_int(value: object) -> int | None:
 
 
 def check_mask(fingers: object) -> Finger:
-    """A mask of axes: a Finger, or an int in 1..15.
-
-    Raises:
-        TypeError: not a Finger or an int.
-        ValueError: empty, or bits beyond the four axes.
-    """
+    """A mask of axes: a Finger, or an int in 1..15."""
     mask = as_int(fingers)
     if mask is None:
         raise TypeError(f"fingers must be a Finger mask or an int in 1..15, got {fingers!r}")
@@ -78,11 +60,7 @@ def check_mask(fingers: object) -> Finger:
 
 
 def parse_fingers(name: str, text: str) -> Finger:
-    """A mask of axes from words: ``ABC``, ``A,B``, ``scissor``, ``jaw``, ``all``.
-
-    Raises:
-        ValueError: it names something else, or nothing.
-    """
+    """A mask of axes from words: ``ABC``, ``A,B``, ``scissor``, ``jaw``, ``all``."""
     mask = Finger(0)
     for word in text.upper().split(","):
         word = word.strip()
@@ -97,12 +75,7 @@ def parse_fingers(name: str, text: str) -> Finger:
 
 
 def check_axis(finger: object) -> Finger:
-    """Exactly one axis.
-
-    Raises:
-        TypeError: not a Finger or an int.
-        ValueError: not one of A, B, C, SCISSOR.
-    """
+    """Exactly one axis."""
     if type(finger) is Finger and finger in _SINGLE:
         return finger
     value = as_int(finger)
@@ -115,22 +88,12 @@ def check_axis(finger: object) -> Finger:
 
 
 def check_seconds(name: str, value: object, low: float, high: float) -> float:
-    """A duration in seconds within low..high.
-
-    Raises:
-        TypeError: not a number.
-        ValueError: not finite, or outside the range.
-    """
+    """A duration in seconds within low..high."""
     return check_number(name, value, low, high, "seconds")
 
 
 def check_number(name: str, value: object, low: float, high: float, what: str = "a number") -> float:
-    """A number within low..high; ``what`` is for the message.
-
-    Raises:
-        TypeError: not a number.
-        ValueError: not finite, or outside the range.
-    """
+    """A number within low..high; ``what`` is for the message."""
     number = as_float(value)
     if number is None:
         raise TypeError(f"{name} must be {what} in {low}..{high}, got {value!r}")
@@ -154,12 +117,7 @@ def as_float(value: object) -> float | None:
 
 
 def check_timeout(name: str, value: object) -> float | None:
-    """A timeout: None for no limit, or seconds above 0.
-
-    Raises:
-        TypeError: not None and not a number.
-        ValueError: not finite, or not above 0.
-    """
+    """A timeout: None for no limit, or seconds above 0."""
     if value is None:
         return None
     number = as_float(value)
@@ -171,11 +129,7 @@ def check_timeout(name: str, value: object) -> float | None:
 
 
 def check_flag(name: str, value: object) -> bool:
-    """True or False.
-
-    Raises:
-        TypeError: neither.
-    """
+    """True or False."""
     if not isinstance(value, bool):
         raise TypeError(f"{name} must be True or False, got {value!r}")
     return value

@@ -13,12 +13,7 @@ from .status import RobotiqStatus
 
 
 def check_at_least(at_least: object, fingers: Finger) -> int:
-    """The number of contacts that make a grasp: 1 to the number of axes; None means all of them.
-
-    Raises:
-        TypeError: neither None nor an int.
-        ValueError: outside the range.
-    """
+    """The number of contacts that make a grasp: 1 to the number of axes; None means all of them."""
     every = fingers.bit_count()
     return every if at_least is None else check_int("at_least", at_least, 1, every)
 

@@ -39,23 +39,13 @@ class Stroke:
         return self.closed_reading - self.open_reading
 
     def opening_mm(self, position: int) -> float:
-        """The opening at a position: all of it at the open reading and below, 0 from the closed reading on.
-
-        Raises:
-            TypeError: position is not an int.
-            ValueError: position is outside 0..255.
-        """
+        """The opening at a position: all of it up to the open reading, 0 from the closed reading on."""
         # Requests beyond the end stops are legal; the finger ends at the stop.
         reached = min(max(check_byte("position", position), self.open_reading), self.closed_reading)
         return self.mm * (self.closed_reading - reached) / self.counts
 
     def position_of(self, millimetres: float) -> int:
-        """The position, in counts, closest to an opening.
-
-        Raises:
-            TypeError: not a number.
-            ValueError: outside 0 (closed) .. ``mm`` (open).
-        """
+        """The position, in counts, closest to an opening."""
         opening = check_number("millimetres", millimetres, 0.0, self.mm)
         return round(self.closed_reading - opening / self.mm * self.counts)
 
@@ -231,53 +221,33 @@ _ADAPTIVE_FAULTS: Final = tuple(Fault.adaptive(code) for code in range(16))
 # registers of the serial line. The vendor's software reads with function 3, newer manuals list 4 and 23.
 _GATEWAY: Final = RegisterMap(request=0x03E8, status=0x07D0, read_function=3, device_id=9)
 
-TWO_FINGER_85: Final = Model(
-    name="2f85",
-    title="2F-85",
-    axes=_JAW,
-    object_status=(reg.gOBJ,),
-    faults=_ADAPTIVE_FAULTS,
-    tcp=_GATEWAY,
-    rtu=_GATEWAY,
-    # Manual of the 2F-85 and 2F-140, specifications. Open reads 3, closed 227 to 230 (PickNik's driver).
-    stroke=Stroke(85.0, open_reading=3, closed_reading=228),
-    open_reading_max=6,
-    closed_reading_min=226,
-    speeds_mm_s=(20.0, 150.0),
-    forces_n=(20.0, 235.0),
-)
+
+def _with_jaw(
+    name: str, title: str, mm: float, speeds_mm_s: tuple[float, float], forces_n: tuple[float, float]
+) -> Model:
+    return Model(
+        name=name,
+        title=title,
+        axes=_JAW,
+        object_status=(reg.gOBJ,),
+        faults=_ADAPTIVE_FAULTS,
+        tcp=_GATEWAY,
+        rtu=_GATEWAY,
+        # A 2F-85 reads 3 and 227 to 230 (PickNik's driver); no other source gives the readings of the others.
+        stroke=Stroke(mm, open_reading=3, closed_reading=228),
+        open_reading_max=6,
+        closed_reading_min=226,
+        speeds_mm_s=speeds_mm_s,
+        forces_n=forces_n,
+    )
+
+
+# Manual of the 2F-85 and 2F-140, specifications; manual of the Hand-E, the 130 N are those of its example.
+TWO_FINGER_85: Final = _with_jaw("2f85", "2F-85", 85.0, (20.0, 150.0), (20.0, 235.0))
 """The 2F-85."""
-TWO_FINGER_140: Final = Model(
-    name="2f140",
-    title="2F-140",
-    axes=_JAW,
-    object_status=(reg.gOBJ,),
-    faults=_ADAPTIVE_FAULTS,
-    tcp=_GATEWAY,
-    rtu=_GATEWAY,
-    # The same manual; readings as for the 2F-85: no other source gives them.
-    stroke=Stroke(140.0, open_reading=3, closed_reading=228),
-    open_reading_max=6,
-    closed_reading_min=226,
-    speeds_mm_s=(30.0, 250.0),
-    forces_n=(10.0, 125.0),
-)
+TWO_FINGER_140: Final = _with_jaw("2f140", "2F-140", 140.0, (30.0, 250.0), (10.0, 125.0))
 """The 2F-140."""
-HAND_E: Final = Model(
-    name="hand-e",
-    title="Hand-E",
-    axes=_JAW,
-    object_status=(reg.gOBJ,),
-    faults=_ADAPTIVE_FAULTS,
-    tcp=_GATEWAY,
-    rtu=_GATEWAY,
-    # Manual of the Hand-E, specifications; the 130 N are those of its example.
-    stroke=Stroke(50.0, open_reading=3, closed_reading=228),
-    open_reading_max=6,
-    closed_reading_min=226,
-    speeds_mm_s=(20.0, 150.0),
-    forces_n=(20.0, 130.0),
-)
+HAND_E: Final = _with_jaw("hand-e", "Hand-E", 50.0, (20.0, 150.0), (20.0, 130.0))
 """The Hand-E."""
 
 MODELS: Final = {model.name: model for model in (THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, HAND_E)}
@@ -285,12 +255,7 @@ MODELS: Final = {model.name: model for model in (THREE_FINGER, TWO_FINGER_85, TW
 
 
 def model_of(value: object, name: str = "model") -> Model:
-    """A model, or the one with this name; None is the 3-Finger.
-
-    Raises:
-        TypeError: neither a Model nor a text.
-        ValueError: no model has this name.
-    """
+    """A model, or the one with this name; None is the 3-Finger."""
     if value is None:
         return THREE_FINGER
     if isinstance(value, Model):

@@ -14,13 +14,10 @@ from typing import Final
 
 from .checks import as_int
 
-REGISTER_COUNT: Final = 8
-"""Registers in either block."""
+REGISTER_COUNT: Final = 8  # registers in either block
 
-Registers = tuple[int, ...]
-"""Eight registers of 16 bits."""
-Echo = tuple[int, ...]
-"""What a status repeats of a request: activation, go, and the position of each axis."""
+Registers = tuple[int, ...]  # eight registers of 16 bits
+Echo = tuple[int, ...]  # what a status repeats of a request: activation, go, and the position of each axis
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +50,7 @@ class Field:
         return registers[self._word] >> self._offset & self._mask
 
     def write(self, registers: MutableSequence[int], value: int) -> None:
-        """Put a value into a block in place.
-
-        Raises:
-            ValueError: the value does not fit into the field.
-        """
+        """Put a value into a block in place."""
         mask, offset = self._mask, self._offset
         if not 0 <= value <= mask:
             raise ValueError(
@@ -93,8 +86,7 @@ gFLT: Final = Field(2, 0, 4, "fault code; the high nibble is not part of it")
 gPR: Final = tuple(Field(3 + 3 * n, doc=f"echo of the position of {name}") for n, name in enumerate("ABCS"))
 gPO: Final = tuple(Field(4 + 3 * n, doc=f"position of {name}") for n, name in enumerate("ABCS"))
 gCU: Final = tuple(Field(5 + 3 * n, doc=f"current of {name}, 10 mA a count") for n, name in enumerate("ABCS"))
-STATUS_RESERVED: Final = (Field(2, 4, 4), Field(15))
-"""What the manual gives no meaning: the bits read 0."""
+STATUS_RESERVED: Final = (Field(2, 4, 4), Field(15))  # what the manual gives no meaning: the bits read 0
 
 MILLIAMPERE_PER_COUNT: Final = 10
 """gCU: the manual's worked example reads 0x0F as 150 mA; two editions print the relation upside down."""
@@ -122,12 +114,7 @@ RTU_REGISTERS: Final = RegisterMap(request=0x03E8, status=0x07D0, read_function=
 
 
 def check_registers(registers: Sequence[int]) -> Registers:
-    """Eight registers of 16 bits as a tuple of plain ints.
-
-    Raises:
-        TypeError: a register is not an int.
-        ValueError: not eight registers, or one outside 0..65535.
-    """
+    """Eight registers of 16 bits as a tuple of plain ints."""
     block = tuple(registers)
     if len(block) != REGISTER_COUNT:
         raise ValueError(f"registers: expected {REGISTER_COUNT} of them, got {len(block)}")

@@ -60,11 +60,7 @@ class Request:
 
     @property
     def registers(self) -> reg.Registers:
-        """The eight registers.
-
-        Raises:
-            ValueError: a position, speed or force does not fit into a byte.
-        """
+        """The eight registers."""
         block = [0] * reg.REGISTER_COUNT
         reg.rACT.write(block, self.activate)
         reg.rGTO.write(block, self.go)
@@ -83,12 +79,7 @@ class Request:
 
     @classmethod
     def from_registers(cls, registers: Sequence[int], model: Model = THREE_FINGER) -> Request:
-        """The image in a block of eight registers.
-
-        Raises:
-            TypeError: a register is not an int.
-            ValueError: not eight registers, or one outside 0..65535.
-        """
+        """The image in a block of eight registers."""
         block = reg.check_registers(registers)
         return cls(
             activate=bool(reg.rACT.read(block)),

@@ -65,8 +65,7 @@ def percentile(ordered: list[float], share: float) -> float:
     return ordered[math.ceil(share * len(ordered)) - 1] if ordered else 0.0
 
 
-SAMPLES: Final = 2000
-"""The periods and round trips that percentiles are made from: 10 s at 200 Hz."""
+SAMPLES: Final = 2000  # the periods and round trips that percentiles are made from: 10 s at 200 Hz
 
 
 @dataclass(slots=True)
@@ -75,8 +74,7 @@ class Counters:
 
     polls: int = 0
     writes: int = 0
-    has_begun_to_write: bool = False
-    """Whether a write was begun, acknowledged or not."""
+    has_begun_to_write: bool = False  # whether a write was begun, acknowledged or not
     overruns: int = 0
     reconnects: int = 0
     longest_stall: float = 0.0

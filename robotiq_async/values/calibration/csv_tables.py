@@ -22,8 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, TextIO
 
-Table = dict[int, tuple[int, ...]]
-"""For each value, its runs."""
+Table = dict[int, tuple[int, ...]]  # for each value, its runs
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,14 +44,11 @@ class Layout:
         return [self.value, *(f"run_{number}_{self.unit}" for number in range(1, runs + 1))]
 
 
-SPEED: Final = Layout("speed_value", "ms", 600_000)
-"""Closing times, at most 10 minutes."""
-FORCE: Final = Layout("force_value", "g", 100_000)
-"""Readings of a scale between the fingers, at most 100 kg."""
+SPEED: Final = Layout("speed_value", "ms", 600_000)  # closing times, at most 10 minutes
+FORCE: Final = Layout("force_value", "g", 100_000)  # readings of a scale between the fingers, at most 100 kg
 LONGEST: Final = 10_000
 """Characters of a line at most, so that a large file without line ends is not read into memory."""
-NEW: Final = 0o666
-"""Mode of a new file, before the umask."""
+NEW: Final = 0o666  # mode of a new file, before the umask
 
 
 class TableError(ValueError):
@@ -137,11 +133,7 @@ def _lines(file: TextIO) -> Iterator[str]:
 
 
 def integer(path: Path | str, line: int, name: str, text: str, high: int) -> int:
-    """An integer in 0..high.
-
-    Raises:
-        TableError: it is not.
-    """
+    """An integer in 0..high."""
     if not re.fullmatch(r"[0-9]{1,12}", text) or int(text) > high:
         raise TableError(path, line, f"{name} must be an integer in 0..{high}, got {text!r}")
     return int(text)

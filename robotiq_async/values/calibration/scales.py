@@ -21,13 +21,10 @@ from ..checks import check_byte, check_number
 from ..model import THREE_FINGER, Model, Stroke
 from .csv_tables import FORCE, SPEED, Layout, Table, TableError, read_table, thesis_table
 
-GRAVITY: Final = 9.81
-"""m/s2, the thesis's value."""
+GRAVITY: Final = 9.81  # m/s2, the thesis's value
 
-LONGEST_S: Final = 600.0
-"""Longest closing time that a table may contain."""
-STRONGEST_N: Final = 1000.0
-"""Strongest force that a table may contain."""
+LONGEST_S: Final = 600.0  # longest closing time that a table may contain
+STRONGEST_N: Final = 1000.0  # strongest force that a table may contain
 
 Points = tuple[tuple[int, float], ...]
 
@@ -208,11 +205,7 @@ class ForceCalibration:
 
 
 def _read_curve(path: Path | str, layout: Layout) -> Table:
-    """Read a table of at least two rows.
-
-    Raises:
-        TableError: the file is not such a table, or has fewer than two rows.
-    """
+    """Read a table of at least two rows."""
     table = read_table(path, layout)
     if len(table) < 2:
         values = f"{layout.value.replace('_', ' ')}s"
@@ -231,12 +224,7 @@ def newton(grams: float) -> float:
 
 
 def checked_points(given: Iterable[tuple[int, float]], high: float) -> Points:
-    """Copy points into tuples of plain numbers, and check that they form a curve.
-
-    Raises:
-        TypeError: a value or a figure of the wrong type.
-        ValueError: fewer than two points, values that do not rise, or a figure outside 0..high.
-    """
+    """Copy points into tuples of plain numbers, and check that they form a curve."""
     points = tuple(
         (check_byte("a value of points", value), check_number("a figure of points", figure, 0.0, high))
         for value, figure in given
@@ -255,12 +243,7 @@ def covered(points: Points) -> range:
 
 
 def interpolated(name: str, value: int, points: Sequence[tuple[int, float]]) -> float:
-    """The figure at a value, on the straight line between its neighbours.
-
-    Raises:
-        TypeError: value is not an int.
-        ValueError: value is outside 0..255, or beyond the points.
-    """
+    """The figure at a value, on the straight line between its neighbours."""
     low, high = points[0][0], points[-1][0]
     value = check_byte(name, value)
     if not low <= value <= high:
@@ -271,12 +254,7 @@ def interpolated(name: str, value: int, points: Sequence[tuple[int, float]]) -> 
 
 
 def nearest_in_range(name: str, wanted: float, figures: Mapping[int, float]) -> int:
-    """The value with the closest figure, the lowest of several.
-
-    Raises:
-        TypeError: wanted is not a number.
-        ValueError: wanted is below or above all figures.
-    """
+    """The value with the closest figure, the lowest of several."""
     figure = check_number(name, wanted, min(figures.values()), max(figures.values()))
     return nearest(figure, figures)
 
