@@ -11,8 +11,8 @@ from ..control.grip_watch import SLIP_COUNTS, GripWatch
 from ..runtime.concurrency import running_loop
 from ..runtime.log import Log
 from ..session.options import LONGEST_WAIT_S
-from ..session.state_waiters import check_states
 from ..session.streams import Channel, Channels, Stream
+from ..session.waiting import check_states
 from ..values.calibration import Units
 from ..values.checks import (
     check_byte,

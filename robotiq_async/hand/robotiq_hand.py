@@ -24,7 +24,7 @@ from ..session.options import (
     ReconnectPolicy,
 )
 from ..session.session import Session
-from ..session.stall_watch import STALLED_S, StallWatch
+from ..session.waiting import STALLED_S, StallWatch
 from ..values.calibration import ForceCalibration, SpeedCalibration
 from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED, Finger, Severity, State, Trigger
 from ..values.errors import (

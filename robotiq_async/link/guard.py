@@ -28,13 +28,7 @@ class GuardedTransport:
     """Limits the time of every call, converts foreign exceptions, and closes after a failure."""
 
     def __init__(
-        self,
-        inner: Transport,
-        name: str,
-        *,
-        connect_timeout: float,
-        response_timeout: float,
-        log: Log = log,
+        self, inner: Transport, name: str, *, connect_timeout: float, response_timeout: float, log: Log = log
     ) -> None:
         self._log = log
         self._inner = inner

@@ -17,12 +17,6 @@ class Watchdog:
 
     Setting and cancelling a timer for each exchange would cost more than the exchange itself. So one timer
     runs until it expires, and then checks when the exchange of that moment is due.
-
-    Args:
-        loop: the running loop.
-        seconds: time limit of one exchange.
-        is_waiting: whether an exchange is under way.
-        on_timeout: called when the exchange is not over in time.
     """
 
     def __init__(

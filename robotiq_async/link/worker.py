@@ -31,10 +31,6 @@ class Worker:
     async def call(self, what: Callable[[], Awaitable[T]], seconds: float) -> T:
         """Make a call and wait for its result.
 
-        Args:
-            what: makes the call; it may raise before it returns an awaitable.
-            seconds: time limit.
-
         Raises:
             LateError: the time limit expired.
             Exception: raised by the call; a CancelledError of its own becomes a RuntimeError.

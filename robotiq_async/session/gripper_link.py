@@ -1,11 +1,13 @@
-"""How a gripper is reached: its address as text, its identity, and what opens a transport to it."""
+"""How a gripper is reached, what identifies it, and claims: no two hands of a process own the same one."""
 
 from __future__ import annotations
 
+import asyncio
+import threading
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Final
+from typing import Final, Generic, TypeVar
 
 from ..link.address import Address, canonical_address, parse_address
 from ..link.guard import GuardedTransport
@@ -16,12 +18,36 @@ from ..runtime.log import Log
 from ..values.checks import check_int
 from ..values.model import THREE_FINGER, Model, model_of
 from ..values.registers import REGISTER_COUNT, RegisterMap
-from .claims import Gripper
 
 LAST_BLOCK: Final = 0x10000 - REGISTER_COUNT
 """The highest first register of a block: registers are numbered to 0xFFFF."""
 _GATEWAY: Final = " (two grippers behind one gateway: give each of the hands its device_id)"
 _LINE: Final = " (a serial port has one owner, whatever the device_id: two would read each other's replies)"
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Gripper:
+    """What identifies a gripper before it is connected.
+
+    Attributes:
+        place: the same for all spellings of its address.
+        unit: the unit id that was given; None if none was, or if only one hand can own the place.
+        hint: for the error message, in case two grippers were meant.
+    """
+
+    place: str
+    unit: int | None = None
+    hint: str = field(default="", compare=False)
+
+    def may_be(self, other: Gripper) -> bool:
+        """Whether both may be the same gripper.
+
+        Grippers answer any unit id, so ids count only if both were given: then there is a gateway.
+        """
+        units = {self.unit, other.unit}
+        return self.place == other.place and (None in units or len(units) == 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,3 +146,41 @@ def _over_modbus(address: Address, registers: RegisterMap, names_unit: bool, nam
         address.is_rtu,
         model,
     )
+
+
+@dataclass(slots=True, eq=False)
+class _Claim(Generic[T]):
+    gripper: Callable[[], Gripper]
+    owner: T
+    loop: asyncio.AbstractEventLoop
+
+
+class Claims(Generic[T]):
+    """Grippers and their owners. Thread-safe."""
+
+    def __init__(self) -> None:
+        self._claiming = threading.Lock()
+        self._claims: dict[T, _Claim[T]] = {}
+
+    def claim(self, gripper: Callable[[], Gripper], owner: T, is_over: Callable[[T], bool]) -> T | None:
+        """Claim a gripper for the running loop; return its present owner if it has one.
+
+        Args:
+            gripper: identifies it; called anew for each later claim, because a serial port may be renamed.
+            owner: the new owner.
+            is_over: whether an owner in this loop has ended without a release.
+        """
+        here = asyncio.get_running_loop()
+        with self._claiming:
+            wanted = gripper()
+            for each in list(self._claims.values()):
+                if each.loop.is_closed() or (each.loop is here and is_over(each.owner)):
+                    self.release(each.owner)
+                elif each.gripper().may_be(wanted):
+                    return each.owner
+            self._claims[owner] = _Claim(gripper, owner, here)
+        return None
+
+    def release(self, owner: T) -> None:
+        """Give up a claim. Takes no lock: any thread may call it."""
+        self._claims.pop(owner, None)

@@ -227,10 +227,7 @@ class HandOptions:
     response_timeout: Annotated[
         float,
         _seconds(
-            "Seconds for one answer",
-            0.005,
-            LONGEST_RESPONSE_S,
-            Place.FILE | Place.ROS | Place.COMMAND_LINE,
+            "Seconds for one answer", 0.005, LONGEST_RESPONSE_S, Place.FILE | Place.ROS | Place.COMMAND_LINE
         ),
     ] = RESPONSE_TIMEOUT_S
     activation_timeout: Annotated[float, _seconds("Seconds for an activation", 0.01, 120.0)] = (

@@ -23,12 +23,7 @@ from ..link.transport import Link
 from ..link.watchdog import HELD_S
 from ..runtime.tick import Tick
 from ..values.enums import Ending
-from ..values.errors import (
-    NotStartedError,
-    ResponseTimeoutError,
-    RobotiqConnectionError,
-    WrongModelError,
-)
+from ..values.errors import NotStartedError, ResponseTimeoutError, RobotiqConnectionError, WrongModelError
 from ..values.events import SentRequest
 from ..values.model import names_that_fit
 from ..values.registers import Registers

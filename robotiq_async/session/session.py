@@ -28,12 +28,11 @@ from ..values.errors import (
 from ..values.events import Transition
 from ..values.statistics import Counters
 from ..values.status import RobotiqStatus
-from .claims import Claims
+from .gripper_link import Claims
 from .options import HandOptions
 from .poller import Poller
-from .stall_watch import STALLED_S, ActivationProgress, StallWatch
-from .state_waiters import StateWaiters
 from .streams import Channels
+from .waiting import STALLED_S, ActivationProgress, StallWatch, StateWaiters
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -40,11 +40,7 @@ class RobotiqStatus:
 
     # The hand makes one of these 200 times a second: it keeps the registers and nothing else.
     def __init__(
-        self,
-        registers: reg.Registers,
-        timestamp: float = 0.0,
-        sequence: int = 0,
-        model: Model = THREE_FINGER,
+        self, registers: reg.Registers, timestamp: float = 0.0, sequence: int = 0, model: Model = THREE_FINGER
     ) -> None:
         if hasattr(self, "_sequence"):
             raise AttributeError("RobotiqStatus is immutable: it is made once")

@@ -11,7 +11,7 @@ from typing import NamedTuple, Self
 
 from robotiq_async import Finger, RobotiqError, State
 from robotiq_async.control.state_machine import RUNNING
-from robotiq_async.session.stall_watch import STALLED_S
+from robotiq_async.session.waiting import STALLED_S
 from robotiq_async.simulator import parse_troubles
 from robotiq_async.simulator.troubles.trouble import KINDS
 from robotiq_async.values.registers import Registers

@@ -19,7 +19,7 @@ from robotiq_async import (
 from robotiq_async.control.first_motion import IGNORED_S
 from robotiq_async.control.requests.standstill import LAG_S
 from robotiq_async.session.options import ACTIVATION_TIMEOUT_S
-from robotiq_async.session.stall_watch import STALLED_S, TOLD_EVERY_S
+from robotiq_async.session.waiting import STALLED_S, TOLD_EVERY_S
 from robotiq_async.values.errors import MoveIgnoredError
 from tests.grippers import activate_beforehand
 from tests.hand.habits import Asleep, Late, Plain, Silent, Stopped

@@ -6,8 +6,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from robotiq_async.control.state_machine import StateMachine
-from robotiq_async.session.claims import Gripper
-from robotiq_async.session.gripper_link import GripperLink
+from robotiq_async.session.gripper_link import Gripper, GripperLink
 from robotiq_async.session.options import HandOptions, ReconnectPolicy
 from robotiq_async.session.session import Session
 from robotiq_async.session.streams import Channels

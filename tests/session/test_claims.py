@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from robotiq_async.session.claims import Claims, Gripper
+from robotiq_async.session.gripper_link import Claims, Gripper
 
 
 def never(_: object) -> bool:

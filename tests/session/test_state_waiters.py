@@ -7,7 +7,7 @@ import gc
 
 import pytest
 
-from robotiq_async.session.state_waiters import StateWaiters
+from robotiq_async.session.waiting import StateWaiters
 from robotiq_async.values.enums import Fault, State
 from robotiq_async.values.errors import ConnectionLostError, GripperFaultError, RobotiqError
 

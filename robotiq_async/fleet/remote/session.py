@@ -11,8 +11,8 @@ from typing import Any, Final
 from ...runtime.clock import now
 from ...runtime.concurrency import check_loop, wait_shielded
 from ...runtime.log import Log
-from ...session.state_waiters import StateWaiters
 from ...session.streams import Channels
+from ...session.waiting import StateWaiters
 from ...values.checks import check_seconds
 from ...values.enums import Ending, State, Trigger
 from ...values.errors import (

@@ -9,12 +9,7 @@ from math import ceil, floor
 from typing import overload
 
 from ..checks import check_number
-from .scales import (
-    ForceCalibration,
-    SpeedCalibration,
-    covered,
-    nearest,
-)
+from .scales import ForceCalibration, SpeedCalibration, covered, nearest
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -1,9 +1,9 @@
-"""Logs the progress of an activation, and detects when it, or a release, makes none: an emergency stop."""
+"""Waits of callers: futures for a state, and what ends the wait for an activation that makes no progress."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Final, Self
 
@@ -12,6 +12,7 @@ import anyio
 from ..control.state_machine import StateMachine
 from ..runtime.log import Log
 from ..values.enums import Severity, State
+from ..values.errors import RobotiqError
 from ..values.registers import Registers
 from ..values.status import RobotiqStatus
 from .streams import Listeners
@@ -21,6 +22,52 @@ STALLED_S: Final = 5.0
 time, makes no progress. While it moves, its currents and positions change. No figure is published."""
 TOLD_EVERY_S: Final = 4.0  # an activation may take half a minute on a real gripper
 ACTIVATING: Final = frozenset({State.DO_ACTIVATION, State.WF_ACTIVATION})
+_Waiter = tuple[Collection[State], Mapping[State, Callable[[], RobotiqError]], asyncio.Future[State]]
+
+
+def check_states(states: Collection[object]) -> None:
+    """Raise ValueError for no state, and TypeError for anything but a State."""
+    if not states:
+        raise ValueError("states must name at least one State, got none")
+    for state in states:
+        if not isinstance(state, State):
+            raise TypeError(f"states must be State members, got {state!r}")
+
+
+class StateWaiters:
+    """Wakes callers for the states that they wait for, however short these last."""
+
+    def __init__(self) -> None:
+        self._waiters: list[_Waiter] = []
+
+    @contextmanager
+    def watching(
+        self, states: Collection[State], failing: Mapping[State, Callable[[], RobotiqError]]
+    ) -> Iterator[asyncio.Future[State]]:
+        """Yield a future for the first of some states from now on."""
+        reached: asyncio.Future[State] = asyncio.get_running_loop().create_future()
+        waiter = (states, failing, reached)
+        self._waiters.append(waiter)
+        try:
+            yield reached
+        finally:
+            self._waiters.remove(waiter)
+            if reached.done() and not reached.cancelled():
+                reached.exception()  # retrieved: the caller may have been cancelled, and asyncio would log it
+
+    def reached(self, state: State) -> None:
+        for states, failing, future in self._waiters:
+            if future.done():
+                continue
+            if state in states:
+                future.set_result(state)
+            elif state in failing:
+                future.set_exception(failing[state]())
+
+    def fail(self, failure: Callable[[], RobotiqError]) -> None:
+        for _, _, future in self._waiters:
+            if not future.done():
+                future.set_exception(failure())
 
 
 class StallWatch:
