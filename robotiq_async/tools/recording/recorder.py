@@ -27,9 +27,9 @@ from typing import Final, Protocol, Self
 from ...hand import Hand
 from ...runtime.concurrency import in_a_thread, wait_shielded
 from ...values.errors import RecordingError
-from .csv_file import CsvFile
 from .feed import JOINTS, Feed, Message
 from .raw_output import write_all
+from .table import CsvFile
 
 _missing = ""
 try:  # Here and not in a constructor: importing takes 0.1 s, in which a hand could not poll.

@@ -1,4 +1,4 @@
-"""Messages of a hand as rows of a table, for spreadsheets and pandas.
+"""Messages of a hand as rows of a table, for spreadsheets and pandas, and a recording as such a table.
 
 A column has the name of its JSON key, for an axis with a prefix: ``A.position``. ``time`` is the wall clock,
 in UTC and ISO 8601; ``timestamp`` is in seconds of the program's monotonic clock.
@@ -6,11 +6,14 @@ in UTC and ISO 8601; ``timestamp`` is in seconds of the program's monotonic cloc
 
 from __future__ import annotations
 
+import csv
+import io
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from typing import Any, Final
 
+from .feed import EVENT, STATUS, Message
 from .payloads import SCHEMAS, Fields
 
 _SECOND: Final = 10**9
@@ -87,3 +90,32 @@ def _cell(value: object) -> object:
     if isinstance(value, dict):
         return json.dumps(value)
     return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
+
+
+_KINDS: Final = {STATUS: "status", EVENT: "event"}
+
+
+class CsvFile:
+    """A recording as a table with one row per poll. Needs no extra; a truncated file is readable."""
+
+    def __init__(self, write: Callable[[bytes], object]) -> None:
+        self._write = write
+        self._table = Table("status")
+        self._line(COLUMNS["status"])
+
+    def take(self, message: Message) -> None:
+        """Add a row for a status. Events set the state of the following rows; commands have no row."""
+        kind = _KINDS.get(message.topic)
+        if kind and (row := self._table.row(kind, message.nanoseconds, json.loads(message.data))):
+            self._line(row)
+
+    def flush(self) -> None:
+        """Do nothing: no row is buffered."""
+
+    def finish(self) -> None:
+        """Do nothing: CSV has no footer."""
+
+    def _line(self, cells: list[object] | list[str]) -> None:
+        line = io.StringIO(newline="")
+        csv.writer(line, lineterminator="\n").writerow(cells)
+        self._write(line.getvalue().encode())

@@ -12,8 +12,7 @@ from .....values.enums import FORCE_MAX, SPEED_MAX, Finger
 from ....actions import ACTIONS, Action
 from ..heartbeat import PRESS, PRESS_WITH_VALUE, Heartbeat
 from ..mirror import HandMirror, Mirror
-from .positions import Positions
-from .slider import Slider
+from .positions import Positions, Slider
 
 ARMED_S: Final = 0.3
 """A yes counts only after this time: an earlier one was clicked before the question could be read."""

@@ -10,7 +10,6 @@ from nicegui import events, ui
 from .....values.enums import CLOSED, OPEN, Finger, names_of
 from ..heartbeat import PRESS, PRESS_WITH_VALUE
 from ..mirror import HandMirror
-from .slider import Slider
 from .words import COLORS, NAMES
 
 ROWS: Final = (
@@ -18,6 +17,12 @@ ROWS: Final = (
     *((name, axis, color) for name, axis, color in zip(NAMES, Finger.ALL, COLORS, strict=True)),
 )
 """Name, axes and colour: all fingers together, and each axis alone."""
+
+
+class Slider(ui.slider):
+    """Keeps its value in the browser: an answer of the server would move it back during a drag."""
+
+    LOOPBACK = False
 
 
 class Positions:
