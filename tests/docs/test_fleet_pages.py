@@ -188,20 +188,11 @@ def test_every_key_of_the_file_has_its_row() -> None:
             assert rows == ["needed"]
 
 
-@pytest.mark.parametrize("page", ["fleet.md", "fleet-keys.md"])
-def test_the_files_on_the_pages_are_taken(page: str, tmp_path: Path) -> None:
-    text = (DOCS / "how-to" / page).read_text(encoding="utf-8")
-    keys = tmp_path / "agent-cell-1"
-    keys.mkdir()
-    for name in ("ca.pem", "cert.pem", "key.pem"):
-        (keys / name).touch()
-    (keys / "access.toml").write_text('operate = ["bob"]\n', encoding="utf-8")
-    files = [each for each in shown("toml", text) if "site" in each]
-    assert files
-    for each in files:
-        (tmp_path / "FLEET.toml").write_text(each, encoding="utf-8")
-        settings = read_agent_file(tmp_path / "FLEET.toml")
-        assert (settings.site, settings.host, [*settings.grippers]) == ("lab", "cell-1", ["left"])
+def test_the_file_on_the_page_is_taken(tmp_path: Path) -> None:
+    (file,) = shown("toml", HOW_TO)
+    (tmp_path / "FLEET.toml").write_text(file, encoding="utf-8")
+    settings = read_agent_file(tmp_path / "FLEET.toml")
+    assert (settings.site, settings.host, [*settings.grippers]) == ("lab", "cell-1", ["left"])
 
 
 def test_two_more_lines_make_it_listen_to_others(tmp_path: Path) -> None:

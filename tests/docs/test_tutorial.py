@@ -27,12 +27,6 @@ TYPED = [
 ]
 """What is typed at the prompt, each with the output that the page shows for it."""
 (PROGRAM,) = [pair for pair in pairwise(BLOCKS) if "\nasyncio.run(" in pair[0].text]
-(TEST,) = [
-    (code, output)
-    for code, (_, output) in zip(BLOCKS, pairwise(BLOCKS[1:]), strict=False)
-    if "def test_" in code.text
-]
-"""Between a test and its output stands the command that runs it."""
 BETWEEN_STATEMENTS = 0.05
 """Seconds, as a person's keys are slow: ten polls, and half a second of the simulated fingers."""
 
@@ -60,7 +54,7 @@ def agree(shown: str, printed: str) -> bool:
 
 def test_every_python_block_shows_its_output() -> None:
     assert len(TYPED) >= 12
-    assert all(output.language == "text" for _, output in [*TYPED, PROGRAM, TEST])
+    assert all(output.language == "text" for _, output in [*TYPED, PROGRAM])
     assert {block.language for block in BLOCKS} == {"sh", "python", "text"}
 
 
@@ -82,13 +76,6 @@ async def test_the_program_at_its_end(tmp_path: Path) -> None:
     program.write_text(code.text, encoding="utf-8")
     async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
         printed = await run(str(program), server.address)
-    assert agree(output.text, printed), printed
-
-
-async def test_the_test_at_its_end(tmp_path: Path) -> None:
-    code, output = TEST
-    (tmp_path / "test_grasp.py").write_text(code.text, encoding="utf-8")
-    printed = await run("-m", "pytest", "-q", "-p", "no:cacheprovider", str(tmp_path / "test_grasp.py"))
     assert agree(output.text, printed), printed
 
 
