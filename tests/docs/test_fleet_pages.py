@@ -10,8 +10,6 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any, Final
 
-import pytest
-
 from robotiq_async import Finger, MoveResult, ObjectStatus, RobotiqHand, State, Transition, Trigger
 from robotiq_async.fleet import GripperName
 from robotiq_async.fleet.agent.agent_file import AgentSettings, read_agent_file
