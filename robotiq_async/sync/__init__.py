@@ -3,14 +3,12 @@
 ======================  ===================================================================
 module                  what it holds
 ======================  ===================================================================
-``robotiq_hand``        the hand: one line for each call of the async one
-``streams``             iterators over its statuses, transitions, requests and grip events
+``robotiq_hand``        the hand, one line for each call of the async one, and the iterators it returns
 ``caller``              how a call gets to the event loop; Ctrl-C, a fork, the end of the program
 ``loop_thread``         the event loop of all blocking hands, in a thread that lives while it is needed
 ======================  ===================================================================
 """
 
-from .robotiq_hand import RobotiqHand
-from .streams import Stream
+from .robotiq_hand import RobotiqHand, Stream
 
 __all__ = ["RobotiqHand", "Stream"]

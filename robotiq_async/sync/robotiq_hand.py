@@ -1,10 +1,10 @@
-"""The blocking RobotiqHand: the calls of the async one, each made in the event loop of the hand."""
+"""The blocking RobotiqHand and its streams: each call is made in the event loop of the async one."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from types import TracebackType
-from typing import Self, TypeVar
+from typing import Generic, Self, TypeVar
 
 from ..control.grip_watch import SLIP_COUNTS
 from ..hand.robotiq_hand import RobotiqHand as AsyncRobotiqHand
@@ -27,10 +27,56 @@ from ..values.move_result import MoveResult
 from ..values.statistics import Statistics
 from ..values.status import RobotiqStatus
 from .caller import Caller
-from .streams import Stream
 
 T = TypeVar("T")
 K = TypeVar("K", bound=type)
+
+
+class Stream(Generic[T]):
+    """An iterator with one reader; dropping it ends it. Made by a hand."""
+
+    def __init__(self, stream: AsyncStream[T], caller: Caller) -> None:
+        self._stream = stream
+        self._caller = caller
+
+    def __iter__(self) -> Self:
+        return self
+
+    def __next__(self) -> T:
+        """The next item; waits for it. An interrupted wait loses nothing.
+
+        Raises:
+            StopIteration: the hand was stopped, or the stream was closed.
+            RobotiqConnectionError: the hand gave up on its link.
+            RuntimeError: another thread is waiting on the same stream.
+        """
+        items = self._caller.wait(self._next)
+        if not items:
+            raise StopIteration
+        return items[0]
+
+    async def _next(self) -> tuple[T, ...]:
+        try:
+            return (await anext(self._stream),)
+        except StopAsyncIteration:
+            return ()
+
+    @property
+    def missed(self) -> int:
+        """Items that were dropped, the oldest first, because the reader was slow."""
+        return self._stream.missed
+
+    def take_nowait(self) -> T | None:
+        """The next item if there is one now, or None."""
+        return self._caller.tell(self._stream.take_nowait)
+
+    def drain(self) -> Iterator[T]:
+        """Iterate over the items that are there now."""
+        return iter(self._caller.tell(lambda: list(self._stream.drain())))
+
+    def close(self) -> None:
+        """End the stream; a waiting reader ends too. Idempotent."""
+        self._caller.wait(self._stream.aclose)
 
 
 def _documented_as(original: type) -> Callable[[K], K]:
