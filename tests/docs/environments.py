@@ -24,7 +24,7 @@ import pytest
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.docs.agents import ROOM, agent_of_the_pages
 from tests.docs.pages import DOCS, PAGES, ROOT, Block, blocks, requirements
-from tests.docs.test_tutorial import PROGRAM, TEST, TYPED, agree
+from tests.docs.test_tutorial import PROGRAM, TYPED, agree
 from tests.docs.test_web_service import PAGE as WEB_SERVICE
 from tests.docs.test_web_service import service, stops
 from tests.grippers import active_gripper
@@ -173,12 +173,3 @@ async def test_the_program_of_the_tutorial(clone: str, tmp_path: Path) -> None:
     program.write_text(code.text, encoding="utf-8")
     async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
         assert agree(output.text, await run(clone, str(program), server.address, folder=ROOT))
-
-
-async def test_the_test_of_the_tutorial(clone: str, tmp_path: Path) -> None:
-    """In the clone, by the command on the page."""
-    code, output = TEST
-    (tmp_path / "test_grasp.py").write_text(code.text, encoding="utf-8")
-    (command,) = re.findall(r"^\.venv/bin/python (-m pytest .*)$", text_of(TUTORIAL), re.MULTILINE)
-    arguments = command.replace("../grasp", str(tmp_path)).split()
-    assert agree(output.text, await run(clone, *arguments, folder=ROOT))
