@@ -42,14 +42,12 @@ from ..values.statistics import Counters, Statistics
 from ..values.status import RobotiqStatus
 from .base import Hand
 
-RESET_TIMEOUT_S: Final = 5.0
-"""A reset takes a device cycle or two; this leaves room for a slow one."""
+RESET_TIMEOUT_S: Final = 5.0  # a reset takes a device cycle or two; this leaves room for a slow one
+# A release opens slowly; no figure is published. A full stroke at the slowest speed takes 10 s.
 RELEASE_TIMEOUT_S: Final = 60.0
-"""A release opens slowly; no figure is published. A full stroke at the slowest speed takes 10 s."""
+# Interference counts as minor for 20 s, a release may take a minute, a reset and an activation follow.
 RECOVER_TIMEOUT_S: Final = 90.0
-"""Interference counts as minor for 20 s, a release may take a minute, a reset and an activation follow."""
-RESETS: Final = 2
-"""After an emergency stop one reset has been seen to help, and sometimes a second."""
+RESETS: Final = 2  # after an emergency stop one reset has been seen to help, and sometimes a second
 
 
 class RobotiqHand(Hand):

@@ -20,8 +20,7 @@ from .loop_thread import LOOP_THREAD
 T = TypeVar("T")
 Function = Callable[[], Coroutine[Any, Any, T]]
 
-EXIT_S: Final = 4.0
-"""How long the end of the program waits for hands that are still running: stop() takes up to 2 s."""
+EXIT_S: Final = 4.0  # the end of the program waits so long for running hands: stop() takes up to 2 s
 
 
 class Caller:
@@ -33,8 +32,7 @@ class Caller:
 
     def __init__(self, hand: AsyncRobotiqHand) -> None:
         self.hand: Final = hand
-        self._calls: set[object] = set()
-        """The calls under way: the hand may be about to run."""
+        self._calls: set[object] = set()  # those under way: the hand may be about to run
         self._is_left_behind = False
         self._has_warned = False
 
@@ -144,8 +142,7 @@ class Caller:
                 await self.hand.hold()
 
 
-_IN_USE: Final[set[Caller]] = set()
-"""The callers of hands that run, or are being called."""
+_IN_USE: Final[set[Caller]] = set()  # the callers of hands that run, or are being called
 
 
 def _stop_all() -> None:

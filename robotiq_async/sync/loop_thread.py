@@ -22,13 +22,9 @@ from ..runtime.log import log
 T = TypeVar("T")
 Function = Callable[[], Coroutine[Any, Any, T]]
 
-NAME: Final = "robotiq_async"
-"""The name of the thread."""
-LOOK_S: Final = 0.1
-"""A waiting thread checks at this interval whether the loop still exists. On Windows Ctrl-C arrives only
-then."""
-GIVE_UP_S: Final = 3.0
-"""How long an interrupted call may take to end: stop() takes up to 2 s, a hold up to 1 s."""
+NAME: Final = "robotiq_async"  # of the thread
+LOOK_S: Final = 0.1  # between two checks that the loop still exists; on Windows Ctrl-C arrives only then
+GIVE_UP_S: Final = 3.0  # for an interrupted call to end: stop() takes up to 2 s, a hold up to 1 s
 
 
 class LoopThread:
@@ -46,8 +42,7 @@ class LoopThread:
     def forget(self) -> None:
         """Start without a thread; also after a fork, because the parent's thread is not in this process."""
         self.is_closing = False
-        self._starting = threading.Lock()
-        """Taken only by loop threads, which Ctrl-C cannot interrupt."""
+        self._starting = threading.Lock()  # taken only by loop threads, which Ctrl-C cannot interrupt
         self._server: _Server | None = None
 
     @property
@@ -227,8 +222,7 @@ class _Call(Generic[T]):
         self._function = function
         self._task: asyncio.Task[T] | None = None
         self._ended: SimpleQueue[asyncio.Task[T] | None] = SimpleQueue()
-        self.is_given_up = False
-        """Whether its caller was interrupted."""
+        self.is_given_up = False  # whether its caller was interrupted
 
     @property
     def has_begun(self) -> bool:
@@ -268,5 +262,4 @@ class _Call(Generic[T]):
                 raise LateError("the call goes on")
 
 
-LOOP_THREAD: Final = LoopThread()
-"""The one of this process."""
+LOOP_THREAD: Final = LoopThread()  # the one of this process
