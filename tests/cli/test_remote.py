@@ -188,6 +188,18 @@ async def test_an_agent_that_is_told_to_end_stops_the_fingers(
     assert (await shell.finish(moving)).code == 1
 
 
+def test_a_second_agent_is_refused(
+    call: Call, beside: Callable[..., Beside], endpoint: str, there: SimulatorServer, tmp_path: Path
+) -> None:
+    first = beside("agent", str(fleet_file(tmp_path, endpoint, there.address)))
+    assert first.read_line() == ADDRESS
+    file = tmp_path / "second.toml"
+    file.write_text(
+        f'site = "lab"\nhost = "cell"\nconnect = ["{endpoint}"]\n[grippers.left]\naddress = "sim://"\n'
+    )
+    call("agent", str(file)).assert_failed(1, "another agent serves zenoh://lab/cell/left")
+
+
 def test_an_agent_that_waits_for_its_router_says_so_and_can_be_told_to_end(
     beside: Callable[..., Beside], tmp_path: Path
 ) -> None:

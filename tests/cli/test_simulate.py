@@ -50,12 +50,15 @@ def test_it_prints_its_address_serves_ends_cleanly_and_is_exact_only_on_request(
     assert process.finish(number) == Outcome(0, "", "")
 
 
-def test_something_may_be_in_the_way(call: Call, beside: Callable[..., Beside]) -> None:
+def test_something_may_be_in_the_way_and_the_gripper_stays_active_between_clients(
+    call: Call, beside: Callable[..., Beside]
+) -> None:
     options = ("--speedup", "20", "--object", "150", "--exact", "--plain")
     address = beside("simulate", "--port", "0", *options).read_line()
     assert call("move", "255", "--yes", address).code == 0
     reading = json.loads(call("status", "--json", address).out)
     assert [reading[name]["position"] for name in ("A", "B", "C")] == [150] * 3
+    assert "Activating" not in call("move", "0", "--yes", address).out
 
 
 def test_something_fixed_fails_an_activation(call: Call, beside: Callable[..., Beside]) -> None:
@@ -66,7 +69,7 @@ def test_something_fixed_fails_an_activation(call: Call, beside: Callable[..., B
 
 @pytest.mark.parametrize(
     ("options", "second_status", "seconds"),
-    [((), [9, 0], 12), (("--plain",), [0, 0], 4.2)],
+    [((), [9, 0], 12), (("--like-hardware",), [9, 0], 12), (("--plain",), [0, 0], 4.2)],
 )
 async def test_the_habits_of_real_grippers_unless_it_is_plain(
     shell: Shell, options: tuple[str, ...], second_status: list[int], seconds: float
