@@ -8,7 +8,7 @@ import pytest
 
 from robotiq_async import Finger, RobotiqHand
 from robotiq_async.tools.actions import ACTIONS, Operator
-from robotiq_async.tools.web.services import SERVICES
+from robotiq_async.tools.web.commands import SERVICES
 
 pytestmark = pytest.mark.virtual_time
 

@@ -27,7 +27,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import Operator
 from robotiq_async.tools.description import hand_model
 from robotiq_async.tools.description.kinematics import JOINTS, joint_angles
-from robotiq_async.tools.web.page.widgets.positions import ROWS
+from robotiq_async.tools.web.page.widgets.controls import ROWS
 from robotiq_async.tools.web.server import PageServer
 from robotiq_async.tools.web.settings import PageSettings
 from robotiq_async.values.enums import DEFAULT_SPEED

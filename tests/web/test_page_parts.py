@@ -19,9 +19,8 @@ from robotiq_async.tools.web.commands import BUTTONS, FRESH_S, MAX_COMMANDS, Pag
 from robotiq_async.tools.web.page.heartbeat import LOST_S, Heartbeat
 from robotiq_async.tools.web.page.mirror import HISTORY_S, Mirror
 from robotiq_async.tools.web.page.widgets.words import event_words, fault_words, state_words
-from robotiq_async.tools.web.server import PageServer
+from robotiq_async.tools.web.server import HandUpdates, PageServer
 from robotiq_async.tools.web.settings import PageSettings
-from robotiq_async.tools.web.updates import HandUpdates
 from robotiq_async.tools.wording import refusal_words
 from robotiq_async.values.enums import Trigger
 from tests.fake_hand import FakeHand

@@ -64,8 +64,8 @@ def replay(
 
 def _in_order(file: Path) -> Iterator[Entry]:
     need("mcap", "record")
-    from ...tools.recording.export import in_order
     from ...tools.recording.recordings import read_recording
+    from ...tools.recording.table import in_order
 
     return in_order(entry for entry in read_recording(file) if entry.is_json)
 
@@ -126,8 +126,8 @@ def export(
         of: What has a row.
     """
     need("mcap", "record")
-    from ...tools.recording.export import export as write
     from ...tools.recording.recordings import read_recording
+    from ...tools.recording.table import export as write
 
     table = target or file.with_suffix(".csv")
     if table.suffix.lower() != ".csv":

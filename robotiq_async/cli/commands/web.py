@@ -22,9 +22,8 @@ from ..failures import CommandError, UsageError, usage
 from ..output.messages import tell
 
 if TYPE_CHECKING:
-    from ...tools.web.server import PageServer
+    from ...tools.web.server import HandUpdates, PageServer
     from ...tools.web.settings import PageSettings
-    from ...tools.web.updates import HandUpdates
 
 AGAIN_S: Final = 3.0
 """Pause between two attempts to reach one of several grippers."""

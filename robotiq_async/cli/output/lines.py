@@ -11,10 +11,9 @@ from datetime import datetime
 from typing import TYPE_CHECKING, Any, Final
 
 from ...runtime.concurrency import in_a_thread
-from ...tools.recording.feed import compact
+from ...tools.recording.feed import Timeline, compact
 from ...tools.recording.payloads import Fields, is_command
 from ...tools.recording.raw_output import write_all
-from ...tools.recording.timeline import Timeline
 from ...values.enums import Finger, State, Trigger
 from ...values.status import NO_REQUEST, RobotiqStatus
 from .messages import forwarded_warnings

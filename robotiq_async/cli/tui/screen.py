@@ -18,8 +18,8 @@ from textual.worker import Worker
 
 from ...runtime.clock import now
 from ...tools.actions import ACTIONS, Operator
+from ...tools.recording.feed import Timeline
 from ...tools.recording.payloads import title
-from ...tools.recording.timeline import Timeline
 from ...tools.wording import refusal_words
 from ...values.enums import Finger, State
 from ...values.errors import RobotiqError

@@ -33,7 +33,7 @@ from .table import CsvFile
 
 _missing = ""
 try:  # Here and not in a constructor: importing takes 0.1 s, in which a hand could not poll.
-    from .mcap_file import McapFile
+    from .recordings import McapFile
 except ImportError as error:
     _missing = str(error)
 

@@ -9,12 +9,19 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from datetime import UTC, datetime
-from typing import Any, Final
+from heapq import heappop, heappush
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
+from ...values.calibration.csv_tables import write_rows
 from .feed import EVENT, STATUS, Message
 from .payloads import SCHEMAS, Fields
+
+if TYPE_CHECKING:
+    from .recordings import Entry
 
 _SECOND: Final = 10**9
 _FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
@@ -23,6 +30,9 @@ _MAY_LACK: Final = ("B", "C", "SCISSOR")
 """The axes that a sibling of the 3-Finger does not have."""
 STATE: Final = "state"
 """The column with the state of the hand as of the last event; the JSON of a status does not have it."""
+
+NEARBY: Final = 100  # entries in the window for sorting
+PREFIX: Final = "/gripper/"
 
 
 def _names(schema: Mapping[str, Any], prefix: str = "") -> list[str]:
@@ -119,3 +129,54 @@ class CsvFile:
         line = io.StringIO(newline="")
         csv.writer(line, lineterminator="\n").writerow(cells)
         self._write(line.getvalue().encode())
+
+
+def export(entries: Iterable[Entry], kind: str, target: Path | str) -> int:
+    """Write the messages of one kind into a CSV file, all or none; an existing file is replaced.
+
+    Args:
+        entries: of a recording, JSON.
+        kind: "status", "command" or "event".
+        target: the file.
+
+    Returns:
+        The number of rows; 0 writes no file.
+
+    Raises:
+        RecordingError: a message does not have a recorder's format.
+        OSError: the file cannot be written; it is unchanged.
+    """
+    count = 0
+
+    def counted(rows: Iterator[list[object]]) -> Iterator[list[object]]:
+        nonlocal count
+        for row in rows:
+            count += 1
+            yield row
+
+    rows = counted(_rows(entries, kind))
+    first = next(rows, None)
+    if first is not None:
+        write_rows(target, chain([COLUMNS[kind], first], rows))
+    return count
+
+
+def _rows(entries: Iterable[Entry], kind: str) -> Iterator[list[object]]:
+    table = Table(kind)
+    for entry in in_order(entries):
+        of = entry.topic.removeprefix(PREFIX)
+        if of in (kind, "event") and of != entry.topic:
+            row = entry.read(lambda fields: table.row(of, entry.nanoseconds, fields))  # noqa: B023  # at once
+            if row is not None:
+                yield row
+
+
+def in_order(entries: Iterable[Entry]) -> Iterator[Entry]:
+    """Sort by time: messages of different streams are some milliseconds out of order in the file."""
+    waiting: list[tuple[int, int, Entry]] = []
+    for number, entry in enumerate(entries):
+        heappush(waiting, (entry.nanoseconds, number, entry))
+        if len(waiting) > NEARBY:
+            yield heappop(waiting)[2]
+    while waiting:
+        yield heappop(waiting)[2]

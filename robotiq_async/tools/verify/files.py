@@ -23,9 +23,9 @@ from ...values.model import Model, model_of
 from ...values.request import Request
 from ...values.status import RobotiqStatus
 from ..recording.feed import COMMAND, EVENT, STATUS, Message, Topic, compact
-from ..recording.mcap_file import McapFile
 from ..recording.payloads import Fields
 from ..recording.raw_output import write_all
+from ..recording.recordings import McapFile
 from .catalogue import STAGE
 from .recorded_link import Frame
 from .report import Report, page

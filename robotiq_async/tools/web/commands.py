@@ -1,19 +1,25 @@
-"""Carries out the commands of the pages, and holds the axes when a page has gone."""
+"""Carries out the commands of the pages, and holds the axes when a page has gone.
+
+A command is a service: called by name, with arguments in a JSON object.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Callable, Sequence
+import reprlib
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from dataclasses import dataclass
 from time import monotonic
-from typing import Final
+from types import MappingProxyType
+from typing import Any, Final
 
-from ...values.enums import State
+from ...values.checks import parse_fingers
+from ...values.enums import Finger, State
 from ...values.errors import RobotiqError
-from ..actions import Operator
+from ..actions import ACTIONS, Action, Operator
 from ..recording.payloads import Fields
 from ..wording import refusal_words
-from .services import SERVICES
 
 MAX_COMMANDS: Final = 16
 """Commands of one page at a time; a halt is never refused."""
@@ -26,6 +32,113 @@ BUTTONS: Final = {
 """The button that helps in a state."""
 FRESH_S: Final = 1.5
 """Maximum age of a command; a halt is never too old."""
+Arguments = Mapping[str, Any]
+
+_BYTE: Final = {"type": "integer", "minimum": 0, "maximum": 255}
+_FINGERS: Final = {"type": "string", "description": "ABC, or A,B, or scissor, or all"}
+RESPONSE: Final = {"type": "object", "properties": {"outcome": {"type": "string"}}}
+"""JSON Schema of every response: a description of the outcome."""
+
+
+@dataclass(frozen=True, slots=True)
+class Service:
+    """A command that other programs can call.
+
+    Attributes:
+        name: for example ``/gripper/move``.
+        arguments: each with its JSON Schema.
+        required: names of the required arguments.
+        run: carries it out; returns a description of the outcome.
+    """
+
+    name: str
+    arguments: Mapping[str, object]
+    required: tuple[str, ...]
+    run: Callable[[Operator, Arguments], Awaitable[str]]
+
+    @property
+    def schema(self) -> dict[str, object]:
+        """JSON Schema of a request."""
+        return {
+            "type": "object",
+            "properties": dict(self.arguments),
+            "required": list(self.required),
+            "additionalProperties": False,
+        }
+
+    async def call(self, operator: Operator, payload: bytes) -> str:
+        """Carry out a request; returns a description of the outcome.
+
+        Args:
+            operator: carries it out.
+            payload: a JSON object with the arguments; empty for none.
+
+        Raises:
+            ValueError: malformed, or an argument that is missing, unknown or outside its range.
+            TypeError: an argument of the wrong type.
+            RobotiqError: it could not be carried out.
+        """
+        return await self.run(operator, self._checked(payload))
+
+    def _checked(self, payload: bytes) -> Arguments:
+        try:
+            arguments = json.loads(payload.strip() or b"{}")
+        except (ValueError, RecursionError) as error:
+            raise ValueError(f"{self.name} takes a JSON object: {error}") from None
+        if not isinstance(arguments, dict):
+            raise ValueError(f"{self.name} takes a JSON object, got {reprlib.repr(arguments)}")
+        for name in arguments:
+            if name not in self.arguments:
+                known = ", ".join(self.arguments) or "none"
+                raise ValueError(f"{self.name} has no argument {reprlib.repr(name)}; it has: {known}")
+        for name in self.required:
+            if name not in arguments:
+                raise ValueError(f"{self.name} needs the argument {name!r}")
+        return arguments
+
+
+def _of(action: Action) -> Service:
+    async def run(operator: Operator, arguments: Arguments) -> str:
+        if action.warning and arguments["confirm"] is not True:
+            raise ValueError(f"{action.name} needs confirm = true: {action.warning}")
+        return await operator.act(action)
+
+    confirm = {"confirm": {"type": "boolean", "description": action.warning}} if action.warning else {}
+    return Service(f"/gripper/{action.name}", confirm, tuple(confirm), run)
+
+
+async def _move(operator: Operator, arguments: Arguments) -> str:
+    axes = _fingers(arguments, "ABC")
+    speed, force = arguments.get("speed"), arguments.get("force")
+    return await operator.move(arguments["position"], axes, speed=speed, force=force)
+
+
+async def _set_speed(operator: Operator, arguments: Arguments) -> str:
+    await operator.hand.set_speed(arguments["value"], _fingers(arguments, "ALL"))
+    return "set"
+
+
+async def _set_force(operator: Operator, arguments: Arguments) -> str:
+    await operator.hand.set_force(arguments["value"], _fingers(arguments, "ALL"))
+    return "set"
+
+
+def _fingers(arguments: Arguments, usual: str) -> Finger:
+    words = arguments.get("fingers", usual)
+    if not isinstance(words, str):
+        raise TypeError(f"fingers must be a text like ABC, or scissor, got {reprlib.repr(words)}")
+    return parse_fingers("fingers", words)
+
+
+_MOVE: Final = {"position": _BYTE, "fingers": _FINGERS, "speed": _BYTE, "force": _BYTE}
+_ALL: Final = (
+    *(_of(action) for action in ACTIONS.values()),
+    Service("/gripper/move", _MOVE, ("position",), _move),
+    Service("/gripper/set_speed", {"value": _BYTE, "fingers": _FINGERS}, ("value",), _set_speed),
+    Service("/gripper/set_force", {"value": _BYTE, "fingers": _FINGERS}, ("value",), _set_force),
+)
+SERVICES: Final = MappingProxyType({service.name: service for service in _ALL})
+"""The services by name."""
 
 
 class PageCommands:

@@ -13,8 +13,10 @@ import json
 import os
 import sys
 from asyncio.subprocess import PIPE, Process
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
+from itertools import zip_longest
 from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
@@ -23,12 +25,13 @@ from ...hand import Hand
 from ...runtime.clock import now
 from ...runtime.concurrency import wait_shielded
 from ...runtime.log import log
-from ...values.errors import ViewerError
+from ...values.errors import NotStartedError, ViewerError
+from ...values.status import RobotiqStatus
 from ..actions import Operator
-from ..recording.payloads import Fields
+from ..recording.feed import Timeline
+from ..recording.payloads import Fields, is_command
 from .commands import PageCommands
 from .settings import PageSettings
-from .updates import HandUpdates
 
 if find_spec("nicegui") is None:
     from ...runtime.extras import install
@@ -44,6 +47,79 @@ BACKLOG: Final = 16_384
 LINE: Final = 65_536
 SILENCE_S: Final = 2.0
 """The page's process sends four heartbeats a second; after this silence its motions are held."""
+BUFFER: Final = 64
+"""Statuses between two calls of gather(), for the peaks of the currents: a third of a second."""
+EVENTS: Final = 200
+"""Events kept for a page that does not read."""
+STATISTICS_S: Final = 1.0
+
+
+class HandUpdates:
+    """Collects what happens to a hand. It only listens.
+
+    Attributes:
+        hand: may be started later.
+        problem: why the hand could not be started; empty if it was.
+    """
+
+    def __init__(self, hand: Hand) -> None:
+        self.hand = hand
+        self.problem = ""
+        self._timeline = Timeline(hand, BUFFER)
+        self._events: deque[Fields] = deque(maxlen=EVENTS)
+        self._peaks = [0] * len(hand.model.axes)
+        self._counted_at = 0.0
+
+    def open(self) -> None:
+        """Listen again after a stop of the hand."""
+        self._timeline.open()
+
+    def gather(self) -> None:
+        """Collect what is new; call it often."""
+        for at, each in self._timeline.new():
+            if isinstance(each, RobotiqStatus):
+                currents = map(each.current_ma, each.model.axes)
+                self._peaks = [max(pair) for pair in zip_longest(self._peaks, currents, fillvalue=0)]
+            elif not is_command(each):
+                self._events.append({**each, "time": at})
+
+    def take(self, index: int) -> Fields:
+        """The next update. It contains each event once.
+
+        Args:
+            index: number of the hand on the page.
+        """
+        fields: Fields = {
+            "hand": index,
+            "state": self.hand.state.name,
+            "problem": self.problem,
+            "peaks": self._peaks,
+            "events": list(self._events),
+            **self._newest(),
+            **dict(self._statistics()),
+        }
+        self._events.clear()
+        self._peaks = [0] * len(self._peaks)
+        return fields
+
+    def _newest(self) -> Fields:
+        try:
+            status = self.hand.status
+        except NotStartedError:
+            return {}
+        return {
+            "model": status.model.name,
+            "registers": status.registers,
+            "timestamp": status.timestamp,
+            "sequence": status.sequence,
+            "age": max(now() - status.timestamp, 0.0),
+        }
+
+    def _statistics(self) -> Iterator[tuple[str, Fields]]:
+        # Once a second: percentiles are expensive.
+        if now() - self._counted_at >= STATISTICS_S:
+            self._counted_at = now()
+            yield "statistics", self.hand.statistics.as_dict()
 
 
 class PageServer:

@@ -7,7 +7,7 @@ import socket
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import uvicorn
 from fastapi import FastAPI
@@ -18,7 +18,9 @@ from .access import Access
 from .guard import Guard
 from .mirror import Mirror
 from .pages import register
-from .pipes import Pipes
+
+if TYPE_CHECKING:
+    from .__main__ import Pipes
 
 BEAT_S: Final = 0.25
 MESSAGE_MAX: Final = 65_536
