@@ -13,35 +13,24 @@ from robotiq_async import ReconnectPolicy, RobotiqHand, State
 pytestmark = pytest.mark.virtual_time
 
 
+NO_VALUES: dict[str, list[Any]] = {
+    "device_id": [-1, 256, "2", True],
+    "read_function": [6, "3", 3.0],
+    "poll_interval": [0, 1.0, "5ms"],
+    "connect_timeout": [0, math.nan],
+    "response_timeout": [-1, 5.1],
+    "activation_timeout": [0],
+    "reconnect": ["yes", 1],
+    "keep_grip": [1, None],
+    "speed": [256],
+    "force": [-1, 1.0],
+    "request_address": [65529],
+    "status_address": [-1, "0"],
+}
+
+
 @pytest.mark.parametrize(
-    ("option", "value"),
-    [
-        ("device_id", -1),
-        ("device_id", 256),
-        ("device_id", "2"),
-        ("device_id", True),
-        ("read_function", 6),
-        ("read_function", "3"),
-        ("read_function", 3.0),
-        ("poll_interval", 0),
-        ("poll_interval", 1.0),
-        ("poll_interval", "5ms"),
-        ("connect_timeout", 0),
-        ("connect_timeout", float("nan")),
-        ("response_timeout", -1),
-        ("response_timeout", 5.1),
-        ("activation_timeout", 0),
-        ("reconnect", "yes"),
-        ("reconnect", 1),
-        ("keep_grip", 1),
-        ("keep_grip", None),
-        ("speed", 256),
-        ("force", -1),
-        ("force", 1.0),
-        ("request_address", 65529),
-        ("status_address", -1),
-        ("status_address", "0"),
-    ],
+    ("option", "value"), [(option, value) for option, values in NO_VALUES.items() for value in values]
 )
 def test_options(option: str, value: Any) -> None:
     with pytest.raises((TypeError, ValueError), match=option) as caught:

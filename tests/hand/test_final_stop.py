@@ -5,13 +5,12 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Sequence
-from itertools import pairwise
 from typing import Any
 
 import pytest
 
-from robotiq_async import Fault, Finger, NotStartedError, RobotiqHand, State
-from robotiq_async.simulator import Habits, SerialSimulatorServer, SimulatedGripper, SimulatorServer
+from robotiq_async import Finger, NotStartedError, RobotiqHand, State
+from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import Request
 from tests.contract.bench import until
@@ -295,81 +294,7 @@ async def test_waiting_for_the_end_is_no_request(hand: RobotiqHand) -> None:
     await stopping
 
 
-# -- a gripper that forgets writes -------------------------------------------------------------------------
-
-SPACING_S = 0.01
-"""By the manual of 2014 a write that comes sooner after another one may be dropped."""
-
-
-@pytest.mark.parametrize("later", [0.001, 0.004, 0.006, 0.009])
-@pytest.mark.parametrize("options", [{}, {"keep_grip": True}], ids=str)
-async def test_a_stop_that_was_acknowledged_and_forgotten_is_sent_again(
-    options: dict[str, bool], later: float
-) -> None:
-    """It returned with a warning after 1.2 s, and the axis went on to its target."""
-    loop = asyncio.get_running_loop()
-    gripper = SimulatedGripper(loop.time, habits=Habits(write_spacing=SPACING_S))
-    await activate_beforehand(gripper)
-    async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
-        await hand.set_speed(0)
-        await asyncio.sleep(1)
-        await hand.set_position(255, A)
-        await asyncio.sleep(later)
-        before = loop.time()
-        await hand.stop(**options)
-        assert loop.time() - before < 2.0
-        assert not gripper.is_moving
-        assert gripper.position(A) < 60
-
-
-@pytest.mark.parametrize("later", [0.001, 0.004, 0.006, 0.009])
-async def test_a_halt_that_was_acknowledged_and_forgotten_is_sent_again(later: float) -> None:
-    """It returned half a second later, and the axis went on."""
-    loop = asyncio.get_running_loop()
-    gripper = SimulatedGripper(loop.time, habits=Habits(write_spacing=SPACING_S))
-    await activate_beforehand(gripper)
-    async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
-        await hand.set_speed(0)
-        await asyncio.sleep(1)
-        await hand.set_position(255, A)
-        await asyncio.sleep(later)
-        await hand.halt()
-        assert not gripper.is_moving
-        assert hand.state is State.RUNNING_IDLE
-
-
-@pytest.mark.parametrize("later", [0.001, 0.004, 0.006, 0.009])
-async def test_a_reset_that_was_acknowledged_and_forgotten_is_sent_again(later: float) -> None:
-    """The hand waited for it for ever, in WF_RESET. What activates comes at its distance from the reset."""
-    loop = asyncio.get_running_loop()
-    gripper = SimulatedGripper(loop.time, habits=Habits(write_spacing=SPACING_S))
-    await activate_beforehand(gripper)
-    async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
-        await asyncio.sleep(1)
-        await hand.set_position(255, A)
-        await asyncio.sleep(later)
-        async with asyncio.timeout(1.0):
-            await hand.reset()
-        assert not gripper.is_moving
-        async with asyncio.timeout(10):
-            await hand.activate()
-
-
-async def test_an_activation_and_a_release_keep_their_distance_from_the_write_before() -> None:
-    """They move the fingers, and are sent once: forgotten, the gripper stayed reset, or in its fault."""
-    loop = asyncio.get_running_loop()
-    gripper = SimulatedGripper(loop.time, speedup=20, habits=Habits(write_spacing=20 * SPACING_S))
-    await activate_beforehand(gripper)
-    async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
-        gripper.inject_fault(Fault.SCISSOR_BLOCKED)
-        await hand.wait_for_state(State.FAULT)
-        await hand.halt()
-        await hand.atr()
-        await hand.reset()
-        await hand.activate()
-        kept = [write.time for write in gripper.writes]
-        assert min(later - earlier for earlier, later in pairwise(kept)) >= SPACING_S
-        assert [image.activate for image in images_since(gripper, 0)][-2:] == [False, True]
+# -- what is decided and not on its way ---------------------------------------------------------------------
 
 
 class WatchedLine(VirtualLine):

@@ -9,38 +9,33 @@ import pytest
 from robotiq_async import Finger, InvalidStateError, RobotiqHand, State
 from robotiq_async.simulator import RtuOverTcpSimulatorServer, SimulatedGripper, Trouble
 from tests.grippers import activate_beforehand
-from tests.virtual import run
+
+pytestmark = pytest.mark.virtual_time
 
 A = Finger.A
 
 
-def test_a_move_through_a_serial_server() -> None:
-    async def main() -> None:
-        gripper = SimulatedGripper(asyncio.get_running_loop().time)
-        async with RtuOverTcpSimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
-            result = await hand.move(200)
-            assert result.positions[A] == pytest.approx(200, abs=2)
-            assert hand.statistics.reconnects == 0
-            assert hand.statistics.period_p50 == pytest.approx(0.015, abs=1e-6)
-
-    run(main)
+async def test_a_move_through_a_serial_server() -> None:
+    gripper = SimulatedGripper(asyncio.get_running_loop().time)
+    async with RtuOverTcpSimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
+        result = await hand.move(200)
+        assert result.positions[A] == pytest.approx(200, abs=2)
+        assert hand.statistics.reconnects == 0
+        assert hand.statistics.period_p50 == pytest.approx(0.015, abs=1e-6)
 
 
 @pytest.mark.parametrize("words", ["reset", "close", "accept-silence", "refuse", "silence", "wrong-checksum"])
-def test_it_comes_back(words: str) -> None:
-    async def main() -> None:
-        gripper = SimulatedGripper(asyncio.get_running_loop().time)
-        async with RtuOverTcpSimulatorServer(gripper) as server:
-            await activate_beforehand(gripper)
-            async with RobotiqHand(server.address) as hand:
-                lasting = {} if words in ("reset", "close") else {"lasts": 3.0}
-                ongoing = await server.fault_injector.begin(Trouble(words, **lasting))  # type: ignore[arg-type]
-                await hand.wait_for_state(State.DISCONNECTED, timeout=5)
-                await server.fault_injector.end(ongoing)
-                await hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
-                await hand.move(100, A)
-
-    run(main)
+async def test_it_comes_back(words: str) -> None:
+    gripper = SimulatedGripper(asyncio.get_running_loop().time)
+    async with RtuOverTcpSimulatorServer(gripper) as server:
+        await activate_beforehand(gripper)
+        async with RobotiqHand(server.address) as hand:
+            lasting = {} if words in ("reset", "close") else {"lasts": 3.0}
+            ongoing = await server.fault_injector.begin(Trouble(words, **lasting))  # type: ignore[arg-type]
+            await hand.wait_for_state(State.DISCONNECTED, timeout=5)
+            await server.fault_injector.end(ongoing)
+            await hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
+            await hand.move(100, A)
 
 
 @pytest.mark.parametrize("kind", ["exception", "wrong-transaction", "wrong-protocol"])
@@ -51,16 +46,13 @@ def test_what_frames_of_a_line_do_not_have(kind: str) -> None:
 
 
 @pytest.mark.parametrize("units", [(None, None), (9, 12)])
-def test_a_serial_server_has_one_owner(units: tuple[int | None, int | None]) -> None:
-    async def main() -> None:
-        gripper = SimulatedGripper(asyncio.get_running_loop().time)
-        async with RtuOverTcpSimulatorServer(gripper) as server:
-            one = RobotiqHand(server.address, device_id=units[0])
-            await one.start(activate=False)
-            with pytest.raises(InvalidStateError, match="would read each other's replies"):
-                await RobotiqHand(server.address, device_id=units[1]).start(activate=False)
-            with pytest.raises(InvalidStateError):
-                await RobotiqHand(server.address.removeprefix("rtu+")).start(activate=False)
-            await one.stop()
-
-    run(main)
+async def test_a_serial_server_has_one_owner(units: tuple[int | None, int | None]) -> None:
+    gripper = SimulatedGripper(asyncio.get_running_loop().time)
+    async with RtuOverTcpSimulatorServer(gripper) as server:
+        one = RobotiqHand(server.address, device_id=units[0])
+        await one.start(activate=False)
+        with pytest.raises(InvalidStateError, match="would read each other's replies"):
+            await RobotiqHand(server.address, device_id=units[1]).start(activate=False)
+        with pytest.raises(InvalidStateError):
+            await RobotiqHand(server.address.removeprefix("rtu+")).start(activate=False)
+        await one.stop()

@@ -22,7 +22,10 @@ from robotiq_async.runtime.clock import now
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import Request
+from tests.contract.bench import until
 from tests.virtual import VirtualLoop, run
+
+pytestmark = pytest.mark.virtual_time
 
 
 class Wire:
@@ -195,22 +198,19 @@ WAYS.remove(("open", "return at once"))
 
 
 @pytest.mark.parametrize(("call", "what"), WAYS)
-def test_a_rogue_transport_fails_the_start(call: str, what: str) -> None:
-    async def main() -> None:
-        wire = Rogue(call, what)
-        wire.is_rogue = True
-        hand = RobotiqHand(wire, connect_timeout=0.2, response_timeout=0.1)
-        async with asyncio.timeout(5):
-            with pytest.raises((ConnectFailedError, ProtocolError, ConnectionLostError)):
-                await hand.start()
-        assert hand.state is State.SHUTDOWN
-        wire.is_rogue = False
-        wire.released.set()
-        async with hand:
-            await hand.move(30, Finger.A)
-        assert wire.most_inside == 1
-
-    run(main)
+async def test_a_rogue_transport_fails_the_start(call: str, what: str) -> None:
+    wire = Rogue(call, what)
+    wire.is_rogue = True
+    hand = RobotiqHand(wire, connect_timeout=0.2, response_timeout=0.1)
+    async with asyncio.timeout(5):
+        with pytest.raises((ConnectFailedError, ProtocolError, ConnectionLostError)):
+            await hand.start()
+    assert hand.state is State.SHUTDOWN
+    wire.is_rogue = False
+    wire.released.set()
+    async with hand:
+        await hand.move(30, Finger.A)
+    assert wire.most_inside == 1
 
 
 @pytest.mark.parametrize(
@@ -220,68 +220,58 @@ def test_a_rogue_transport_fails_the_start(call: str, what: str) -> None:
         *(("write", what) for what in IN_ANY_CALL if what != "return at once"),
     ],
 )
-def test_a_rogue_transport_is_a_lost_link(call: str, what: str) -> None:
-    async def main() -> None:
-        wire = Rogue(call, what)
-        async with RobotiqHand(wire, connect_timeout=0.2, response_timeout=0.1) as hand:
-            wire.is_rogue = True
-            hand.command(Finger.A, position=100)
-            await hand.wait_for_state(State.DISCONNECTED, timeout=5)
-            wire.is_rogue = False
-            wire.released.set()
-            await hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
-            await hand.move(30, Finger.B)
-        assert wire.most_inside == 1
-
-    run(main)
+async def test_a_rogue_transport_is_a_lost_link(call: str, what: str) -> None:
+    wire = Rogue(call, what)
+    async with RobotiqHand(wire, connect_timeout=0.2, response_timeout=0.1) as hand:
+        wire.is_rogue = True
+        hand.command(Finger.A, position=100)
+        await hand.wait_for_state(State.DISCONNECTED, timeout=5)
+        wire.is_rogue = False
+        wire.released.set()
+        await hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
+        await hand.move(30, Finger.B)
+    assert wire.most_inside == 1
 
 
 @pytest.mark.parametrize("call", ["read", "write", "close"])
 @pytest.mark.parametrize("what", IN_ANY_CALL)
-def test_stop_ends_on_a_rogue_transport(call: str, what: str) -> None:
-    async def main() -> None:
-        before = asyncio.all_tasks()
-        wire = Rogue(call, what)
-        hand = RobotiqHand(wire, response_timeout=0.5)
-        await hand.start()
-        await hand.set_position(255, Finger.A)
-        wire.is_rogue = True
-        began = now()
-        await hand.stop()
-        assert now() - began < 2.0
-        assert hand.state is State.SHUTDOWN
-        wire.released.set()
-        await asyncio.gather(*asyncio.all_tasks() - before, return_exceptions=True)
-        assert wire.most_inside == 1
-
-    run(main)
+async def test_stop_ends_on_a_rogue_transport(call: str, what: str) -> None:
+    before = asyncio.all_tasks()
+    wire = Rogue(call, what)
+    hand = RobotiqHand(wire, response_timeout=0.5)
+    await hand.start()
+    await hand.set_position(255, Finger.A)
+    wire.is_rogue = True
+    began = now()
+    await hand.stop()
+    assert now() - began < 2.0
+    assert hand.state is State.SHUTDOWN
+    wire.released.set()
+    await asyncio.gather(*asyncio.all_tasks() - before, return_exceptions=True)
+    assert wire.most_inside == 1
 
 
-def test_an_answer_that_comes_after_its_time_is_not_believed() -> None:
+async def test_an_answer_that_comes_after_its_time_is_not_believed() -> None:
     """A call that swallows its cancellation answers two seconds late."""
-
-    async def main() -> None:
-        wire = Rogue("read", "never, and does not end")
-        async with RobotiqHand(wire, response_timeout=0.1) as hand:
-            statuses = hand.statuses(1000)
-            wire.is_rogue = True
-            asked = now()
-            await hand.wait_for_state(State.DISCONNECTED)
-            assert now() - asked < 0.1 + 0.01
-            known = hand.status
-            with pytest.raises(ConnectionLostError):
-                await hand.set_position(255)
-            await asyncio.sleep(2)
-            assert hand.state is State.DISCONNECTED
-            wire.gripper.write(0, Request(activate=True, go=True).registers)
-            wire.is_rogue = False
-            wire.released.set()
-            await hand.wait_for_state(State.RUNNING_IDLE, timeout=2.5)
-            seen = [each for each in statuses.drain() if each.sequence > known.sequence]
-            assert all(each.timestamp > asked + 2 for each in seen)
-            assert wire.most_inside == 1
-
-    run(main)
+    wire = Rogue("read", "never, and does not end")
+    async with RobotiqHand(wire, response_timeout=0.1) as hand:
+        statuses = hand.statuses(1000)
+        wire.is_rogue = True
+        asked = now()
+        await hand.wait_for_state(State.DISCONNECTED)
+        assert now() - asked < 0.1 + 0.01
+        known = hand.status
+        with pytest.raises(ConnectionLostError):
+            await hand.set_position(255)
+        await asyncio.sleep(2)
+        assert hand.state is State.DISCONNECTED
+        wire.gripper.write(0, Request(activate=True, go=True).registers)
+        wire.is_rogue = False
+        wire.released.set()
+        await hand.wait_for_state(State.RUNNING_IDLE, timeout=2.5)
+        seen = [each for each in statuses.drain() if each.sequence > known.sequence]
+        assert all(each.timestamp > asked + 2 for each in seen)
+        assert wire.most_inside == 1
 
 
 class HeldUp(Wire):
@@ -295,15 +285,12 @@ class HeldUp(Wire):
         return await super().read()
 
 
-def test_a_reply_that_waits_while_the_loop_is_held_up_is_in_time() -> None:
-    async def main() -> None:
-        async with RobotiqHand(HeldUp(), response_timeout=0.05) as hand:
-            statuses = hand.statuses()
-            for _ in range(10):
-                await anext(statuses)
-            assert hand.statistics.reconnects == 0
-
-    run(main)
+async def test_a_reply_that_waits_while_the_loop_is_held_up_is_in_time() -> None:
+    async with RobotiqHand(HeldUp(), response_timeout=0.05) as hand:
+        statuses = hand.statuses()
+        for _ in range(10):
+            await anext(statuses)
+        assert hand.statistics.reconnects == 0
 
 
 class Slow(Wire):
@@ -351,39 +338,31 @@ async def test_a_read_that_stop_interrupts_leaves_no_answer_to_the_next() -> Non
     await hand.wait_for_state(State.DISCONNECTED)
     wire.answers_after = 0.05
     wire.calls.clear()
-    async with asyncio.timeout(5):
-        while "read" not in wire.calls:  # noqa: ASYNC110
-            await asyncio.sleep(0)
+    await until(lambda: "read" in wire.calls)
     await hand.stop()
     first = wire.calls.index("read")
     assert wire.calls[first : first + 3] == ["read", "close", "open"]
 
 
-def test_stop_is_bounded_when_a_transport_neither_answers_nor_closes() -> None:
-    async def main() -> None:
-        wire = Slow()
-        hand = RobotiqHand(wire, response_timeout=0.5)
-        await hand.start()
+async def test_stop_is_bounded_when_a_transport_neither_answers_nor_closes() -> None:
+    wire = Slow()
+    hand = RobotiqHand(wire, response_timeout=0.5)
+    await hand.start()
+    wire.hangs = True
+    began = now()
+    await hand.stop()
+    assert now() - began < 2.0
+
+
+async def test_a_write_fails_within_a_second_though_closing_takes_its_time_too() -> None:
+    wire = Slow()
+    async with RobotiqHand(wire, response_timeout=0.5) as hand:
         wire.hangs = True
         began = now()
-        await hand.stop()
-        assert now() - began < 2.0
-
-    run(main)
-
-
-def test_a_write_fails_within_a_second_though_closing_takes_its_time_too() -> None:
-    async def main() -> None:
-        wire = Slow()
-        async with RobotiqHand(wire, response_timeout=0.5) as hand:
-            wire.hangs = True
-            began = now()
-            with pytest.raises(ConnectionLostError):
-                await hand.set_position(100)
-            assert now() - began < 0.6
-            wire.hangs = False
-
-    run(main)
+        with pytest.raises(ConnectionLostError):
+            await hand.set_position(100)
+        assert now() - began < 0.6
+        wire.hangs = False
 
 
 class Mute(Wire):
@@ -424,28 +403,24 @@ def test_a_transport_that_cannot_tell_whether_it_is_open_is_opened_again(
 
 @pytest.mark.parametrize("backwards", [False, True])
 @pytest.mark.parametrize("turns", range(10))
-def test_the_fingers_are_stopped_over_a_transport_object_when_the_loop_is_torn_down(
+async def test_the_fingers_are_stopped_over_a_transport_object_when_the_loop_is_torn_down(
     backwards: bool, turns: int
 ) -> None:
     """asyncio.run() cancels every task at once, in any order and wherever it is."""
-
-    async def main() -> None:
-        wire = Wire()
-        hand = RobotiqHand(wire)
-        await hand.start()
-        await hand.set_position(255, Finger.A)
-        await anext(hand.statuses())
-        for _ in range(turns):
-            await asyncio.sleep(0)
-        tasks = asyncio.all_tasks() - {asyncio.current_task()}
-        assert len(tasks) == 2
-        for task in sorted(tasks, key=lambda each: each.get_name(), reverse=backwards):
-            task.cancel()
-        began = now()
-        await asyncio.wait(tasks)
-        assert now() - began < 0.2
-        image = Request.from_registers(wire.gripper.writes[-1].registers)
-        assert (image.activate, image.go) == (True, False)
-        assert not wire.is_open
-
-    run(main)
+    wire = Wire()
+    hand = RobotiqHand(wire)
+    await hand.start()
+    await hand.set_position(255, Finger.A)
+    await anext(hand.statuses())
+    for _ in range(turns):
+        await asyncio.sleep(0)
+    tasks = asyncio.all_tasks() - {asyncio.current_task()}
+    assert len(tasks) == 2
+    for task in sorted(tasks, key=lambda each: each.get_name(), reverse=backwards):
+        task.cancel()
+    began = now()
+    await asyncio.wait(tasks)
+    assert now() - began < 0.2
+    image = Request.from_registers(wire.gripper.writes[-1].registers)
+    assert (image.activate, image.go) == (True, False)
+    assert not wire.is_open

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from robotiq_async import Finger, RobotiqHand
+from robotiq_async import Fault, Finger, RobotiqHand, State
 from robotiq_async.simulator import Habits, SimulatedGripper, SimulatorServer
 from robotiq_async.values.request import Request
 from tests.contract.bench import until
@@ -75,21 +75,50 @@ async def test_writes_keep_the_distance_that_is_asked_for(spacing: float) -> Non
 
 
 @pytest.mark.parametrize("later", [0.0, 0.001, 0.004, 0.006, 0.009])
-@pytest.mark.parametrize("call", ["halt", "stop", "reset"])
+@pytest.mark.parametrize("call", ["halt", "stop", "stop that keeps a grip", "reset"])
 async def test_a_stop_waits_for_nothing_and_is_repeated_soon(call: str, later: float) -> None:
-    """It was written again half a second later."""
+    """stop() ended with a warning after 1.2 s, halt() after 0.5 s, reset() never; and the axis went on."""
     async with forgetful() as (gripper, hand):
         loop = asyncio.get_running_loop()
         await hand.set_speed(0)
         await asyncio.sleep(1)
         await hand.set_position(255, A)
         await asyncio.sleep(later)
-        sent, asked = hand.requests(), loop.time()
-        stopping = asyncio.create_task(getattr(hand, call)())
-        await until(lambda: not Request.from_registers(gripper.request_registers).go)
+        keeps, sent, asked = "keeps" in call, hand.requests(), loop.time()
+        stopping = asyncio.create_task(hand.stop(keep_grip=True) if keeps else getattr(hand, call)())
+
+        def is_stopped() -> bool:
+            request = Request.from_registers(gripper.request_registers)
+            return request.position(A) < 60 if keeps else not request.go
+
+        await until(is_stopped)
         assert loop.time() - asked < 0.025, "it is repeated as soon as the gripper bears that"
-        await stopping
-        assert next(sent.drain()).timestamp - asked < 0.006, "and the first one waits for nothing"
+        async with asyncio.timeout(1.0):
+            await stopping
+        assert not gripper.is_moving
+        assert gripper.position(A) < 60
+        if not keeps:
+            assert next(sent.drain()).timestamp - asked < 0.006, "and the first one waits for nothing"
+        if call == "halt":
+            assert hand.state is State.RUNNING_IDLE
+        if call == "reset":  # what activates comes at its distance from the reset
+            async with asyncio.timeout(10):
+                await hand.activate()
+
+
+async def test_an_activation_and_a_release_keep_their_distance_from_the_write_before() -> None:
+    """They move the fingers, and are sent once: forgotten, the gripper stayed reset, or in its fault."""
+    async with forgetful() as (gripper, hand):
+        gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+        await hand.wait_for_state(State.FAULT)
+        await hand.halt()
+        await hand.atr()
+        await hand.reset()
+        await hand.activate()
+        writes = gripper.writes
+    assert min(later.time - earlier.time for earlier, later in pairwise(writes)) >= SPACING_S
+    activations = [Request.from_registers(each.registers).activate for each in writes]
+    assert activations[-2:] == [False, True]
 
 
 @pytest.mark.parametrize("later", [0.0, 0.001, 0.002, 0.003, 0.004, 0.006])
