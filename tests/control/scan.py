@@ -17,14 +17,44 @@ from robotiq_async.control.state_machine import StateMachine
 from robotiq_async.session.options import units_of
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values.enums import Trigger
+from robotiq_async.values.errors import RobotiqError
 from robotiq_async.values.model import THREE_FINGER, Model
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import Request
-from tests.control.outcome import Outcome
 from tests.register_words import with_object_status
 
 POLL_S = 0.005
 LAG = int(os.environ.get("STATUS_LAG", "0"))
+
+
+class Outcome:
+    """A caller that waits, and what it was told; told twice is a failure."""
+
+    def __init__(self) -> None:
+        self.told: list[object] = []
+
+    def done(self) -> bool:
+        return bool(self.told)
+
+    def set_result(self, result: object) -> None:
+        self.told.append(result)
+        assert len(self.told) == 1, f"told twice: {self.told}"
+
+    set_exception = set_result
+
+    @property
+    def is_told(self) -> bool:
+        return bool(self.told)
+
+    @property
+    def result(self) -> MoveResult:
+        assert isinstance(self.told[0], MoveResult), self.told
+        return self.told[0]
+
+    @property
+    def error(self) -> RobotiqError:
+        assert isinstance(self.told[0], RobotiqError), self.told
+        return self.told[0]
 
 
 class Scan:

@@ -8,8 +8,7 @@ from robotiq_async import ConnectionLostError, Finger, NotActivatedError
 from robotiq_async.control.motion import Move
 from robotiq_async.control.requests.pending import Command
 from tests.control.other_client import going_to
-from tests.control.outcome import Outcome
-from tests.control.scan import Scan
+from tests.control.scan import Outcome, Scan
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 

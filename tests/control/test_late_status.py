@@ -10,8 +10,7 @@ from robotiq_async import Finger, MoveResult, MoveSupersededError, ObjectStatus
 from robotiq_async.control.requests.standstill import LAG_READS, LAG_S, LONG_AGO, Moment, Standstill
 from robotiq_async.values.model import THREE_FINGER
 from tests.control.other_client import image
-from tests.control.outcome import Outcome
-from tests.control.scan import POLL_S, Scan, started
+from tests.control.scan import POLL_S, Outcome, Scan, started
 
 A, B, C, S = THREE_FINGER.axes
 ABC = Finger.ABC

@@ -8,17 +8,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robotiq_async.control.contact import agrees, drifts
 from robotiq_async.control.requests.merging import merged
 from robotiq_async.control.requests.pending import Command, PendingCommand
-from robotiq_async.values.enums import NO_AXES, Finger, Mode
+from robotiq_async.values.enums import NO_AXES, Finger, Mode, ObjectStatus
 from robotiq_async.values.errors import MoveSupersededError
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
-from tests.control.outcome import Outcome
+from tests.control.scan import Outcome
 from tests.register_words import status_of
 
 A, B, C, S = THREE_FINGER.axes
+IN_MOTION, OPENING, CLOSING, THERE = ObjectStatus
 AT = (101, 102, 103, 104)
 GOING = Request(
     activate=True,
@@ -134,7 +136,7 @@ def test_an_axis_that_drifts_is_asked_to_stay_where_it_is() -> None:
     assert positions(after(GOING, hold(A | B))) == (101, 102, 30, 40)
 
 
-def test_an_axis_that_stands_where_it_was_asked_to_keeps_its_request() -> None:
+def test_axes_that_stand_where_they_were_asked_to_keep_their_requests() -> None:
     at_rest = status_of(0x39, 0xFF, position=(9, 22, 103, 40))
     assert positions(after(GOING, hold(Finger.ALL), at_rest)) == (10, 20, 103, 40)
 
@@ -210,3 +212,94 @@ def test_whatever_is_asked_an_axis_that_nobody_addresses_is_asked_nothing_new_or
             assert now.position in (before.position, status.position(axis))
         if base.go and axis not in pending.hold and axis not in pending.positions:
             assert now.position == before.position
+
+
+# -- what position, contact and motion tell about a request ------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("request_", "what", "position", "direction", "expected"),
+    [
+        # At the requested position, within one or two counts.
+        (100, THERE, 100, 0, True),
+        (100, THERE, 98, 0, True),
+        (100, THERE, 102, 0, True),
+        (100, THERE, 97, 0, False),
+        (100, THERE, 103, 0, False),
+        # Fully open reads 6-7 although 0 was asked, fully closed 240 or more although 255 was asked.
+        (0, THERE, 6, 0, True),
+        (0, THERE, 7, 0, True),
+        (0, THERE, 20, 0, False),
+        (255, THERE, 240, 0, True),
+        (255, THERE, 241, 0, True),
+        (255, THERE, 255, 0, True),
+        (255, THERE, 230, 0, False),
+        (0, THERE, 137, 0, False),
+        # A contact while closing needs a request further closed, one while opening further open.
+        (151, CLOSING, 150, 0, True),
+        (150, CLOSING, 150, 0, False),
+        (0, CLOSING, 150, 0, False),
+        (149, OPENING, 150, 0, True),
+        (150, OPENING, 150, 0, False),
+        (255, OPENING, 150, 0, False),
+        # A moving axis goes towards its request.
+        (200, IN_MOTION, 100, 0, True),
+        (200, IN_MOTION, 100, 5, True),
+        (200, IN_MOTION, 100, -5, False),
+        (0, IN_MOTION, 100, 5, False),
+        (0, IN_MOTION, 100, -5, True),
+        (100, IN_MOTION, 100, 0, False),
+        (100, IN_MOTION, 100, 5, False),
+    ],
+)
+def test_a_request_agrees_with_what_an_axis_does(
+    request_: int, what: ObjectStatus, position: int, direction: int, expected: bool
+) -> None:
+    assert agrees(THREE_FINGER, request_, what, position, direction) is expected
+
+
+# -- whether an axis has to be asked to stay ---------------------------------------------------------------
+
+
+def is_held(
+    request: int, what: ObjectStatus, position: int, *, go: bool = True, arrived: Finger = Finger.ALL
+) -> bool:
+    """Whether holding axis A means asking for where it is."""
+    base = Request(activate=True, go=go, axes=(AxisRequest(request),) * 4)
+    return drifts(A, base, status_of(0x31 | go << 3, what, position=position), arrived)
+
+
+def test_a_moving_axis_drifts_wherever_it_goes() -> None:
+    assert is_held(200, IN_MOTION, 100)
+    assert is_held(100, IN_MOTION, 100)
+
+
+@pytest.mark.parametrize(("request_", "what"), [(255, CLOSING), (151, CLOSING), (0, OPENING)])
+def test_an_axis_in_contact_keeps_its_request_and_its_grip(request_: int, what: ObjectStatus) -> None:
+    assert not is_held(request_, what, 150)
+    assert not is_held(request_, what, 150, arrived=Finger(0))
+
+
+def test_a_grip_that_comes_from_the_request_before_is_about_to_end() -> None:
+    assert is_held(20, CLOSING, 150)
+
+
+@pytest.mark.parametrize("position", [98, 100, 102])
+def test_an_axis_that_stands_where_it_was_asked_to_keeps_its_request(position: int) -> None:
+    assert not is_held(100, THERE, position)
+
+
+def test_an_axis_that_stands_somewhere_else_is_about_to_go() -> None:
+    assert is_held(100, THERE, 97)
+
+
+@pytest.mark.parametrize(("position", "held"), [(98, True), (100, False), (102, True)])
+def test_an_axis_close_to_its_request_that_has_not_arrived_may_be_about_to_go(
+    position: int, held: bool
+) -> None:
+    assert is_held(100, THERE, position, arrived=B | C | S) is held
+
+
+@pytest.mark.parametrize("what", ObjectStatus)
+def test_nothing_drifts_while_rgto_is_clear(what: ObjectStatus) -> None:
+    assert not is_held(100, what, 50, go=False, arrived=Finger(0))

@@ -1,13 +1,18 @@
-"""What goes out of what callers have asked for, and who is told then."""
+"""What goes out of what callers have asked for, and who is told then: once, with an error of their own."""
 
 from __future__ import annotations
 
+import asyncio
+
+import pytest
+
 from robotiq_async.control.open_requests import OpenRequests
 from robotiq_async.control.requests.pending import Command
+from robotiq_async.control.waiters import copy_of, fail, resolve
 from robotiq_async.values.enums import Fault, Finger
-from robotiq_async.values.errors import ConnectionLostError, GripperFaultError
+from robotiq_async.values.errors import ConnectionLostError, GripperFaultError, RobotiqError
 from robotiq_async.values.model import THREE_FINGER
-from tests.control.outcome import Outcome
+from tests.control.scan import Outcome
 
 A, B, C, S = THREE_FINGER.axes
 NONE = Finger(0)
@@ -71,3 +76,56 @@ def test_a_fault_ends_what_moves_and_not_what_stops() -> None:
     assert not halter.is_told
     assert not holder.is_told
     assert (callers.pending.hold, callers.pending.speeds) == (B, {})
+
+
+# -- callers that wait -------------------------------------------------------------------------------------
+
+
+def test_an_acknowledgement_is_told_as_none() -> None:
+    callers = [Outcome(), Outcome()]
+    resolve(callers)
+    assert [caller.told for caller in callers] == [[None], [None]]
+
+
+def test_a_failure_is_told_to_everybody_with_an_error_and_a_traceback_of_their_own() -> None:
+    callers, error = [Outcome(), Outcome()], ConnectionLostError("gone")
+    fail(callers, error)
+    errors = [caller.error for caller in callers]
+    assert all(isinstance(each, ConnectionLostError) and str(each) == "gone" for each in errors)
+    assert len({id(each) for each in (*errors, error)}) == 3
+
+
+def test_who_has_been_told_is_not_told_again() -> None:
+    caller = Outcome()
+    resolve([caller])
+    fail([caller], ConnectionLostError("gone"))
+    resolve([caller])
+    assert caller.told == [None]
+
+
+async def test_a_caller_that_was_cancelled_is_passed_over() -> None:
+    future: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+    future.cancel()
+    resolve([future])
+    fail([future], ConnectionLostError("gone"))
+    assert future.cancelled()
+
+
+async def test_a_future_is_a_waiter() -> None:
+    done: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+    failed: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+    resolve([done])
+    fail([failed], ConnectionLostError("gone"))
+    await done
+    with pytest.raises(ConnectionLostError, match="gone"):
+        await failed
+
+
+@pytest.mark.parametrize("cause", [None, OSError(104, "reset by peer")])
+def test_a_copy_of_an_error_says_what_the_error_says(cause: OSError | None) -> None:
+    error: RobotiqError = GripperFaultError(Fault.SCISSOR_BLOCKED)
+    error.__cause__ = cause
+    copy = copy_of(error)
+    assert isinstance(copy, GripperFaultError)
+    assert copy is not error
+    assert (str(copy), copy.fault, copy.__cause__) == (str(error), Fault.SCISSOR_BLOCKED, cause)

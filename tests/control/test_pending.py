@@ -12,7 +12,7 @@ from robotiq_async.control.requests.pending import Command, PendingCommand
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.errors import ConnectionLostError, MoveSupersededError
 from robotiq_async.values.model import THREE_FINGER
-from tests.control.outcome import Outcome
+from tests.control.scan import Outcome
 
 A, B, C, S = THREE_FINGER.axes
 ABC, ALL = Finger.ABC, Finger.ALL

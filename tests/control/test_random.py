@@ -10,8 +10,7 @@ from robotiq_async import JAW, Finger, MoveResult, ObjectStatus, State
 from robotiq_async.control.motion import Move
 from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.values.model import THREE_FINGER, TOLERANCE, TWO_FINGER_85, Model
-from tests.control.outcome import Outcome
-from tests.control.scan import Scan
+from tests.control.scan import Outcome, Scan
 from tests.register_words import only_holds
 
 masks = st.integers(1, 15).map(Finger)

@@ -1,6 +1,10 @@
-"""Which of the written images a gripper shows, and from when on it acts: slow ones and skipping ones."""
+"""Which of the written images a gripper shows, from when on it acts, and what a look at a status costs."""
 
 from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from types import FrameType
 
 import pytest
 from hypothesis import given, settings
@@ -256,3 +260,40 @@ def test_a_position_that_was_never_written_is_foreign_at_any_time(
         if request is not None:
             history.write(request, now)
         assert history.see_at_once(shows(foreign, now)) is None
+
+
+# -- what a look costs, in calls: the same on every machine ------------------------------------------------
+
+
+def calls(what: Callable[[], object]) -> int:
+    """How many functions of Python are called."""
+    count = 0
+
+    def see(_frame: FrameType, event: str, _argument: object) -> None:
+        nonlocal count
+        count += event == "call"
+
+    sys.setprofile(see)
+    try:
+        what()
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+def cost_of_a_look(writes: int) -> int:
+    """That of the status after so many writes, none of which shows."""
+    history, now = History(255), 0.0
+    for number in range(writes):
+        now += 0.005
+        history.write(image(number % 200), now)
+
+    def look() -> None:
+        history.see(shows(250, now), now)
+        assert not history.is_in_doubt
+
+    return calls(look)
+
+
+def test_a_look_at_a_status_calls_nothing_for_each_write_of_the_last_half_second() -> None:
+    assert cost_of_a_look(90) <= cost_of_a_look(10)
