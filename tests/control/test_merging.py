@@ -80,10 +80,6 @@ def test_a_speed_and_a_force_change_their_axes_and_start_nothing() -> None:
     assert image == replace(HALTED, axes=(*HALTED.axes[:1], AxisRequest(20, 200, 100), *HALTED.axes[2:]))
 
 
-def test_a_position_sets_rgto() -> None:
-    assert after(HALTED, command(A, 200), RESTING).go
-
-
 # -- waking ------------------------------------------------------------------------------------------------
 
 
@@ -97,10 +93,6 @@ def test_an_axis_that_gripped_keeps_its_request_when_rgto_is_raised() -> None:
     assert positions(after(HALTED, command(A, 200), RESTING, gripping=B)) == (200, 20, 103, 104)
 
 
-def test_an_axis_that_gripped_goes_where_it_is_asked() -> None:
-    assert positions(after(HALTED, command(A, 200), RESTING, gripping=A | B)) == (200, 20, 103, 104)
-
-
 # -- rACT and rATR are for the sequences -------------------------------------------------------------------
 
 
@@ -110,12 +102,6 @@ def test_ract_is_never_raised(had: bool, shows: bool) -> None:
     """It would activate a gripper that has lost its activation, or that was reset on purpose."""
     status = status_of(0x30 | shows, 0xFF)
     assert after(replace(HALTED, activate=had), command(A, 200), status).activate == (had and shows)
-
-
-def test_ratr_is_never_repeated() -> None:
-    """The base may be the image of a release: written again, it would let go."""
-    released = replace(HALTED, release=True)
-    assert not after(released, command(A, 200), RESTING).release
 
 
 # -- halting -----------------------------------------------------------------------------------------------
@@ -200,7 +186,7 @@ def test_whatever_is_asked_an_axis_that_nobody_addresses_is_asked_nothing_new_or
         pending.merge(Command(*each))
     image = merged(base, pending, status, gripping=gripping, arrived=arrived)
     assert (image.mode, image.individual_fingers, image.individual_scissor) == (base.mode, True, True)
-    assert not image.release
+    assert not image.release, "written again, the image of a release would let go"
     assert not (image.activate and not (base.activate and status.activation_echo))
     assert image.go == (base.go or bool(pending.positions))
     for axis, before, now in zip(THREE_FINGER.axes, base.axes, image.axes, strict=True):
@@ -261,45 +247,28 @@ def test_a_request_agrees_with_what_an_axis_does(
 # -- whether an axis has to be asked to stay ---------------------------------------------------------------
 
 
-def is_held(
-    request: int, what: ObjectStatus, position: int, *, go: bool = True, arrived: Finger = Finger.ALL
-) -> bool:
-    """Whether holding axis A means asking for where it is."""
-    base = Request(activate=True, go=go, axes=(AxisRequest(request),) * 4)
-    return drifts(A, base, status_of(0x31 | go << 3, what, position=position), arrived)
-
-
-def test_a_moving_axis_drifts_wherever_it_goes() -> None:
-    assert is_held(200, IN_MOTION, 100)
-    assert is_held(100, IN_MOTION, 100)
-
-
-@pytest.mark.parametrize(("request_", "what"), [(255, CLOSING), (151, CLOSING), (0, OPENING)])
-def test_an_axis_in_contact_keeps_its_request_and_its_grip(request_: int, what: ObjectStatus) -> None:
-    assert not is_held(request_, what, 150)
-    assert not is_held(request_, what, 150, arrived=Finger(0))
-
-
-def test_a_grip_that_comes_from_the_request_before_is_about_to_end() -> None:
-    assert is_held(20, CLOSING, 150)
-
-
-@pytest.mark.parametrize("position", [98, 100, 102])
-def test_an_axis_that_stands_where_it_was_asked_to_keeps_its_request(position: int) -> None:
-    assert not is_held(100, THERE, position)
-
-
-def test_an_axis_that_stands_somewhere_else_is_about_to_go() -> None:
-    assert is_held(100, THERE, 97)
-
-
-@pytest.mark.parametrize(("position", "held"), [(98, True), (100, False), (102, True)])
-def test_an_axis_close_to_its_request_that_has_not_arrived_may_be_about_to_go(
-    position: int, held: bool
+@pytest.mark.parametrize("arrived", [Finger.ALL, B | C | S])
+@pytest.mark.parametrize(
+    ("request_", "what", "position", "held"),
+    [
+        (200, IN_MOTION, 100, True),
+        (100, IN_MOTION, 100, True),
+        # In contact it keeps its request, and with it its grip.
+        (255, CLOSING, 150, False),
+        (151, CLOSING, 150, False),
+        (0, OPENING, 150, False),
+        (20, CLOSING, 150, True),  # a grip by the request before, about to end
+        (100, THERE, 97, True),
+        (100, THERE, 98, None),
+        (100, THERE, 100, False),
+        (100, THERE, 102, None),
+    ],
+)
+def test_an_axis_that_moves_or_is_about_to_is_asked_to_stay(
+    request_: int, what: ObjectStatus, position: int, held: bool | None, arrived: Finger
 ) -> None:
-    assert is_held(100, THERE, position, arrived=B | C | S) is held
-
-
-@pytest.mark.parametrize("what", ObjectStatus)
-def test_nothing_drifts_while_rgto_is_clear(what: ObjectStatus) -> None:
-    assert not is_held(100, what, 50, go=False, arrived=Finger(0))
+    """Close to its request (None) it is held only if it has not arrived: it may be about to go."""
+    status = status_of(0x39, what, position=position)
+    going = Request(activate=True, go=True, axes=(AxisRequest(request_),) * 4)
+    assert drifts(A, going, status, arrived) is (A not in arrived if held is None else held)
+    assert not drifts(A, replace(going, go=False), status, arrived), "nothing moves while rGTO is clear"

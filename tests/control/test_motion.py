@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.control.motion import MARGIN_S, LiveMoves, Move
+from robotiq_async.control.motion import LiveMoves, Move
 from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.enums import Finger, ObjectStatus
 from robotiq_async.values.errors import ConnectionLostError, MoveSupersededError, RobotiqError
@@ -37,46 +37,33 @@ def ended(each: tuple[Move, Outcome], status: RobotiqStatus) -> MoveResult:
 # -- when it has ended -------------------------------------------------------------------------------------
 
 
-def test_a_move_has_arrived_when_every_addressed_axis_rests_under_its_request() -> None:
-    each, _ = move(255)
-    assert each.has_arrived(status_of(0xF9, 0xFF, echo=255), Finger.ALL, {})
-    assert each.has_arrived(status_of(0xB9, 0xEA, echo=(255, 255, 255, 0)), Finger.ALL, {})
+UNDER = (255, 255, 255, 0)
+"""The echo of a move of the fingers to 255."""
 
 
-@pytest.mark.parametrize("byte_1", [0b11_11_11_00, 0b11_11_00_11, 0b11_00_11_11])
-def test_a_move_has_not_arrived_while_one_addressed_axis_moves(byte_1: int) -> None:
-    each, _ = move(255)
-    assert not each.has_arrived(status_of(0x39, byte_1, echo=255), Finger.ALL, {})
-
-
-def test_an_axis_that_is_not_addressed_may_move_on() -> None:
-    each, _ = move(255, A | B)
-    assert each.has_arrived(status_of(0x39, 0b00_00_11_11, echo=(255, 255, 0, 0)), Finger.ALL, {})
-
-
-@pytest.mark.parametrize("echo", [(254, 255, 255, 0), (255, 0, 255, 0), (255, 255, 100, 0)])
-def test_a_move_has_not_arrived_while_one_echo_shows_another_request(echo: tuple[int, ...]) -> None:
-    each, _ = move(255)
-    assert not each.is_under(status_of(0xF9, 0xFF, echo=echo), {})
-    assert not each.has_arrived(status_of(0xF9, 0xFF, echo=echo), Finger.ALL, {})
-
-
-def test_a_halted_gripper_is_not_under_a_move() -> None:
-    each, _ = move(255)
-    assert not each.is_under(status_of(0xF1, 0xFF, echo=255), {})
-    assert not each.has_arrived(status_of(0xF1, 0xFF, echo=255), Finger.ALL, {})
-
-
-def test_a_moving_gripper_is_under_its_move() -> None:
-    each, _ = move(255)
-    assert each.is_under(status_of(0x39, 0xC0, echo=255), {})
-    assert not each.has_arrived(status_of(0x39, 0xC0, echo=255), Finger.ALL, {})
-
-
-def test_arriving_does_not_depend_on_the_position_reached() -> None:
-    """Open stops at 6-7 although 0 was asked, closed at 240 or above."""
-    each, _ = move(0)
-    assert each.has_arrived(status_of(0xF9, 0xFF, echo=0, position=7), Finger.ALL, {})
+@pytest.mark.parametrize(
+    ("axes", "byte_0", "byte_1", "echo", "is_under", "has_arrived"),
+    [
+        (ABC, 0xF9, 0xFF, UNDER, True, True),
+        (ABC, 0xB9, 0xEA, UNDER, True, True),  # in contact
+        (ABC, 0x39, 0b11_11_11_00, UNDER, True, False),
+        (ABC, 0x39, 0b11_11_00_11, UNDER, True, False),
+        (ABC, 0x39, 0b11_00_11_11, UNDER, True, False),
+        (ABC, 0x39, 0b00_11_11_11, UNDER, True, True),  # an axis that is not addressed may move on
+        (A | B, 0x39, 0b00_00_11_11, (255, 255, 0, 0), True, True),
+        (ABC, 0xF9, 0xFF, (254, 255, 255, 0), False, False),
+        (ABC, 0xF9, 0xFF, (255, 0, 255, 0), False, False),
+        (ABC, 0xF9, 0xFF, (255, 255, 100, 0), False, False),
+        (ABC, 0xF1, 0xFF, UNDER, False, False),  # halted
+    ],
+)
+def test_a_move_has_arrived_when_every_addressed_axis_rests_under_its_request(
+    axes: Finger, byte_0: int, byte_1: int, echo: tuple[int, ...], is_under: bool, has_arrived: bool
+) -> None:
+    """Wherever it rests: open stops at 6-7 although 0 was asked, closed at 240 or above."""
+    (each, _), status = move(255, axes), status_of(byte_0, byte_1, echo=echo, position=241)
+    assert each.is_under(status, {}) is is_under
+    assert each.has_arrived(status, Finger.ALL, {}) is has_arrived
 
 
 # -- the outcome is handed over once -----------------------------------------------------------------------
@@ -97,13 +84,6 @@ def test_a_move_that_ended_well_does_not_fail_afterwards() -> None:
     assert outcome.result.status == status_of(0xF9, 0xFF)
 
 
-def test_every_caller_has_an_error_of_its_own() -> None:
-    (one, first), (other, second), error = move(), move(), MoveSupersededError("both")
-    one.fail(error)
-    other.fail(error)
-    assert first.error is not second.error
-
-
 @pytest.mark.parametrize("error", [MoveSupersededError("no"), ConnectionLostError("yes")])
 def test_a_move_knows_whether_the_link_went_down_under_it(error: RobotiqError) -> None:
     each, _ = move()
@@ -115,7 +95,7 @@ def test_a_move_knows_whether_the_link_went_down_under_it(error: RobotiqError) -
 # -- the result --------------------------------------------------------------------------------------------
 
 
-def held() -> MoveResult:
+def test_a_result_tells_of_each_addressed_axis_and_of_no_other() -> None:
     """A and B hold something, C is closed, the scissor touches something too."""
     each, outcome = move(255, ABC, now=10.0)
     each.see(status_of(0x39, 0xC0, echo=255, current=(15, 5, 0, 200)))
@@ -124,23 +104,17 @@ def held() -> MoveResult:
         0x79, 0b10_11_10_10, echo=255, position=(150, 151, 241, 99), current=(9, 9, 9, 9), at=12.5
     )
     each.see(last)
-    return ended((each, outcome), last)
-
-
-def test_a_result_tells_outcome_and_position_of_each_addressed_axis() -> None:
-    result = held()
+    result = ended((each, outcome), last)
     assert dict(result.outcomes) == {
         A: ObjectStatus.CONTACT_CLOSING,
         B: ObjectStatus.CONTACT_CLOSING,
         C: ObjectStatus.AT_POSITION,
     }
     assert dict(result.positions) == {A: 150, B: 151, C: 241}
-
-
-def test_a_result_tells_contacts_of_addressed_axes_only() -> None:
-    result = held()
     assert result.contacts == A | B
     assert result.object_detected
+    assert dict(result.peak_current_ma) == {A: 150, B: 400, C: 90}
+    assert (result.duration, result.status) == (2.5, last)
 
 
 def test_a_contact_while_opening_is_an_object_too() -> None:
@@ -156,18 +130,8 @@ def test_without_a_contact_nothing_was_detected() -> None:
     assert not result.object_detected
 
 
-def test_a_result_tells_the_highest_current_of_each_addressed_axis() -> None:
-    assert dict(held().peak_current_ma) == {A: 150, B: 400, C: 90}
-
-
-def test_a_result_tells_the_time_from_the_call_to_the_last_status() -> None:
-    result = held()
-    assert result.duration == 2.5
-    assert result.status.timestamp == 12.5
-
-
 def test_a_result_cannot_be_changed() -> None:
-    result = held()
+    result = ended(move(255, ABC), status_of(0xF9, 0xFF))
     with pytest.raises(dataclasses.FrozenInstanceError):
         result.contacts = ABC  # type: ignore[misc]
     for mapping in (result.outcomes, result.positions, result.peak_current_ma):
@@ -194,27 +158,25 @@ def timeout(position: int, axes: Finger, at: int | tuple[int, ...], speed: int |
     return move.default_timeout(status_of(0x31, position=at), speeds, closing_time)
 
 
-@pytest.mark.parametrize(("speed", "seconds"), [(0, SLOWEST_S), (255, FASTEST_S)])
-def test_a_full_closing_may_take_twice_its_measured_time_and_two_seconds(speed: int, seconds: float) -> None:
-    assert timeout(241, ABC, 6, speed) == pytest.approx(2 * seconds + 2)
-    assert timeout(6, ABC, 241, speed) == pytest.approx(2 * seconds + 2)
-
-
-def test_half_the_distance_takes_half_the_time() -> None:
-    assert timeout(118, A, 6, 0) == pytest.approx(2 * SLOWEST_S * 112 / 235 + 2)
-
-
-def test_no_distance_leaves_the_margin() -> None:
-    assert timeout(100, ABC, 100, 0) == MARGIN_S == 2.0
-
-
-def test_the_slowest_addressed_axis_counts() -> None:
-    assert timeout(241, A | B, 6, (255, 0, 255, 255)) == pytest.approx(2 * SLOWEST_S + 2)
-    assert timeout(241, A | B, (240, 6, 6, 6), (0, 255, 0, 0)) == pytest.approx(2 * FASTEST_S + 2)
-
-
-def test_axes_that_are_not_addressed_do_not_count() -> None:
-    assert timeout(241, A, 6, (255, 0, 0, 0)) == pytest.approx(2 * FASTEST_S + 2)
+@pytest.mark.parametrize(
+    ("position", "axes", "at", "speed", "seconds"),
+    [
+        (241, ABC, 6, 0, SLOWEST_S),
+        (6, ABC, 241, 0, SLOWEST_S),
+        (241, ABC, 6, 255, FASTEST_S),
+        (6, ABC, 241, 255, FASTEST_S),
+        (118, A, 6, 0, SLOWEST_S * 112 / 235),  # half the distance
+        (100, ABC, 100, 0, 0.0),
+        # The slowest addressed axis counts, and no other.
+        (241, A | B, 6, (255, 0, 255, 255), SLOWEST_S),
+        (241, A | B, (240, 6, 6, 6), (0, 255, 0, 0), FASTEST_S),
+        (241, A, 6, (255, 0, 0, 0), FASTEST_S),
+    ],
+)
+def test_a_move_may_take_twice_the_measured_time_and_two_seconds(
+    position: int, axes: Finger, at: int | tuple[int, ...], speed: int | tuple[int, ...], seconds: float
+) -> None:
+    assert timeout(position, axes, at, speed) == pytest.approx(2 * seconds + 2)
 
 
 @given(st.integers(0, 255), st.integers(1, 15), st.integers(0, 255), st.integers(0, 255))
@@ -300,8 +262,9 @@ def test_those_that_an_error_is_for_fail_and_the_others_go_on() -> None:
     moves.fail(MoveSupersededError("A"), lambda move: move.axes is A)
     assert isinstance(one.error, MoveSupersededError)
     assert not other.told
-    moves.fail(MoveSupersededError("all"))
+    moves.fail(error := MoveSupersededError("all"))
     assert isinstance(other.error, MoveSupersededError)
+    assert other.error is not error, "each caller has one of its own"
     assert not moves
 
 
