@@ -1,4 +1,4 @@
-"""What becomes of grips, from the statuses alone."""
+"""What becomes of grips, from the statuses alone; and what a closing holds, from how it ended."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robotiq_async import GraspResult, MoveResult
 from robotiq_async.control.grip_watch import SLIP_COUNTS, GripWatch
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values.enums import Finger, ObjectStatus
@@ -72,11 +73,6 @@ def test_an_axis_that_moves_in_contact_slips(moved: int) -> None:
     assert told(seen(CLOSING, 150), seen(CLOSING, 150 + moved)) == [(SLIPPED, moved)] * slips
 
 
-def test_it_slips_as_well_when_it_creeps() -> None:
-    creeping = [seen(CLOSING, position) for position in range(150, 159)]
-    assert told(*creeping) == [(SLIPPED, 4), (SLIPPED, 4)]
-
-
 def test_how_far_it_may_move_can_be_said() -> None:
     assert told(seen(CLOSING, 150), seen(CLOSING, 152), watch=GripWatch(slip=1)) == [(SLIPPED, 2)]
     assert told(seen(CLOSING, 150), seen(CLOSING, 160), watch=GripWatch(slip=10)) == []
@@ -98,88 +94,64 @@ def test_an_axis_that_tries_again_and_gets_further_has_slipped() -> None:
     assert told(seen(CLOSING, 174), seen(CLOSING, 176), watch=watch) == [(SLIPPED, 4)]
 
 
-@pytest.mark.parametrize(("request_", "stop"), [(255, 241), (200, 200)])
-def test_an_axis_that_closes_on_to_its_end_has_lost_the_part(request_: int, stop: int) -> None:
-    on = [seen(MOVING, 160, request_), seen(REACHED, stop, request_)]
-    assert told(seen(CLOSING, 150, request_), *on) == [(SLIPPED, 10), (LOST, stop - 160)]
-    assert told(seen(CLOSING, 150, request_), on[-1]) == [(LOST, stop - 150)], "also when nobody saw it move"
-
-
-@pytest.mark.parametrize("then", [seen(MOVING, 149, 0), seen(REACHED, 6, 0), seen(REACHED, 150, 150)])
-def test_an_axis_that_is_asked_to_let_go_has_released_the_part(then: RobotiqStatus) -> None:
-    assert told(seen(CLOSING, 150), then) == [(RELEASED, then.position(A) - 150)]
-
-
-def test_a_request_to_let_go_is_told_when_the_contact_ends() -> None:
-    assert told(seen(CLOSING, 150), seen(CLOSING, 150, 0)) == []
-
-
-def test_a_grip_from_inside_is_held_by_opening_and_released_by_closing() -> None:
-    held = seen(OPENING, 60, 0)
-    assert told(held, seen(REACHED, 6, 0)) == [(LOST, -54)]
-    assert told(held, seen(MOVING, 70, 255)) == [(RELEASED, 10)]
-    assert told(held, seen(MOVING, 50, 0), seen(OPENING, 50, 0)) == [(SLIPPED, -10), (GAINED, 0)]
-
-
-def test_the_other_contact_is_another_grip() -> None:
-    assert told(seen(CLOSING, 150), seen(OPENING, 100, 0)) == [(RELEASED, -50), (GAINED, 0)]
-    assert told(seen(CLOSING, 150), seen(OPENING, 100)) == [(LOST, -50), (GAINED, 0)]
+HELD, INSIDE = seen(CLOSING, 150), seen(OPENING, 60, 0)
+NO_ECHO = seen(CLOSING, 150, 0)
+"""Under simple control A's registers drive all fingers; the echoes of the others stay what they were."""
+OPENS_LATE = [seen(CLOSING, position, 0) for position in (150, 147, 145, 141)]
+"""The object status may trail the echo and the position by some reads."""
 
 
 @pytest.mark.parametrize(
-    "then",
+    ("statuses", "changes"),
     [
-        seen(MOVING, 150, byte_0=0x00),  # reset, or without power
-        seen(CLOSING, 150, byte_0=0x09),  # an automatic release
-        seen(MOVING, 150, byte_0=0x31),  # a halt after which no contact is reported
-        seen(MOVING, 150, fault=FAULT),
-        seen(MOVING, 150, 0, byte_0=0x09),
-        seen(MOVING, 150, 0, byte_0=0x31),
-        seen(MOVING, 150, 0, fault=FAULT),
-    ],
-    ids=[
-        "reset",
-        "release",
-        "halt",
-        "fault",
-        "release under another request",
-        "halt under another request",
-        "fault under another request",
+        (
+            [seen(CLOSING, position) for position in range(150, 159)],
+            [(SLIPPED, 4), (SLIPPED, 4)],
+        ),  # it creeps
+        # It closes on to its end, also when no status shows the motion.
+        ([HELD, seen(MOVING, 160), seen(REACHED, 241)], [(SLIPPED, 10), (LOST, 81)]),
+        ([HELD, seen(REACHED, 241)], [(LOST, 91)]),
+        (
+            [seen(CLOSING, 150, 200), seen(MOVING, 160, 200), seen(REACHED, 200, 200)],
+            [(SLIPPED, 10), (LOST, 40)],
+        ),
+        ([seen(CLOSING, 150, 200), seen(REACHED, 200, 200)], [(LOST, 50)]),
+        # It is asked to let go: that is told when the contact ends.
+        ([HELD, seen(MOVING, 149, 0)], [(RELEASED, -1)]),
+        ([HELD, seen(REACHED, 6, 0)], [(RELEASED, -144)]),
+        ([HELD, seen(REACHED, 150, 150)], [(RELEASED, 0)]),
+        ([HELD, seen(CLOSING, 150, 0)], []),
+        # A grip from inside is held by opening and released by closing.
+        ([INSIDE, seen(REACHED, 6, 0)], [(LOST, -54)]),
+        ([INSIDE, seen(MOVING, 70, 255)], [(RELEASED, 10)]),
+        ([INSIDE, seen(MOVING, 50, 0), seen(OPENING, 50, 0)], [(SLIPPED, -10), (GAINED, 0)]),
+        # The other contact is another grip.
+        ([HELD, seen(OPENING, 100, 0)], [(RELEASED, -50), (GAINED, 0)]),
+        ([HELD, seen(OPENING, 100)], [(LOST, -50), (GAINED, 0)]),
+        # What is not known to be held is lost.
+        ([HELD, seen(MOVING, 150, byte_0=0x00)], [(LOST, 0)]),  # reset, or without power
+        ([HELD, seen(CLOSING, 150, byte_0=0x09)], [(LOST, 0)]),  # an automatic release
+        ([HELD, seen(MOVING, 150, byte_0=0x31)], [(LOST, 0)]),  # a halt after which no contact is reported
+        ([HELD, seen(MOVING, 150, fault=FAULT)], [(LOST, 0)]),
+        ([HELD, seen(MOVING, 150, 0, byte_0=0x09)], [(LOST, 0)]),  # the same three under another request
+        ([HELD, seen(MOVING, 150, 0, byte_0=0x31)], [(LOST, 0)]),
+        ([HELD, seen(MOVING, 150, 0, fault=FAULT)], [(LOST, 0)]),
+        # A contact that is still reported after a halt or in a fault is one.
+        ([HELD, seen(CLOSING, 150, byte_0=0x31), seen(CLOSING, 150, fault=FAULT)], []),
+        # Without an echo to go by nothing counts as asked for; from the first echo on that presses it does.
+        ([NO_ECHO, seen(REACHED, 241, 0)], [(LOST, 91)]),
+        ([NO_ECHO, seen(MOVING, 150, 0)], [(LOST, 0)]),
+        ([NO_ECHO, HELD, seen(MOVING, 149, 0)], [(RELEASED, -1)]),
+        # An axis that opens before its contact ends has not slipped, also where the watch begins in between.
+        ([HELD, *OPENS_LATE, seen(MOVING, 139, 0)], [(RELEASED, -11)]),
+        ([*OPENS_LATE[:2], seen(MOVING, 145, 0)], [(RELEASED, -5)]),
+        # A late status is passed over; one of another clock, as from before a restart, is believed.
+        ([seen(CLOSING, 150, at=2.0), seen(REACHED, 100, 100, at=1.5), seen(CLOSING, 150, at=3.0)], []),
+        ([seen(CLOSING, 150, at=5000.0), seen(REACHED, 241, at=7.0)], [(LOST, 91)]),
     ],
 )
-def test_what_is_not_known_to_be_held_is_lost(then: RobotiqStatus) -> None:
-    assert told(seen(CLOSING, 150), then) == [(LOST, 0)]
-
-
-def test_a_contact_that_is_still_reported_after_a_halt_or_in_a_fault_is_none_the_less_one() -> None:
-    assert told(seen(CLOSING, 150), seen(CLOSING, 150, byte_0=0x31), seen(CLOSING, 150, fault=FAULT)) == []
-
-
-def test_without_an_echo_to_go_by_nothing_counts_as_asked_for() -> None:
-    """Under simple control A's registers drive all fingers; the echoes of the others stay what they were."""
-    assert told(seen(CLOSING, 150, 0), seen(REACHED, 241, 0)) == [(LOST, 91)]
-    assert told(seen(CLOSING, 150, 0), seen(MOVING, 150, 0)) == [(LOST, 0)]
-
-
-def test_from_the_first_echo_on_that_presses_letting_go_can_be_told() -> None:
-    assert told(seen(CLOSING, 150, 0), seen(CLOSING, 150), seen(MOVING, 149, 0)) == [(RELEASED, -1)]
-
-
-def test_an_axis_that_opens_before_its_contact_ends_has_not_slipped() -> None:
-    """The object status may trail the echo and the position by some reads."""
-    late = [seen(CLOSING, position, 0) for position in (150, 147, 145, 141)]
-    assert told(seen(CLOSING, 150), *late, seen(MOVING, 139, 0)) == [(RELEASED, -11)]
-    assert told(late[0], late[1], seen(MOVING, 145, 0)) == [(RELEASED, -5)], "also for who begins in between"
-
-
-def test_a_status_that_is_late_is_passed_over() -> None:
-    late = seen(REACHED, 100, 100, at=1.5)
-    assert told(seen(CLOSING, 150, at=2.0), late, seen(CLOSING, 150, at=3.0)) == []
-
-
-def test_a_status_of_another_clock_is_believed() -> None:
-    """Else whoever begins with one that was kept from before a restart of the computer hears nothing."""
-    assert told(seen(CLOSING, 150, at=5000.0), seen(REACHED, 241, at=7.0)) == [(LOST, 91)]
+def test_statuses_tell(statuses: list[RobotiqStatus], changes: list[tuple[GripChange, int]]) -> None:
+    assert told(*statuses) == changes
 
 
 def test_it_may_begin_with_a_status_from_before() -> None:
@@ -347,3 +319,38 @@ def test_something_soft_that_is_pressed_deeper_slips() -> None:
     cell.gripper.place_object(A, 150, soft=40)
     cell.ask(255, force=50)
     assert changes(cell.ask(255, force=255)) == [(SLIPPED, A), (GAINED, A)]
+
+
+# -- the result of a grasp ---------------------------------------------------------------------------------
+
+
+def grasp(at_least: int, **outcomes: ObjectStatus) -> GraspResult:
+    ends = {Finger[name]: how for name, how in outcomes.items()}
+    contacts = Finger(sum(axis for axis, how in ends.items() if how.is_contact))
+    move = MoveResult(ends, dict.fromkeys(ends, 150), contacts, 1.0, dict.fromkeys(ends, 0), status_of(0xB9))
+    return GraspResult(move, at_least)
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "holds"),
+    [
+        ({"A": CLOSING, "B": CLOSING, "C": CLOSING}, A | B | C),
+        ({"A": CLOSING, "B": REACHED, "C": CLOSING}, A | C),
+        ({"A": OPENING, "B": CLOSING, "C": REACHED}, B),
+        ({"A": REACHED, "B": REACHED, "C": REACHED}, Finger(0)),
+    ],
+)
+def test_what_a_contact_stopped_while_closing_holds(outcomes: dict[str, ObjectStatus], holds: Finger) -> None:
+    for at_least in (1, 2, 3):
+        result = grasp(at_least, **outcomes)
+        assert result.holds == holds
+        assert result.is_held == bool(result) == (holds.bit_count() >= at_least)
+
+
+def test_it_is_told_in_the_words_that_a_person_looks_for() -> None:
+    assert repr(grasp(1, A=CLOSING, B=REACHED)) == (
+        "<GraspResult held: contact of A, 1 needed; A=150, B=150>"
+    )
+    assert repr(grasp(2, A=REACHED, B=REACHED)) == (
+        "<GraspResult not held: contact of none, 2 needed; A=150, B=150>"
+    )
