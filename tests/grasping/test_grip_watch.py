@@ -94,7 +94,7 @@ def test_an_axis_that_tries_again_and_gets_further_has_slipped() -> None:
     assert told(seen(CLOSING, 174), seen(CLOSING, 176), watch=watch) == [(SLIPPED, 4)]
 
 
-HELD, INSIDE = seen(CLOSING, 150), seen(OPENING, 60, 0)
+HELD, SHORT, INSIDE = seen(CLOSING, 150), seen(CLOSING, 150, 200), seen(OPENING, 60, 0)
 NO_ECHO = seen(CLOSING, 150, 0)
 """Under simple control A's registers drive all fingers; the echoes of the others stay what they were."""
 OPENS_LATE = [seen(CLOSING, position, 0) for position in (150, 147, 145, 141)]
@@ -104,18 +104,13 @@ OPENS_LATE = [seen(CLOSING, position, 0) for position in (150, 147, 145, 141)]
 @pytest.mark.parametrize(
     ("statuses", "changes"),
     [
-        (
-            [seen(CLOSING, position) for position in range(150, 159)],
-            [(SLIPPED, 4), (SLIPPED, 4)],
-        ),  # it creeps
+        # It creeps.
+        ([seen(CLOSING, position) for position in range(150, 159)], [(SLIPPED, 4), (SLIPPED, 4)]),
         # It closes on to its end, also when no status shows the motion.
         ([HELD, seen(MOVING, 160), seen(REACHED, 241)], [(SLIPPED, 10), (LOST, 81)]),
         ([HELD, seen(REACHED, 241)], [(LOST, 91)]),
-        (
-            [seen(CLOSING, 150, 200), seen(MOVING, 160, 200), seen(REACHED, 200, 200)],
-            [(SLIPPED, 10), (LOST, 40)],
-        ),
-        ([seen(CLOSING, 150, 200), seen(REACHED, 200, 200)], [(LOST, 50)]),
+        ([SHORT, seen(MOVING, 160, 200), seen(REACHED, 200, 200)], [(SLIPPED, 10), (LOST, 40)]),
+        ([SHORT, seen(REACHED, 200, 200)], [(LOST, 50)]),
         # It is asked to let go: that is told when the contact ends.
         ([HELD, seen(MOVING, 149, 0)], [(RELEASED, -1)]),
         ([HELD, seen(REACHED, 6, 0)], [(RELEASED, -144)]),
