@@ -1,15 +1,28 @@
-"""Errors, contact codes and commands on the pages are those of the library."""
+"""Errors, states, codes and commands on the pages are those of the library."""
 
 from __future__ import annotations
 
 import re
 
 import robotiq_async
-from robotiq_async import ObjectStatus
+from robotiq_async import Fault, ObjectStatus, State
 from robotiq_async.cli.app import COMMANDS
 from tests.docs.pages import DOCS, ROOT
 
 REFERENCE = (DOCS / "reference.md").read_text(encoding="utf-8")
+
+
+def test_every_state_has_its_row() -> None:
+    text = (DOCS / "state-machine.md").read_text(encoding="utf-8")
+    for state in State:
+        assert re.search(rf"^\|.*\b{state.name}\b", text, re.MULTILINE), state
+
+
+def test_every_fault_has_its_row() -> None:
+    text = (DOCS / "registers.md").read_text(encoding="utf-8")
+    for fault in Fault:
+        (row,) = re.findall(rf"^\| 0x{int(fault):02X} \| `{fault.name}` \|.*$", text, re.MULTILINE)
+        assert f"| {fault.severity.value} |" in row
 
 
 def test_the_contact_codes_are_those_of_the_library() -> None:
