@@ -43,12 +43,7 @@ _ACTIONS: Final = {"atr": "release", "start": "the start", "stop": "the end"}
 
 
 def refusal_words(error: RobotiqError, hints: Mapping[State, str]) -> str:
-    """Why a command was refused, and which key or button helps.
-
-    Args:
-        error: the error of the command.
-        hints: for each state, the key or the button that helps.
-    """
+    """Why a command was refused, and which key or button helps: of the hints, that of the state."""
     if isinstance(error, NotActivatedError):
         return f"{_message(error)}; {hints[State.RESET]}"
     if isinstance(error, GripperFaultError):

@@ -69,12 +69,7 @@ def event_line(fields: Fields) -> str:
 
 
 def brief_line(fields: Fields, contacts: dict[str, Any]) -> str:
-    """The line for a state, a fault, or a change of the contacts; empty for everything else.
-
-    Args:
-        fields: a status, a request, or an event.
-        contacts: positions of the axes in contact as of the last status; is updated.
-    """
+    """The line for a state, a fault, or a change of the contacts, which it updates; empty for all else."""
     if "kind" in fields:
         return "" if is_command(fields) else event_line(fields)
     if "contacts" not in fields:

@@ -51,12 +51,7 @@ def description_message() -> bytes:
 
 
 def transforms(status: RobotiqStatus, nanoseconds: int) -> dict[str, Any]:
-    """The transform of every joint, from parent to child.
-
-    Args:
-        status: the positions.
-        nanoseconds: since 1970: the time of the status.
-    """
+    """The transform of every joint, from parent to child, at the time of the status since 1970."""
     seconds, rest = divmod(nanoseconds, 1_000_000_000)
     angles = dict(zip(JOINTS, joint_angles(status), strict=True))
     found = []

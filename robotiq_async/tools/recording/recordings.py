@@ -64,14 +64,7 @@ class McapFile:
     """Encodes messages as MCAP."""
 
     def __init__(self, output: Output, *, name: str, address: str, ros2: bool = False) -> None:
-        """Write the header.
-
-        Args:
-            output: receives the bytes.
-            name: of the hand.
-            address: of the hand.
-            ros2: write joint states only, in the profile ``ros2``.
-        """
+        """Write the header; with ``ros2`` joint states only follow, in the profile ``ros2``."""
         self._writer: Any = Writer(output, compression=CompressionType.ZSTD)  # type: ignore[arg-type]
         self._writer.start(profile="ros2" if ros2 else "", library=f"robotiq_async {__version__}")
         about = {"version": __version__, "name": name, "address": address, "note": NOTE}

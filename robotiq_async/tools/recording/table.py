@@ -60,16 +60,7 @@ class Table:
         self._state = ""
 
     def row(self, kind: str, nanoseconds: int, fields: Fields) -> list[object] | None:
-        """The row of a message; None if it has none.
-
-        Args:
-            kind: of the message.
-            nanoseconds: time since 1970.
-            fields: its JSON.
-
-        Raises:
-            LookupError, TypeError: it does not have a recorder's format.
-        """
+        """The row of a message of this kind, with its time since 1970; None if it has none."""
         if kind == "event" and "target" in fields:
             self._state = fields["target"]
         if kind != self._kind:

@@ -84,11 +84,7 @@ class HandUpdates:
                 self._events.append({**each, "time": at})
 
     def take(self, index: int) -> Fields:
-        """The next update. It contains each event once.
-
-        Args:
-            index: number of the hand on the page.
-        """
+        """The next update of the hand with this number on the page. It contains each event once."""
         fields: Fields = {
             "hand": index,
             "state": self.hand.state.name,
