@@ -30,28 +30,6 @@ async def test_the_end_stops_the_fingers_and_sees_it_before_it_disconnects() -> 
 
 
 @virtual
-async def test_an_end_that_only_looks_leaves_the_fingers_to_what_they_do() -> None:
-    async with polled() as here:
-        here.controller.command(Command(Finger.ABC, 200, 0))
-        await here.polls(20)
-        here.poller.request_stop(halt=False)
-        await here.end()
-        assert here.wire.gripper.is_moving
-        assert len(here.requests) == 1
-
-
-@virtual
-async def test_an_end_that_keeps_a_grip_leaves_rgto_set() -> None:
-    async with polled() as here:
-        here.controller.command(Command(Finger.ABC, 50, 255))
-        await here.polls(300)
-        here.poller.request_stop(halt=True, keep_grip=True)
-        await here.end()
-        assert here.statuses[-1].go_echo
-        assert len(here.requests) == 1
-
-
-@virtual
 async def test_a_stronger_stop_while_the_link_closes_opens_it_again() -> None:
     async with polled() as here:
         here.controller.command(Command(Finger.ABC, 200, 0))

@@ -35,22 +35,17 @@ def test_it_is_tried_for_ever_unless_said_otherwise() -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong",
+    ("name", "value", "error"),
     [
-        {"first_delay": -0.1},
-        {"max_delay": 0.0},
-        {"max_delay": 61.0},
-        {"give_up_after": float("nan")},
+        ("first_delay", -0.1, ValueError),
+        ("max_delay", 0.0, ValueError),
+        ("max_delay", 61.0, ValueError),
+        ("give_up_after", float("nan"), ValueError),
+        ("activate", 1, TypeError),
+        ("first_delay", "soon", TypeError),
+        ("max_delay", True, TypeError),
     ],
 )
-def test_a_policy_outside_its_ranges_is_refused(wrong: dict[str, float]) -> None:
-    (name,) = wrong
-    with pytest.raises(ValueError, match=name):
-        ReconnectPolicy(**wrong)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("wrong", [{"activate": 1}, {"first_delay": "soon"}, {"max_delay": True}])
-def test_a_policy_of_the_wrong_type_is_refused(wrong: dict[str, object]) -> None:
-    (name,) = wrong
-    with pytest.raises(TypeError, match=name):
-        ReconnectPolicy(**wrong)  # type: ignore[arg-type]
+def test_a_policy_with_a_wrong_value_is_refused(name: str, value: object, error: type[Exception]) -> None:
+    with pytest.raises(error, match=name):
+        ReconnectPolicy(**{name: value})  # type: ignore[arg-type]

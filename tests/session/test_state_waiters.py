@@ -8,8 +8,8 @@ import gc
 import pytest
 
 from robotiq_async.session.waiting import StateWaiters
-from robotiq_async.values.enums import Fault, State
-from robotiq_async.values.errors import ConnectionLostError, GripperFaultError, RobotiqError
+from robotiq_async.values.enums import State
+from robotiq_async.values.errors import ConnectionLostError, RobotiqError
 
 
 def lost() -> RobotiqError:
@@ -19,31 +19,6 @@ def lost() -> RobotiqError:
 @pytest.fixture
 def waiters() -> StateWaiters:
     return StateWaiters()
-
-
-async def test_who_waits_for_a_state_is_told_when_it_is_reached(waiters: StateWaiters) -> None:
-    with waiters.watching({State.RESET, State.FAULT}, {}) as reached:
-        waiters.reached(State.WF_RESET)
-        assert not reached.done()
-        waiters.reached(State.RESET)
-        assert await reached is State.RESET
-
-
-async def test_a_state_that_lasts_no_time_at_all_is_not_missed(waiters: StateWaiters) -> None:
-    with waiters.watching({State.RUNNING_CC}, {}) as reached:
-        waiters.reached(State.RUNNING_CC)
-        waiters.reached(State.RUNNING_IDLE)
-        waiters.reached(State.SHUTDOWN)
-        assert await reached is State.RUNNING_CC
-
-
-async def test_a_state_that_means_it_will_not_come_fails_with_its_error(waiters: StateWaiters) -> None:
-    failing = {State.FAULT: lambda: GripperFaultError(Fault.ACTIVATION_FAULT)}
-    with waiters.watching({State.RUNNING_IDLE}, failing) as reached:
-        waiters.reached(State.FAULT)
-        with pytest.raises(GripperFaultError) as caught:
-            await reached
-    assert caught.value.fault is Fault.ACTIVATION_FAULT
 
 
 async def test_what_is_waited_for_comes_before_what_fails(waiters: StateWaiters) -> None:
@@ -84,14 +59,6 @@ async def test_two_callers_with_the_same_wish_leave_one_by_one(waiters: StateWai
             pass
         waiters.reached(State.RESET)
         assert await stays is State.RESET
-
-
-async def test_who_leaves_with_an_error_is_not_told_any_more(waiters: StateWaiters) -> None:
-    with pytest.raises(KeyError), waiters.watching({State.RESET}, {}) as reached:
-        raise KeyError
-    waiters.reached(State.RESET)
-    assert not reached.done()
-    assert not waiters._waiters
 
 
 async def test_who_was_cancelled_is_passed_over(waiters: StateWaiters) -> None:

@@ -1,10 +1,11 @@
-"""Streams and channels: what a reader gets, what it misses, and how it ends."""
+"""Streams and listeners: what a reader gets and misses, how it ends; callbacks in order, and harmless."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
 import gc
+import logging
 from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 
@@ -53,16 +54,6 @@ async def test_a_reader_that_waits_gets_each_item_and_misses_nothing(channel: Ch
         channel.push(item)
         assert await task == item
     assert stream.missed == 0
-
-
-async def test_a_slow_reader_gets_the_newest_item_and_is_told_how_many_it_missed(
-    channel: Channel[int],
-) -> None:
-    stream = channel.open(1)
-    for item in range(5):
-        channel.push(item)
-    assert await anext(stream) == 4
-    assert stream.missed == 4
 
 
 async def test_missed_items_add_up(channel: Channel[int]) -> None:
@@ -132,16 +123,6 @@ async def test_each_reader_gets_a_failure_of_its_own(channel: Channel[int]) -> N
     assert one is not other
 
 
-@pytest.mark.parametrize(("failure", "error"), [(None, StopAsyncIteration), (lost, ConnectionLostError)])
-async def test_a_waiting_reader_is_told_of_the_end(
-    channel: Channel[int], failure: Callable[[], RobotiqError] | None, error: type[Exception]
-) -> None:
-    task = await reading(channel.open(1))
-    channel.end(failure)
-    with pytest.raises(error):
-        await task
-
-
 async def test_after_the_end_nothing_is_added(channel: Channel[int]) -> None:
     stream = channel.open(None)
     channel.end()
@@ -159,14 +140,6 @@ async def test_a_stream_that_is_opened_before_a_start_waits(channel: Channel[int
     assert await task == 1
 
 
-async def test_a_stream_that_is_opened_after_the_hand_gave_up_raises_the_reason(
-    channel: Channel[int],
-) -> None:
-    channel.end(lost)
-    with pytest.raises(ConnectionLostError):
-        await anext(channel.open(1))
-
-
 async def test_after_a_quiet_end_the_next_stream_waits_for_the_next_start(channel: Channel[int]) -> None:
     channel.end()
     task = await reading(channel.open(1))
@@ -174,9 +147,11 @@ async def test_after_a_quiet_end_the_next_stream_waits_for_the_next_start(channe
     assert await task == 1
 
 
-async def test_a_new_start_forgets_what_the_hand_gave_up_on(channel: Channel[int]) -> None:
+async def test_a_stream_raises_why_the_hand_gave_up_until_a_new_start(channel: Channel[int]) -> None:
     before = channel.open(1)
     channel.end(lost)
+    with pytest.raises(ConnectionLostError):
+        await anext(channel.open(1))
     channel.reopen(asyncio.get_running_loop())
     stream = channel.open(1)
     channel.push(1)
@@ -196,12 +171,15 @@ async def test_closing_ends_a_waiting_reader(channel: Channel[int]) -> None:
         await task
 
 
-async def test_closing_drops_what_is_left_and_may_be_repeated(channel: Channel[int]) -> None:
+async def test_closing_drops_what_is_left_and_what_comes_later_and_may_be_repeated(
+    channel: Channel[int],
+) -> None:
     stream = channel.open(3)
     channel.push(1)
     await stream.aclose()
     await stream.aclose()
     channel.push(2)
+    channel.end(lost)
     assert await rest(stream) == []
 
 
@@ -212,13 +190,6 @@ async def test_closing_wins_over_an_item_that_came_at_the_same_moment(channel: C
     await stream.aclose()
     with pytest.raises(StopAsyncIteration):
         await task
-
-
-async def test_a_failure_after_closing_is_not_the_reader_s_business(channel: Channel[int]) -> None:
-    stream = channel.open(1)
-    await stream.aclose()
-    channel.end(lost)
-    assert await rest(stream) == []
 
 
 # -- cancelling --------------------------------------------------------------------------------------------
@@ -243,22 +214,15 @@ async def test_a_wait_that_is_cancelled_together_with_an_item_loses_nothing(chan
 # -- one reader --------------------------------------------------------------------------------------------
 
 
-async def test_a_second_reader_is_refused_and_the_first_goes_on(channel: Channel[int]) -> None:
-    stream = channel.open(1)
-    first = await reading(stream)
-    with pytest.raises(RuntimeError, match="one reader"):
-        await anext(stream)
-    channel.push(1)
-    assert await first == 1
-
-
-async def test_after_a_cancelled_reader_another_may_read(channel: Channel[int]) -> None:
+async def test_a_second_reader_is_refused_unless_the_first_was_cancelled(channel: Channel[int]) -> None:
     stream = channel.open(1)
     first = await reading(stream)
     first.cancel()
     with pytest.raises(asyncio.CancelledError):
         await first
     second = await reading(stream)
+    with pytest.raises(RuntimeError, match="one reader"):
+        await anext(stream)
     channel.push(1)
     assert await second == 1
 
@@ -482,3 +446,101 @@ async def test_a_derived_stream_ends_with_the_failure(channel: Channel[int]) -> 
     channel.end(lost)
     with pytest.raises(ConnectionLostError):
         await anext(stream)
+
+
+# -- listeners ---------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def listeners() -> Listeners:
+    return Listeners()
+
+
+def test_each_is_told_everything_in_its_order(listeners: Listeners) -> None:
+    one: list[object] = []
+    other: list[object] = []
+    listeners.add(one.append)
+    listeners.tell(1)
+    listeners.add(other.append)
+    listeners.tell(2)
+    assert (one, other) == ([1, 2], [2])
+
+
+def test_one_that_is_removed_is_told_no_more(listeners: Listeners) -> None:
+    told: list[object] = []
+    remove = listeners.add(told.append)
+    remove_other = listeners.add(told.append)
+    remove()
+    remove()
+    listeners.tell(1)
+    assert told == [1], "the same function was added twice"
+    remove_other()
+    listeners.tell(2)
+    assert told == [1]
+
+
+def test_one_that_is_removed_by_another_is_not_told_any_more(listeners: Listeners) -> None:
+    told: list[object] = []
+    removers: list[Callable[[], None]] = []
+    listeners.add(lambda _: removers[0]())
+    removers.append(listeners.add(told.append))
+    listeners.tell(1)
+    assert told == []
+
+
+def test_one_may_remove_itself_and_add_others(listeners: Listeners) -> None:
+    told: list[object] = []
+
+    def once(item: object) -> None:
+        told.append(item)
+        remove()
+        listeners.add(told.append)
+
+    remove = listeners.add(once)
+    listeners.tell(1)
+    listeners.tell(2)
+    assert told == [1, 2]
+
+
+def test_what_a_listener_brings_about_is_told_after_what_it_was_told(listeners: Listeners) -> None:
+    told: list[object] = []
+    listeners.add(lambda item: listeners.tell("then") if item == "first" else None)
+    listeners.add(told.append)
+    listeners.tell("first")
+    assert told == ["first", "then"]
+
+
+@pytest.mark.parametrize("error", [ValueError("no"), asyncio.CancelledError()], ids=repr)
+def test_one_that_raises_is_logged_once_and_hurts_nobody(
+    listeners: Listeners, caplog: pytest.LogCaptureFixture, error: BaseException
+) -> None:
+    told: list[object] = []
+
+    def fail(_: object) -> None:
+        raise error
+
+    listeners.add(fail)
+    listeners.add(told.append)
+    listeners.tell(1)
+    listeners.tell(2)
+    assert told == [1, 2]
+    (record,) = caplog.records
+    assert record.levelno == logging.ERROR
+    assert record.exc_info is not None
+    assert record.exc_info[1] is error
+
+
+def test_an_interrupt_is_not_held_back_and_telling_goes_on_afterwards(listeners: Listeners) -> None:
+    told: list[object] = []
+    errors = [KeyboardInterrupt()]
+
+    def interrupted(item: object) -> None:
+        told.append(item)
+        if errors:
+            raise errors.pop()
+
+    listeners.add(interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        listeners.tell(1)
+    listeners.tell(2)
+    assert told == [1, 2]

@@ -6,14 +6,15 @@ import asyncio
 import os
 import sys
 import threading
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterator
+from contextlib import ExitStack, contextmanager
 from itertools import pairwise
 from typing import Any
 
 import pytest
 
 from robotiq_async.runtime.tick import Tick
-from tests.virtual import VirtualLoop, run
+from tests.virtual import VirtualLoop, virtual
 
 INTERVAL = 0.005
 LINUX = sys.platform == "linux"
@@ -47,6 +48,15 @@ def loop_of_this_test() -> VirtualLoop:
     return loop
 
 
+@contextmanager
+def ticking() -> Iterator[Tick]:
+    """A tick that has begun."""
+    tick = Tick(INTERVAL)
+    tick.start()
+    yield tick
+    tick.close()
+
+
 async def deadlines(tick: Tick, count: int) -> list[float]:
     """When so many ticks came."""
     times = []
@@ -59,52 +69,39 @@ async def deadlines(tick: Tick, count: int) -> list[float]:
 # -- in virtual time ---------------------------------------------------------------------------------------
 
 
-def test_the_deadlines_are_absolute() -> None:
-    async def main() -> None:
-        tick = Tick(INTERVAL)
-        tick.start()
+@virtual
+async def test_the_deadlines_are_absolute() -> None:
+    with ticking() as tick:
         times = []
         for _ in range(200):
-            await tick.wait()
-            times.append(tick.time())
+            times += await deadlines(tick, 1)
             await asyncio.sleep(0.003)  # what is done in between does not shift the next
         assert times[-1] - times[0] == pytest.approx(199 * INTERVAL, abs=1e-6)
-        tick.close()
-
-    run(main)
 
 
-def test_the_first_comes_within_an_interval() -> None:
-    async def main() -> None:
-        tick = Tick(INTERVAL)
+@virtual
+async def test_the_first_comes_within_an_interval() -> None:
+    with ticking() as tick:
         for _ in range(10):
             began = tick.time()
             tick.start()
             assert await tick.wait() == 1
             assert 0 <= tick.time() - began <= INTERVAL + 1e-6
             await asyncio.sleep(0.0123)
-        tick.close()
-
-    run(main)
 
 
-def test_what_was_missed_is_told_and_not_caught_up_with() -> None:
-    async def main() -> None:
-        tick = Tick(INTERVAL)
-        tick.start()
+@virtual
+async def test_missed_ticks_are_counted_and_not_caught_up_with() -> None:
+    with ticking() as tick:
         await tick.wait()
         await asyncio.sleep(4.5 * INTERVAL)
         assert await tick.wait() == 4
         assert await tick.wait() == 1
-        tick.close()
-
-    run(main)
 
 
-def test_who_is_slow_is_not_late_and_a_loop_that_is_held_up_is() -> None:
-    async def main() -> None:
-        tick = Tick(INTERVAL)
-        tick.start()
+@virtual
+async def test_a_slow_reader_is_not_late_and_a_loop_that_is_held_up_is() -> None:
+    with ticking() as tick:
         await tick.wait()
         await asyncio.sleep(0.2)
         await tick.wait()
@@ -116,66 +113,45 @@ def test_who_is_slow_is_not_late_and_a_loop_that_is_held_up_is() -> None:
         await tick.wait()
         assert tick.late < 0.001
         assert tick.longest_late == pytest.approx(0.2, abs=INTERVAL)
-        tick.close()
-
-    run(main)
 
 
-def test_being_late_is_noticed_while_nobody_waits() -> None:
-    async def main() -> None:
-        tick = Tick(INTERVAL)
-        tick.start()
+@virtual
+async def test_a_delay_is_noticed_while_no_reader_waits() -> None:
+    with ticking() as tick:
         loop_of_this_test().hold_up(0.1)
         await asyncio.sleep(0.001)
         assert tick.late == pytest.approx(0.1, abs=INTERVAL)
-        tick.close()
-
-    run(main)
 
 
+@virtual
 @pytest.mark.parametrize("hands", [2, 64])
-def test_the_hands_of_a_loop_are_spread_over_the_interval(hands: int) -> None:
-    async def main() -> None:
-        ticks = [Tick(INTERVAL) for _ in range(hands)]
-        for tick in ticks:
-            tick.start()
+async def test_the_hands_of_a_loop_are_spread_over_the_interval(hands: int) -> None:
+    with ExitStack() as stack:
+        ticks = [stack.enter_context(ticking()) for _ in range(hands)]
         await asyncio.sleep(INTERVAL)
         times = sorted(tick.due % INTERVAL for tick in ticks)
         gaps = [later - earlier for earlier, later in pairwise([*times, times[0] + INTERVAL])]
         assert min(gaps) > 0.3 * INTERVAL / hands
         assert max(gaps) < 3 * INTERVAL / hands
-        for tick in ticks:
-            tick.close()
-
-    run(main)
 
 
-def test_a_loop_with_a_clock_of_its_own_is_woken_by_that_clock() -> None:
-    async def main() -> None:
-        tick = Tick(INTERVAL)
-        assert tick.source == ""
-        tick.start()
+@virtual
+async def test_a_loop_with_a_clock_of_its_own_is_woken_by_that_clock() -> None:
+    assert Tick(INTERVAL).source == ""
+    with ticking() as tick:
         assert tick.source == "loop timer"
         tick.close()
-        tick.close()
         assert tick.source == ""
 
-    run(main)
 
-
-def test_one_that_is_closed_does_not_stop_the_others() -> None:
-    async def main() -> None:
-        first, second = Tick(INTERVAL), Tick(INTERVAL)
-        first.start()
-        second.start()
+@virtual
+async def test_a_tick_that_is_closed_does_not_stop_the_others() -> None:
+    with ticking() as first, ticking() as second:
         first.close()
         assert len(await deadlines(second, 3)) == 3
         first.start()
         second.close()
         assert len(await deadlines(first, 3)) == 3
-        first.close()
-
-    run(main)
 
 
 # -- in real time ------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Work that ends well, whatever happens to those who wait for it."""
+"""Work that ends well whatever happens to its callers, and which hosts are this machine."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import anyio
 import pytest
 
 from robotiq_async.runtime.concurrency import in_a_thread, wait_shielded
+from robotiq_async.runtime.sockets import is_loopback
 
 
 async def test_a_cancellation_waits_for_the_end() -> None:
@@ -57,3 +58,13 @@ async def test_nobody_waits_for_a_thread_that_is_stuck() -> None:
             await work
     stuck.set()
     assert all(thread.daemon for thread in threading.enumerate() if thread.name == "robotiq_async")
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.1.2.3", "::1", "localhost", "LOCALHOST"])
+def test_a_host_of_this_machine(host: str) -> None:
+    assert is_loopback(host)
+
+
+@pytest.mark.parametrize("host", ["127.evil.example", "localhost.example.com", "::1234", "0.0.0.0"])
+def test_a_host_that_others_may_reach(host: str) -> None:
+    assert not is_loopback(host)
