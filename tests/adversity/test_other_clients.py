@@ -10,8 +10,8 @@ import pytest
 from robotiq_async import Finger
 from robotiq_async.simulator import Trouble
 from robotiq_async.values.request import AxisRequest, Request
-from tests.adversity.world import World, world
-from tests.virtual import run
+from tests.adversity.world import World, started, world
+from tests.virtual import run, virtual
 
 B = Finger.B
 
@@ -20,9 +20,7 @@ def test_a_write_does_not_wait_for_another_client_that_writes_all_the_time(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     async def main() -> None:
-        async with world() as here:
-            await here.activate_beforehand()
-            await here.hand.start()
+        async with started() as here:
             await here.hand.move(50)
             streaming = asyncio.create_task(stream(here))
             await asyncio.sleep(0.1)
@@ -42,22 +40,20 @@ def test_a_write_does_not_wait_for_another_client_that_writes_all_the_time(
     assert len([each for each in caplog.records if "another client" in each.message]) == 1
 
 
-def test_stop_over_a_new_link_leaves_what_others_have_activated_active() -> None:
-    async def main() -> None:
-        async with world() as here:
-            await here.hand.start(activate=False)
-            here.gripper.place_object(Finger.ABC, 150)
-            async with here.server.fault_injector.making(Trouble("refuse")):
-                await asyncio.sleep(0.3)
-                here.gripper.write(0, [0x0100])
-                await asyncio.sleep(3)
-                axes = (AxisRequest(255, 128, 64),) * 4
-                here.gripper.write(0, Request(activate=True, go=True, axes=axes).registers)
-                await asyncio.sleep(3)
-            await here.hand.stop()
-            await asyncio.sleep(0.2)
-            asked = Request.from_registers(here.gripper.request_registers)
-            assert asked.activate
-            assert not asked.go
-
-    run(main)
+@virtual
+async def test_stop_over_a_new_link_leaves_what_others_have_activated_active() -> None:
+    async with world() as here:
+        await here.hand.start(activate=False)
+        here.gripper.place_object(Finger.ABC, 150)
+        async with here.server.fault_injector.making(Trouble("refuse")):
+            await asyncio.sleep(0.3)
+            here.gripper.write(0, [0x0100])
+            await asyncio.sleep(3)
+            axes = (AxisRequest(255, 128, 64),) * 4
+            here.gripper.write(0, Request(activate=True, go=True, axes=axes).registers)
+            await asyncio.sleep(3)
+        await here.hand.stop()
+        await asyncio.sleep(0.2)
+        asked = Request.from_registers(here.gripper.request_registers)
+        assert asked.activate
+        assert not asked.go

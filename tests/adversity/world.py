@@ -222,3 +222,12 @@ async def world(
                 task.cancel()
             await asyncio.gather(*watching, return_exceptions=True)
             await hand.stop()
+
+
+@asynccontextmanager
+async def started(link: str = "tcp", **options: Any) -> AsyncIterator[World]:
+    """A world whose gripper is active and open, and whose hand is started."""
+    async with world(link, **options) as here:
+        await here.activate_beforehand()
+        await here.hand.start()
+        yield here
