@@ -70,7 +70,7 @@ def pytest_asyncio_loop_factories(item: pytest.Item) -> dict[str, Callable[[], a
 
 @pytest.fixture(scope="session", autouse=True)
 def state_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Agents keep their records there, and not in the home of whoever runs the tests."""
+    """Agents keep their records there, and not in the home of the person who runs the tests."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("STATE_DIRECTORY", str(tmp_path_factory.mktemp("state")))
         yield
@@ -128,7 +128,7 @@ async def clock() -> Clock:
 
 @pytest.fixture
 async def gripper(clock: Clock) -> SimulatedGripper:
-    """A fast one that stops where it is told to."""
+    """A fast one that stops exactly where it is asked to."""
     return SimulatedGripper(clock, speedup=20, spread=False)
 
 

@@ -192,7 +192,7 @@ async def test_it_still_knows_after_the_hand_was_started_again(active: Operator)
 async def test_a_recovery_does_not_go_on_after_a_halt_or_a_reset(
     active: Operator, gripper: SimulatedGripper
 ) -> None:
-    """It waits for a minor fault to clear; what comes after that would surprise whoever has halted."""
+    """It waits for a minor fault to clear; what comes after that would surprise the person who has halted."""
     for name in ("halt", "reset"):
         gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
         await active.hand.wait_for_state(State.FAULT)

@@ -70,7 +70,7 @@ def test_where_one_hand_is_shown_its_name_is_left_out() -> None:
 def test_what_others_say_neither_begins_a_line_nor_steers_a_terminal(
     words: str, caplog: pytest.LogCaptureFixture
 ) -> None:
-    log.warning("%s says: %s", "somebody", words)
+    log.warning("%s says: %s", "a client", words)
     log.warning("refused: %s", ValueError(words))
     for record in caplog.records:
         assert record.getMessage().isprintable()

@@ -143,7 +143,7 @@ ERRORS: list[Exception] = [
     MoveTimeoutError("too slow", status_of(0x39, 0xC0)),
     MoveIgnoredError("asleep", status_of(0xF9, 0xFF)),
     ConnectFailedError("tcp://192.168.1.11:502", "refused"),
-    ControlLostError("somebody commands the gripper", "held"),
+    ControlLostError("another client commands the gripper", "held"),
     NotAllStoppedError("not stopped", {LEFT: "no answer"}, ["tls/cell-2:7447"]),
     TableError("table.csv", 3, "no number"),
     TableError("table.csv", None, "the file is empty"),

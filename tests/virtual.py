@@ -1,7 +1,7 @@
 """An event loop whose time is not real: it jumps ahead when nothing is left to do.
 
 Seconds of polling pass in milliseconds, a timeout takes no time, two runs take the same course, and
-whoever waits for something that will never come is found out at once. Connections made in such a loop
+a wait for something that will never come is an error at once. Connections made in such a loop
 are made of memory; real descriptors (the fake serial line) work too, as long as what is written to one
 can be read from the other at once.
 """
@@ -30,7 +30,7 @@ LATENCY_S = 0.0002
 
 
 class NothingWillHappenError(AssertionError):
-    """Everybody waits, and nothing is going to happen."""
+    """All tasks wait, and nothing is going to happen."""
 
 
 class HoldWatch:
@@ -111,7 +111,7 @@ class _Selector(selectors.DefaultSelector):
             call()
             return events
         if not events and timeout is None:
-            raise NothingWillHappenError("everybody waits, and nothing is going to happen")
+            raise NothingWillHappenError("all tasks wait, and nothing is going to happen")
         if not events and timeout:
             self.now += timeout
         return events
@@ -165,7 +165,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         """Connect at once."""
         listener = self._listeners.get(port)
         if listener is None:
-            raise ConnectionRefusedError(111, "nobody listens")
+            raise ConnectionRefusedError(111, "no server listens")
         here, there = MemoryTransport(self), MemoryTransport(self)
         here.peer, there.peer = there, here
         there.attach(listener.factory())

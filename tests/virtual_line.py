@@ -39,7 +39,7 @@ class VirtualLine:
         return port
 
     def carry(self, sender: str, data: bytes) -> None:
-        """Bring bytes to the other port, if somebody has opened it."""
+        """Bring bytes to the other port, if it is open."""
         other = self._ports.get(self.FAR if sender == self.NEAR else self.NEAR)
         if other is not None and self._is_plugged:
             other.arrive(data)

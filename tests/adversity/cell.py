@@ -120,7 +120,7 @@ async def _begun(world: World, call: Call) -> Call:
 
 
 async def _told(task: asyncio.Future[object], deadline: float) -> str:
-    """What the caller was told."""
+    """What the caller got."""
     try:
         async with asyncio.timeout_at(deadline):
             await task
@@ -169,7 +169,7 @@ def _check_motions(world: World, before: Before, phase: Phase, kind: str, told: 
 def _check_travel(world: World, before: dict[Finger, float], addressed: Finger) -> None:
     after = world.travels()
     moved = {axis: after[axis] - before[axis] for axis in after if axis not in addressed}
-    assert not any(moved.values()), f"axes moved that nobody addressed: {moved}"
+    assert not any(moved.values()), f"axes moved that were not addressed: {moved}"
 
 
 async def _works(world: World, *, activate: bool) -> None:

@@ -197,7 +197,7 @@ class Line:
         self.statuses += 1
         said = [payload(frame, self.serial, self.model) for frame in self.given]
         assert b"".join(each.to_bytes(2, "big") for each in status.registers) in said, (
-            f"nobody said {status!r}"
+            f"never sent: {status!r}"
         )
 
 
@@ -207,7 +207,7 @@ async def live(
     """Use a hand until so many replies have passed.
 
     Raises:
-        AssertionError: a status that nobody sent.
+        AssertionError: a status that was never sent.
         Exception: anything but a RobotiqError that came out of a call.
     """
     server.policy = line

@@ -96,7 +96,7 @@ class Soak:
         await self.restart()
 
     async def user(self, axes: Finger, ends: float) -> None:
-        """Somebody who moves these axes."""
+        """A user who moves these axes."""
         calls = (self.move, self.move, self.set_position, self.control_loop, self.cancelled_move, self.halt)
         while time.monotonic() < ends:
             mask = Finger(int(axes) & self.rng.randrange(1, 16)) or axes

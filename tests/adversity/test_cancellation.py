@@ -144,7 +144,7 @@ async def cancelled(walk: Walk, way: Way, turn: int) -> str:
         if how == "cancelled":
             assert here.hand.state in walk.ends, here.hand.state
             if walk in (WALKS["move"], WALKS["async with"]):
-                assert here.gripper.travel(A) - gone <= AXIS_STOPS_WITHIN, "nobody stopped it"
+                assert here.gripper.travel(A) - gone <= AXIS_STOPS_WITHIN, "it was not stopped"
         if how != "ended before" and here.hand.state is not State.DISCONNECTED:
             await check_nothing_is_left(here)
         return how
@@ -223,7 +223,7 @@ def is_started(hand: RobotiqHand) -> bool:
 async def check_nothing_is_left(world: World) -> None:
     """Nothing is pending, the link is in step, and the next command moves only its axis.
 
-    That nobody is left who waits is looked at below the hand: tests/control/test_moves.py and
+    That no caller is left waiting is tested below the hand: tests/control/test_moves.py and
     tests/session/test_session_waits.py.
     """
     hand = world.hand

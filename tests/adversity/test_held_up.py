@@ -108,7 +108,7 @@ async def test_a_silent_gripper_is_given_up_on_also_in_a_loop_that_is_held_up_ag
 async def test_what_happened_while_the_loop_was_held_up_is_seen_before_the_next_write(how: str) -> None:
     async with started() as here:
         await here.hand.move(50, A)
-        here.gripper.write(0, [0x0000])  # somebody resets the gripper ...
+        here.gripper.write(0, [0x0000])  # another client resets the gripper ...
         here.loop.hold_up(1.0)  # ... while other code holds the loop
         if how == "command":
             here.hand.command(A, position=100)
@@ -178,7 +178,7 @@ async def test_a_move_cancelled_while_the_loop_was_held_up_stops_where_it_is_by_
         assert abs(here.gripper.position(A) - at) < 10
 
 
-# -- a loop that nobody runs, as between the prompts of IPython's terminal ---------------------------------
+# -- a loop that is not run, as between the prompts of IPython's terminal ---------------------------------
 
 
 @pytest.mark.parametrize("kind", ["asyncio", "uvloop"])
@@ -191,7 +191,7 @@ def test_a_loop_that_was_not_running_is_late_and_goes_on(kind: str, caplog: pyte
         for _ in range(3):  # prompts that are answered at once
             runner.run(asyncio.sleep(0.01))
         assert caplog.messages == []
-        time.sleep(0.2)  # nothing is waited for: that nobody runs the loop is what is tried
+        time.sleep(0.2)  # nothing is waited for: the test is that the loop does not run
         runner.run(asyncio.sleep(0.02))
         (warning,) = caplog.messages
         assert "it was not running" in warning

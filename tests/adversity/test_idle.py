@@ -1,4 +1,4 @@
-"""A gripper that loses its activation when nobody asks anything for a while: one source says that it does."""
+"""A gripper that loses its activation without requests for a while, as one source says."""
 
 from __future__ import annotations
 

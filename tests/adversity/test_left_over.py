@@ -1,4 +1,4 @@
-"""Replies to requests of connections that are gone: what comes of them when somebody else gets them."""
+"""Replies to requests of connections that are gone: what happens when another client gets them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A link that fails at the worst moment: a cancelled move is stopped or told, and nobody waits for long."""
+"""A link that fails at the worst moment: a cancelled move is stopped or fails, and no call waits for long."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ class LiveUse(RuleBasedStateMachine):
         self.stack = AsyncExitStack()
         self.calls: set[asyncio.Task[Any]] = set()
         self.may_move = ALL
-        """Axes that somebody has given a reason to move since everything was last at rest."""
+        """Axes that a user has given a reason to move since everything was last at rest."""
         self.foreign = 0
 
     def run(self, work: Coroutine[Any, Any, Any]) -> Any:
@@ -97,7 +97,7 @@ class LiveUse(RuleBasedStateMachine):
         self.runner.close()
 
     def call(self, work: Coroutine[Any, Any, Any]) -> None:
-        """Somebody makes a call and waits for it; it is begun before this returns."""
+        """A user makes a call and waits for it; it is begun before this returns."""
 
         async def begin() -> None:
             self.calls.add(asyncio.create_task(work))
@@ -238,7 +238,7 @@ class LiveUse(RuleBasedStateMachine):
             if self.hand.statistics.reconnects > reconnects:
                 writes = len(self.gripper.writes)
                 await asyncio.sleep(1.0)
-                assert only_holds(self.gripper, writes), "something was written that nobody had asked for"
+                assert only_holds(self.gripper, writes), "something was written without a request"
 
         self.run(fail())
 

@@ -65,7 +65,7 @@ async def test_a_gateway_that_is_a_little_slow_has_confirmed_the_stop_by_then(la
 
 @pytest.mark.parametrize("late", [0.6, 0.8])
 def test_a_slower_one_has_been_told_to_stop(late: float, caplog: pytest.LogCaptureFixture) -> None:
-    """It is not waited for; the log says that nobody knows."""
+    """It is not waited for; the log says that it is unknown."""
     caplog.set_level(logging.WARNING, "robotiq_async")
 
     async def main() -> None:

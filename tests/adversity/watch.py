@@ -70,7 +70,7 @@ class WriteWatch:
         return self._number % 256, self._number // 256 % 256
 
     def forget(self) -> None:
-        """Somebody else has written, or everything is at rest: begin anew."""
+        """Another client has written, or everything is at rest: begin anew."""
         self._past = [set() for _ in self._model.axes]
         self._last: list[AxisRequest | None] = [None] * len(self._model.axes)
 
@@ -80,7 +80,7 @@ class WriteWatch:
         for registers, positions in images:
             image = Request.from_registers(registers, self._model)
             if not image.go:
-                # Nobody is asked to move; and what comes after must not be what was halted.
+                # No axis is asked to move; and what comes after must not be what was halted.
                 self._last = [None] * len(self._model.axes)
                 continue
             for at, (request, position) in enumerate(zip(image.axes, positions, strict=True)):

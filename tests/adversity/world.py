@@ -116,7 +116,7 @@ class World:
     async def until(self, condition: Callable[[], bool]) -> None:
         """Wait until something is true; half a minute at most, and in this loop that takes no time."""
         async with asyncio.timeout(30):
-            while not condition():  # noqa: ASYNC110  # what is waited for tells nobody
+            while not condition():  # noqa: ASYNC110  # there is no event to wait for
                 await asyncio.sleep(0.001)
 
     async def until_moving(self) -> None:
@@ -154,7 +154,7 @@ class World:
             index = bisect_right(given_at, status.timestamp) - 1
             while index >= 0 and self.gripper.stamps[index][1] != status.registers[7] & 0xFF:
                 index -= 1
-            assert index >= 0, f"nobody ever sent {status!r}"
+            assert index >= 0, f"never sent: {status!r}"
             newer = bisect_right(self.server.heard, given_at[index])
             asked_again = self.server.heard[newer : bisect_left(self.server.heard, status.timestamp)]
             assert not asked_again, f"{status!r} answers an older request: asked again at {asked_again}"

@@ -80,7 +80,7 @@ def role(*arguments: object) -> Iterator[Role]:
 
 
 def endpoint() -> str:
-    """Where nobody listens yet."""
+    """Where no server listens yet."""
     with socket.socket() as reserved:
         reserved.bind(("127.0.0.1", 0))
         return f"tcp/127.0.0.1:{reserved.getsockname()[1]}"

@@ -211,7 +211,7 @@ async def commands(hand: Hand, more: Callable[[], Figures] = dict) -> None:
         tell({**meter.figures(), **figures, **more()})
 
 
-# -- many grippers that nobody has -------------------------------------------------------------------------
+# -- many grippers without a client -------------------------------------------------------------------------
 
 
 async def generator(endpoint: str, count: str) -> None:

@@ -79,7 +79,7 @@ def _options(what: str, parts: Sequence[str], seconds: float) -> argparse.Namesp
 
 
 def say(what: str) -> None:
-    """Progress, for whoever waits."""
+    """Progress, for the person who waits."""
     print(what, file=sys.stderr, flush=True)  # noqa: T201
 
 

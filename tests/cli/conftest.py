@@ -174,7 +174,7 @@ class _LoneLoop(VirtualLoop):
         done = self.create_future()
         try:
             done.set_result(function(*arguments))
-        except Exception as error:  # noqa: BLE001  # whoever waits gets it
+        except Exception as error:  # noqa: BLE001  # the waiting caller gets it
             done.set_exception(error)
         return done
 

@@ -1,4 +1,4 @@
-"""A terminal for commands, and somebody who types."""
+"""A terminal for commands, and a person who types."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ ACTIVATE = (0x0100, 0, 0, 0, 0, 0, 0, 0)
 
 
 class WatchedGripper(SimulatedGripper):
-    """Tells when it is told to go, and can be made older at once."""
+    """Notes when it is asked to go, and can be made older at once."""
 
     def __init__(self) -> None:
         self.age = 0.0
@@ -128,7 +128,7 @@ def test_a_grip_is_kept_from_one_move_to_the_next(call: Call, there: SimulatorSe
 
 
 class InterruptingGripper(SimulatedGripper):
-    """Ctrl-C comes when an axis is told to go to a position."""
+    """Ctrl-C comes when an axis is asked to go to a position."""
 
     at = -1
 
@@ -158,7 +158,7 @@ def test_move_in_fault_fails(call: Call, there: SimulatorServer) -> None:
 
 @pytest.mark.parametrize("command", [["status"], ["monitor"], ["move", "3", "--yes"], ["demo", "--yes"]])
 def test_nobody_there(call: Call, command: list[str]) -> None:
-    # Bound and not listening: connections are refused, and nobody else gets the port.
+    # Bound and not listening: connections are refused, and no other program gets the port.
     with socket.socket() as reserved:
         reserved.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{reserved.getsockname()[1]}"

@@ -30,7 +30,7 @@ MOVING = {
     "measure force": (*COMMAND_LINE, "measure", "force", "--no-plot"),
 }
 NOBODY = "tcp://127.0.0.1:1"
-"""Whoever connects to it ends with 1."""
+"""A command that connects to it ends with 1."""
 ELSEWHERE = """
 import os, sys
 os.dup2(os.open({!r}, os.O_WRONLY | os.O_CREAT), {})
@@ -51,7 +51,7 @@ def written(file: Path) -> str:
     return file.read_text(encoding="utf-8")
 
 
-# -- nobody to ask -----------------------------------------------------------------------------------------
+# -- no person to ask --------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("command", [each for each in MOVING if each != "demo.py"])
@@ -81,7 +81,7 @@ def test_a_simulated_gripper_inside_the_program_needs_nobody(call: Call) -> None
     assert "[y/N]" not in outcome.out
 
 
-# -- somebody to ask ---------------------------------------------------------------------------------------
+# -- a person to ask ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

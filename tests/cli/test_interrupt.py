@@ -80,7 +80,7 @@ async def test_a_move_in_its_activation(shell: Shell) -> None:
     async with SimulatorServer(SimulatedGripper(speedup=2)) as server:
         process = await shell.start("move", "255", "--yes", server.address)
         async with asyncio.timeout(30):
-            while not server.gripper.is_moving:  # noqa: ASYNC110  # the gripper tells nobody
+            while not server.gripper.is_moving:  # noqa: ASYNC110  # there is no event to wait for
                 await asyncio.sleep(0.005)
         await interrupted(shell, process)
         assert not server.gripper.is_moving

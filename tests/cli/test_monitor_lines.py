@@ -96,7 +96,7 @@ async def test_a_hand_that_has_ended_ends_it(
 async def test_a_reader_that_stops_reading_does_not_hold_up_the_polling(
     server: SimulatorServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A full pipe: the gripper is read on, and the reader is told what it has missed."""
+    """A full pipe: the gripper is read on, and the reader learns what it has missed."""
     reading, writing = os.pipe()
     hand = RobotiqHand(server.address, poll_interval=0.002)
     await hand.start(activate=False)

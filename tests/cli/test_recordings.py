@@ -118,7 +118,7 @@ async def test_a_recorder_makes_the_same_table(call: Call, tmp_path: Path) -> No
 
 
 def test_no_gripper_no_file(call: Call, tmp_path: Path) -> None:
-    # Bound and not listening: connections are refused, and nobody else gets the port.
+    # Bound and not listening: connections are refused, and no other program gets the port.
     with socket.socket() as reserved:
         reserved.bind(("127.0.0.1", 0))
         outcome = call("record", str(tmp_path / "it.mcap"), f"127.0.0.1:{reserved.getsockname()[1]}")

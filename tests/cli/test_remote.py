@@ -62,7 +62,7 @@ class Served:
     async def moves(self) -> None:
         """Wait until finger A is on its way, and let it take long."""
         async with asyncio.timeout(20):
-            while self.gripper.position(Finger.A) < 20:  # noqa: ASYNC110  # it tells nobody
+            while self.gripper.position(Finger.A) < 20:  # noqa: ASYNC110  # there is no event to wait for
                 await asyncio.sleep(0.01)
         self.brake.slow_down()
 
@@ -116,7 +116,7 @@ def test_an_agent_says_which_gripper_is_simulated(
 def test_the_log_of_an_agent_calls_each_gripper_by_its_name(
     beside: Callable[..., Beside], endpoint: str, tmp_path: Path
 ) -> None:
-    with socket.socket() as reserved:  # and nobody listens there
+    with socket.socket() as reserved:  # and no server listens there
         reserved.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{reserved.getsockname()[1]}"
         agent = beside("agent", str(fleet_file(tmp_path, endpoint, address)))
@@ -141,7 +141,7 @@ def test_an_agent_whose_list_nobody_reads_serves_all_the_same(
 
 
 def test_a_move_asks_first(call: Call, endpoint: str) -> None:
-    # Nobody is there: whoever connects ends with 1.
+    # No agent is there: a command that connects ends with 1.
     call("move", "100", ADDRESS).assert_failed(2, "this moves the gripper at zenoh://lab/cell/left")
 
 

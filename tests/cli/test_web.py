@@ -35,7 +35,7 @@ SETTINGS = PageSettings(control=True, addresses=("one", "two"))
 
 
 def status(url: str) -> int:
-    """What the page answers to whoever has this address."""
+    """What the page answers to a browser with this address."""
     parts = urlsplit(url)
     connection = http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=20)
     try:
@@ -114,7 +114,7 @@ async def test_the_demo_waits_until_somebody_looks(shell: Shell) -> None:
 
 @pytest.fixture
 def screen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """A screen, and somebody's home folder."""
+    """A screen, and a user's home folder."""
     monkeypatch.setenv("DISPLAY", ":0")
     monkeypatch.setenv("HOME", str(tmp_path))
     return tmp_path
@@ -199,7 +199,7 @@ async def test_a_hand_that_can_be_reached_again_is_not_started_once_the_page_end
         await operators[0].hand.start()
         await operators[0].move(10, Finger.A)
         page = PageServer([each.hand for each in operators], SETTINGS, operators=operators)
-        page.updates[1].problem = "nobody was there"
+        page.updates[1].problem = "no answer"
         trying = asyncio.create_task(_try_again(page, 1, operators[1]))
         await asyncio.sleep(AGAIN_S - 0.5)
         dead.policy = lambda _: []

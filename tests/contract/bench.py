@@ -89,7 +89,7 @@ async def connected(here: Lab) -> None:
 
 
 async def until(condition: Callable[[], bool]) -> None:
-    """Look at every virtual millisecond: a gripper tells nobody what happens to it."""
+    """Look at every virtual millisecond: a gripper sends no events."""
     loop = asyncio.get_running_loop()
     while not condition():
         turn = loop.create_future()
@@ -110,7 +110,7 @@ def contract(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., No
 
 
 async def at_rest(hand: Hand) -> None:
-    """Wait until nothing moves any more."""
+    """Wait until nothing moves."""
     async for _ in hand.statuses():
         if hand.state is State.RUNNING_IDLE and not hand.is_moving:
             return

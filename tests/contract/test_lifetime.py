@@ -422,7 +422,7 @@ async def test_the_wait_of_a_start_ends_at_once(where: str, how: str) -> None:
 
 
 async def cut_off(here: Bench, where: str) -> None:
-    """Nobody answers from here on, and who was connected knows."""
+    """No answers from here on, and clients that were connected notice."""
     here.server.refuse()
     here.server.cut()
     await until(lambda: where == LOCAL or here.lab is None or here.lab.local.state is State.DISCONNECTED)

@@ -102,7 +102,7 @@ async def test_reading_from_another_thread(where: str) -> None:
 
 @pytest.fixture
 def nothing_kept() -> Iterator[None]:
-    """What was left open in a closed loop goes, with a warning of Python's, when nobody holds it."""
+    """Collect what was left open in a closed loop: Python warns of it then."""
     yield
     gc.collect()
 

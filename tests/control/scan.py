@@ -28,7 +28,7 @@ LAG = int(os.environ.get("STATUS_LAG", "0"))
 
 
 class Outcome:
-    """A caller that waits, and what it was told; told twice is a failure."""
+    """A caller that waits, and its result; a second result is a failure."""
 
     def __init__(self) -> None:
         self.told: list[object] = []

@@ -1,4 +1,4 @@
-"""Grips: what they survive, and when there is none any more."""
+"""Grips: what they survive, and when they end."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Halts: they go at once, stop everything, and are told when the gripper shows it."""
+"""Halts: they go at once, stop everything, and end when the gripper shows it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Holds that somebody asks for: what moves stays where it is, what grips keeps its grip."""
+"""Holds that a caller asks for: what moves stays where it is, what grips keeps its grip."""
 
 from __future__ import annotations
 

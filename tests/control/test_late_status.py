@@ -244,7 +244,7 @@ def test_an_axis_at_a_software_limit_ends_when_the_lag_is_over(lag: int) -> None
     assert told.result.outcomes == {S: THERE}
 
 
-# -- whoever looks -----------------------------------------------------------------------------------------
+# -- every reader -----------------------------------------------------------------------------------------
 
 
 @LAGS

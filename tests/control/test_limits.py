@@ -1,4 +1,4 @@
-"""Software limits that are echoed in place of the request, and how other clients are told from them."""
+"""Software limits that are echoed in place of the request, and how other clients differ from them."""
 
 from __future__ import annotations
 

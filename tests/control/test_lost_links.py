@@ -149,7 +149,7 @@ def test_a_hold_survives_a_lost_link() -> None:
         at = scan.positions()[A]
         scan.now += 0.05
         scan.connect(activate=False)
-        assert scan.state is State.RUNNING_IDLE, "nobody has asked for anything"
+        assert scan.state is State.RUNNING_IDLE, "nothing was asked for"
         scan.run(5)
         # Whether a lost hold arrived is known after a device cycle: a quarter of a second, six counts.
         assert scan.positions()[A] <= at + (8 if written else 4)

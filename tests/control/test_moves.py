@@ -1,4 +1,4 @@
-"""Awaited moves: when they end, what takes them over, and what becomes of one that nobody awaits."""
+"""Awaited moves: when they end, what takes them over, and what becomes of one that is not awaited."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def test_an_abandoned_move_is_held_where_it_is(scan: Scan) -> None:
     scan.run(1.0)
     scan.controller.abandon(move)
     at = scan.gripper.position(A)
-    assert not scan.controller._requests.moves, "nobody waits for it any more"
+    assert not scan.controller._requests.moves, "no caller waits for it"
     scan.run(2.0)
     assert not scan.gripper.is_moving
     assert scan.gripper.position(A) == pytest.approx(at, abs=3)

@@ -32,7 +32,7 @@ def test_a_halt_goes_before_what_was_asked_with_it() -> None:
 
 
 def test_a_halt_does_for_every_hold_and_is_told_to_who_waits_for_one() -> None:
-    """The hold alone would leave nothing to write, and nobody would be told."""
+    """The hold alone would leave nothing to write, and no call would end."""
     callers, before, after = OpenRequests(), Outcome(), Outcome()
     callers.hold(A, "", before)
     callers.halt(Outcome())

@@ -1,4 +1,4 @@
-"""What is merged between two writes, and who is told what."""
+"""What is merged between two writes, and how each call ends."""
 
 from __future__ import annotations
 
@@ -174,7 +174,7 @@ def test_everybody_who_waits_is_told_of_a_failure_with_an_error_of_their_own() -
 
 
 def test_who_waits_for_the_acknowledgement_alone_does_not_include_who_halts() -> None:
-    """A halt is told when the gripper shows that it has stopped."""
+    """A halt ends when the gripper shows that it has stopped."""
     pending, callers = PendingCommand(), [Outcome(), Outcome()]
     pending.merge(Command(A, 100), callers[0])
     pending.merge(Command(A, None, 50), callers[1])

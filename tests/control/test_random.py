@@ -94,7 +94,7 @@ class RandomUse(RuleBasedStateMachine):
             self.scan.step(answer=False)
         if self.scan.state is not State.DISCONNECTED:
             self.scan.controller.lost(None)
-        assert all(told.is_told for _, told in self.told), "somebody waits for ever"
+        assert all(told.is_told for _, told in self.told), "a caller waits for ever"
         writes = len(self.scan.gripper.writes)
         self.scan.now += away
         self.scan.connect(activate=False)
@@ -108,7 +108,7 @@ class RandomUse(RuleBasedStateMachine):
         self.scan.run(0.02)  # 0x09 is one when it lasts
         assert self.scan.state is State.FAULT
         self.scan.run(1.0)
-        assert all(told.is_told for _, told in self.told), "somebody waits for ever"
+        assert all(told.is_told for _, told in self.told), "a caller waits for ever"
         at = {axis: self.scan.gripper.position(axis) for axis in self.model.axes}
         contacts = self.scan.latest.contacts
         self.scan.gripper.clear_faults()

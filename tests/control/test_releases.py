@@ -1,4 +1,4 @@
-"""Automatic releases that somebody else ends."""
+"""Automatic releases that another client ends."""
 
 from __future__ import annotations
 

@@ -105,7 +105,7 @@ def test_the_image_is_made_from_the_status_that_a_sequence_begins_with(
 
 @pytest.mark.parametrize("shown", [READY, RUNNING, BUSY, FAULTY, RELEASED])
 def test_an_activation_begins_with_nothing_but_a_reset_gripper(shown: RobotiqStatus) -> None:
-    """Somebody else has activated it meanwhile, or it reports a fault."""
+    """Another client has activated it meanwhile, or it reports a fault."""
     writes_nothing(activation(at_rest), shown)
 
 

@@ -141,7 +141,7 @@ def test_a_gripper_may_skip_an_image() -> None:
     assert history.see_at_once(shows(0, 1.02)) == image(0)
     assert history.see_at_once(shows(20, 1.03)) == image(20)
     assert history.acts(last, 1.03)
-    assert history.acts(skipped, 1.03), "a later image acts, so it is not to be waited for any more"
+    assert history.acts(skipped, 1.03), "a later image acts, so it need not be waited for"
 
 
 # -- changes without an echo -------------------------------------------------------------------------------

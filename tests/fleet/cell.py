@@ -109,7 +109,7 @@ def cut(seconds: float, *, out: bool = True, back: bool = True, keeps: bool = Fa
 
 
 async def router_restarted(world: World) -> None:
-    """Everybody loses everybody, at once, and for two seconds."""
+    """All lose all others, at once, and for two seconds."""
     names = [bus.name for bus in world.network.buses]
     pairs = [(one, other) for one in names for other in names if one < other]
     for pair in pairs:
@@ -235,7 +235,7 @@ class Doing:
         self.call = self.world.holder.host.start(told(work))
 
     async def loop(self) -> None:
-        """A control loop: each of its commands is told from all others by position and speed."""
+        """A control loop: each of its commands has a position and a speed of its own."""
         hand, world = self.world.holder.hand, self.world
         number = 0
         while self.goes_on:
@@ -327,7 +327,7 @@ async def outcome(world: World, phase: str, trouble: Trouble) -> Outcome:
 
 
 async def said(doing: Doing) -> str:
-    """What the holder was told: how its call ended, else what its hand showed."""
+    """What the holder got: how its call ended, else what its hand showed."""
     holder, call = doing.world.holder, doing.call
     if holder.host.is_dead:
         return "killed"
@@ -385,7 +385,7 @@ def commands(doing: Doing) -> list[tuple[float, tuple[int, int]]]:
 
 def check_travel(world: World, addressed: Finger) -> None:
     moved = {axis: world.moved(axis) for axis in THREE_FINGER.axes if axis not in addressed}
-    assert not any(moved.values()), f"axes moved that nobody addressed: {moved}"
+    assert not any(moved.values()), f"axes moved that were not addressed: {moved}"
 
 
 def lease_of(world: World) -> str:
@@ -424,7 +424,7 @@ async def works(world: World) -> None:
     if holder.host.is_dead:
         commander = other
     else:
-        # Who lost the lease to somebody's halt does not come back by itself.
+        # A client that lost the lease to a halt does not come back by itself.
         await asyncio.sleep(1.5)
         assert not holder.hand.is_in_control, "the old holder came back after a halt"
     await commander.do(commander.hand.acquire())

@@ -1,6 +1,6 @@
 """Everything at once over a network of namespaces: cuts, losses, agents that are killed, halts, floods.
 
-``python -m tests.fleet.chaos [ROUNDS]`` as root on Linux with ip and nft. A gripper, its agent and whoever
+``python -m tests.fleet.chaos [ROUNDS]`` as root on Linux with ip and nft. A gripper, its agent and those who
 halts are on one side of a cable, a client that asks for bursts of moves on the other, with a program that
 asks questions without end. What it must show is in :func:`judged`.
 """
@@ -212,7 +212,7 @@ async def _run(cell: Cell, rounds: int, chance: random.Random) -> dict[str, Any]
 
 
 def judged(images: list[tuple[float, int, int]], barred: list[tuple[float, float]]) -> dict[str, Any]:
-    """What must not be: motion after a halt that nobody has taken back, or with another speed or force."""
+    """What must not be: motion after a halt that was not taken back, or with another speed or force."""
     first = next((at for at, speed, force in images if (speed, force) == (SPEED, FORCE)), 0.0)
     return {
         "images": len(images),

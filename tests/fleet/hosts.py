@@ -59,14 +59,14 @@ class Host(_Loop):
         self.thaw()
 
     def kill(self) -> None:
-        """SIGKILL: nothing of it runs any more, and its connections are closed."""
+        """SIGKILL: nothing of it runs, and its connections are closed."""
         self.freeze()
         self.is_dead = True
         for transport in self._transports:
             transport.close()
 
     async def bury(self) -> None:
-        """Let what was killed, or is left, come to its end where nobody hears it."""
+        """Let what was killed, or is left, come to its end unheard."""
         self.is_dead = True
         self.thaw()
         left = asyncio.all_tasks(self)

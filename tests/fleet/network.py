@@ -82,7 +82,7 @@ class Network:
         return [self.stream(one, other), self.stream(other, one)]
 
     def cut(self, *ways: tuple[str, str]) -> None:
-        """Let nothing arrive any more; each way is a source and a target."""
+        """Let nothing arrive from now on; each way is a source and a target."""
         for source, target in ways:
             self.stream(source, target).is_cut = True
             self.loop.call_later(LINK_LEASE_S, self._look, source, target)
@@ -195,7 +195,7 @@ class _Received:
         self._reply(_Reply(payload, attachment))
 
     def __del__(self) -> None:
-        """Who drops a query says so to whoever asked."""
+        """A dropped query is reported to the client that asked."""
         if not self._is_answered:
             self._reply(None)
 
@@ -219,7 +219,7 @@ class MemoryBus:
         self.watchers: list[tuple[str, Callable[[str, bool], None]]] = []
         self.is_closed = False
         self.endpoints: list[str] = []
-        """Names of buses that it was told to connect to."""
+        """Names of buses that it connects to."""
 
     def _others(self) -> list[MemoryBus]:
         return [

@@ -69,7 +69,7 @@ class Agent:
     publish: Callable[[str], None]
     """Takes the last part of the key."""
     heard: asyncio.Event = field(default_factory=asyncio.Event)
-    """Whether somebody has published something."""
+    """Whether something was published."""
 
 
 @dataclass

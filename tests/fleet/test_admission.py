@@ -245,7 +245,7 @@ def test_it_is_known_why_a_lease_ended_for_a_while() -> None:
     for _ in range(1000):
         lease.grant(ANNA, 0.0)
         lease.end("released")
-    assert lease.end_of(first) == "expired", "so long ago nobody remembers"
+    assert lease.end_of(first) == "expired", "so long ago that it was forgotten"
     assert len(lease._ends) <= 64
 
 

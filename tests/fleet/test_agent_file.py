@@ -80,7 +80,7 @@ def test_with_keys_it_listens_encrypted(tmp_path: Path) -> None:
 
 
 def test_behind_a_router_it_does_not_listen(tmp_path: Path) -> None:
-    """Zenoh's routers carry nothing between two who may listen: it was heard of by nobody."""
+    """Zenoh's routers carry nothing between two who may listen: no client heard of it."""
     settings = read(tmp_path, f'connect = ["tcp/127.0.0.1:7447"]\n{GOOD}')
     assert (settings.listen, settings.connect) == ((), ("tcp/127.0.0.1:7447",))
     assert agent_configuration("lab", "cell", settings.listen, settings.connect)["mode"] == "client"

@@ -55,7 +55,7 @@ async def test_who_was_cut_off_does_not_come_back_after_a_halt_or_a_take(what: s
 
 @virtual
 async def test_who_was_cut_off_does_not_come_back_after_a_halt_of_the_next_holder() -> None:
-    """Only a halt of somebody who had not held the lease barred the one before."""
+    """Only a halt of a client that had not held the lease barred the one before."""
     async with lab() as here:
         first = here.client("first")
         await first.start()
@@ -122,7 +122,7 @@ async def test_silence_is_noticed_while_the_lease_is_asked_for_again() -> None:
     """The last status of an agent that had died was shown as the present one for ever."""
     async with lab() as here, here.client() as hand:
         here.network.cut(("client", "agent"))
-        while hand.is_in_control:  # noqa: ASYNC110  # what is waited for tells nobody
+        while hand.is_in_control:  # noqa: ASYNC110  # there is no event to wait for
             await asyncio.sleep(0.01)
         here.network.cut(("agent", "client"))
         await asyncio.sleep(3)
@@ -131,7 +131,7 @@ async def test_silence_is_noticed_while_the_lease_is_asked_for_again() -> None:
 
 @virtual
 async def test_an_agent_that_is_ending_refuses_and_says_so() -> None:
-    """It acknowledged what it did not do any more."""
+    """It acknowledged what it no longer did."""
     async with lab() as here, here.client("reader", control=False) as reader:
         await here.local.set_speed(0)
         await here.local.set_position(250, Finger.A)
@@ -176,7 +176,7 @@ async def restart(here: World, how: str) -> None:
 async def test_who_was_cut_off_does_not_come_back_although_the_agent_was_started_anew(
     what: str, how: str
 ) -> None:
-    """It came back by itself, and moved 3 s after somebody had halted."""
+    """It came back by itself, and moved 3 s after another client's halt."""
     async with world() as here:
         hand, other = here.holder.hand, here.other.hand
 
@@ -305,7 +305,7 @@ async def test_a_record_of_before_a_restart_of_the_machine_says_nothing(
     unknown = FileRecords(tmp_path)
     unknown.keep(LEFT, {"number": 3})
     await unknown.kept()
-    assert FileRecords(tmp_path).read(LEFT) is None, "where nobody can tell nothing is known"
+    assert FileRecords(tmp_path).read(LEFT) is None, "what cannot be read is unknown"
 
 
 async def test_what_cannot_be_kept_takes_the_old_one_away(

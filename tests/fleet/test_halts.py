@@ -87,7 +87,7 @@ async def test_a_halt_of_all_names_what_it_did_not_reach() -> None:
 
 @virtual
 async def test_a_halt_of_all_looks_on_for_links_that_come_up_late() -> None:
-    """It knew nothing of agents whose links came up after it had looked; somebody else looks on meanwhile."""
+    """It knew nothing of agents whose links came up after it had looked; another client watches."""
     async with world() as here, Fleet(bus=here.network.bus("screen")) as screen:
         changes = screen.changes()
         call = await move_slowly(here)
@@ -207,7 +207,7 @@ async def test_a_refused_command_does_not_forget_the_hold_that_is_owed() -> None
         await gone.start()
         await other.start()
         moving = asyncio.create_task(gone.move(255, Finger.ABC, speed=0))
-        while not here.gripper.is_moving:  # noqa: ASYNC110  # what is waited for tells nobody
+        while not here.gripper.is_moving:  # noqa: ASYNC110  # there is no event to wait for
             await asyncio.sleep(0.001)
         await here.server.stop()
         here.network.cut(("gone", "agent"), ("agent", "gone"))

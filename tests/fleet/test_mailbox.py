@@ -181,7 +181,7 @@ def test_answers_go_out_in_their_order_and_then_it_ends() -> None:
 
 
 def test_whoever_does_not_read_holds_up_nobody_and_too_much_is_dropped_in_the_thread() -> None:
-    """Dropping a question says so to whoever asked, and takes as long as an answer: it held up the loop."""
+    """A dropped question is reported to its client, as slow as an answer: it held up the loop."""
     reply_sender, read = ReplySender(), threading.Event()
     sent, dropped_in = list[int](), set[threading.Thread]()
     reply_sender.put(lambda: (read.wait(PATIENCE_S), None)[1], lambda: None)

@@ -302,7 +302,7 @@ async def test_a_fleet_is_halted_in_the_role_for_it(keys: Path) -> None:
 
 
 async def test_idle_connections_keep_nobody_out() -> None:
-    """300 of them, by somebody who only opens them, kept new clients out for 12 s."""
+    """300 of them, by a client that only opens them, kept new clients out for 12 s."""
     port = free_port()
     endpoint = f"tcp/127.0.0.1:{port}"
     async with contextlib.AsyncExitStack() as stack:
@@ -357,7 +357,7 @@ async def test_endpoints_that_are_not_reached() -> None:
     client = await open_bus(client_configuration(endpoints), "b")
     try:
         async with asyncio.timeout(20):
-            while len(await client.unreached()) > 1:  # noqa: ASYNC110  # it tells nobody
+            while len(await client.unreached()) > 1:  # noqa: ASYNC110  # there is no event to wait for
                 await asyncio.sleep(0.05)
         assert await client.unreached() == endpoints[2:]
         await agents[1].close()

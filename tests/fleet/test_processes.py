@@ -92,7 +92,7 @@ class Site:
         loop = asyncio.get_running_loop()
         began = loop.time()
         async with asyncio.timeout(LIMIT_S):
-            while not condition():  # noqa: ASYNC110  # the gripper is a model and tells nobody
+            while not condition():  # noqa: ASYNC110  # there is no event to wait for
                 await asyncio.sleep(0.01)
         return loop.time() - began
 

@@ -245,7 +245,7 @@ async def test_a_move_that_is_cancelled_on_its_way_moves_until_the_agent_has_cal
 
 
 class Losing(Between):
-    """A bus that drops requests, or their answers, and tells nobody.
+    """A bus that drops requests, or their answers, without a word.
 
     Attributes:
         said: the commands that were sent or lost, in order.

@@ -362,7 +362,7 @@ async def test_a_halt_beside_the_gentle_end_of_an_agent_counts(after: float) -> 
         try:
             await reader.halt()
         except (ConnectionLostError, RobotiqError):
-            assert here.serving.done(), "there was somebody to ask"
+            assert here.serving.done(), "there was a client to ask"
         else:
             assert is_stopped(here)
         with suppress(asyncio.CancelledError):

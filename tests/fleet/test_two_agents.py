@@ -54,7 +54,7 @@ async def another(here: Lab) -> AsyncIterator[Other]:
         other = Other(gripper, server, hand, serving)
         try:
             await ready.wait()
-            while hand.state is not State.RUNNING_IDLE:  # noqa: ASYNC110  # what is waited for tells nobody
+            while hand.state is not State.RUNNING_IDLE:  # noqa: ASYNC110  # there is no event to wait for
                 await asyncio.sleep(0.01)
             await asyncio.sleep(0.01)  # until clients have heard of it
             yield other
@@ -111,7 +111,7 @@ async def test_a_halt_stops_both_and_says_so_only_then() -> None:
         for hand in (here.local, other.local):
             await hand.set_speed(0)
             await hand.set_position(255, Finger.A)
-        while not (here.gripper.is_moving and other.gripper.is_moving):  # noqa: ASYNC110  # it tells nobody
+        while not (here.gripper.is_moving and other.gripper.is_moving):  # noqa: ASYNC110  # there is no event to wait for
             await asyncio.sleep(0.001)
         here.network.stream("other agent", "reader").delay = 0.3  # the answer that is longed for comes first
         await reader.halt()

@@ -37,7 +37,7 @@ def test_the_table_is_complete() -> None:
 @pytest.mark.parametrize("trouble", TROUBLES)
 @virtual
 async def test_a_halt_in_the_midst(trouble: str) -> None:
-    """Whoever asks is told the truth, and the old holder does not come back."""
+    """A client that asks hears the truth, and the old holder does not come back."""
     async with world() as here:
         doing = Doing(here)
         await moving(doing)

@@ -33,7 +33,7 @@ NAMES = ("left", "right")
 
 
 class World:
-    """All there is in one test: the holder's troubles are its own, and those of the agent are everybody's.
+    """All there is in one test: the holder's troubles are its own, and those of the agent concern all.
 
     Attributes:
         holder: commands left.
@@ -71,7 +71,7 @@ class World:
 
     async def until(self, condition: Callable[[], bool], limit: float = 30.0) -> None:
         async with asyncio.timeout(limit):
-            while not condition():  # noqa: ASYNC110  # what is waited for tells nobody
+            while not condition():  # noqa: ASYNC110  # there is no event to wait for
                 await asyncio.sleep(LOOK_S)
 
     async def start_agent(self, name: str, **options: Any) -> ServingAgent:

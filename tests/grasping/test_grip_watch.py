@@ -270,7 +270,7 @@ class Cell:
             pass
 
     def ask(self, position: int, force: int = 64, seconds: float = 5.0) -> list[GripEvent]:
-        """What is told after a request."""
+        """The events after a request."""
         self._write(position, force)
         return [event for status in self.statuses(seconds) for event in self.watch.see(status)]
 

@@ -1,4 +1,4 @@
-"""Who forgets the async of ``async with`` and ``async for`` is told so."""
+"""Forgetting the async of ``async with`` and ``async for`` is an error that says so."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The loop is never held up, and a hand survives one that somebody else holds up; time limits: adversity."""
+"""The loop is never held up, and a hand survives one that other code holds up; time limits: adversity."""
 
 from __future__ import annotations
 

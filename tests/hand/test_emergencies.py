@@ -246,7 +246,7 @@ async def test_a_stop_over_a_new_link_does_not_activate_a_gripper_that_lost_its_
 
 
 async def test_a_loop_that_is_held_up_is_not_held_up_more_by_reading_again() -> None:
-    """With nothing to write an old status harms nobody; 96 hands in a loop lost 6 % of their polls."""
+    """With nothing to write an old status does no harm; 96 hands in a loop lost 6 % of their polls."""
     wire = Wire()
     async with RobotiqHand(wire, poll_interval=0.1) as hand:
         stream = hand.statuses(buffer=10)
@@ -264,7 +264,7 @@ async def test_a_stop_does_not_wait_for_the_next_poll(
     async with RobotiqHand(server.address, poll_interval=0.1) as hand:
         await hand.set_speed(0)
         await hand.set_position(255)
-        while not gripper.is_moving:  # noqa: ASYNC110  # the gripper tells nobody
+        while not gripper.is_moving:  # noqa: ASYNC110  # there is no event to wait for
             await asyncio.sleep(0.001)
         await anext(hand.statuses())
         async with asyncio.TaskGroup() as group:

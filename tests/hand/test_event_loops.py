@@ -188,7 +188,7 @@ class TestClosedLoop:
 
     @pytest.fixture(autouse=True)
     def nothing_kept(self) -> Iterator[None]:
-        """What was left open in that loop is closed, with a warning of Python's, when nobody holds it."""
+        """Collect what was left open in that loop: Python warns of it then."""
         yield
         gc.collect()
 

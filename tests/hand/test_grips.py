@@ -50,7 +50,7 @@ class Bench:
 
     async def moving(self, hand: RobotiqHand, fingers: Finger = A) -> asyncio.Task[object]:
         task: asyncio.Task[object] = asyncio.create_task(hand.close(fingers, speed=0))
-        while not self.gripper.is_moving:  # noqa: ASYNC110  # the gripper tells nobody
+        while not self.gripper.is_moving:  # noqa: ASYNC110  # there is no event to wait for
             await asyncio.sleep(0.001)
         return task
 
@@ -104,7 +104,7 @@ async def cancelled(here: Bench) -> str:
 
 
 async def killed(here: Bench) -> str:
-    """Seen from the gripper: the connection ends, and nobody comes back."""
+    """Seen from the gripper: the connection ends, and no client comes back."""
     async with here.holding():
         here.server.refuse()
         here.server.cut()

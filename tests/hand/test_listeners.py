@@ -165,7 +165,7 @@ async def test_a_listener_that_raises_does_not_end_the_hand(
 
 
 async def coroutine(item: object) -> None:
-    raise AssertionError("nobody would await it")
+    raise AssertionError("it would never be awaited")
 
 
 @pytest.mark.parametrize("callback", [None, 3, coroutine], ids=["None", "3", "coroutine"])

@@ -242,7 +242,7 @@ async def test_a_reset_gripper_refuses_by_name(server: SimulatorServer) -> None:
 
 
 async def eventful(hand: RobotiqHand, server: SimulatorServer, clock: Clock) -> None:
-    """Whatever is logged: states, a lost link, another client, a listener, an end that nobody hears."""
+    """All that is logged: states, a lost link, another client, a listener, an undelivered end."""
     hand.add_listener(lambda item: (_ for _ in ()).throw(ValueError(repr(item))))
     await started(hand, clock)
     image = Request(activate=True, go=True, axes=(AxisRequest(10, 255, 100),) * 4)

@@ -107,7 +107,7 @@ async def test_missed_ticks_are_skipped_and_not_caught_up() -> None:
 
 
 class Rogue(Wire):
-    """Does something that a transport must not do, in the call that it is told."""
+    """Does something that a transport must not do, in the given call."""
 
     def __init__(self, call: str, what: str) -> None:
         super().__init__()

@@ -63,7 +63,7 @@ async def test_the_hand_with_a_server_that_is_not_pymodbus() -> None:
 
 @pytest.mark.parametrize("framer", [FramerType.SOCKET, FramerType.RTU])
 async def test_the_hand_with_the_server_of_pymodbus(framer: FramerType) -> None:
-    """The simulator's server is ours, as the link is: here somebody else reads what the link writes."""
+    """The simulator's server is ours, as the link is: another implementation reads what the link writes."""
     gripper = SimulatedGripper(speedup=20)
     gripper.place_object(A, 150)
     serial = framer is FramerType.RTU

@@ -54,7 +54,7 @@ class Scripted:
         self.connections = 0
         self.writers: list[asyncio.StreamWriter] = []
         self.left_over = b""
-        """What whoever connects is sent, before anything was asked."""
+        """What a client is sent before it has asked for anything."""
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self.connections += 1

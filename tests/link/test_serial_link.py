@@ -371,7 +371,7 @@ async def test_a_port_that_is_forbidden_and_anything_else(
     def refuse(*_: object, **__: object) -> None:
         raise error
 
-    # pyserial is below what is tested; whoever runs this may open everything, perhaps.
+    # pyserial is below what is tested; the user who runs this may open everything, perhaps.
     monkeypatch.setattr(serial, "serial_for_url", refuse)
     with pytest.raises(ConnectFailedError, match=why if why != FORBIDDEN else "not allowed to open it"):
         await unopened("/dev/ttyUSB7").open()

@@ -1,4 +1,4 @@
-"""Calls of somebody else's code: made in order, in one task, and waited for so long and no longer."""
+"""Calls of foreign code: made in order, in one task, with a time limit."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ async def test_what_a_call_raises_is_raised(worker: Worker) -> None:
 @in_virtual_time
 async def test_a_late_call_is_cancelled_and_the_next_goes_on_in_its_task(worker: Worker) -> None:
     async def in_time() -> int:
-        async with asyncio.timeout(0.5):  # relies on nobody having cancelled the task before
+        async with asyncio.timeout(0.5):  # relies on the task not having been cancelled before
             await asyncio.sleep(0.1)
         task = asyncio.current_task()
         assert task is not None

@@ -1,6 +1,6 @@
 """``make canary``: does the library live with the newest of everything it depends on?
 
-The constraints are left out, so the environment has what somebody gets who installs today, the tools of the
+The constraints are left out, so the environment has what a user gets who installs today, the tools of the
 tests included. It is thrown away; what is newer than in constraints.txt is named, whatever the tests say.
 
     make canary TESTS="tests/cli tests/telemetry"

@@ -1,4 +1,4 @@
-"""``make dist``: the sdist and the wheel, each tried by somebody who has nothing else.
+"""``make dist``: the sdist and the wheel, each tried in an environment with nothing else.
 
     dist/robotiq_async-VERSION.tar.gz
     dist/robotiq_async-VERSION-py3-none-any.whl

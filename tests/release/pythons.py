@@ -52,7 +52,7 @@ def interpreter(version: str) -> str | None:
 
 def _asked(command: str, version: str) -> str:
     """Where a command's interpreter is; empty if it does not run."""
-    # pyenv's commands do nothing unless they are told which version is meant.
+    # pyenv's commands do nothing unless they know which version is meant.
     variables = {**os.environ, "PYENV_VERSION": version}
     asked = [command, "-c", "import sys; print(sys.executable)"]
     done = subprocess.run(asked, env=variables, capture_output=True, text=True, check=False)

@@ -131,7 +131,7 @@ async def test_any_hand_will_do() -> None:
     await connection.close("the end")
 
 
-# -- stops ---------------------------------------------------------------------------------------------------
+# -- stops -------------------------------------------------------------------------------------------------
 
 
 async def test_forbidding_aborts_the_goal_and_halts(
@@ -250,7 +250,7 @@ async def test_a_connection_that_is_ending_takes_no_command_while_the_rest_ends(
     assert await settled(gripper) < FAR
 
 
-# -- what a lost link keeps back -----------------------------------------------------------------------------
+# -- what a lost link keeps back ---------------------------------------------------------------------------
 
 
 async def test_the_fingers_of_a_goal_that_a_lost_link_ended_are_held_when_it_is_back(
@@ -311,7 +311,7 @@ async def test_the_end_of_the_node_owes_nothing(connection: Connection, server: 
     await connection.close("the end")  # no task is left: the fixtures look
 
 
-# -- what is told -------------------------------------------------------------------------------------------
+# -- what is reported --------------------------------------------------------------------------------------
 
 
 async def test_diagnoses_of_a_gripper_that_is_well(connection: Connection) -> None:

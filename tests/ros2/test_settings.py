@@ -1,4 +1,4 @@
-"""The parameters: what will do, and what is told of what will not. No ROS is needed here."""
+"""The parameters: what is accepted, and the errors for what is not. No ROS is needed here."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ LOST = ConnectionLostError("unplugged")
 
 
 class Published(Channel[T]):
-    """What is told, and what goes wrong where it is told goes wrong in the poller."""
+    """What is published; an error of a receiver is an error of the poller."""
 
     def __init__(self, push: Callable[[T], None]) -> None:
         super().__init__(Listeners())
@@ -61,7 +61,7 @@ class Polled:
         self.task: asyncio.Task[None]
 
     def publish(self, status: RobotiqStatus) -> None:
-        assert self.controller.status is status, "the controller is told first"
+        assert self.controller.status is status, "the controller comes first"
         self.statuses.append(status)
         call, self.at_next_status = self.at_next_status, None
         if call is not None:
@@ -74,7 +74,7 @@ class Polled:
         """Wait until so many more statuses have come."""
         until = len(self.statuses) + count
         async with asyncio.timeout(30):
-            while len(self.statuses) < until:  # noqa: ASYNC110  # the poller tells nobody
+            while len(self.statuses) < until:  # noqa: ASYNC110  # there is no event to wait for
                 await asyncio.sleep(0.0001)
 
     async def end(self, within: float = STOP_S + 0.1) -> None:

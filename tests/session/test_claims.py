@@ -82,16 +82,16 @@ async def test_an_owner_of_another_loop_is_not_asked_whether_it_is_over(claims: 
 
 async def test_of_many_threads_one_gets_it(claims: Claims[str]) -> None:
     def slowly() -> Gripper:
-        time.sleep(0.001)  # somebody else's turn, in the middle of a claim
+        time.sleep(0.001)  # another thread's turn, in the middle of a claim
         return Gripper("another")
 
-    claims.claim(slowly, "somebody", never)
+    claims.claim(slowly, "another", never)
     together = threading.Barrier(4)
 
     async def claim(who: str) -> bool:
         together.wait()
         got_it = claims.claim(lambda: Gripper("x"), who, never) is None
-        together.wait()  # whose loop is closed owns nothing any more
+        together.wait()  # an owner whose loop is closed owns nothing
         return got_it
 
     def in_its_loop(number: int) -> bool:

@@ -1,4 +1,4 @@
-"""One run of a hand: who owns the address, who is told of its end, and what can be waited for."""
+"""One run of a hand: who owns the address, who learns of its end, and what can be waited for."""
 
 from __future__ import annotations
 
@@ -162,7 +162,7 @@ async def test_who_waits_when_the_task_fails_is_told_too(caplog: pytest.LogCaptu
 class TestClosedLoop:
     @pytest.mark.parametrize("state", [State.RUNNING_IDLE, State.DO_SHUTDOWN, State.SHUTDOWN])
     def test_it_counts_as_over_once_it_is_abandoned(self, state: State) -> None:
-        """In SHUTDOWN the task had ended, and nobody had come round to seeing it: the next start failed."""
+        """In SHUTDOWN the task had ended, but its end was not seen yet: the next start failed."""
         here, session = in_a_loop_that_is_closed(state)
         assert session.lost_its_loop
         with pytest.raises(NotStartedError, match="was closed"):

@@ -1,4 +1,4 @@
-"""What a caller waits for beside the task that polls, and how it is told that it will not come."""
+"""What a caller waits for beside the task that polls, and how it learns that it will not come."""
 
 from __future__ import annotations
 
@@ -206,7 +206,7 @@ async def test_who_waits_for_the_next_status_is_told_of_the_end() -> None:
             await waiting
 
 
-# -- what is told of it ------------------------------------------------------------------------------------
+# -- what is reported of it --------------------------------------------------------------------------------
 
 
 @virtual

@@ -28,7 +28,7 @@ async def test_what_is_waited_for_comes_before_what_fails(waiters: StateWaiters)
 
 
 async def test_a_shutdown_alone_does_not_tell_why_and_ends_no_wait(waiters: StateWaiters) -> None:
-    """Whether the hand was stopped or gave up is told by fail(), right after."""
+    """fail() says right after whether the hand was stopped or gave up."""
     with waiters.watching({State.RESET}, {}) as reached:
         waiters.reached(State.SHUTDOWN)
         assert not reached.done()

@@ -379,7 +379,7 @@ async def test_a_reader_whose_loop_was_closed_holds_up_nobody(channel: Channel[i
     assert await anext(stream) == 1
     assert not channel._waited_for
     assert not left.done()
-    left._log_destroy_pending = False  # type: ignore[attr-defined]  # nobody will run it any more
+    left._log_destroy_pending = False  # type: ignore[attr-defined]  # it will never run again
 
 
 @pytest.mark.parametrize("debug", [False, True])

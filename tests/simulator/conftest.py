@@ -1,4 +1,4 @@
-"""A bench for the simulated gripper, without a spread: a clock turned by hand, and requests in words."""
+"""A bench for the simulated gripper, without a spread: a clock turned by hand, and requests by name."""
 
 from __future__ import annotations
 

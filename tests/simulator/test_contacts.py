@@ -94,7 +94,7 @@ def test_a_contact_latches_against_requests_on_the_same_side(holding: Bench, tar
 
 
 def test_a_contact_latches_when_its_object_gives_way_or_is_gone(holding: Bench) -> None:
-    """A finger that locks itself does not follow; gDT says so until somebody asks for more."""
+    """A finger that locks itself does not follow; gDT says so until more is asked for."""
     holding.gripper.place_object(Finger.A, 170)
     holding.wait(5)
     assert where(holding, Finger.A) == (150, CLOSING)

@@ -39,7 +39,7 @@ ONLY_ON = dict.fromkeys(
 
 @asynccontextmanager
 async def simulator(**options: Any) -> AsyncIterator[SimulatorServer]:
-    """A simulator whose gripper goes by the clock of the loop, and stops where it is told to."""
+    """A simulator whose gripper goes by the clock of the loop, and stops exactly where it is asked to."""
     gripper = SimulatedGripper(asyncio.get_running_loop().time, spread=False, **options)
     async with SimulatorServer(gripper) as server:
         yield server

@@ -50,7 +50,7 @@ async def narrow(server: SimulatorServer) -> AsyncIterator[RawClient]:
 
 
 async def until_held(server: SimulatorServer) -> None:
-    """Wait until a client is not read from any more."""
+    """Wait until a client is no longer read from."""
     async with asyncio.timeout(20):
         while all(each.transport.is_reading() for each in server.connections):  # noqa: ASYNC110
             await asyncio.sleep(0.001)
@@ -95,7 +95,7 @@ async def test_replies_that_are_sent_later_are_not_kept_without_limit() -> None:
             assert (await client.reply())[2] == struct.pack(">BHH", 6, 1, value)
 
 
-# On a serial line nobody can be made to wait.
+# On a serial line no client can be made to wait.
 
 
 @pytest.fixture

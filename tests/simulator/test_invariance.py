@@ -65,7 +65,7 @@ _OTHERWISE = Habits(
     keeps_status_on_halt=False,
     opens_without_rics=False,
 )
-"""All but a fault after silence, which goes by when somebody looks."""
+"""All but a fault after silence, which depends on when it is read."""
 
 
 def _run(

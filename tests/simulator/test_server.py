@@ -91,7 +91,7 @@ async def until_settled(client: RawClient) -> RobotiqStatus:
 
 async def until_written(server: SimulatorServer) -> None:
     """Wait for the first write to reach the gripper, whose reply is then on its way."""
-    while not server.gripper.writes:  # noqa: ASYNC110 - the gripper tells nobody
+    while not server.gripper.writes:  # noqa: ASYNC110 - there is no event to wait for
         await asyncio.sleep(0)
 
 
@@ -347,7 +347,7 @@ async def test_stop_during_a_power_cycle(server: SimulatorServer) -> None:
 
 
 async def test_a_power_cycle_that_is_cancelled_ends(server: SimulatorServer) -> None:
-    """It left a gripper without power that nobody could connect to."""
+    """It left a gripper without power that no client could connect to."""
     cycle = asyncio.create_task(server.power_cycle(off_time=3600.0))
     await asyncio.sleep(0)
     assert not server.gripper.is_powered
@@ -359,7 +359,7 @@ async def test_a_power_cycle_that_is_cancelled_ends(server: SimulatorServer) -> 
 
 
 async def test_after_a_power_cycle_a_trouble_that_lasts_goes_on(server: SimulatorServer) -> None:
-    """Whoever refused connections, it accepted them."""
+    """It accepted connections, whichever trouble refused them."""
     async with server.fault_injector.making(Trouble("refuse")):
         await server.power_cycle()
         assert server.gripper.is_powered

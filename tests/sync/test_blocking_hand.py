@@ -241,6 +241,6 @@ def test_a_listener_may_command_but_not_wait(hand: RobotiqHand, wire: Wire) -> N
 
 
 def test_the_async_hand_tells_a_stranger_of_it() -> None:
-    """Whoever takes the async one for this one is told of a loop; the page on notebooks says what to do."""
+    """A program that uses the async one in its place gets an error about a loop."""
     with pytest.raises(RuntimeError, match="needs a running asyncio event loop"):
         robotiq_async.RobotiqHand().start().send(None)

@@ -79,7 +79,7 @@ def test_hands_that_were_not_stopped_are_stopped_together(caplog: pytest.LogCapt
 
 
 def test_a_hand_that_the_program_has_dropped_is_stopped_too(wire: Wire) -> None:
-    """It runs on, and nobody could stop it any more."""
+    """It ran on, and could not be stopped."""
 
     def begin() -> None:
         hand = RobotiqHand(wire)

@@ -1,4 +1,4 @@
-"""Reading recordings that somebody else has made, or broken, on purpose or not."""
+"""Reading recordings that others have made, or broken, on purpose or not."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ async def viewed(hand: RobotiqHand) -> AsyncIterator[Client]:
         yield one
 
 
-# -- what is told ------------------------------------------------------------------------------------------
+# -- what is reported --------------------------------------------------------------------------------------
 
 
 @pytest.mark.skipif(not LINUX, reason="asks Linux who listens where")
@@ -88,7 +88,7 @@ async def test_the_messages_have_what_their_schema_says(hand: RobotiqHand) -> No
 
 
 async def test_whoever_comes_late_is_told_the_state(hand: RobotiqHand, server: SimulatorServer) -> None:
-    """A gripper that is lost tells nothing more; its state is told once a second all the same."""
+    """A gripper that is lost tells nothing more; its state is published once a second all the same."""
     server.refuse()
     server.cut()
     await hand.wait_for_state(State.DISCONNECTED)
@@ -106,7 +106,7 @@ async def test_whoever_comes_late_is_told_the_state(hand: RobotiqHand, server: S
 
 
 async def test_the_hand_can_be_drawn(hand: RobotiqHand) -> None:
-    """The description when somebody begins to listen, and a transform for every joint of it."""
+    """The description when a viewer begins to listen, and a transform for every joint of it."""
     store = get_typestore(Stores.ROS2_HUMBLE)
     async with viewed(hand) as one:
         await one.subscribe("/robot_description", "/tf")

@@ -89,7 +89,7 @@ async def test_a_fault(fault: int) -> None:
 
 
 async def test_a_program_that_was_killed_in_a_full_stroke() -> None:
-    """What it left set is told, and cleared only if the person agrees; the next run begins with no motion."""
+    """What it left set is reported, and cleared only on consent; the next run begins with no motion."""
     async with served(active=True) as server:
         server.gripper.write(0, CLOSING.registers)
         await asyncio.sleep(15)

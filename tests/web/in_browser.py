@@ -157,7 +157,7 @@ async def press(browser: Browser, hand: RobotiqHand, name: str) -> None:
 
 
 async def seen(hand: RobotiqHand, *, moving: bool, go: bool = True, within: float = 20) -> RobotiqStatus:
-    """Wait until the fingers move or stand still, and are asked to go anywhere or not any more."""
+    """Wait until the fingers move or stand still, and are asked to go or not."""
     async with asyncio.timeout(within):
         async for status in hand.statuses():
             if status.is_moving is moving and (go or not status.go_echo):

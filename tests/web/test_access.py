@@ -170,7 +170,7 @@ GUARD = Guard(None, RULES)  # type: ignore[arg-type]
 
 
 async def entered(client: str, password: str, *, ends: bool = True) -> dict[str, Any]:
-    """What is answered to somebody who enters a password."""
+    """What is answered to a password."""
     answers: list[dict[str, Any]] = []
     parts = [{"type": "http.request", "body": f"password={password}".encode(), "more_body": not ends}]
 

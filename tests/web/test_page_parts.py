@@ -211,7 +211,7 @@ async def test_the_mirror_shows_what_the_hand_is(hand: RobotiqHand, gripper: Sim
     assert shown.statistics["polls"] == pytest.approx(hand.statistics.polls, abs=20)
     assert state_words(shown, is_quiet=True)[0].endswith("silent")
     mirrored(updates, mirror)
-    assert len(shown.events) == len(lines), "events are told once"
+    assert len(shown.events) == len(lines), "each event is shown once"
 
 
 async def test_a_peak_of_the_current_is_not_lost_between_two_looks(hand: RobotiqHand) -> None:

@@ -87,7 +87,7 @@ def test_cancel_stops_the_fingers(cell: Cell) -> None:
 
 
 def test_a_cancel_that_comes_while_a_goal_is_being_accepted(cell: Cell) -> None:
-    """Goals and cancels as fast as they can be sent: whoever was told "canceling" has not arrived."""
+    """Goals and cancels as fast as they can be sent: a goal that is being cancelled has not arrived."""
     waited(cell.client.cancel_all())  # the service is known from here on
     for _ in range(5):
         accepting, feedback = cell.client.begin_goal(["fingers"], [2.8])

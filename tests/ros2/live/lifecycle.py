@@ -51,7 +51,7 @@ def test_a_life(simulator: Simulator) -> None:
         assert client.change("deactivate")
         assert client.change("cleanup")
         assert client.state() == "unconfigured"
-        told = json.loads(client.status().wait(new=False).data)  # what is kept for whoever comes now
+        told = json.loads(client.status().wait(new=False).data)  # what is kept for new subscribers
         assert told == {"state": "SHUTDOWN", "connected": False, "takes_commands": False}
         assert client.change("configure")
         process.prints("connected to", times=2)

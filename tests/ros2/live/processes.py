@@ -48,7 +48,7 @@ class Process:
         return self
 
     def __exit__(self, kind: object = None, *_: object) -> None:
-        if kind is not None:  # whoever looks for the reason wants it
+        if kind is not None:  # needed to find the reason
             print(self.text)  # noqa: T201
         if self._child.poll() is None:
             self._child.kill()
