@@ -74,9 +74,10 @@ class RobotiqHand(Hand):
         name: what to call this hand, in 1..64 printable characters: errors and the log begin with it, and
             metrics and recordings carry it. None calls it by its address.
         device_id: Modbus unit id, 0..255 over TCP and 1..247 over RTU; by default 2 over TCP and 9 over
-            RTU. Two hands on one TCP address need one each: that of their gripper behind the gateway.
+            RTU, of a jaw 9 on either. Two hands on one TCP address need one each: that of their gripper
+            behind the gateway.
         read_function: Modbus function that reads the status, 3 or 4; by default 4 over TCP and 3 over
-            RTU.
+            RTU, of a jaw 3 on either.
         poll_interval: seconds between polls, 0.001..0.1; over RTU 0.015 unless given.
         write_spacing: seconds from the acknowledgement of a write to the next one, 0..0.1; requests made
             meanwhile are merged. The manual of 2014 says that a gripper may lose writes less than 10 ms
@@ -90,8 +91,8 @@ class RobotiqHand(Hand):
         reconnect: whether a lost link is opened again, or a :class:`ReconnectPolicy`.
         speed: what the axes get until set otherwise, 0..255.
         force: what the axes get until set otherwise, 0..255.
-        request_address: first request register; by default 0 over TCP and 0x03E8 over RTU.
-        status_address: first status register; by default 0 over TCP and 0x07D0 over RTU.
+        request_address: first request register; by default 0 over TCP and 0x03E8 over RTU and of a jaw.
+        status_address: first status register; by default 0 over TCP and 0x07D0 over RTU and of a jaw.
         calibration: how fast this gripper is: default timeouts of moves come from it, and the speeds of
             :attr:`units`. None for the thesis's gripper.
         force_calibration: what :attr:`units` labels force values with. None for the manual's figures.

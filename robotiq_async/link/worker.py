@@ -29,7 +29,7 @@ class Worker:
         self._calls: _Calls
 
     async def call(self, what: Callable[[], Awaitable[T]], seconds: float) -> T:
-        """Make a call and wait for its result.
+        """Make a call and wait for its result; ``what`` may raise before it returns an awaitable.
 
         Raises:
             LateError: the time limit expired.

@@ -61,6 +61,8 @@ HELD_UP: Final = (
 class Poller:
     """Runs the link of one hand from start to stop; :meth:`run` is the body of its task.
 
+    No other task may use the transport.
+
     Attributes:
         connected: done after the first status; holds the error if there is none.
         failure: why the link was given up, if it was.

@@ -39,13 +39,23 @@ class Stroke:
         return self.closed_reading - self.open_reading
 
     def opening_mm(self, position: int) -> float:
-        """The opening at a position: all of it up to the open reading, 0 from the closed reading on."""
+        """The opening at a position: all of it up to the open reading, 0 from the closed reading on.
+
+        Raises:
+            TypeError: position is not an int.
+            ValueError: position is outside 0..255.
+        """
         # Requests beyond the end stops are legal; the finger ends at the stop.
         reached = min(max(check_byte("position", position), self.open_reading), self.closed_reading)
         return self.mm * (self.closed_reading - reached) / self.counts
 
     def position_of(self, millimetres: float) -> int:
-        """The position, in counts, closest to an opening."""
+        """The position, in counts, closest to an opening.
+
+        Raises:
+            TypeError: not a number.
+            ValueError: outside 0 (closed) .. ``mm`` (open).
+        """
         opening = check_number("millimetres", millimetres, 0.0, self.mm)
         return round(self.closed_reading - opening / self.mm * self.counts)
 

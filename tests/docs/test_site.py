@@ -127,7 +127,7 @@ def test_what_is_described_exists_once() -> None:
         ("See :class:`~robotiq_async.RobotiqHand`.", "See `RobotiqHand`."),
         ("as :attr:`Hand.statistics` does", "as `Hand.statistics` does"),
         ("(:mod:`.feed`)", "(`feed`)"),
-        ("in :mod:`robotiq_async.values.calibration.closing_time`", "in `closing_time`"),
+        ("in :mod:`robotiq_async.values.calibration.scales`", "in `scales`"),
         ("Like this::\n\n    code", "Like this:\n\n    code"),
         ("``a::b`` and [::1]", "``a::b`` and [::1]"),
     ],

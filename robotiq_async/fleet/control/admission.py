@@ -34,7 +34,12 @@ class Admission:
             raise AgentError("the agent was restarted since this request was made; nothing was done")
 
     def admit(self, call: Call, now: float) -> None:
-        """Accept a command and count it. The caller has ended an expired lease first."""
+        """Accept a command and count it. The caller has ended an expired lease first.
+
+        Raises:
+            ControlLostError: not from the holder; or late; or the preceding command is missing.
+            AgentError: a later command came first.
+        """
         self._check_holder(call, now)
         if call.number <= self._newest:
             raise AgentError("a later request overtook this one; nothing was done")

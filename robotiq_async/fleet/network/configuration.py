@@ -32,6 +32,8 @@ def agent_configuration(
 ) -> dict[str, object]:
     """Configuration of an agent's session. With keys, clients may do only what its access list permits.
 
+    Without an endpoint to listen on, the agent is reached through the routers in ``connect`` alone.
+
     Raises:
         TypeError, ValueError: a malformed or unprotected endpoint; a folder that lacks a file.
     """

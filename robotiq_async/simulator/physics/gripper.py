@@ -38,8 +38,8 @@ class SimulatedGripper(Surroundings):
     depend on how often anybody looks. Use one from one thread only.
 
     A write takes effect one device cycle later, as on the device. Speeds are the measured ones of
-    :mod:`robotiq_async.values.calibration.closing_time`; the scissor moves the same counts a second, as none
-    are published. What the motors draw is in :mod:`.axis`; how much axes miss what they are asked
+    :func:`robotiq_async.values.calibration.scales.closing_time`; the scissor moves the same counts a second,
+    as none are published. What the motors draw is in :mod:`.axis`; how much axes miss what they are asked
     in :mod:`.spread`: as with a real gripper, a program that waits for gPO = rPR may wait for ever.
 
     Choices where no source settles the behaviour; those that can be changed are in :class:`Habits`:

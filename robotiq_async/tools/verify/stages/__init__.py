@@ -81,7 +81,7 @@ STAGES: Final = (
         *(6, "full strokes", full_strokes.full_strokes),
         "the scissor to both ends, then A, B and C closed and open three times",
         "the whole way",
-        "slowest, speed 64, and at last the FASTEST there is (2 s), the weakest force",
+        "slowest, speed 64, and at last the FASTEST there is (2 s, a jaw under 1 s), the weakest force",
         *("everything; nothing may be between the fingers", "1 minute"),
         jaw_moves="the jaw, closed and open three times",
     ),

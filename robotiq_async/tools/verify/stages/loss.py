@@ -48,12 +48,12 @@ async def loss(bench: Bench) -> None:
         (POWER, "loss.power", _power),
     ):
         answer = await bench.person.chooses(words, GO_OR_SKIP)
-        if answer is None:
-            raise EndError("declined", f"{name} was neither done nor skipped")
         if answer == "s":
             bench.untold(name, "skipped")
-        else:
+        elif answer == ENTER:
             await part(bench)
+        else:
+            raise EndError("declined", f"{name} was neither done nor skipped")
 
 
 async def _client(bench: Bench) -> None:

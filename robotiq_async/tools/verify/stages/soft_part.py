@@ -17,7 +17,7 @@ CLOSE_S: Final = 15.0
 LEFT_S: Final = 5.0
 
 PLACE: Final = (
-    "Put a block of foam, wider than your fist, between the fingers so that it lies there by itself. "
+    "Put a block of foam between the fingers, nearly as wide as they open, so that it lies there by itself. "
     "Take your hand away. Then press Enter: the fingers close on it."
 )
 RELEASE: Final = "The fingers open now, and the foam falls. Keep your hands away. Enter opens them."
