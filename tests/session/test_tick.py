@@ -136,6 +136,18 @@ async def test_the_hands_of_a_loop_are_spread_over_the_interval(hands: int) -> N
 
 
 @virtual
+async def test_each_hand_keeps_its_own_interval() -> None:
+    fast, slow = Tick(0.002), Tick(0.1)
+    fast.start()
+    slow.start()
+    fast_times, slow_times = await asyncio.gather(deadlines(fast, 500), deadlines(slow, 10))
+    assert [b - a for a, b in pairwise(fast_times)] == pytest.approx([0.002] * 499, abs=1e-6)
+    assert [b - a for a, b in pairwise(slow_times)] == pytest.approx([0.1] * 9, abs=1e-6)
+    fast.close()
+    slow.close()
+
+
+@virtual
 async def test_a_loop_with_a_clock_of_its_own_is_woken_by_that_clock() -> None:
     assert Tick(INTERVAL).source == ""
     with ticking() as tick:
