@@ -23,7 +23,6 @@ MOTIONS: dict[str, Any] = {
     "set_position": lambda hand: hand.set_position(30, A),
     "hold": lambda hand: hand.hold(),
 }
-A, ABC = Finger.A, Finger.ABC
 GENTLE = (10, 5)
 
 

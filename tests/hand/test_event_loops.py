@@ -14,8 +14,6 @@ import pytest
 from robotiq_async import Finger, NotStartedError, RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
-ADVICE = "call_soon_threadsafe|run_coroutine_threadsafe"
-
 
 async def in_a_thread(work: Callable[[], object]) -> BaseException | None:
     """What a call from another thread raises, or None."""

@@ -170,7 +170,18 @@ def test_a_malformed_port_is_a_value_error(port: str) -> None:
         assert "malformed address" in refusal(f"{host}:{port}")
 
 
-IPV4 = "127.1 127.0.1 2130706433 0 0x7f000001 0x7f.1 0X gripper.1 gripper.0x1f 192.168.1.011 192.168.1.256"
+IPV4 = (
+    "127.1 127.0.1 2130706433 0 0x7f000001 0x7f.1 0X gripper.1 gripper.0x1f 192.168.1.011 192.168.1.256 "
+    "192.168.1 192.168.1.11. 1.2.3.4.5 0177.0.0.1"
+)
+
+
+@pytest.mark.parametrize("host", IPV4.split())
+def test_an_ipv4_address_is_four_numbers(host: str) -> None:
+    """Resolvers take more for one, and do not agree on which: 011 is 9 to some."""
+    with pytest.raises(ValueError, match=r"malformed address.*four numbers") as caught:
+        parse_address(f"tcp://{host}:502")
+    assert FORMS in str(caught.value)
 
 
 @pytest.mark.parametrize(
